@@ -351,7 +351,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eva
                 if points.is_empty() {
                     break;
                 }
-                let rows = self.compared(&axis_values, &|| context.stopped());
+                let rows = self.compared(&axis_values, Cancel::When(&|| context.stopped()));
                 // The rows may be incomplete if the engine was stopped.
                 if context.stopped() {
                     break;

@@ -103,6 +103,12 @@ impl<R> ResultColumn<R> {
         self
     }
 
+    /// Marks the column as one whose worst value is in summaries of a result.
+    pub fn in_summary(mut self) -> Self {
+        self.declared.is_in_summary = true;
+        self
+    }
+
     /// Sets the limit between good and bad values.
     pub fn limit(mut self, value: f64, scale: f64) -> Self {
         self.declared.limit = Some(Limit { value, scale });

@@ -39,12 +39,20 @@ pub struct Engine<'a> {
     /// Whether consecutive rows share work. The source then keeps to the grid's order, and
     /// otherwise takes chunks that are far apart.
     pub is_helped_by_neighbours: bool,
+    /// A function that returns the reason why a point of the grid fails, in words; `None` if it
+    /// does not know one.
+    pub failure_reason: Box<dyn Fn(u64) -> Option<String> + Sync + 'a>,
 }
 
 impl<'a> Engine<'a> {
     /// Creates an engine of an evaluator whose rows share no work.
     pub fn new(evaluator: impl Evaluator + 'a, simd: &'static str) -> Self {
-        Self { evaluator: Box::new(evaluator), simd, is_helped_by_neighbours: false }
+        Self {
+            evaluator: Box::new(evaluator),
+            simd,
+            is_helped_by_neighbours: false,
+            failure_reason: Box::new(|_| None),
+        }
     }
 }
 

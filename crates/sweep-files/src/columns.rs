@@ -44,6 +44,8 @@ pub struct Column {
     pub worse: Option<Worse>,
     /// The limit between good and bad values, if the file's metadata has one.
     pub limit: Option<f64>,
+    /// Whether summaries of the file report the column's worst value.
+    pub is_in_summary: bool,
     /// The index among the fields of the schema.
     pub field: usize,
 }
@@ -78,6 +80,7 @@ fn column(field: &Field, place: usize) -> Option<Column> {
         whole: field.data_type().is_integer(),
         worse: Worse::named(&metadata(key::WORSE)),
         limit: metadata(key::LIMIT).parse().ok(),
+        is_in_summary: metadata(key::SUMMARY) == "true",
         field: place,
     })
 }

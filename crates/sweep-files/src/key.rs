@@ -15,6 +15,8 @@ pub const COLUMNS: &str = "sweep.columns";
 pub const WORSE: &str = "worse";
 /// The limit between good and bad values of a column, if it has a meaning independent of the plan.
 pub const LIMIT: &str = "limit";
+/// The mark `true` of a column whose worst value and rows beyond the limit are in summaries.
+pub const SUMMARY: &str = "summary";
 /// Settings and result of a boundary: quantity, limit, tolerance, lattice, trials, rounds. In
 /// boundary files alone.
 pub const BOUNDARY: &str = "sweep.boundary";

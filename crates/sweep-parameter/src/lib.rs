@@ -152,6 +152,14 @@ impl Worse {
         }
     }
 
+    /// Returns the word for the bad side of a limit: above or below.
+    pub const fn bad_side(self) -> &'static str {
+        match self {
+            Self::Greater => "above",
+            Self::Less => "below",
+        }
+    }
+
     /// Returns by how much `a` is worse than `b`; negative if `a` is better.
     pub fn excess(self, a: f64, b: f64) -> f64 {
         match self {

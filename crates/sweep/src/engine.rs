@@ -23,7 +23,7 @@ use washer_row::{
 
 use crate::columns::Columns;
 use crate::method::direct;
-use crate::plan::{Plan, Scenario, compared_channels};
+use crate::plan::{Plan, Scenario, compared_channels, failure_reason};
 use sweep_engine::method::Steps;
 use sweep_engine::{Error, Interrupt, RowSink, RowSource};
 use sweep_files::panics::{lock, unlocked};
@@ -107,7 +107,11 @@ impl<'a> ModelEngine<'a> {
     /// Returns the engine as commands use it.
     pub fn into_engine(self) -> Engine<'a> {
         let simd = self.widest_simd().name();
-        Engine::new(self, simd)
+        let plan = self.plan;
+        Engine {
+            failure_reason: Box::new(move |point| failure_reason(plan, point)),
+            ..Engine::new(self, simd)
+        }
     }
 
     fn with_simd(forced: Option<Simd>, plan: &'a Plan) -> Self {

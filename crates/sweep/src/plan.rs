@@ -47,6 +47,12 @@ pub(crate) fn prepare_point(
     prepare(Simd::Scalar, &[(machine, spin)], timing).remove(0)
 }
 
+/// Returns the reason why a point of a plan has no equilibrium, if it has none.
+pub(crate) fn failure_reason(plan: &Plan, point: u64) -> Option<String> {
+    let Washer { machine, spin, .. } = plan.scenario(point).model;
+    prepare_point(machine, spin, &timing(plan)).err().map(|reason| reason.to_string())
+}
+
 /// Returns the speed amplitudes (m/s) at which the linear model of a point takes the friction of
 /// its dampers, by their names.
 pub(crate) fn friction_speeds(point: &Point) -> Map<String, Value> {

@@ -18,7 +18,7 @@ use crate::dwell::{AttractorEngine, AttractorSearch};
 use crate::engine::{
     Engine, Evaluator, RunContext, find_responses, map_isolating_panics, simd_from_environment,
 };
-use crate::plan::{Plan, compared_channels, timing};
+use crate::plan::{Plan, compared_channels, failure_reason, timing};
 use sweep_engine::store::{Column, Holds, Layout, axis_columns};
 use sweep_engine::{Error, Job, RowSink, RowSource};
 use sweep_files::{FileKind, key};
@@ -149,7 +149,12 @@ impl<'a> HeldPlan<'a> {
         };
         let evaluator = HeldSpeedEvaluator { held: *self, simd, analysis };
         // The rows of a point share its curve of responses.
-        Ok(Engine { is_helped_by_neighbours: true, ..Engine::new(evaluator, simd_name) })
+        let plan = self.plan;
+        Ok(Engine {
+            is_helped_by_neighbours: true,
+            failure_reason: Box::new(move |point| failure_reason(plan, point)),
+            ..Engine::new(evaluator, simd_name)
+        })
     }
 }
 

@@ -3,7 +3,7 @@
 use super::run::{done, rows};
 use super::{Lines as _, ResultArgs, installed};
 use crate::config::section::counted;
-use crate::store::{OpenRun, Opened};
+use crate::store::{OpenRun, Opened, Tally};
 use crate::{Error, Exit, Job, Model, Plan, tell};
 use std::path::Path;
 
@@ -25,20 +25,28 @@ pub struct Args {
 /// other errors of the store.
 pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
-    merge_job(args, &plan.name, &Job::new(&plan), &args.target.output(&plan))
+    let job = Job::new(&plan);
+    let content = |tally: &Tally| Ok(rows(tally, &job));
+    merge_job(args, &plan.name, &job, &args.target.output(&plan), &content)
 }
 
-/// Joins the shards of a job.
+/// Joins the shards of a job. `content` describes the finished file.
 ///
 /// # Errors
-/// The errors of [`run`].
-pub fn merge_job(args: &Args, name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
+/// The errors of [`run`], and those of `content`.
+pub fn merge_job(
+    args: &Args,
+    name: &str,
+    job: &Job<'_>,
+    output: &Path,
+    content: &dyn Fn(&Tally) -> Result<String, Error>,
+) -> Result<Exit, Error> {
     let interrupt = installed()?;
     let mut run = match OpenRun::open_for_merge(output, job)? {
         Opened::Open(run) => run,
         Opened::Finished((file, tally)) => {
             let there = format!("{name}: all {} points are there already\n", file.points);
-            tell((there + &rows(&tally, job)).trim_end());
+            tell((there + &content(&tally)?).trim_end());
             return Ok(done(args.fail_on_error, &tally.by_status));
         }
     };
@@ -49,7 +57,7 @@ pub fn merge_job(args: &Args, name: &str, job: &Job<'_>, output: &Path) -> Resul
     };
     run.complete(job, &tally, None)?.iter().for_each(|note| tell(note));
     let mut text = format!("{name}: joined {}\n", counted(tally.points as usize, "point"));
-    text += &rows(&tally, job);
+    text += &content(&tally)?;
     text.line("file", output.display());
     tell(text.trim_end());
     Ok(done(args.fail_on_error, &tally.by_status))

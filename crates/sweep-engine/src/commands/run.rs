@@ -6,7 +6,7 @@ use super::{Lines as _, ResultArgs, short};
 use crate::config::section::counted;
 use crate::progress::per_second;
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
-use crate::store::read::{DwellCounts, FAR_OFF, NameCounts, failed, failures};
+use crate::store::read::{ColumnExtreme, NameCounts, failed, failures};
 use crate::store::{Session, ShardRequest, Tally};
 use crate::{
     Design, EffortArgs, Engine, Error, Exit, Interrupt, Job, Model, Plan, duration, tell, threads,
@@ -94,6 +94,7 @@ pub fn execute<M: Model>(
     let output = &args.target.output(plan);
     let finished = |text: &mut String, tally: &Tally| {
         text.push_str(&rows(tally, job));
+        text.push_str(&failure_reasons(engine, tally, job));
         text.line("file", output.display());
         if matches!(plan.design, Some(Design::Spread { .. })) {
             text.line("share", share(tally));
@@ -217,26 +218,28 @@ fn work(session: &Session) -> String {
 
 /// Formats the counts of a result in at most six lines: verdicts, failures, extremes.
 pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
-    if let Some(dwells) = &tally.dwells {
-        let DwellCounts { stable, unstable, beyond, unknown } = dwells;
-        let able = stable - beyond;
-        let points = tally.points;
-        let beyond = match beyond {
-            0 => String::new(),
-            beyond => format!(", {beyond} beyond what a machine can do"),
-        };
-        let rows = format!("{able} of {points} rows, {unstable} not");
-        let mut text = String::new();
-        text.line("stable", format!("{rows}, {unknown} without a response{beyond}"));
-        return text;
+    counts(tally, job.limits, &|point| place(point, job))
+}
+
+/// Formats the reasons why the first points of each status failed, as far as the engine knows them.
+pub fn failure_reasons(engine: &Engine<'_>, tally: &Tally, job: &Job<'_>) -> String {
+    let mut text = String::new();
+    for (status, point) in &tally.first_failed {
+        if let Some(reason) = (engine.failure_reason)(*point) {
+            let place = place(*point * job.layout.rows_a_point, job);
+            let at = if place.is_empty() { place } else { format!(" at {place}") };
+            text.line("reason", format!("{status}{at}: {reason}"));
+        }
     }
-    let at = |point: u64| {
-        let values = (job.axis_values)(point);
-        let place = job.layout.axes.iter().zip(values);
-        let place = place.map(|(axis, value)| format!("{} {}", axis.name, short(value)));
-        place.collect::<Vec<_>>().join(", ")
-    };
-    counts(tally, job.limits, &at)
+    text
+}
+
+/// Formats the values of the axes at a point.
+fn place(point: u64, job: &Job<'_>) -> String {
+    let values = (job.axis_values)(point);
+    let named = job.layout.axes.iter().zip(values);
+    let words = named.map(|(axis, value)| format!("{} {}", axis.name, short(value)));
+    words.collect::<Vec<_>>().join(", ")
 }
 
 /// Formats the share of reliable points among those with a verdict, with its 95 % confidence
@@ -302,18 +305,17 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         place if place.is_empty() => place,
         place => format!(" at {place}"),
     };
-    if let Some(greatest) = &tally.greatest_off {
-        let rows = tally.far_off;
-        let most = greatest.value;
-        let place = place(greatest.point);
-        let which = format!("{rows} rows whose linear model takes it at a speed off by more than");
-        text.line("friction", format!("{which} {FAR_OFF}; at most {most:.3}{place}"));
-    }
     if let Some(greatest) = &tally.greatest_ratio {
         text.line("greatest", format!("ratio {:.3}{}", greatest.value, place(greatest.point)));
     }
-    if let Some(least) = &tally.least_gap_nonlinear_m {
-        text.line("least gap", format!("{:.5} m{}", least.value, place(least.point)));
+    for ColumnExtreme { column, worse, limit, beyond, worst } in &tally.extremes {
+        let Some(worst) = worst else { continue };
+        let mut words = format!("{column} {}{}", short(worst.value), place(worst.point));
+        if let Some(limit) = limit.filter(|_| *beyond > 0) {
+            let rows = counted(*beyond as usize, "row");
+            words += &format!("; {rows} {} {}", worse.bad_side(), short(limit));
+        }
+        text.line(worse.extreme(), words);
     }
     text
 }

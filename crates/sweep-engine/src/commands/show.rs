@@ -261,10 +261,12 @@ fn extremes_at(
 ) -> Result<Vec<(u64, Vec<(String, f64)>)>, Error> {
     let axes: Vec<&str> =
         axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
-    let extremes = [&tally.greatest_ratio, &tally.least_gap_nonlinear_m, &tally.greatest_off];
+    let worst = tally.extremes.iter().filter_map(|column| column.worst.as_ref());
+    let shown: Vec<u64> =
+        tally.greatest_ratio.iter().chain(worst).map(|extreme| extreme.point).collect();
     let mut found = Vec::new();
     file.each_row(&axes, |row| {
-        if extremes.iter().any(|it| it.as_ref().is_some_and(|it| it.point == row.index())) {
+        if shown.contains(&row.index()) {
             let values =
                 axes.iter().enumerate().map(|(k, axis)| ((*axis).to_owned(), row.value(k)));
             found.push((row.index(), values.collect()));

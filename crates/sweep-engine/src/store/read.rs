@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::error::StoreError;
-use sweep_files::{FileKind, ParquetFile, columns, key};
+use sweep_files::{Column, FileKind, ParquetFile, columns, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
 
@@ -59,14 +59,39 @@ pub struct Extreme {
     pub point: u64,
 }
 
-/// The factor by which the speed amplitude that the linear model assumes for friction may differ
-/// from that of the motion. Basis: with more than twice the speed, the friction is that of another
-/// motion. Doubling it reports fewer rows.
-pub const FAR_OFF: f64 = 2.0;
+/// The worst value of a column, and the number of rows beyond its limit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ColumnExtreme {
+    /// The name of the column.
+    pub column: String,
+    /// The direction in which values are worse.
+    #[serde(skip)]
+    pub worse: Worse,
+    /// The limit between good and bad values, if the column has one.
+    pub limit: Option<f64>,
+    /// The number of rows that are worse than the limit.
+    pub beyond: u64,
+    /// The worst value and its point; `None` if no row has a value.
+    #[serde(flatten)]
+    pub worst: Option<Extreme>,
+}
 
-#[allow(clippy::trivially_copy_pass_by_ref)]
-fn is_zero(count: &u64) -> bool {
-    *count == 0
+impl ColumnExtreme {
+    /// Creates the extreme of a column without rows; `None` for a column that is not in summaries.
+    fn new(column: &Column) -> Option<Self> {
+        let worse = column.worse.filter(|_| column.is_in_summary)?;
+        let name = column.name.clone();
+        Some(Self { column: name, worse, limit: column.limit, beyond: 0, worst: None })
+    }
+
+    /// Adds the value at a point.
+    fn add(&mut self, value: f64, point: u64) {
+        let is_worse = |than: f64| self.worse.excess(value, than) > 0.0;
+        self.beyond += u64::from(self.limit.is_some_and(is_worse));
+        if !value.is_nan() && self.worst.as_ref().is_none_or(|worst| is_worse(worst.value)) {
+            self.worst = Some(Extreme { value, point });
+        }
+    }
 }
 
 /// The counts and extremes of a result's rows.
@@ -97,31 +122,10 @@ pub struct Tally {
     pub greatest_error: Option<Extreme>,
     /// The greatest ratio.
     pub greatest_ratio: Option<Extreme>,
-    /// The least gap of the nonlinear model, m.
-    pub least_gap_nonlinear_m: Option<Extreme>,
-    /// The number of rows in which the linear model linearises friction at a speed that is wrong by
-    /// a factor of more than [`FAR_OFF`].
-    #[serde(skip_serializing_if = "is_zero")]
-    pub far_off: u64,
-    /// The greatest factor by which the speed for friction is wrong, if there is friction.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub greatest_off: Option<Extreme>,
-    /// The counts of a `sweep stability` result, which has no verdicts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub dwells: Option<DwellCounts>,
-}
-
-/// The numbers of rows of a `sweep stability` result, by stability.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct DwellCounts {
-    /// The number of rows in which all disturbances decay.
-    pub stable: u64,
-    /// The number of rows in which a disturbance grows.
-    pub unstable: u64,
-    /// The number of stable rows whose motion is beyond the limits of the machine.
-    pub beyond: u64,
-    /// The number of rows without a response.
-    pub unknown: u64,
+    /// The worst values of the columns that are marked for summaries.
+    pub extremes: Vec<ColumnExtreme>,
+    /// The first point of each status except `ok`.
+    pub first_failed: BTreeMap<String, u64>,
 }
 
 /// The number of occurrences of each name.
@@ -150,9 +154,8 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     let fields = file.schema().fields().iter().map(|field| field.name().as_str());
     let ratios = fields.clone().filter(|name| name.starts_with("ratio_"));
     let has = |name: &str| fields.clone().any(|field| field == name);
-    // A result of `sweep stability` or `sweep dwell` has no verdicts.
-    let is_stability = has("stable");
-    let has_verdicts = !is_stability && !has("motion");
+    // Files of other kinds, such as responses at held speeds, have no verdicts.
+    let has_verdicts = file.kind() == Some(FileKind::Map);
     let needed = match has_verdicts {
         true => &["point", "status", "reliable", "sensitive", "method"][..],
         false => &["point", "status"],
@@ -162,32 +165,31 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     }
     let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
     let over = limits.map_or(0.0, RatioLimits::over_estimate);
+    let marked: Vec<Column> = columns(file.schema());
+    let mut extremes: Vec<ColumnExtreme> = marked.iter().filter_map(ColumnExtreme::new).collect();
     let mut names: Vec<&str> = ratios.collect();
     let ratios = names.len();
+    names.extend(marked.iter().filter(|it| it.is_in_summary).map(|it| it.name.as_str()));
     let mut column = |name| {
         names.push(name);
         names.len() - 1
     };
     let [point, status, method] = ["point", "status", "method"].map(&mut column);
-    let [stable, beyond, reliable] = ["stable", "beyond", "reliable"].map(&mut column);
-    let [sensitive, error, converged] = ["sensitive", "error", "converged"].map(&mut column);
-    let [greatest, gap] = ["ratio_max", "min_gap_nonlinear_m"].map(&mut column);
-    let off = column("friction_speed_off");
+    let [reliable, sensitive] = ["reliable", "sensitive"].map(&mut column);
+    let [error, converged, greatest] = ["error", "converged", "ratio_max"].map(&mut column);
     let mut tally = Tally::default();
     file.each_row(&names, |row| {
         let flag = |column| row.cell(column).flag();
         tally.points += 1;
-        row.word(status).into_iter().for_each(|name| add(&mut tally.by_status, name));
-        if is_stability {
-            let dwells = tally.dwells.get_or_insert_default();
-            match flag(stable) {
-                Some(true) => {
-                    dwells.stable += 1;
-                    dwells.beyond += u64::from(row.word(beyond).is_some());
-                }
-                Some(false) => dwells.unstable += 1,
-                None => dwells.unknown += 1,
+        let point = row.value(point) as u64;
+        if let Some(name) = row.word(status) {
+            add(&mut tally.by_status, name);
+            if name != "ok" {
+                tally.first_failed.entry(name.to_owned()).or_insert(point);
             }
+        }
+        for (k, extreme) in extremes.iter_mut().enumerate() {
+            extreme.add(row.value(ratios + k), point);
         }
         if !has_verdicts {
             return Ok(());
@@ -204,21 +206,19 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         tally.sensitive += u64::from(flag(sensitive) == Some(true));
         tally.unconverged += u64::from(flag(converged) == Some(false));
         row.word(method).into_iter().for_each(|name| add(&mut tally.by_method, name));
-        tally.far_off += u64::from(row.value(off) > FAR_OFF);
-        let extreme = |best: &mut Option<Extreme>, value: f64, better: fn(&f64, &f64) -> bool| {
-            let is_best = best.as_ref().is_none_or(|best| better(&value, &best.value));
-            if is_best && !value.is_nan() {
-                *best = Some(Extreme { value, point: row.value(point) as u64 });
+        let keep_greatest = |greatest: &mut Option<Extreme>, value: f64| {
+            let is_greatest = greatest.as_ref().is_none_or(|greatest| value > greatest.value);
+            if is_greatest && !value.is_nan() {
+                *greatest = Some(Extreme { value, point });
             }
         };
-        extreme(&mut tally.greatest_off, row.value(off), f64::gt);
         // The error of a failed row means nothing.
         let error = if row.word(status) == Some("ok") { row.value(error) } else { f64::NAN };
-        extreme(&mut tally.greatest_error, error, f64::gt);
-        extreme(&mut tally.greatest_ratio, row.value(greatest), f64::gt);
-        extreme(&mut tally.least_gap_nonlinear_m, row.value(gap), f64::lt);
+        keep_greatest(&mut tally.greatest_error, error);
+        keep_greatest(&mut tally.greatest_ratio, row.value(greatest));
         Ok::<(), StoreError>(())
     })?;
+    tally.extremes = extremes;
     Ok(tally)
 }
 

@@ -71,6 +71,8 @@ pub struct Column {
     pub worse: Option<Worse>,
     /// The limit between good and bad values, if there is a natural one.
     pub limit: Option<Limit>,
+    /// Whether summaries of a result report the column's worst value.
+    pub is_in_summary: bool,
 }
 
 /// The columns and the kind of a result.
@@ -127,6 +129,7 @@ impl Column {
             kind,
             worse: None,
             limit: None,
+            is_in_summary: false,
         }
     }
 
@@ -152,8 +155,8 @@ impl Column {
         self.declared(data_type, nullable)
     }
 
-    /// Returns the Arrow field of the column, with its unit, description, worse side and limit as
-    /// metadata.
+    /// Returns the Arrow field of the column, with its unit, description, worse side, limit and mark
+    /// for summaries as metadata.
     pub(crate) fn declared(&self, data_type: DataType, nullable: bool) -> Field {
         let mut metadata = HashMap::from([
             ("unit".to_owned(), self.unit.clone()),
@@ -163,6 +166,7 @@ impl Column {
         metadata.extend(
             self.limit.map(|limit| (key::LIMIT.to_owned(), Value::from(limit.value).to_string())),
         );
+        metadata.extend(self.is_in_summary.then(|| (key::SUMMARY.to_owned(), true.to_string())));
         Field::new(&self.name, data_type, nullable).with_metadata(metadata)
     }
 

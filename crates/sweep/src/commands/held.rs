@@ -1,7 +1,7 @@
 //! The commands about held speeds, `sweep stability` and `sweep dwell`, and the options by which
 //! `sweep status` and `sweep merge` refer to their jobs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::show::FURTHER;
 use crate::dwell::AttractorSearch;
@@ -10,8 +10,9 @@ use crate::speeds::SpeedList;
 use crate::stability::{HeldPlan, check};
 use sweep_engine::commands::cells::Lines as _;
 use sweep_engine::commands::grid::ResultArgs;
-use sweep_engine::commands::run::{RunCommand, WorkArgs, exit, installed};
+use sweep_engine::commands::run::{RunCommand, WorkArgs, exit, failure_reasons, installed, rows};
 use sweep_engine::commands::{merge, status};
+use sweep_engine::store::Tally;
 use sweep_engine::{Error, Exit, Job};
 use sweep_files::ParquetFile;
 
@@ -87,17 +88,26 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> Args<Options> {
             work,
             options: [&own_options, &merge_options],
         };
-        let finished = |text: &mut String, _: &_| {
-            for (name, words) in FURTHER.listed(&ParquetFile::open(&output)?)? {
-                text.line(name, words);
-            }
+        let engine = held.engine()?;
+        let finished = |text: &mut String, tally: &Tally| {
+            text.push_str(&content(&output)?);
+            text.push_str(&failure_reasons(&engine, tally, &job));
             text.line("file", output.display());
             text.next("show", &output);
             Ok(())
         };
-        let report = command.execute(&held.engine()?, &job, &output, &installed()?, &finished)?;
+        let report = command.execute(&engine, &job, &output, &installed()?, &finished)?;
         Ok(exit(work, &report))
     }
+}
+
+/// Describes the content of a finished file about held speeds.
+fn content(output: &Path) -> Result<String, Error> {
+    let mut text = String::new();
+    for (name, words) in FURTHER.listed(&ParquetFile::open(output)?)? {
+        text.line(name, words);
+    }
+    Ok(text)
 }
 
 /// Returns the options that repeat a command about held speeds, and those by which `merge` refers
@@ -142,7 +152,11 @@ impl JobArgs<merge::Args> {
         let target = &self.command.target;
         let plan: Plan = target.grid.load()?;
         let (job, output, _) = self.held.job(&plan, target);
-        merge::merge_job(&self.command, &plan.name, &job, &output)
+        let content = |tally: &Tally| match self.held.speed {
+            Some(_) => content(&output),
+            None => Ok(rows(tally, &job)),
+        };
+        merge::merge_job(&self.command, &plan.name, &job, &output, &content)
     }
 }
 
