@@ -24,9 +24,10 @@ use lane_ode::rk4::RK4_STABILITY_LIMIT;
 /// accurate, and its idealisation is coarser. Doubling it saves less than a run.
 const SPEED_TOLERANCE: f64 = 5e-3;
 
-/// The greatest number of linear runs. Basis: several times the usual three or four. Doubling it
-/// costs time for points without a fixed point.
-pub(crate) const MAX_RUNS: usize = 24;
+/// The greatest number of linear runs. Basis: three or four are usual, and 38 were needed between
+/// a damper that sticks and one that slides. Doubling it costs time for points without a fixed
+/// point.
+pub(crate) const MAX_RUNS: usize = 48;
 
 /// The phase of the fastest motion in a step of the first runs, rad. Basis: it gives speeds within
 /// a percent. Doubling it gives errors 16 times as large.
@@ -118,8 +119,12 @@ impl Search {
             }
         }
         let steps: Vec<f64> = self.inverse.iter().map(|row| -dot(row, &residuals)).collect();
+        // Dampers that move together may need steps against their own residuals.
+        let relative = |number: f64, k: usize| number / self.reciprocals[k];
+        let toward = |k: usize| relative(steps[k], k) * relative(residuals[k], k);
+        let is_toward = (0..steps.len()).map(toward).sum::<f64>() > 0.0;
         let next: Vec<f64> =
-            (0..steps.len()).map(|k| self.next(k, residuals[k], steps[k])).collect();
+            (0..steps.len()).map(|k| self.next(k, residuals[k], steps[k], is_toward)).collect();
         let changes = difference(&next, &self.reciprocals);
         let is_small = |change: &[f64]| {
             let mut changes = change.iter().zip(&self.reciprocals);
@@ -133,15 +138,16 @@ impl Search {
     }
 
     /// Returns the next reciprocal of a damper by its residual and the step of Broyden's method.
-    fn next(&self, damper: usize, residual: f64, step: f64) -> f64 {
+    /// `is_toward` tells whether the steps of all dampers together lead the way of the residuals.
+    fn next(&self, damper: usize, residual: f64, step: f64, is_toward: bool) -> f64 {
         let now = self.reciprocals[damper];
         let most = self.most[damper];
-        let next = match (step * residual > 0.0, residual > 0.0) {
-            (true, _) => now + step,
-            // The motion is slower than assumed, the more so the slower that is: the damper
-            // sticks.
-            (false, true) => most,
+        let next = match (is_toward || step * residual > 0.0, residual > 0.0) {
+            // The motion is slower than assumed, the more so the slower that is, and a fixed point
+            // would be of a negative speed: the damper sticks.
+            (false, true) if now + step <= 0.0 => most,
             (false, false) => now + residual,
+            _ => now + step,
         };
         if next > 0.0 { next.min(most) } else { 0.5 * now }
     }

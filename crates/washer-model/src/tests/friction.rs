@@ -115,6 +115,24 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
     }
 }
 
+/// Both dampers of a machine at its resonance slide, and the way to the fixed point leads against
+/// the residual of one of them. The expected speeds are by Newton's method for both, with rows of
+/// `sweep run` at given speeds.
+#[test]
+fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
+    let mut machine = machine(0.514, [46.1; 2], None);
+    machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 3.4);
+    let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 265.13, ramp_s: 8.0 };
+    let timing = Timing { end_s: 30.0, window_s: [10.0, 30.0], checkpoints: 0 };
+    let point = prepare(Simd::best(), &[(machine, spin)], &timing).remove(0).unwrap();
+    let expected_m_per_s = [0.622_071, 0.388_478];
+    assert_eq!(point.friction_speeds().len(), 2);
+    for (found, expected) in point.friction_speeds().iter().zip(expected_m_per_s) {
+        let off = found.speed_m_per_s / expected;
+        assert!((off - 1.0).abs() < 0.02, "{off}: {found:?}");
+    }
+}
+
 #[test]
 fn a_stuck_damper_has_the_least_speed_amplitude() {
     let machine = machine(0.01, [120.0, 120.0], None);
