@@ -156,6 +156,8 @@ struct Node {
     length: f64,
     /// The monodromy matrix, here or close by.
     monodromy: Square,
+    /// The steps of its turn, if forces have corners.
+    steps: Option<usize>,
 }
 
 /// Interpolates between two nodes, at a share of the length: the cubic through both along both
@@ -453,7 +455,8 @@ impl<'a> Curve<'a> {
         }
         let is_own = off < OWN && self.is_careful;
         let monodromy = jacobian.monodromy;
-        let node = Node { at: self.at, tangent, is_own, length, monodromy };
+        let steps = self.settings.steps_at_corners();
+        let node = Node { at: self.at, tangent, is_own, length, monodromy, steps };
         if let Some(turning) = self.turning {
             return self.closer(node, turning);
         }
@@ -527,17 +530,21 @@ impl<'a> Curve<'a> {
     }
 
     /// Returns the folds without stairs: the pairs of neighbours that are nearest in speed cancel
-    /// out, as long as they are as near as a stair.
+    /// out, as long as they are as near as a stair of the steps by which they were found. Later
+    /// parts of the curve may have shorter steps.
     fn folds_of_machine(&self) -> Vec<usize> {
         let mut folds = self.folds.clone();
-        let Some(steps) = self.settings.steps_at_corners() else { return folds };
-        let at = |fold: usize| self.nodes[fold].at[SPEED] * UNIT_OF_SPEED;
-        let height = |pair: &[usize]| (at(pair[0]) - at(pair[1])).abs();
+        let height_steps = |pair: &[usize]| {
+            let [a, b] = [&self.nodes[pair[0]], &self.nodes[pair[1]]];
+            let steps = a.steps.min(b.steps)?;
+            Some(((a.at[SPEED] - b.at[SPEED]) * UNIT_OF_SPEED).abs() * steps as f64)
+        };
         loop {
-            let pairs = folds.windows(2).map(height).enumerate();
-            let lowest = pairs.min_by(|a, b| a.1.total_cmp(&b.1));
+            let pairs = folds.windows(2).map(height_steps).enumerate();
+            let heights = pairs.filter_map(|(pair, height)| Some((pair, height?)));
+            let lowest = heights.min_by(|a, b| a.1.total_cmp(&b.1));
             match lowest {
-                Some((pair, height)) if height * (steps as f64) < STAIR_STEPS => {
+                Some((pair, height)) if height < STAIR_STEPS => {
                     folds.drain(pair..pair + 2);
                 }
                 _ => return folds,
@@ -652,11 +659,13 @@ mod tests {
     /// these nodes.
     fn curve<'a>(point: &'a crate::Point, speeds_rpm: &[f64], folds: &[usize]) -> Curve<'a> {
         let mut curve = Curve::new(Settings::new(point));
+        let steps = curve.settings.steps_at_corners();
         for (k, &speed_rpm) in speeds_rpm.iter().enumerate() {
             let at = place_of(&[0.0; STATES], speed_rpm);
             let tangent = [0.0; PLACE];
             let monodromy = [[N(0.0); STATES]; STATES];
-            curve.nodes.push(Node { at, tangent, is_own: true, length: k as f64, monodromy });
+            let length = k as f64;
+            curve.nodes.push(Node { at, tangent, is_own: true, length, monodromy, steps });
         }
         curve.folds = folds.to_vec();
         curve
@@ -675,6 +684,20 @@ mod tests {
         assert_eq!(found(true, 210.0), [(0, true)]);
         assert_eq!(found(true, 225.0), [(0, true)]);
         assert_eq!(found(true, 250.0), [(2, false)]);
+    }
+
+    /// A curve whose later parts need shorter steps keeps its branches before them.
+    #[test]
+    fn stairs_are_measured_by_their_own_steps() {
+        let point = point(true);
+        let mut curve = curve(&point, &[200.0, 220.05, 220.0, 240.0, 230.0, 260.0], &[1, 2, 3, 4]);
+        while curve.settings.follow_closer() {}
+        let branches = |speed_rpm: f64| {
+            let guesses = curve.guesses(speed_rpm).into_iter();
+            guesses.map(|it| it.branch).collect::<Vec<_>>()
+        };
+        assert_eq!(branches(225.0), [0]);
+        assert_eq!(branches(250.0), [2]);
     }
 
     /// Many stairs by a fold leave the fold itself.
