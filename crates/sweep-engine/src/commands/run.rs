@@ -303,10 +303,10 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         place => format!(" at {place}"),
     };
     if let Some(greatest) = &tally.greatest_off {
-        let rows = tally.far_off;
+        let rows = counted(tally.far_off as usize, "row");
         let most = greatest.value;
         let place = place(greatest.point);
-        let which = format!("{rows} rows whose linear model takes it at a speed off by more than");
+        let which = format!("{rows} whose linear model takes it at a speed off by more than");
         text.line("friction", format!("{which} {FAR_OFF}; at most {most:.3}{place}"));
     }
     if let Some(greatest) = &tally.greatest_ratio {
@@ -337,6 +337,17 @@ mod tests {
         let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
         let said = counts(&tally, 2.0.into(), &|_| String::new());
         assert!(said.contains("error  rows by method: 1 capped_1"), "{said}");
+    }
+
+    #[test]
+    fn one_row_of_friction_is_singular() {
+        let greatest_off = Some(Extreme { value: 2.5, point: 0 });
+        let said = |far_off| {
+            let tally = Tally { greatest_off: greatest_off.clone(), far_off, ..Tally::default() };
+            counts(&tally, 2.0.into(), &|_| String::new())
+        };
+        assert!(said(1).contains(" 1 row whose linear model"), "{}", said(1));
+        assert!(said(2).contains(" 2 rows whose linear model"), "{}", said(2));
     }
 
     #[test]
