@@ -45,6 +45,9 @@ fn report_does_not_overwrite_a_page_of_plot_and_takes_an_option_for_each_express
     assert_eq!(exit_code(&written), Some(0), "{}", all_output(&written));
     assert!(fs::read(test_folder.path(page)).unwrap() == before);
     assert!(test_folder.path("results/short.report.html").exists());
+    let failed = test_folder.sweep(&["report", MAP, "--require", "count(point >= 0) < 0"]);
+    assert_eq!(exit_code(&failed), Some(4), "{}", all_output(&failed));
+    assert!(all_output(&failed).contains("FAILS  count(point >= 0) < 0: 6\n"));
     let refused = test_folder.sweep(&["report", MAP, "--require", "point >= 0", "point < 9"]);
     assert_eq!(exit_code(&refused), Some(2));
     assert!(all_output(&refused).contains("a `--require` of its own"), "{}", all_output(&refused));

@@ -489,6 +489,11 @@ fn failed_points_are_rows_and_fail_the_run_only_on_request() {
     assert!(all_output(&last).contains(idle), "{}", all_output(&last));
     let checked = test_folder.sweep(&["check", "g.toml"]);
     assert!(all_output(&checked).contains(" no_equilibrium, of "), "{}", all_output(&checked));
+    assert!(all_output(&checked).contains("takes       about "), "{}", all_output(&checked));
+    let checked = test_folder.sweep(&["check", "g.toml", "--at", "spring_stiffness_n_per_m=1"]);
+    assert_eq!(checked.status.code(), Some(1), "{}", all_output(&checked));
+    let unknown = "takes       not known: none of the ";
+    assert!(all_output(&checked).contains(unknown), "{}", all_output(&checked));
     let whole = output(fresh_folder().run().arg("--fail-on-error"));
     assert_eq!(whole.status.code(), Some(0), "{}", all_output(&whole));
 }

@@ -125,6 +125,8 @@ fn the_summary_names_the_active_constraint_and_the_nearest_candidate() {
     let rest = text.split_once("nearest  candidate ").expect("the nearest").1;
     assert!(rest.contains("max(ratio_max) < 1e-3 by "), "{text}");
     let candidate = rest.split(',').next().expect("its number");
+    let is_row = |line: &str| line.split_whitespace().next() == Some(candidate);
+    assert!(text.lines().any(is_row), "no row of candidate {candidate} in {text}");
     let show = "show results/study.parquet --json --columns candidate --where feasible";
     assert_eq!(output_of(&folder, show).trim(), "[]");
     let excess = |file: &str| number(&folder, file, "excess_2");

@@ -6,6 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sweep::{Error, EvaluationTask, MemoryTable, RanToFile};
 
+use crate::counted;
 use crate::errors;
 use crate::result::PyResultTable;
 use crate::work::{Supervised, WorkOptions, supervise};
@@ -18,8 +19,8 @@ pub(crate) fn rows_or_raise(
     let table = evaluated.value_or_raise(py, |evaluated| match evaluated {
         Err(error) => errors::error(py, &error),
         Ok(table) => {
-            let rows = table.rows();
-            let text = format!("interrupted; `result` of this exception holds {rows} rows");
+            let rows = counted(table.rows() as u64, "row");
+            let text = format!("interrupted; `result` of this exception holds {rows}");
             interruption(py, text, Some(table))
         }
     })?;

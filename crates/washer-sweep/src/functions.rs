@@ -15,7 +15,12 @@ use crate::plan::PyPlan;
 use crate::result::PyResultTable;
 use crate::work::{WorkOptions, supervise, supervise_abandonable};
 
-/// Computes natural frequencies over spin speed.
+/// Computes natural frequencies, damping and resonances over spin speeds, by default 0 to 1200
+/// rpm.
+///
+/// `speeds_rpm` are m speeds in rpm; the result has a row for each speed and mode. The machine is
+/// the plan's, with the values in `at`, each in the unit with which its name ends; other axes are
+/// ignored. Without a plan it is the built-in machine.
 #[pyfunction]
 #[pyo3(signature = (plan=None, *, speeds_rpm=None, at=None))]
 pub(crate) fn modes(
@@ -37,7 +42,15 @@ pub(crate) fn modes(
     Ok(PyResultTable::new(found))
 }
 
-/// Finds periodic responses at held speeds, and whether they are stable.
+/// Finds the periodic response of both models at each point of the plan's grid and each held
+/// speed, and the growth of disturbances about it.
+///
+/// `speeds_rpm` are m speeds in rpm. The result has m rows for each point, or more where a speed
+/// has several responses, in the order of points, then of speeds. `threads` is the number of
+/// threads, by default one for each core.
+///
+/// With `out` it also writes a Parquet file, byte for byte as `sweep stability` does, and the same
+/// call continues after an interruption.
 #[pyfunction]
 #[pyo3(signature = (plan, speeds_rpm, out=None, *, threads=None, progress=true, fresh=false))]
 pub(crate) fn stability(
@@ -51,7 +64,14 @@ pub(crate) fn stability(
     held_speeds(plan, speeds_rpm, None, (out, fresh), WorkOptions { threads, progress })
 }
 
-/// Finds the attractors at held speeds.
+/// Finds the attractors of each point of the plan's grid at each held speed, a row for each.
+///
+/// `speeds_rpm` are m speeds in rpm. `starts` is the number of starts at a speed; some are kicks of
+/// up to `kick` rad/s. With `carry` the start is the motion at the next lower (`up`) or higher
+/// (`down`) speed. `threshold` searches for the smallest kick after which the motion does not
+/// return. `longest` is the greatest duration of a trajectory in s. `sections` adds that many
+/// states at successive turns, a row each. With `out` it also writes a Parquet file, byte for byte
+/// as `sweep dwell` does.
 #[pyfunction]
 #[pyo3(signature = (plan, speeds_rpm, out=None, *, starts=12, kick=6.0, carry=None, threshold=false,
                     longest=600.0, sections=0, threads=None, progress=true, fresh=false))]
@@ -90,7 +110,12 @@ fn held_speeds(
     finish::rows_or_file(py, task, into, options)
 }
 
-/// Searches for the best candidates of a study.
+/// Searches for the candidates of a study file with the least objectives within its constraints.
+///
+/// `set` overrides constants of the study's grid, in the unit with which each name ends. The result
+/// has a row for each candidate, in the order in which they were evaluated. With `out` it also
+/// writes a Parquet file, byte for byte as `sweep optimise` does, and the same call continues after
+/// an interruption.
 #[pyfunction]
 #[pyo3(signature = (study, out=None, *, set=None, threads=None, progress=true, fresh=false))]
 pub(crate) fn optimise(
@@ -109,7 +134,12 @@ pub(crate) fn optimise(
     finish::table_or_raise(py, found, || errors::interrupted_without_result(py))
 }
 
-/// Explains why the linear model fails at a point.
+/// Explains why the linear model fails at one point: the unstable speeds that the run passes,
+/// the modes that grow there, and changes of the machine that make these speeds stable.
+///
+/// `at` gives a value to each axis, and to any other parameter, in the unit with which its name
+/// ends. `speeds_rpm` are equally spaced speeds in rpm to examine; by default each rpm from half of
+/// the slowest mode's frequency to the greatest speed of the run.
 #[pyfunction]
 #[pyo3(signature = (plan, at=None, *, speeds_rpm=None, threads=None))]
 pub(crate) fn explain<'py>(
@@ -128,7 +158,15 @@ pub(crate) fn explain<'py>(
     explanation(py, explained)
 }
 
-/// Fits numbers of a machine to measured run-ups.
+/// Fits numbers of the plan's machine to one or several measured run-ups.
+///
+/// A table has n rows, one for each instant: the column `time_s`, optionally `speed_rpm`, and
+/// channels with their units, such as `tub_front_y_m_per_s2`, with NaN where there is no sample.
+/// `free` are the names of the numbers to fit, or `name=from:to`; `own` are further ones that have
+/// a value for each table. `at` has the constants of each table. `known` are tolerances of fixed
+/// numbers, such as `tub_mass_kg=2%`; all others have those of their kind, or with `none` are
+/// exact. `draws` is the number of rows for the probability of the verdict, `bootstrap` the number
+/// of repeated fits. The keys of the result are those of `sweep fit --json`.
 #[pyfunction]
 #[pyo3(signature = (
     plan, table, free, *, own=Vec::new(), at=None, linear=false, shift=true, starts=1, bootstrap=0,
@@ -180,7 +218,8 @@ fn explanation(py: Python<'_>, found: Explained) -> PyResult<Bound<'_, PyAny>> {
     py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, found.text))
 }
 
-/// Lists all numbers that can be set or swept.
+/// Lists all numbers that can be set or swept, with their values in the plan or the built-in
+/// machine.
 #[pyfunction]
 #[pyo3(signature = (plan=None))]
 pub(crate) fn parameters<'py>(

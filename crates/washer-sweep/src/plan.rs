@@ -9,7 +9,7 @@ use sweep::{BoundaryOptions, PlanEvaluator, TraceExtras, TraceOptions, WasherGri
 use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
 use crate::work::{WorkOptions, supervise, supervise_abandonable};
-use crate::{columns, errors, finish};
+use crate::{columns, counted, errors, finish};
 
 /// The name of a plan that has neither a file nor a name.
 const UNNAMED: &str = "plan";
@@ -61,6 +61,10 @@ impl PyPlan {
     }
 
     /// Reads a plan from a grid file, or from the text of one.
+    ///
+    /// A string with a line break or `=` is a text. `set` overrides constants by their names, in
+    /// the unit with which each name ends, such as `unbalance_mass_kg`. Raises `PlanError` with all
+    /// mistakes.
     #[staticmethod]
     #[pyo3(signature = (source, *, set=None))]
     fn from_toml(source: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
@@ -109,7 +113,18 @@ impl PyPlan {
         Ok((again, (text, is_file, sets)))
     }
 
-    /// Evaluates both models at each row of a table.
+    /// Evaluates both models at each row of a table. The result's rows are in the same order.
+    ///
+    /// The table has n rows and a column of n numbers for each axis of the plan, in the unit with
+    /// which its name ends; an axis with a single value may be left out. The result has n rows, and
+    /// `result.units` has the unit of each of its columns. `threads` is the number of threads, by
+    /// default one for each core; `progress` shows the progress. Every value has to lie between the
+    /// least and the greatest value of its axis, because the steps of the method are chosen for the
+    /// ranges of the axes. A row of the result therefore depends on the plan and on its own values
+    /// alone, and has the bits of a run with this point.
+    ///
+    /// Raises `PlanError` for columns and values that do not fit, before the computation, and
+    /// `Interrupted` on Ctrl-C.
     #[pyo3(signature = (table, *, threads=None, progress=false))]
     fn evaluate(
         &self,
@@ -126,6 +141,12 @@ impl PyPlan {
     }
 
     /// Evaluates both models at every point of the grid.
+    ///
+    /// The result has a row for each point, in grid order: the first axis varies slowest. `threads`
+    /// is the number of threads, by default one for each core.
+    ///
+    /// With `out` it also writes a Parquet file, byte for byte as `sweep run` does. An interrupted
+    /// run keeps its rows beside the file, and the same call continues it; `fresh` starts over.
     #[pyo3(signature = (out=None, *, threads=None, progress=true, fresh=false))]
     fn run(
         &self,
@@ -143,7 +164,18 @@ impl PyPlan {
         )
     }
 
-    /// Computes time histories of both models at one point, or at every one.
+    /// Computes time histories of both models at one point, every `every` s, or with `turns`
+    /// once a turn.
+    ///
+    /// The result has a row for each instant, with `time_s` in s, displacements in m and angles in
+    /// rad. `at` gives a value to each axis, and to any other parameter, in the unit with which its
+    /// name ends. With `all` it gives values to some axes only, and every point with these values
+    /// has a history, in one table with the columns `point` and the axes. `model` restricts the
+    /// table to the `nonlinear` or the `linear` model. `rates` adds rates and accelerations of the
+    /// channels, `states` the ten coordinates and their speeds, `forces` the forces of springs,
+    /// dampers, stops, bushings and feet, and `angle` the drum's angle. `start` gives the initial
+    /// state: deviations q1 to q10 (m, rad) and speeds u1 to u10 (per s). If a model fails, a
+    /// warning says so, and its values are null from then on.
     #[pyo3(signature = (
         at=None, *, all=false, model=None, every=0.01, turns=false, rates=false, states=false,
         forces=false, angle=false, start=None
@@ -178,7 +210,14 @@ impl PyPlan {
         Ok(PyResultTable::new(table))
     }
 
-    /// Traces the curve on which a quantity is at its limit.
+    /// Traces the curve on which a quantity is at its limit, over the first two axes.
+    ///
+    /// `quantity` is a column of numbers of this plan's rows for which greater or lesser values are
+    /// worse, or an expression of columns as in `sweep require`. `limit` is in the column's unit;
+    /// by default it is the column's own. `tolerance` is the width of the final brackets, in the
+    /// unit of the second axis. `lattice` is the number of cells along each axis that are searched
+    /// first. The result has a row for each crossing, and one for each line without any. With `out`
+    /// the search writes that file, and the same call continues it after an interruption.
     #[pyo3(signature = (
         quantity="ratio_max", *, limit=None, tolerance=None, lattice=6, out=None, threads=None,
         progress=true, fresh=false
@@ -246,6 +285,7 @@ impl PyPlan {
         let plan = self.evaluator.plan();
         let axes: Vec<&str> = plan.axes.iter().map(|axis| &*axis.parameter.name).collect();
         let axes = if axes.is_empty() { "no axes".to_owned() } else { axes.join(", ") };
-        format!("<washer_sweep.Plan {}: {} points over {axes}>", plan.name, plan.points())
+        let points = counted(plan.points(), "point");
+        format!("<washer_sweep.Plan {}: {points} over {axes}>", plan.name)
     }
 }

@@ -15,6 +15,7 @@ use sweep::MemoryTable;
 use sweep_files::{FileKind, cells};
 
 use crate::arrow;
+use crate::counted;
 use crate::errors;
 
 /// A result in memory.
@@ -145,6 +146,9 @@ impl PyResultTable {
     }
 
     /// Writes the result as `.parquet`, or a figure of it as `.svg`, `.pdf`, `.png` or `.html`.
+    ///
+    /// Parquet files have the bytes that the command writes. An existing file is overwritten only
+    /// if it has the same kind.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
         let is_rows = ending.eq_ignore_ascii_case("parquet");
@@ -197,9 +201,9 @@ impl PyResultTable {
     fn __repr__(&self) -> String {
         let name = self.0.plan()["name"].as_str().unwrap_or("unnamed");
         let kind = self.0.kind().word();
-        let rows = self.0.rows();
-        let columns = self.0.schema().fields().len();
-        format!("<washer_sweep.Result: {kind} of {name}, {rows} rows, {columns} columns>")
+        let rows = counted(self.0.rows() as u64, "row");
+        let columns = counted(self.0.schema().fields().len() as u64, "column");
+        format!("<washer_sweep.Result: {kind} of {name}, {rows}, {columns}>")
     }
 }
 
@@ -217,7 +221,7 @@ fn append(values: &Bound<'_, PyList>, part: &ArrayRef) -> PyResult<()> {
     cells::words(part).into_iter().flatten().try_for_each(|word| values.append(word))
 }
 
-/// Reads a result file of any kind.
+/// Reads a result file of any kind, and checks its digest.
 #[pyfunction]
 pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<PyResultTable> {
     let table = py.detach(|| MemoryTable::read(&path));

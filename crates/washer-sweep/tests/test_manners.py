@@ -1,7 +1,10 @@
 """Signals, threads and forks."""
 
+import ast
+import inspect
 import multiprocessing
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -198,3 +201,24 @@ def test_sigterm_of_a_script_ends_it():
         time.sleep(0.5)
         process.send_signal(signal.SIGTERM)
         assert process.wait(timeout=5) == -signal.SIGTERM
+
+
+def documented(body, owner=washer_sweep):
+    """The functions of the stubs and of their classes with their docstrings, without properties and
+    special methods."""
+    for node in body:
+        if isinstance(node, ast.ClassDef):
+            yield from documented(node.body, getattr(owner, node.name))
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+            if text := ast.get_docstring(node):
+                is_property = any(getattr(of, "id", "") == "property" for of in node.decorator_list)
+                if not is_property:
+                    yield getattr(owner, node.name), text
+
+
+def test_help_is_that_of_the_stubs():
+    stubs = pathlib.Path(washer_sweep.__file__).with_suffix(".pyi").read_text()
+    found = list(documented(ast.parse(stubs).body))
+    assert len(found) > 12
+    for function, text in found:
+        assert inspect.getdoc(function) == text, function

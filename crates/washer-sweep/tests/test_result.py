@@ -186,6 +186,8 @@ def test_figures_are_the_commands(sweep, short, tmp_path):
     whole = short.evaluate({name: points[name] for name in short.axes})
     assert "<svg" in whole._repr_svg_()
     assert repr(scattered).startswith("<washer_sweep.Result: map of short, 2 rows,")
+    one = short.evaluate({"unbalance_mass_kg": [0.11], "damping_n_s_per_m": [99]})
+    assert repr(one).startswith("<washer_sweep.Result: map of short, 1 row,")
     trace = short.trace({"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100})
     assert "<svg" in trace._repr_svg_()
 

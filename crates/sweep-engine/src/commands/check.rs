@@ -35,9 +35,8 @@ pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     }
     let estimate = M::estimate(&plan, threads::count(None, &threads::process)?)?;
     show(&summary(&plan, &estimate))?;
-    let tried = estimate.sampled.values().sum::<u64>();
     // If every tried point fails, the run would be of no use.
-    Ok(if tried > 0 && failed(&estimate.sampled) == tried { Exit::Failed } else { Exit::Done })
+    Ok(if is_failed_throughout(&estimate) { Exit::Failed } else { Exit::Done })
 }
 
 /// Formats the plan and the estimate in a few lines.
@@ -97,28 +96,57 @@ fn time_words<M: Model>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> Str
             format!(", the first {part} s each{off}")
         }
     };
+    if is_failed_throughout(estimate) {
+        return format!("not known: none of the {tried} tried could be computed");
+    }
     let about = duration(estimate.wall_s);
     format!("about {about}: an estimate, from {tried} integrated just now{part}")
 }
 
+/// Whether points were tried, and every one of them failed.
+fn is_failed_throughout(estimate: &Estimate) -> bool {
+    let tried = estimate.sampled.values().sum::<u64>();
+    tried > 0 && failed(&estimate.sampled) == tried
+}
+
 fn describe<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> String {
     let name = &axis.parameter.name;
-    let count = axis.values.len();
-    let values = if design.is_some() { String::new() } else { format!("{count} values ") };
+    let count = counted(axis.values.len() as usize, "value");
+    let values = if design.is_some() { String::new() } else { format!("{count} ") };
     match &axis.values {
-        AxisValues::Linear { from, to, .. } => format!("{name}: {values}from {from} to {to}"),
+        AxisValues::Linear { from, to, .. } => {
+            format!("{name}: {values}from {}", span([*from, *to], plain))
+        }
         AxisValues::Log { from, to, .. } => {
-            format!("{name}: {values}from {from} to {to}, logarithmic")
+            format!("{name}: {values}from {}, logarithmic", span([*from, *to], plain))
         }
         AxisValues::Distributed(Distribution { shape, from, to }) => {
-            let numbers = shape.numbers().map(|(key, number)| format!("{key} {number}"));
+            let numbers = shape.numbers().map(|(key, number)| format!("{key} {}", plain(number)));
             let range = span([*from, *to], short);
             format!("{name}: {}, {}, from {range}", shape.name(), numbers.join(", "))
         }
         AxisValues::List(values) => {
-            let shown: Vec<_> = values.iter().take(8).map(f64::to_string).collect();
+            let shown: Vec<_> = values.iter().take(8).copied().map(plain).collect();
             let more = if values.len() > shown.len() { ", ..." } else { "" };
-            format!("{name}: {count} values, {}{more}", shown.join(", "))
+            format!("{name}: {count}, {}{more}", shown.join(", "))
         }
+    }
+}
+
+/// Formats a number with at most 12 significant digits, so that computed ends of a range are without
+/// rounding errors.
+fn plain(value: f64) -> String {
+    format!("{value:.11e}").parse().unwrap_or(value).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_without_rounding_errors() {
+        assert_eq!(plain(0.4 - 0.1), "0.3");
+        assert_eq!(plain(28.0 / 3.0), "9.33333333333");
+        assert_eq!([1e9, 60.0, 0.05, -2.5].map(plain), ["1000000000", "60", "0.05", "-2.5"]);
     }
 }

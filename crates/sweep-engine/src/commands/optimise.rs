@@ -129,8 +129,9 @@ fn slack_lines<M: Model>(
 
 /// Describes the candidate with the least violation, and the conditions that it violates. The
 /// violation is the sum of the excesses over the conditions, each divided by the greatest excess of
-/// all candidates. Returns `None` if no candidate has all excesses.
-fn nearest<M: Model>(study: &Study<M>, file: &ResultTable) -> Result<Option<String>, Error> {
+/// all candidates. Returns the candidate's number with the description; `None` if no candidate has
+/// all excesses.
+fn nearest<M: Model>(study: &Study<M>, file: &ResultTable) -> Result<Option<(u64, String)>, Error> {
     let names: Vec<String> = (1..=study.conditions.len()).map(|k| format!("excess_{k}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let mut rows: Vec<(u64, Vec<f64>)> = Vec::new();
@@ -154,7 +155,7 @@ fn nearest<M: Model>(study: &Study<M>, file: &ResultTable) -> Result<Option<Stri
     {
         text.line("", format!("{} by {}", goal.text(), short(*excess)));
     }
-    Ok(Some(text))
+    Ok(Some((*candidate, text)))
 }
 
 /// Claims the path of the model's own file, if one is asked for, before the search.
@@ -200,9 +201,12 @@ fn summarise<M: Model>(
     let objectives = study.objectives.iter().map(|one| one.name.as_str());
     let names: Vec<&str> =
         ["candidate", "feasible", "on_front"].into_iter().chain(sought).chain(objectives).collect();
-    let chosen = candidate.or_else(|| about["best"].as_u64());
+    let best = about["best"].as_u64();
+    let chosen = candidate.or(best);
+    let nearest = if best.is_none() { nearest(study, &file)? } else { None };
     let mut feasible = 0;
     let mut front = Vec::new();
+    let mut nearest_cells = None;
     let mut values = None;
     // The least value of the first objective before and in the last third of the candidates.
     let mut least = [f64::INFINITY; 2];
@@ -220,6 +224,9 @@ fn summarise<M: Model>(
             let own = cells[3..].iter().take(study.parameters.len());
             values = own.map(Cell::number).collect::<Option<Vec<f64>>>();
         }
+        if nearest.as_ref().is_some_and(|(candidate, _)| *candidate == row.index()) {
+            nearest_cells = Some(cells.clone());
+        }
         if cells[2] == Cell::Flag(true) {
             late += usize::from(row.index() >= first_late);
             front.push(cells);
@@ -234,10 +241,10 @@ fn summarise<M: Model>(
         _ => String::new(),
     };
     text.line("feasible", format!("{feasible} of {all}{ended}"));
-    match about["best"].as_u64() {
-        Some(best) => text.line("best", format!("candidate {best}")),
-        None => text.extend(nearest(study, &file)?),
+    if let Some(best) = best {
+        text.line("best", format!("candidate {best}"));
     }
+    text.extend(nearest.map(|(_, described)| described));
     if let Some(values) = values.as_ref().filter(|_| !study.conditions.is_empty()) {
         text.extend(slack_lines(study, values, effort)?);
     }
@@ -272,10 +279,10 @@ fn summarise<M: Model>(
     }
     let apart = front.len().div_ceil(LISTED).max(1);
     let is_best = |cells: &[Cell]| cells[0].number() == about["best"].as_f64();
-    // The best candidate is always listed.
+    // The best candidate is always listed, and the nearest one if none is feasible.
     let listed = front.iter().enumerate();
     let listed = listed.filter(|(k, cells)| k % apart == 0 || is_best(cells));
-    let listed = listed.map(|(_, cells)| cells);
+    let listed = listed.map(|(_, cells)| cells).chain(&nearest_cells);
     let shown = |cells: &[Cell]| cells.iter().take(1).chain(&cells[3..]).map(word).collect();
     let headings: Vec<String> =
         names.iter().take(1).chain(&names[3..]).map(|&name| name.to_owned()).collect();

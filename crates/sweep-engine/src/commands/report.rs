@@ -98,6 +98,9 @@ pub fn run<M: Model>(
             false => folded.join(", "),
         };
         let verdict = if checked.holds { "holds" } else { "FAILS" };
+        if !checked.holds {
+            tell(&format!("FAILS  {}: {found}", checked.expression));
+        }
         claims.push(vec![checked.expression, found, verdict.to_owned()]);
     }
     body += &table("What is required", &["", "found", ""], &claims);

@@ -331,6 +331,7 @@ pub(super) fn failed_words(by_status: &NameCounts) -> Option<String> {
 mod tests {
     use super::*;
     use crate::store::read::Extreme;
+    use sweep_parameter::Worse;
 
     #[test]
     fn an_infinite_error_is_left_out() {
@@ -339,6 +340,21 @@ mod tests {
         let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
         let said = counts(&tally, 2.0.into(), &|_| String::new());
         assert!(said.contains("error  rows by method: 1 capped_1"), "{said}");
+    }
+
+    #[test]
+    fn rows_beyond_the_limit_of_a_marked_column_are_counted() {
+        let said = |beyond| {
+            let worst = Some(Extreme { value: 2.5, point: 0 });
+            let column = "speed_off".to_owned();
+            let limit = Some(2.0);
+            let extreme = ColumnExtreme { column, worse: Worse::Greater, limit, beyond, worst };
+            let tally = Tally { extremes: vec![extreme], ..Tally::default() };
+            counts(&tally, 2.0.into(), &|_| String::new())
+        };
+        assert!(said(0).contains("  greatest  speed_off 2.5\n"), "{}", said(0));
+        assert!(said(1).contains("  greatest  speed_off 2.5; 1 row above 2\n"), "{}", said(1));
+        assert!(said(2).contains("; 2 rows above 2\n"), "{}", said(2));
     }
 
     #[test]

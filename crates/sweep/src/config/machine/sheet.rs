@@ -13,7 +13,8 @@ pub(super) const MOVING_MASS: &str = "moving_mass_kg";
 /// follow.
 #[derive(Default)]
 pub(super) struct SheetKeys {
-    /// Whether the file gives the drum's radius and depth, so that it may omit other numbers.
+    /// Whether the file gives a number of a data sheet, so that it may omit numbers that follow from
+    /// a whole one.
     pub(super) is_given: bool,
     moving_mass_kg: Option<f64>,
     drum_radius_m: Option<f64>,
@@ -61,17 +62,20 @@ const DRUM_RADIUS: &str = "radius_m";
 /// The key of the drum's inner depth.
 const DRUM_DEPTH: &str = "depth_m";
 
+/// The keys of the drum's size, without which no number may be omitted.
+const DRUM_SIZES: [&str; 2] = [DRUM_RADIUS, DRUM_DEPTH];
+
 /// The range of the drum's inner radius and depth (m).
 const DRUM_SIZE: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
 
 impl SheetKeys {
     /// Returns the data sheet of a file whose keys are not yet read.
     pub(super) fn new(keys: &Keys<'_>) -> Self {
-        let has_both = |root: &Section<'_>| {
-            let at = |key| root.key_inside("drum", key);
-            at(DRUM_RADIUS) && at(DRUM_DEPTH)
+        let has_any = |root: &Section<'_>| {
+            let is_of_drum = |key: &str| root.key_inside("drum", key);
+            root.key_at(MOVING_MASS).is_some() || DRUM_SIZES.into_iter().any(is_of_drum)
         };
-        Self { is_given: keys.section().is_some_and(has_both), ..Self::default() }
+        Self { is_given: keys.section().is_some_and(has_any), ..Self::default() }
     }
 
     /// Walks over the data sheet's keys of element `k` of a section.
@@ -135,6 +139,13 @@ impl SheetKeys {
             drum_depth_m: self.drum_depth_m.unwrap_or_default(),
         };
         let is_whole = self.drum_radius_m.is_some() && self.drum_depth_m.is_some();
+        if !self.omitted.is_empty() {
+            for key in DRUM_SIZES.into_iter().filter(|key| !root.key_inside("drum", key)) {
+                let expected = "the drum's inner radius_m and depth_m in [drum], from which the \
+                                numbers that are left out follow";
+                root.missing(key, expected);
+            }
+        }
         if sheet.moving_mass_kg.is_some() && !needs_mass[0] {
             let title = format!("`{MOVING_MASS}` beside the tub's mass");
             let expected =
