@@ -36,6 +36,7 @@ pub fn is_temporary(name: &str) -> bool {
 
 /// Makes a name of a temporary file that this process has not made before.
 pub fn temporary_name() -> String {
+    /// The number of names that this process has made.
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let sequence = COUNT.fetch_add(1, Ordering::Relaxed);
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();

@@ -13,16 +13,15 @@ use arrow_array::{
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use parquet::basic::{ConvertedType, Repetition, Type};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArrayType, DataType as Physical};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::ChunkReader;
-use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::schema::types::Type as Declared;
 use serde_json::Value;
 
-use crate::key;
+use crate::{key, pages};
 
 /// Greatest number of rows in a batch; a batch has rows of one row group. Basis: a batch of a
 /// hundred columns takes 3 MB. Doubling it doubles the memory.
@@ -56,6 +55,13 @@ pub fn schema(file: &ParquetMetaData) -> SchemaRef {
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
 
+/// Whether values of a column of decimals have a length that is read. The library allocates a
+/// batch of values of any length that a file declares.
+fn has_decimal_length(declared: &Declared) -> bool {
+    let Declared::PrimitiveType { type_length, .. } = declared else { return false };
+    usize::try_from(*type_length).is_ok_and(|length| (1..=MAX_DECIMAL_BYTES).contains(&length))
+}
+
 /// Returns the type as which a column is read. Integers and floats are read as the widest type of
 /// their kind.
 fn data_type(declared: &Declared) -> DataType {
@@ -65,6 +71,9 @@ fn data_type(declared: &Declared) -> DataType {
         return DataType::Null;
     }
     match (declared.get_physical_type(), about.converted_type()) {
+        (Type::FIXED_LEN_BYTE_ARRAY, As::DECIMAL) if !has_decimal_length(declared) => {
+            DataType::Null
+        }
         (Type::BOOLEAN, _) => DataType::Boolean,
         (Type::FLOAT | Type::DOUBLE, _) => DataType::Float64,
         (Type::INT32 | Type::INT64 | Type::FIXED_LEN_BYTE_ARRAY, As::DECIMAL) => DataType::Float64,
@@ -146,12 +155,11 @@ impl<R: ChunkReader + 'static> Batches<R> {
             let Some(group) = self.file.row_groups().get(self.group) else { return Ok(None) };
             self.group += 1;
             self.left = usize::try_from(group.num_rows())?;
-            let open = |leaf: &usize| {
-                let column = group.column(*leaf);
-                let source = Arc::clone(&self.source);
-                let pages = SerializedPageReader::new(source, column, self.left, None)?;
-                Ok(get_column_reader(column.column_descr_ptr(), Box::new(pages)))
-            };
+            // The pages of the last row group go before others come.
+            self.columns.clear();
+            let budget = pages::budget();
+            let open =
+                |leaf: &usize| pages::open(&self.source, group.column(*leaf), self.left, &budget);
             self.columns = self.leaves.iter().map(open).collect::<Result<_, ParquetError>>()?;
         }
         let rows = self.left.min(BATCH_ROWS);
@@ -236,8 +244,8 @@ fn numbers<T: Physical, A: ArrowPrimitiveType>(
     }))
 }
 
-/// Greatest size of a decimal that is read in full, in bytes. Basis: 38 digits, which is the most
-/// that other programs write. Doubling it needs wider integers than i128.
+/// Greatest size of a decimal that is read, in bytes. Basis: 38 digits, which is the most that
+/// other programs write. Doubling it needs wider integers than i128.
 const MAX_DECIMAL_BYTES: usize = 16;
 
 /// Reads decimals as numbers. They are stored as whole numbers, in units of the last of `scale`
@@ -260,13 +268,11 @@ fn decimals(column: &mut ColumnReader, scale: i32, rows: usize) -> Result<ArrayR
     }
 }
 
-/// Returns the integer that big-endian bytes in two's complement stand for; only the last bytes if
-/// there are more than an i128 holds.
+/// Returns the integer that big-endian bytes in two's complement stand for.
 fn big_endian_integer(bytes: &[u8]) -> i128 {
     let sign = bytes.first().is_some_and(|first| *first >= 0x80);
     let filled: i128 = if sign { -1 } else { 0 };
-    let last = bytes.len().saturating_sub(MAX_DECIMAL_BYTES);
-    bytes[last..].iter().fold(filled, |sum, byte| (sum << 8) | i128::from(*byte))
+    bytes.iter().fold(filled, |sum, byte| (sum << 8) | i128::from(*byte))
 }
 
 fn words(

@@ -1,31 +1,33 @@
-//! A check of a Parquet file's footer, before the library reads it.
-//!
-//! A footer of a few bytes can make the library count for minutes, recurse until the stack is full,
-//! or allocate for columns that are not there.
+//! Checks a Parquet file's footer before the library reads it, because the library trusts it;
+//! `thrift` says where.
 
-use std::io::{self, Read, Seek, SeekFrom};
+use bytes::Bytes;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::reader::{ChunkReader, Length};
 
 use crate::thrift::{self, Found, Shape, Wire};
 use Wire::{Binary, Bool, Byte, Double, List, Number, Struct};
 
-/// Length of a file's end, in bytes: the footer's length (4) and the mark.
-const TAIL_BYTES: u64 = 8;
-const MARK: &[u8] = b"PAR1";
-
-/// Greatest length of a footer, in bytes. Basis: the library allocates up to 25 bytes per byte of a
+/// Greatest length of a footer, in bytes. Basis: the library takes up to 25 bytes per byte of a
 /// footer, beside its columns. Doubling it doubles this memory.
-pub(crate) const LONGEST_BYTES: u64 = 16 << 20;
+const MAX_FOOTER_BYTES: usize = 16 << 20;
 
-/// Greatest number of columns and groups of columns. Basis: the library allocates up to 2 kB for
-/// each, even if the name is empty. Doubling it doubles this memory.
-pub(crate) const MOST_COLUMNS: u64 = 100_000;
+/// Greatest number of columns and groups of columns. Basis: the library takes up to 2 kB for each,
+/// even if the name is empty. Doubling it doubles this memory.
+const MAX_COLUMNS: u64 = 100_000;
 
-/// Greatest depth of nested groups of columns. Basis: the library recurses through them. Doubling
-/// it doubles the stack that is needed.
-pub(crate) const DEEPEST: usize = 100;
+/// Greatest depth of nested groups of columns. Basis: the library recurses through them, and C++
+/// Parquet has this limit too. Doubling it doubles the stack that is needed.
+const MAX_DEPTH: usize = 100;
 
-// The types as which version 60 of the Parquet library reads the fields. The names are those of
-// Parquet's format.
+/// Greatest total length of the columns' paths, in bytes. Basis: a thousand columns in groups with
+/// names of 64 kB, more than any sound file has. Doubling it doubles the memory of the copies of
+/// names that the library makes.
+const MAX_PATH_BYTES: u64 = 64 << 20;
+
+/// The types as which the library reads the fields of `FileMetaData` in Parquet's format. The
+/// constants below have the names of the format's structs.
 const FILE: Shape = &[
     (1..=1, Number),
     (2..=2, List(&Struct(SCHEMA_ELEMENT))),
@@ -35,8 +37,10 @@ const FILE: Shape = &[
     (6..=6, Binary),
     (7..=7, List(&Struct(&[(1..=3, EMPTY)]))),
 ];
+/// The fields of `SchemaElement`.
 const SCHEMA_ELEMENT: Shape =
     &[(1..=3, Number), (4..=4, Binary), (5..=9, Number), (10..=10, Struct(LOGICAL_TYPE))];
+/// The fields of `LogicalType`.
 const LOGICAL_TYPE: Shape = &[
     (5..=5, Struct(&[(1..=2, Number)])),
     (7..=8, Struct(&[(1..=1, Bool), (2..=2, Struct(&[(1..=3, EMPTY)]))])),
@@ -45,6 +49,7 @@ const LOGICAL_TYPE: Shape = &[
     (17..=18, Struct(&[(1..=1, Binary), (2..=2, Number)])),
     (1..=19, EMPTY),
 ];
+/// The fields of `RowGroup`.
 const ROW_GROUP: Shape = &[
     (1..=1, List(&Struct(COLUMN_CHUNK))),
     (2..=3, Number),
@@ -52,8 +57,10 @@ const ROW_GROUP: Shape = &[
     (5..=5, Number),
     (7..=7, Number),
 ];
+/// The fields of `ColumnChunk`.
 const COLUMN_CHUNK: Shape =
     &[(1..=1, Binary), (2..=2, Number), (3..=3, Struct(COLUMN_META_DATA)), (4..=7, Number)];
+/// The fields of `ColumnMetaData`.
 const COLUMN_META_DATA: Shape = &[
     (1..=1, Number),
     (2..=2, List(&Number)),
@@ -65,114 +72,129 @@ const COLUMN_META_DATA: Shape = &[
     (16..=16, Struct(&[(1..=1, Number), (2..=3, List(&Number))])),
     (17..=17, Struct(&[(1..=1, Struct(&[(1..=8, Double)])), (2..=2, List(&Number))])),
 ];
+/// The fields of `Statistics`.
 pub(crate) const STATISTICS: Shape =
     &[(1..=2, Binary), (3..=4, Number), (5..=6, Binary), (7..=8, Bool), (9..=9, Number)];
+/// A struct without fields, such as a union's empty case.
 const EMPTY: Wire = Struct(&[]);
 
-/// The reason why a Parquet file is refused before the library reads it.
-#[derive(Debug, thiserror::Error)]
-pub enum Refused {
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// A footer that cannot be parsed, or declares impossible counts.
-    #[error("its footer makes no sense")]
-    Footer,
-    /// A footer that is longer than any sound file's.
-    #[error("its footer is longer than {} MiB", LONGEST_BYTES >> 20)]
-    LongFooter,
-    /// More columns and groups of columns than any sound file has.
-    #[error("it has more than {} columns", MOST_COLUMNS)]
-    TooManyColumns,
-    /// Groups of columns that are nested more deeply than in any sound file.
-    #[error("its columns are nested more than {} deep", DEEPEST)]
-    TooDeep,
-    /// A page header that cannot be parsed, or declares impossible sizes.
-    #[error("the header of a page makes no sense")]
-    PageHeader,
-    /// Pages that unpack into more bytes than the caller allows.
-    #[error("its pages unpack into too many bytes")]
-    TooLong,
-}
-
+/// Path of field numbers to the name of a column or group.
+const NAME: &[i16] = &[2, 4];
 /// Path of field numbers to a group's number of children.
 const CHILDREN: &[i16] = &[2, 5];
+/// Path of field numbers to a column or group.
+const ELEMENT: &[i16] = &[2];
 
-/// Checks that the library can safely read a file's footer. A file without a footer passes: the
-/// library reports it.
+/// Reads a file's metadata.
 ///
 /// # Errors
-/// [`Refused::Io`], [`Refused::Footer`], [`Refused::LongFooter`], [`Refused::TooManyColumns`],
-/// [`Refused::TooDeep`].
-pub fn check(file: &mut (impl Read + Seek)) -> Result<(), Refused> {
-    let length = file.seek(SeekFrom::End(0))?;
-    let Some(end) = length.checked_sub(TAIL_BYTES) else { return Ok(()) };
-    file.seek(SeekFrom::Start(end))?;
-    let mut tail = [0; TAIL_BYTES as usize];
-    file.read_exact(&mut tail)?;
-    let [a, b, c, d, mark @ ..] = tail;
-    let length = u64::from(u32::from_le_bytes([a, b, c, d]));
-    let Some(start) = end.checked_sub(length) else { return Ok(()) };
-    if mark != MARK {
-        return Ok(());
-    }
-    if length > LONGEST_BYTES {
-        return Err(Refused::LongFooter);
-    }
-    file.seek(SeekFrom::Start(start))?;
-    let mut footer = Vec::new();
-    file.take(length).read_to_end(&mut footer)?;
-    check_footer(&footer)
+/// Those of the library; fails if it could not read the footer safely.
+pub fn metadata<R: ChunkReader>(file: &R) -> Result<ParquetMetaData, ParquetError> {
+    ParquetMetaDataReader::new().parse_and_finish(&Footer(file))
 }
 
-fn check_footer(footer: &[u8]) -> Result<(), Refused> {
-    let (mut elements, mut declared, mut children) = (0_u64, 0_u64, 0);
+/// Returns the error for a file that is refused.
+pub(crate) fn refused(reason: impl Into<String>) -> ParquetError {
+    ParquetError::General(reason.into())
+}
+
+/// A reader of a file that checks the footer before the library reads it.
+struct Footer<'a, R>(&'a R);
+
+impl<R: ChunkReader> Length for Footer<'_, R> {
+    fn len(&self) -> u64 {
+        self.0.len()
+    }
+}
+
+impl<R: ChunkReader> ChunkReader for Footer<'_, R> {
+    type T = R::T;
+
+    fn get_read(&self, start: u64) -> Result<R::T, ParquetError> {
+        self.0.get_read(start)
+    }
+
+    /// Returns the footer, the only bytes that the library takes here.
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
+        if length > MAX_FOOTER_BYTES {
+            let most = MAX_FOOTER_BYTES >> 20;
+            return Err(refused(format!("its footer is longer than {most} MiB")));
+        }
+        let footer = self.0.get_bytes(start, length)?;
+        check(&footer)?;
+        Ok(footer)
+    }
+}
+
+fn check(footer: &[u8]) -> Result<(), ParquetError> {
     let mut tree = Tree::default();
+    let mut name = 0;
+    let mut children = 0;
     let rest = thrift::walk(footer, FILE, &mut |path, found| match (path, found) {
+        (NAME, Found::Number(length)) => name = u64::try_from(length).unwrap_or(0),
         (CHILDREN, Found::Number(number)) => children = u64::try_from(number).unwrap_or(0),
-        ([2], Found::End) => {
-            elements += 1;
-            declared = declared.saturating_add(children);
-            tree.add(children);
+        (ELEMENT, Found::End) => {
+            tree.add(name, children);
+            name = 0;
             children = 0;
         }
         _ => {}
     });
     // The library allocates as many columns as a group declares.
-    if rest.is_none() || declared >= elements.max(1) {
-        return Err(Refused::Footer);
+    if rest.is_none() || tree.declared >= tree.elements.max(1) {
+        return Err(refused("its footer makes no sense"));
     }
-    if elements > MOST_COLUMNS {
-        return Err(Refused::TooManyColumns);
+    if tree.elements > MAX_COLUMNS {
+        return Err(refused(format!("it has more than {MAX_COLUMNS} columns")));
     }
-    if tree.depth > DEEPEST { Err(Refused::TooDeep) } else { Ok(()) }
+    if tree.depth > MAX_DEPTH {
+        return Err(refused(format!("its columns are nested more than {MAX_DEPTH} deep")));
+    }
+    if tree.path_bytes > MAX_PATH_BYTES {
+        let most = MAX_PATH_BYTES >> 20;
+        return Err(refused(format!("the paths of its columns are longer than {most} MiB")));
+    }
+    Ok(())
 }
 
 /// The nesting of columns and groups; each group comes before its children.
 #[derive(Default)]
 struct Tree {
-    /// The number of children that are still to come, for each open group.
-    open: Vec<u64>,
+    /// The number of columns and groups.
+    elements: u64,
+    /// The number of children that all groups declare.
+    declared: u64,
+    /// The number of children that are still to come, and the length of the path, for each open
+    /// group.
+    open: Vec<(u64, u64)>,
     /// The greatest depth so far.
     depth: usize,
+    /// The total length of the columns' paths.
+    path_bytes: u64,
 }
 
 impl Tree {
-    fn add(&mut self, children: u64) {
-        while self.open.pop_if(|left| *left == 0).is_some() {}
-        if let Some(left) = self.open.last_mut() {
+    /// Adds the next column or group, with the length of its name and the number of its children.
+    fn add(&mut self, name: u64, children: u64) {
+        self.elements += 1;
+        self.declared = self.declared.saturating_add(children);
+        while self.open.pop_if(|(left, _)| *left == 0).is_some() {}
+        let mut path = name;
+        if let Some((left, parent)) = self.open.last_mut() {
             *left -= 1;
+            path += *parent;
         }
         if children > 0 {
-            self.open.push(children);
+            self.open.push((children, path));
             self.depth = self.depth.max(self.open.len());
+        } else {
+            self.path_bytes = self.path_bytes.saturating_add(path);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::io::Cursor;
     use std::sync::Arc;
 
     use parquet::column::writer::ColumnWriter;
@@ -185,18 +207,32 @@ mod tests {
     use super::*;
     use crate::thrift::encode::varint;
 
+    /// The mark at either end of a file.
+    const MARK: &[u8] = b"PAR1";
+
     /// Encodes a column, or a group if `children` is not zero.
     fn element(children: u64) -> Vec<u8> {
         match children {
             0 => vec![0x15, 10, 0x25, 0, 0x18, 1, b'x', 0],
-            _ => [&[0x35, 0, 0x18, 1, b'g', 0x15], varint(2 * children).as_slice(), &[0]].concat(),
+            _ => group(1, children),
         }
+    }
+
+    /// Encodes a group with a name of this length.
+    fn group(name: usize, children: u64) -> Vec<u8> {
+        let length = varint(name as u64);
+        let children = varint(2 * children);
+        [&[0x35, 0, 0x18], &length[..], &vec![b'g'; name], &[0x15], &children, &[0]].concat()
     }
 
     /// Encodes a file without rows that has these groups and columns, given by their numbers of
     /// children, and `more` fields at the footer's end.
     fn file(children: impl IntoIterator<Item = u64>, more: &[u8]) -> Vec<u8> {
-        let elements: Vec<_> = children.into_iter().map(element).collect();
+        file_from(children.into_iter().map(element).collect(), more)
+    }
+
+    /// Encodes a file like [`file`] from its encoded groups and columns.
+    fn file_from(elements: Vec<Vec<u8>>, more: &[u8]) -> Vec<u8> {
         let footer = [
             &[0x15, 2, 0x19, 0xfc],
             varint(elements.len() as u64).as_slice(),
@@ -210,7 +246,10 @@ mod tests {
     }
 
     fn message(file: &[u8]) -> String {
-        check(&mut Cursor::new(file)).map_or_else(|error| error.to_string(), |()| "fine".to_owned())
+        match metadata(&Bytes::copy_from_slice(file)) {
+            Ok(_) => "fine".to_owned(),
+            Err(error) => error.to_string().replace("Parquet error: ", ""),
+        }
     }
 
     #[test]
@@ -277,9 +316,10 @@ mod tests {
     }
 
     #[test]
-    fn files_without_a_footer_pass() {
+    fn files_without_a_footer_are_reported_by_the_library() {
         for bytes in [&b""[..], b"PAR1", b"time_s,x\n1,2\n", b"PAR1\xff\0\0\0PAR1", &[0; 100]] {
-            assert_eq!(message(bytes), "fine");
+            let message = message(bytes);
+            assert!(message != "fine" && !message.contains("its footer"), "{message}");
         }
     }
 
@@ -295,22 +335,35 @@ mod tests {
     fn groups_that_are_nested_too_deeply_are_refused() {
         // The root counts as one level of nesting.
         let chain = |groups| std::iter::repeat_n(1, groups).chain([0]);
-        assert_eq!(message(&file(chain(DEEPEST), &[])), "fine");
-        let refusal = message(&file(chain(DEEPEST + 1), &[]));
+        assert_eq!(message(&file(chain(MAX_DEPTH), &[])), "fine");
+        let refusal = message(&file(chain(MAX_DEPTH + 1), &[]));
         assert_eq!(refusal, "its columns are nested more than 100 deep");
         // Groups side by side are not nested.
         let beside = [150].into_iter().chain([1, 0].repeat(150));
         assert_eq!(message(&file(beside, &[])), "fine");
         // Each group has a leaf and a further group, so the last child counts to the depth.
-        let comb = [2].into_iter().chain([0, 2].repeat(DEEPEST)).chain([0, 0]);
+        let comb = [2].into_iter().chain([0, 2].repeat(MAX_DEPTH)).chain([0, 0]);
         assert_eq!(message(&file(comb, &[])), "its columns are nested more than 100 deep");
     }
 
     #[test]
     fn too_many_columns_are_refused() {
         let flat = |columns: u64| std::iter::once(columns).chain((0..columns).map(|_| 0));
-        assert_eq!(message(&file(flat(MOST_COLUMNS - 1), &[])), "fine");
-        assert_eq!(message(&file(flat(MOST_COLUMNS), &[])), "it has more than 100000 columns");
+        assert_eq!(message(&file(flat(MAX_COLUMNS - 1), &[])), "fine");
+        assert_eq!(message(&file(flat(MAX_COLUMNS), &[])), "it has more than 100000 columns");
+    }
+
+    #[test]
+    fn paths_that_are_too_long_together_are_refused() {
+        // The library copies the group's name for each of its columns.
+        let columns = 1 << 10;
+        let file = |name: usize| {
+            let groups = [element(1), group(name, columns)];
+            file_from(groups.into_iter().chain((0..columns).map(|_| element(0))).collect(), &[])
+        };
+        // The root's name and a column's have a byte each.
+        assert_eq!(message(&file((1 << 16) - 2)), "fine");
+        assert_eq!(message(&file(1 << 16)), "the paths of its columns are longer than 64 MiB");
     }
 
     #[test]
@@ -323,7 +376,7 @@ mod tests {
     #[test]
     fn a_footer_that_is_too_long_is_refused() {
         let mut bytes = file([1, 0], &[]);
-        let length = (LONGEST_BYTES as usize) + 1;
+        let length = MAX_FOOTER_BYTES + 1;
         let footer = [vec![0; length], (length as u32).to_le_bytes().to_vec(), MARK.to_vec()];
         bytes.extend(footer.concat());
         assert_eq!(message(&bytes), "its footer is longer than 16 MiB");

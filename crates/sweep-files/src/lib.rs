@@ -12,9 +12,10 @@
 //!   whoever writes to the folder next.
 //!
 //! Reading: `regular` opens regular files only, so that a FIFO cannot hold a command up;
-//! `ParquetFile` checks the digest that our files carry (`seal`), that the library can read the
-//! footer (`footer`), and what pages declare to unpack into (`pages`), and turns every failure of
-//! the library, panics included, into an error with the file's name.
+//! `ParquetFile` checks the digest that our files carry (`seal`), and turns every failure of the
+//! library, panics included, into an error with the file's name. Rows are read in batches
+//! (`batches`). The library trusts what a file declares (`thrift` says where), so that the footer
+//! (`footer`) and each page header (`pages`) are checked before it reads them.
 
 pub mod atomic;
 pub mod batches;
@@ -26,7 +27,7 @@ pub mod key;
 mod kind;
 mod leaves;
 mod output;
-pub mod pages;
+mod pages;
 pub mod panics;
 mod parquet;
 pub mod regular;
@@ -37,7 +38,6 @@ mod writer;
 
 pub use columns::{CellKind, Column, columns};
 pub use error::FileError;
-pub use footer::Refused;
 pub use kind::{EXPORTED_CSV, FileKind, OWN_FILE, PDF_START, beside};
 pub use leaves::{Step, dotted, leaves};
 pub use output::{Output, judge, ready, write};

@@ -7,23 +7,13 @@ use std::sync::Arc;
 
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
-use parquet::basic::Type;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{FileMetaData, KeyValue, ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::metadata::{FileMetaData, KeyValue, ParquetMetaData};
 use serde_json::Value;
 
 use crate::batches::{self, Batches};
-use crate::pages::{self, Unpacked};
 use crate::seal::{self, Seal};
-use crate::{FileError, Refused, footer, key, panics, regular};
-
-/// Greatest number of bytes that the pages of a file may unpack into at once. Basis: our pages have
-/// 1 MiB, and half of 2 GB is left for everything else. Twice as many may take 2 GB.
-const MAX_UNPACKED_BYTES: u64 = 1 << 30;
-/// Weight of a byte of words against [`MAX_UNPACKED_BYTES`]. Basis: the library takes 32 bytes for
-/// each word of a dictionary, which may have only 4 in the file, its length. Doubling it halves the
-/// number of words in the longest file that is read.
-const BYTES_PER_WORD_BYTE: u64 = 8;
+use crate::{FileError, footer, key, panics, regular};
 
 /// Beginning of the name by which this program signs its files, before a version.
 pub const CREATED_BY: &str = "sweep version ";
@@ -66,7 +56,6 @@ impl ParquetFile {
             parsed => parsed?,
         };
         if file.is_copy() {
-            file.check_pages()?;
             return Ok(file);
         }
         if seal == Seal::Broken {
@@ -79,29 +68,7 @@ impl ParquetFile {
         if seal == Seal::Absent && (is_ours || has_digest) {
             return Err(FileError::damaged(path));
         }
-        file.check_pages()?;
         Ok(file)
-    }
-
-    /// Refuses pages that do not fit in memory, before any is unpacked.
-    fn check_pages(&self) -> Result<(), FileError> {
-        for group in self.metadata.row_groups() {
-            let mut at_once = 0_u64;
-            for column in group.columns() {
-                // The library panics if the file places a column before the file's beginning.
-                let range = panics::caught(|| column.byte_range());
-                let outside = |_| FileError::not_parquet(&self.path, "a column lies outside of it");
-                let (start, length) = range.map_err(outside)?;
-                let is_words = column.column_type() == Type::BYTE_ARRAY;
-                let weight = if is_words { BYTES_PER_WORD_BYTE } else { 1 };
-                let left = (MAX_UNPACKED_BYTES - at_once) / weight;
-                let most = Unpacked { total: u64::MAX, at_once: left };
-                let codec = column.compression();
-                let sizes = pages::unpacked(&mut &self.file, start, length, codec, most);
-                at_once += weight * sizes.map_err(refused(&self.path))?.at_once;
-            }
-        }
-        Ok(())
     }
 
     /// Opens a file to find out its kind. Its digest is checked only if it cannot be parsed.
@@ -117,9 +84,8 @@ impl ParquetFile {
     }
 
     fn parse(path: &Path, file: File, seal: Seal) -> Result<Self, FileError> {
-        footer::check(&mut &file).map_err(refused(path))?;
         let load = || {
-            let metadata = ParquetMetaDataReader::new().parse_and_finish(&file)?;
+            let metadata = footer::metadata(&file)?;
             Ok((batches::schema(&metadata), Arc::new(metadata)))
         };
         let (schema, metadata) = guarded(load).map_err(not_parquet(path))?;
@@ -219,22 +185,6 @@ impl ParquetFile {
 /// Calls the library, and turns a panic into an error.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
     panics::in_parquet("it makes no sense inside", work)
-}
-
-/// Returns a function that makes a file's error from the reason why it is refused.
-fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
-    move |refused| match refused {
-        Refused::Io(source) => FileError::io("read", path)(source),
-        Refused::TooLong => {
-            let [all, words] =
-                [1, BYTES_PER_WORD_BYTE].map(|weight| (MAX_UNPACKED_BYTES / weight) >> 20);
-            let reason = format!(
-                "its pages unpack into more than {all} MiB at once, or into {words} MiB of words"
-            );
-            FileError::not_parquet(path, reason)
-        }
-        refused => FileError::not_parquet(path, refused.to_string()),
-    }
 }
 
 /// Returns a function that makes a file's error from one of the library: [`FileError::Io`] if the
@@ -391,9 +341,9 @@ mod tests {
             let mut writer = Writer::new(file, &batch.schema(), properties).unwrap();
             writer.write(&batch).unwrap();
             writer.end().unwrap().close().unwrap();
-            ParquetFile::open(&path)
+            ParquetFile::open(&path).and_then(|file| Ok(rows(&file)?[0].num_rows()))
         };
-        assert_eq!(write(10).unwrap().rows(), 10);
+        assert_eq!(write(10).unwrap(), 10);
         let message = write(130).unwrap_err().to_string();
         assert!(message.contains("into 128 MiB of words"), "{message}");
     }
@@ -425,15 +375,27 @@ mod tests {
         writer.write(&batch).unwrap();
         let sound = writer.end().unwrap().into_inner().unwrap();
         std::fs::write(&path, &sound).unwrap();
-        assert_eq!(ParquetFile::open(&path).unwrap().rows(), 3000);
+        let read = || ParquetFile::open(&path).and_then(|file| rows(&file));
+        assert_eq!(read().unwrap().iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
         // The header's number of entries, 1500, becomes 8191; the library believes any.
         let declared = [0x4c, 0x15, 0xb8, 0x17];
         let at = sound.windows(4).position(|bytes| bytes == declared).unwrap();
         let mut other = sound;
         other[at + 2..at + 4].copy_from_slice(&[0xfe, 0x7f]);
         std::fs::write(&path, &other).unwrap();
-        let message = ParquetFile::open(&path).unwrap_err().to_string();
+        let message = read().unwrap_err().to_string();
         assert!(message.contains("the header of a page makes no sense"), "{message}");
+    }
+
+    #[test]
+    fn a_file_of_97_bytes_that_declares_many_lengths_of_words_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.parquet");
+        let bytes = include_bytes!("../../../fuzz/corpus-result/words_counted.parquet");
+        assert_eq!(bytes.len(), 97);
+        std::fs::write(&path, bytes).unwrap();
+        let message = rows(&ParquetFile::open(&path).unwrap()).unwrap_err().to_string();
+        assert!(message.contains("encoded by DELTA_LENGTH_BYTE_ARRAY"), "{message}");
     }
 
     /// Opens a file of two rows with columns of these types. The second row is null in columns that
@@ -458,6 +420,10 @@ mod tests {
                 ColumnWriter::FloatColumnWriter(column) => write!(column, 0.5),
                 ColumnWriter::DoubleColumnWriter(column) => write!(column, 0.5),
                 ColumnWriter::ByteArrayColumnWriter(column) => write!(column, "word".into()),
+                ColumnWriter::FixedLenByteArrayColumnWriter(column) => {
+                    let length = column.get_descriptor().type_length() as usize;
+                    write!(column, vec![1; length].into())
+                }
                 _ => unreachable!(),
             };
             column.close().unwrap();
@@ -490,6 +456,7 @@ mod tests {
                 optional boolean j;
                 optional binary k (STRING);
                 required binary l (UTF8);
+                required fixed_len_byte_array(2) m (DECIMAL(4, 1));
             }",
         );
         let batches = rows(&file).unwrap();
@@ -506,6 +473,7 @@ mod tests {
         };
         assert_eq!(words(10), (1, vec![Some("word"), None]));
         assert_eq!(words(11), (1, vec![Some("word"); 2]));
+        assert_eq!(cells::numbers(batch.column(12)).unwrap(), [Some(25.7); 2]);
     }
 
     #[test]
@@ -513,6 +481,7 @@ mod tests {
         for column in [
             "optional int32 x (DATE);",
             "optional int64 x (TIMESTAMP(NANOS, true));",
+            "optional fixed_len_byte_array(17) x (DECIMAL(40, 2));",
             "optional int64 x (TIME(MICROS, true));",
             "optional binary x;",
             "repeated int64 x;",

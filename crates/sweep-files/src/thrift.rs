@@ -1,30 +1,51 @@
 //! Walks structs in Thrift's compact protocol before the Parquet library reads them.
 //!
-//! The library assumes the type of every field that it knows, whatever type the file declares, and
-//! counts through an unknown list of booleans without reading a byte. So this walk follows the
-//! types that the file declares, and refuses a file where these are not the types that the library
-//! assumes. The library then reads the file in the same way as this walk.
+//! Version 60.1 of the library trusts what a file declares (paths in its `src`):
+//!
+//! * `parquet_thrift.rs:508` counts through a list of booleans without reading a byte, 2^31 times
+//!   for each six bytes of a footer or page header: seconds each.
+//! * `schema/types.rs:1535` allocates as many columns as a group declares, 16 GB for a few bytes;
+//!   line 1539 recurses through groups until the stack is full; and line 1380 copies the names of
+//!   all groups around a column for each column.
+//! * `file/serialized_reader.rs:457` allocates the unpacked size that a page header declares, up to
+//!   2 GB; `compression.rs:313` unpacks gzip to its end, whatever the header declares.
+//! * `encodings/decoding.rs:379` allocates as many entries of a dictionary as a page header
+//!   declares; lines 989 and 1120 as many lengths of words as the data of a page declare.
+//!
+//! Lengths of Thrift's lists and of the footer, and compressed sizes, it checks itself.
+//!
+//! The library assumes the type of every field that it knows, whatever type the file declares
+//! (`parquet_macros.rs:389`). So this walk follows the types that the file declares, and refuses a
+//! file where these are not the types that the library assumes. The library then reads the file in
+//! the same way as this walk. `footer` and `pages` decide by the numbers that the walk finds.
 
 use std::ops::RangeInclusive;
 
 /// Greatest depth of nested structs and lists. Basis: Parquet's own have seven levels. Doubling it
 /// accepts deeper files.
-const DEEPEST: usize = 16;
+const MAX_NESTING: usize = 16;
 
-/// Codes of the types of fields, as a file declares them.
+/// The code of a true boolean, as a file declares the type of a field. This code and those below
+/// are Thrift's; Parquet has no other types.
 const TRUE: u8 = 1;
+/// The code of a false boolean.
 const FALSE: u8 = 2;
+/// The code of an integer of one byte.
 const BYTE: u8 = 3;
+/// The code of an integer of 16 bits.
 const I16: u8 = 4;
+/// The code of an integer of 32 bits.
 const I32: u8 = 5;
+/// The code of an integer of 64 bits.
 const I64: u8 = 6;
+/// The code of a float of 64 bits.
 const DOUBLE: u8 = 7;
+/// The code of bytes or a text.
 const BINARY: u8 = 8;
+/// The code of a list.
 const LIST: u8 = 9;
-const SET: u8 = 10;
-const MAP: u8 = 11;
+/// The code of a struct.
 const STRUCT: u8 = 12;
-const UUID: u8 = 13;
 
 /// The type as which the library reads a field.
 #[derive(Clone, Copy)]
@@ -45,7 +66,7 @@ pub(crate) type Shape = &'static [(RangeInclusive<i16>, Wire)];
 /// An item that a walk reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Found {
-    /// An integer, or 1 or 0 for a boolean.
+    /// An integer, 1 or 0 for a boolean, or the length of bytes.
     Number(i64),
     /// The end of a struct.
     End,
@@ -55,8 +76,9 @@ pub(crate) enum Found {
 /// with each number and the path of field numbers that leads to it; elements of a list have the
 /// path of the list.
 ///
-/// Returns `None` if the bytes end too early, a declared type is not that in `shape`, or a
-/// collection holds booleans.
+/// Returns `None` if the bytes end too early, the fields of a struct are not in order, a declared
+/// type is not that in `shape`, a list holds booleans, or a field is a set, a map or a UUID, which
+/// Parquet has not.
 pub(crate) fn walk<'a>(
     bytes: &'a [u8],
     shape: Shape,
@@ -93,16 +115,21 @@ impl Walk<'_, '_> {
         let mut field = 0_i16;
         loop {
             let head = self.byte()?;
-            let (step, declared) = (head >> 4, head & 0xf);
+            let step = head >> 4;
+            let declared = head & 0xf;
             if declared == 0 {
                 (self.found)(&self.path, Found::End);
                 return Some(());
             }
+            let last = field;
             field = match step {
                 // The library truncates field numbers to this type too.
                 0 => self.number()? as i16,
                 step => field.checked_add(i16::from(step))?,
             };
+            if field <= last {
+                return None;
+            }
             let known = shape.and_then(|shape| shape.iter().find(|(at, _)| at.contains(&field)));
             let known = known.map(|(_, kind)| *kind);
             self.path.push(field);
@@ -120,7 +147,7 @@ impl Walk<'_, '_> {
     }
 
     fn value(&mut self, declared: u8, known: Option<Wire>) -> Option<()> {
-        if !known.is_none_or(|kind| kind.is(declared)) || self.depth == DEEPEST {
+        if !known.is_none_or(|kind| kind.is(declared)) || self.depth == MAX_NESTING {
             return None;
         }
         self.depth += 1;
@@ -133,9 +160,10 @@ impl Walk<'_, '_> {
             DOUBLE => self.skip(8)?,
             BINARY => {
                 let length = self.varint()?;
+                (self.found)(&self.path, Found::Number(i64::try_from(length).ok()?));
                 self.skip(length)?;
             }
-            LIST | SET => {
+            LIST => {
                 let head = self.byte()?;
                 let length = if head >> 4 == 0xf { self.varint()? } else { u64::from(head >> 4) };
                 let element = if let Some(Wire::List(kind)) = known { Some(*kind) } else { None };
@@ -143,21 +171,11 @@ impl Walk<'_, '_> {
                     self.value(head & 0xf, element)?;
                 }
             }
-            MAP => {
-                let length = self.varint()?;
-                let kinds = if length > 0 { self.byte()? } else { 0 };
-                for _ in 0..length {
-                    self.value(kinds >> 4, None)?;
-                    self.value(kinds & 0xf, None)?;
-                }
-            }
             STRUCT => {
                 let shape = if let Some(Wire::Struct(shape)) = known { Some(shape) } else { None };
                 self.fields(shape)?;
             }
-            UUID => self.skip(16)?,
-            // Among these are booleans in a collection, which take no bytes by the library's
-            // reading.
+            // Among these are booleans in a list, which take no bytes by the library's reading.
             _ => return None,
         }
         self.depth -= 1;
@@ -240,25 +258,25 @@ mod tests {
             &[0x15, 0x05, 0x06, 0x04, 0xd8, 0x04][..],
             // A list of two structs: true and a text; nothing.
             &[0x19, 0x2c, 0x11, 0x18, 0x02, 7, 7, 0, 0],
-            // Three numbers, and unknown fields: a double, a map, a set, a uuid and a struct.
+            // Three numbers, and unknown fields: a double, a list of texts, and a struct.
             &[0x19, 0x36, 2, 4, 6, 0x17, 1, 2, 3, 4, 5, 6, 7, 8],
-            &[0x1b, 1, 0x85, 1, 9, 2, 0x1a, 0x23, 1, 2, 0x1d],
-            &[0; 16],
-            &[0x1c, 0x15, 8, 0, 0, 99],
+            &[0x19, 0x28, 0, 1, 7, 0x1c, 0x15, 8, 0, 0, 99],
         ]
         .concat();
         let expected = vec![
             (vec![1], Number(-3)),
             (vec![2], Number(300)),
             (vec![3, 1], Number(1)),
+            (vec![3, 2], Number(2)),
             (vec![3], End),
             (vec![3], End),
             (vec![4], Number(1)),
             (vec![4], Number(2)),
             (vec![4], Number(3)),
+            (vec![6], Number(0)),
             (vec![6], Number(1)),
-            (vec![9, 1], Number(4)),
-            (vec![9], End),
+            (vec![7, 1], Number(4)),
+            (vec![7], End),
             (vec![], End),
         ];
         assert_eq!(walked(&bytes), Some((expected, 1)));
@@ -279,12 +297,24 @@ mod tests {
     }
 
     #[test]
-    fn collections_of_booleans_end_the_walk_whatever_length_they_declare() {
+    fn fields_that_are_repeated_or_out_of_order_end_the_walk() {
+        // The library takes the last of them.
+        assert!(walked(&[0x15, 2, 0x15, 2, 0]).is_some());
+        for (field, is_after) in [(3, true), (2, false), (1, false)] {
+            let bytes = [0x25, 2, 0x09, 2 * field, 0x0c, 0];
+            assert_eq!(walked(&bytes).is_some(), is_after, "{field}");
+        }
+    }
+
+    #[test]
+    fn lists_of_booleans_end_the_walk_whatever_length_they_declare() {
         assert!(walked(&[0x59, 0x02, 0]).is_some(), "there is none in it");
+        for other in [0x5a, 0x5b, 0x5d, 0x5e, 0x5f] {
+            assert_eq!(walked(&[&[other], [0; 20].as_slice()].concat()), None, "{other:#x}");
+        }
         for kind in [1, 2] {
             assert_eq!(walked(&[0x59, 0x10 | kind, 1, 0]), None);
             assert_eq!(walked(&[0x59, 0xf0 | kind, 0xff, 0xff, 0xff, 0xff, 7, 0]), None);
-            assert_eq!(walked(&[0x5b, 0xff, 0xff, 0xff, 0xff, 7, 0x10 | kind, 0]), None);
             assert_eq!(walked(&[0x59, 0x19, 0x10 | kind, 1, 0]), None, "in a list");
         }
     }
@@ -292,8 +322,8 @@ mod tests {
     #[test]
     fn structs_and_lists_that_are_nested_too_deeply_end_the_walk() {
         let nested = |depth: usize| [vec![0x5c; depth], vec![0; depth + 1]].concat();
-        assert!(walked(&nested(DEEPEST)).is_some());
-        assert_eq!(walked(&nested(DEEPEST + 1)), None);
+        assert!(walked(&nested(MAX_NESTING)).is_some());
+        assert_eq!(walked(&nested(MAX_NESTING + 1)), None);
         assert_eq!(walked(&[vec![0x59], vec![0x19; 100_000]].concat()), None);
     }
 }

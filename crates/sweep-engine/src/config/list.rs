@@ -24,8 +24,8 @@ use sweep_files::regular;
 
 pub use names::Names;
 
-/// Maximum size of a list, and of a Parquet file's decompressed pages, bytes. Basis: it holds the
-/// maximum number of values. Doubling it doubles the memory of a list.
+/// Maximum size of a list, bytes. Basis: it holds the maximum number of values. Doubling it doubles
+/// the memory of a list.
 const MAX_LIST_BYTES: u64 = 256 << 20;
 /// Maximum number of values of a list. Basis: 160 MB of memory. Doubling it doubles that.
 const MAX_NUMBERS: u64 = 20_000_000;

@@ -1,23 +1,20 @@
-//! Parquet files of numbers. The sizes that a file claims are checked before the library, which
-//! trusts them, reads it.
+//! Parquet files of numbers.
 
-use std::io::Cursor;
 use std::sync::Arc;
 
 use arrow_schema::DataType;
 use bytes::Bytes;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::metadata::ParquetMetaData;
 
 use sweep_files::batches::{self, Batches};
-use sweep_files::pages::{self, Unpacked};
-use sweep_files::{Refused, cells, footer, panics};
+use sweep_files::{cells, footer, panics};
 
 use super::super::section::short;
 use super::names::{Match, Names};
 use super::units::UnitScale;
-use super::{MAX_LIST_BYTES, Unreadable, check_size, is_index};
+use super::{Unreadable, check_size, is_index};
 
 /// The compressions that are read, for a message.
 const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
@@ -44,8 +41,7 @@ pub(super) fn columns(
 }
 
 fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn>, Unreadable> {
-    footer::check(&mut Cursor::new(&bytes)).map_err(refused)?;
-    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(damaged)?;
+    let metadata = footer::metadata(&bytes).map_err(damaged)?;
     let schema = batches::schema(&metadata);
     let fields = schema.fields();
     check_size(0, fields.len())?;
@@ -66,7 +62,7 @@ fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn
             None => columns.push(ParquetColumn { name: header.clone(), header, values: None }),
         }
     }
-    check_sizes(&metadata, &bytes, fields.len())?;
+    check_row_groups(&metadata, fields.len())?;
     let mut rows = 0;
     let fields = known.iter().map(|(_, place, _)| *place).collect();
     let reader = Batches::new(bytes, Arc::new(metadata), &schema, fields);
@@ -101,10 +97,9 @@ fn no_numbers(header: &str, data_type: &DataType) -> Unreadable {
     format!("its column `{}` holds no numbers but {found}", short(header))
 }
 
-/// Rejects a file that would exceed a bound, or could not be decompressed, before it is read.
-fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Result<(), Unreadable> {
+/// Rejects a file of too many rows, or of an unknown compression, before its pages are read.
+fn check_row_groups(metadata: &ParquetMetaData, columns: usize) -> Result<(), Unreadable> {
     let mut rows = 0_u64;
-    let mut unpacked = 0_u64;
     for group in metadata.row_groups() {
         rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
         check_size(rows, columns)?;
@@ -121,25 +116,9 @@ fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Resu
                      read: write it with {READABLE_CODECS}"
                 ));
             }
-            let (start, length) = column.byte_range();
-            if start.checked_add(length).is_none_or(|end| end > bytes.len() as u64) {
-                return Err("it is damaged: a column lies outside of it".to_owned());
-            }
-            let left = MAX_LIST_BYTES - unpacked;
-            let most = Unpacked { total: left, at_once: left };
-            let sizes = pages::unpacked(&mut Cursor::new(bytes), start, length, codec, most);
-            unpacked += sizes.map_err(refused)?.total;
         }
     }
     Ok(())
-}
-
-fn refused(refused: Refused) -> Unreadable {
-    match refused {
-        Refused::Io(error) => error.to_string(),
-        Refused::TooLong => format!("unpacked, it is longer than {} MiB", MAX_LIST_BYTES >> 20),
-        refused => format!("it is damaged: {refused}"),
-    }
 }
 
 fn damaged(error: ParquetError) -> Unreadable {
