@@ -184,11 +184,9 @@ fn friction_has_the_speed_amplitude_of_the_linear_motion() {
     let metrics = "metrics=stop_force,damper_speed";
     let run = test_folder.sweep(&["run", "g.toml", "--set", metrics, "--out", "map.parquet"]);
     assert!(run.status.success(), "{}", all_output(&run));
-    assert!(
-        all_output(&run).contains("friction  0 rows whose linear model"),
-        "{}",
-        all_output(&run)
-    );
+    let summary = all_output(&run);
+    assert!(summary.contains("greatest  friction_speed_off 1"), "{summary}");
+    assert!(!summary.contains(" above 2"), "{summary}");
     let held = ["friction_speed_off >= 1", "friction_speed_off < 1.01"];
     let met = test_folder.sweep(&[&["require", "map.parquet"][..], &held].concat());
     assert_eq!(met.status.code(), Some(0), "{}", all_output(&met));
@@ -216,14 +214,11 @@ fn friction_has_the_speed_amplitude_of_the_linear_motion() {
     let slow = ["--set", "friction_linear_speed_m_per_s=0.02"];
     let given =
         test_folder.sweep(&[&["run", "g.toml", "--out", "given.parquet"], &slow[..]].concat());
-    assert!(
-        all_output(&given).contains("friction  1 rows whose linear model"),
-        "{}",
-        all_output(&given)
-    );
+    assert!(all_output(&given).contains("; 1 row above 2\n"), "{}", all_output(&given));
     let shown = test_folder.sweep(&["show", "given.parquet"]);
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
-    assert!(shown.contains("friction  1 rows whose linear model"), "{shown}");
+    assert!(shown.contains("greatest  friction_speed_off "), "{shown}");
+    assert!(shown.contains("; 1 row above 2\n"), "{shown}");
 }
 
 /// With a given speed amplitude friction may stop the linear model, but not the machine.
@@ -236,11 +231,7 @@ fn a_given_speed_of_friction_is_compared_with_both_motions() {
     let given = ["friction_n=80", "friction_linear_speed_m_per_s=0.02"];
     let words = ["run", "g.toml", "--out", "m.parquet", "--set", given[0], "--set", given[1]];
     let run = test_folder.sweep(&words);
-    assert!(
-        all_output(&run).contains("friction  1 rows whose linear model"),
-        "{}",
-        all_output(&run)
-    );
+    assert!(all_output(&run).contains("; 1 row above 2\n"), "{}", all_output(&run));
     let export = test_folder.sweep(&["export", "m.parquet", "m.csv"]);
     assert!(export.status.success(), "{}", all_output(&export));
     let csv = fs::read_to_string(test_folder.path("m.csv")).expect("it was written");

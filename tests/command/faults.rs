@@ -466,6 +466,12 @@ fn failed_points_are_rows_and_fail_the_run_only_on_request() {
     let run = output(&mut test_folder.run());
     assert_eq!(run.status.code(), Some(0), "{}", all_output(&run));
     assert!(all_output(&run).contains("failed  40 no_equilibrium"), "{}", all_output(&run));
+    // Every command with rows says why.
+    let held = test_folder.sweep(&["stability", "g.toml", "--speed", "100", "--out", "p.parquet"]);
+    for summary in [&run, &held].map(all_output) {
+        assert!(summary.contains("    reason  no_equilibrium at "), "{summary}");
+        assert!(summary.contains("the machine has no stable static equilibrium"), "{summary}");
+    }
     // Rows of an earlier run count too.
     for fresh in [&[] as &[&str], &["--fresh"]] {
         let run = output(test_folder.run().arg("--fail-on-error").args(fresh));
