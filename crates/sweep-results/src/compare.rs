@@ -195,8 +195,8 @@ impl Comparison {
 /// Returns the kind of a file; only files of the same kind are compared.
 fn kind(table: &ResultTable) -> &'static str {
     let is_map = table.column("ratio_max").is_some() && table.column("status").is_some();
-    let other = if is_map { "map" } else { "other" };
-    table.file().kind().map_or(other, FileKind::word)
+    let default_kind = if is_map { "map" } else { "other" };
+    table.file().kind().map_or(default_kind, FileKind::word)
 }
 
 /// Compares the second file with the first.
@@ -225,19 +225,19 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     for (file, names) in keys_by_file.iter().enumerate() {
         for name in names.iter().filter(|name| !keys.contains(name)) {
             let Some(value) = side::single_value(tables[file], name)? else {
-                let which = ["first", "second"][file];
+                let ordinal = ["first", "second"][file];
                 return Err(refuse(format!(
-                    "only the {which} has the axis `{name}`, with several values"
+                    "only the {ordinal} has the axis `{name}`, with several values"
                 )));
             };
             fixed.push((file, name.clone(), value));
         }
     }
     let unmatched_columns = [0, 1].map(|file| {
-        let other = tables[1 - file];
+        let other_table = tables[1 - file];
         let names = tables[file].columns.iter().map(|column| column.name.clone());
         names
-            .filter(|name| other.column(name).is_none() && !keys_by_file[file].contains(name))
+            .filter(|name| other_table.column(name).is_none() && !keys_by_file[file].contains(name))
             .collect::<Vec<_>>()
     });
     let files =
@@ -250,8 +250,8 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     let mut shared: Vec<SharedRow> =
         pairs.iter().map(|&pair| files[0].shared_row(&files[1], pair)).collect();
     let columns = compare_columns(&files, &pairs, &mut shared);
-    let unit = |name: &String| first.column(name).map(|column| column.unit.clone());
-    let key_units = keys.iter().map(|name| unit(name).unwrap_or_default()).collect();
+    let unit_of_key = |name: &String| first.column(name).map(|column| column.unit.clone());
+    let key_units = keys.iter().map(|name| unit_of_key(name).unwrap_or_default()).collect();
     let boundary = if is_boundary {
         boundary::compare_boundaries(first, second)?
     } else {
@@ -288,14 +288,14 @@ fn count_over_estimated(tables: [&ResultTable; 2], shared: &[SharedRow]) -> Opti
 /// Returns the row numbers of matching rows, in the order of the first file. Rows with equal keys
 /// are paired in the order of their files.
 fn match_rows(files: &[ComparedFile; 2]) -> Vec<[usize; 2]> {
-    let mut occurrences = HashMap::new();
+    let mut key_counts = HashMap::new();
     let second_rows: HashMap<_, usize> = (0..files[1].rows)
-        .map(|row| (numbered_key(&files[1], row, &mut occurrences), row))
+        .map(|row| (numbered_key(&files[1], row, &mut key_counts), row))
         .collect();
-    occurrences.clear();
+    key_counts.clear();
     (0..files[0].rows)
         .filter_map(|row| {
-            let key = numbered_key(&files[0], row, &mut occurrences);
+            let key = numbered_key(&files[0], row, &mut key_counts);
             Some([row, *second_rows.get(&key)?])
         })
         .collect()
@@ -305,10 +305,10 @@ fn match_rows(files: &[ComparedFile; 2]) -> Vec<[usize; 2]> {
 fn numbered_key(
     file: &ComparedFile,
     row: usize,
-    occurrences: &mut HashMap<Vec<u64>, usize>,
+    key_counts: &mut HashMap<Vec<u64>, usize>,
 ) -> (Vec<u64>, usize) {
     let key = file.key(row);
-    let count = occurrences.entry(key.clone()).or_default();
+    let count = key_counts.entry(key.clone()).or_default();
     *count += 1;
     (key, *count)
 }
@@ -339,14 +339,16 @@ fn compare_columns(
             row.differs = true;
             // Other writers store NaN where a value is missing.
             let number = |cell: Cell| cell.number().filter(|number| !number.is_nan());
-            let found = ColumnRow { row: index, values: [number(first_cell), number(second_cell)] };
-            if let [Some(first), Some(second)] = found.values {
+            let column_row =
+                ColumnRow { row: index, values: [number(first_cell), number(second_cell)] };
+            if let [Some(first), Some(second)] = column_row.values {
                 change.greatest = change.greatest.max((second - first).abs());
             }
-            let deviation = found.deviation();
+            let deviation = column_row.deviation();
             if deviation > 0.0 && !row.sensitive {
-                let place = change.worst.partition_point(|kept| kept.deviation() >= deviation);
-                change.worst.insert(place, found);
+                let index_in_worst =
+                    change.worst.partition_point(|row_kept| row_kept.deviation() >= deviation);
+                change.worst.insert(index_in_worst, column_row);
                 change.worst.truncate(MAX_WORST);
             }
         }

@@ -119,10 +119,10 @@ impl ExpressionNode {
     pub(crate) fn truth(&self, context: &EvaluationContext<'_>) -> Option<bool> {
         match self {
             Self::Not(node) => node.truth(context).map(|truth| !truth),
-            Self::And(left, right) => and(left.truth(context), right.truth(context)),
+            Self::And(left, right) => conjoin(left.truth(context), right.truth(context)),
             // De Morgan's law holds in three-valued logic too.
             Self::Or(left, right) => {
-                let neither = and(
+                let neither = conjoin(
                     left.truth(context).map(|truth| !truth),
                     right.truth(context).map(|truth| !truth),
                 );
@@ -139,11 +139,11 @@ impl ExpressionNode {
 
 /// Returns the conjunction of two truth values: false if either is false, else unknown if either is
 /// unknown.
-fn and(left: Option<bool>, right: Option<bool>) -> Option<bool> {
-    if left == Some(false) || right == Some(false) {
+fn conjoin(first: Option<bool>, second: Option<bool>) -> Option<bool> {
+    if first == Some(false) || second == Some(false) {
         return Some(false);
     }
-    left.and(right)
+    first.and(second)
 }
 
 /// Returns a cell with a number; a null cell without one, or for NaN.
@@ -176,13 +176,13 @@ impl ComparisonOperator {
 
     /// Compares two cells, whose kinds the parser has made equal.
     fn compare(self, left: &Cell, right: &Cell) -> Option<bool> {
-        let order = match (left, right) {
+        let ordering = match (left, right) {
             (Cell::Number(left), Cell::Number(right)) => left.partial_cmp(right)?,
             (Cell::Text(left), Cell::Text(right)) => left.cmp(right),
             (Cell::Flag(left), Cell::Flag(right)) => left.cmp(right),
             _ => return None,
         };
-        Some((self.0)(order))
+        Some((self.0)(ordering))
     }
 }
 
@@ -295,20 +295,20 @@ impl Accumulator {
 fn quantile(mut numbers: Vec<f64>, probability: f64) -> Option<f64> {
     numbers.sort_by(f64::total_cmp);
     let position = probability * numbers.len().checked_sub(1)? as f64;
-    let below = numbers[position.floor() as usize];
-    let above = numbers[position.ceil() as usize];
-    Some(below + (above - below) * position.fract())
+    let lower = numbers[position.floor() as usize];
+    let upper = numbers[position.ceil() as usize];
+    Some(lower + (upper - lower) * position.fract())
 }
 
-/// Calls `work` for each row that a filter accepts, with the columns of these names.
+/// Calls `visit` for each row that a filter accepts, with the columns of these names.
 ///
 /// # Errors
-/// [`crate::ResultsError::File`], and any error of `work`.
+/// [`crate::ResultsError::File`], and any error of `visit`.
 pub(crate) fn for_each_row(
     table: &ResultTable,
     names: &[&str],
     filter: Option<&Condition>,
-    mut work: impl FnMut(&EvaluationContext<'_>) -> Result<(), ResultsError>,
+    mut visit: impl FnMut(&EvaluationContext<'_>) -> Result<(), ResultsError>,
 ) -> Result<(), ResultsError> {
     let filter_column = names.len();
     let names = [names, &filter.map_or_else(Vec::new, Condition::column_names)].concat();
@@ -317,6 +317,6 @@ pub(crate) fn for_each_row(
             |first_column: usize| EvaluationContext { row, first_column, aggregates: &[] };
         let is_accepted =
             filter.is_none_or(|filter| filter.root.truth(&context(filter_column)) == Some(true));
-        if is_accepted { work(&context(0)) } else { Ok(()) }
+        if is_accepted { visit(&context(0)) } else { Ok(()) }
     })
 }

@@ -41,14 +41,14 @@ pub fn export(
     format: ExportFormat,
     mut output: Output<'_>,
 ) -> Result<(), ResultsError> {
-    let remaining = match format {
+    let last_bytes = match format {
         ExportFormat::Csv => {
             csv::write(table, &mut |text| output.write(text.as_bytes()))?;
             Vec::new()
         }
         ExportFormat::Xlsx => xlsx::encode(table)?,
     };
-    Ok(output.finish(&remaining)?)
+    Ok(output.finish(&last_bytes)?)
 }
 
 /// Returns the names of all columns.

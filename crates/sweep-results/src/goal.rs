@@ -93,10 +93,10 @@ impl Goal {
     /// # Errors
     /// Fails if the batch lacks columns of the expression.
     pub fn slack(&self, batch: &RecordBatch) -> Result<Option<Slack>, ArrowError> {
-        self.least(
+        self.evaluate_rows(
             batch,
             |root, context| root.slack(context),
-            |a, b| if b.part < a.part { b } else { a },
+            |a, b| if b.relative < a.relative { b } else { a },
         )
     }
 
@@ -106,18 +106,18 @@ impl Goal {
     /// # Errors
     /// Fails if the batch lacks columns of the expression.
     pub fn evaluate(&self, batch: &RecordBatch) -> Result<Option<f64>, ArrowError> {
-        let number = |root: &ExpressionNode, context: &EvaluationContext<'_>| {
+        let evaluate_row = |root: &ExpressionNode, context: &EvaluationContext<'_>| {
             if self.is_constraint { root.violation(context) } else { root.value(context).number() }
         };
-        self.least(batch, number, f64::max)
+        self.evaluate_rows(batch, evaluate_row, f64::max)
     }
 
-    /// Evaluates `of` for each row and reduces the results to one; `None` if it has no result for
-    /// one of the rows.
-    fn least<T>(
+    /// Calls `evaluate_row` for each row and reduces the results to one; `None` if it has no result
+    /// for one of the rows.
+    fn evaluate_rows<T>(
         &self,
         batch: &RecordBatch,
-        of: impl Fn(&ExpressionNode, &EvaluationContext<'_>) -> Option<T>,
+        evaluate_row: impl Fn(&ExpressionNode, &EvaluationContext<'_>) -> Option<T>,
         reduce: impl Fn(T, T) -> T,
     ) -> Result<Option<T>, ArrowError> {
         let rows = Rows::from_batch(batch, &self.columns)?;
@@ -132,13 +132,13 @@ impl Goal {
             if result.is_complete { result.value } else { Cell::Null }
         };
         let aggregates: Vec<Cell> = self.expression.aggregates.iter().map(aggregate).collect();
-        let found = |row| {
+        let value_of_row = |row| {
             let context = EvaluationContext { aggregates: &aggregates, ..context(row) };
-            of(&self.expression.root, &context)
+            evaluate_row(&self.expression.root, &context)
         };
-        let rows = if self.expression.by_row { rows.count } else { rows.count.min(1) };
-        let found = (0..rows).map(found).collect::<Option<Vec<T>>>();
-        Ok(found.and_then(|found| found.into_iter().reduce(reduce)))
+        let row_count = if self.expression.by_row { rows.count } else { rows.count.min(1) };
+        let values = (0..row_count).map(value_of_row).collect::<Option<Vec<T>>>();
+        Ok(values.and_then(|values| values.into_iter().reduce(reduce)))
     }
 }
 
@@ -148,7 +148,7 @@ pub struct Slack {
     /// The distance, in the units of the comparison; below 0 beyond the limit.
     pub distance: f64,
     /// The distance, divided by the magnitude of the greater operand.
-    pub part: f64,
+    pub relative: f64,
 }
 
 impl ExpressionNode {
@@ -157,17 +157,17 @@ impl ExpressionNode {
     fn slack(&self, context: &EvaluationContext<'_>) -> Option<Slack> {
         match self {
             Self::And(left, right) | Self::Or(left, right) => {
-                let is_and = matches!(self, Self::And(..));
+                let is_conjunction = matches!(self, Self::And(..));
                 let [left, right] = [left.slack(context)?, right.slack(context)?];
                 // For `and` the nearer limit decides, for `or` the farther one.
-                Some(if (left.part < right.part) == is_and { left } else { right })
+                Some(if (left.relative < right.relative) == is_conjunction { left } else { right })
             }
             Self::Compare(operator, left, right) => {
                 let left = left.value(context).number()?;
                 let right = right.value(context).number()?;
                 let distance = operator.slack(left, right)?;
-                let size = left.abs().max(right.abs()).max(f64::MIN_POSITIVE);
-                Some(Slack { distance, part: distance / size })
+                let magnitude = left.abs().max(right.abs()).max(f64::MIN_POSITIVE);
+                Some(Slack { distance, relative: distance / magnitude })
             }
             _ => None,
         }
@@ -190,7 +190,9 @@ impl ExpressionNode {
                 match (left.value(context).number(), right.value(context).number()) {
                     // The distance of equal operands from a strict comparison is 0, which would
                     // count as no violation.
-                    (Some(l), Some(r)) => operator.violation(l, r).max(f64::MIN_POSITIVE),
+                    (Some(left), Some(right)) => {
+                        operator.violation(left, right).max(f64::MIN_POSITIVE)
+                    }
                     _ => 1.0,
                 }
             }
@@ -242,10 +244,10 @@ mod tests {
             ("share(sound)", Some(0.8), ""),
         ] {
             let goal = parse(text);
-            let found = goal.evaluate(&batch).unwrap();
-            match (found, value) {
-                (Some(found), Some(value)) => assert!((found - value).abs() < 1e-12, "{text}"),
-                _ => assert_eq!(found, value, "{text}"),
+            let result = goal.evaluate(&batch).unwrap();
+            match (result, value) {
+                (Some(result), Some(value)) => assert!((result - value).abs() < 1e-12, "{text}"),
+                _ => assert_eq!(result, value, "{text}"),
             }
             assert_eq!((goal.unit(), goal.is_by_row()), (unit, false), "{text}");
         }
@@ -255,7 +257,7 @@ mod tests {
     #[test]
     fn slack_is_the_distance_of_the_worst_row_from_the_limit() {
         let batch = batch();
-        for (text, distance, part) in [
+        for (text, distance, relative) in [
             ("x_m <= 12.5", 2.5, 0.2),
             ("x_m <= 8", -2.0, -0.2),
             ("x_m > 0.5", 0.5, 0.5),
@@ -263,9 +265,9 @@ mod tests {
             ("max(x_m) <= 12.5 or min(x_m) >= 0.9", 2.5, 0.2),
         ] {
             let goal = Goal::constraint(text, &columns(&batch.schema())).unwrap();
-            let found = goal.slack(&batch).unwrap().unwrap();
-            assert!((found.distance - distance).abs() < 1e-12, "{text}: {found:?}");
-            assert!((found.part - part).abs() < 1e-12, "{text}: {found:?}");
+            let slack = goal.slack(&batch).unwrap().unwrap();
+            assert!((slack.distance - distance).abs() < 1e-12, "{text}: {slack:?}");
+            assert!((slack.relative - relative).abs() < 1e-12, "{text}: {slack:?}");
         }
         for text in ["sound", "y < 9", "x_m != 3", "not (x_m > 12)"] {
             let goal = Goal::constraint(text, &columns(&batch.schema())).unwrap();
@@ -295,14 +297,14 @@ mod tests {
     #[test]
     fn errors_have_positions() {
         let columns = columns(&batch().schema());
-        for (text, at) in [
+        for (text, text_at_error) in [
             ("quantile(x_m)", ")"),
             ("quantile(x_m, 95)", "95"),
             ("quantile(x_m, -1)", "-"),
             ("max(x_m) < 3", "max(x_m) < 3"),
         ] {
             let error = Goal::objective(text, &columns).unwrap_err();
-            assert_eq!(&text[error.span.clone()], at, "{error:?}");
+            assert_eq!(&text[error.span.clone()], text_at_error, "{error:?}");
         }
     }
 }

@@ -15,16 +15,16 @@ where
 {
     let typed: String =
         typed.chars().take(MAX_COMPARED_CHARACTERS).flat_map(char::to_lowercase).collect();
-    let mut nearest = None;
-    let mut greatest = MIN_SIMILARITY;
+    let mut nearest_name = None;
+    let mut greatest_similarity = MIN_SIMILARITY;
     for name in valid {
         let similarity = similarity(&typed, name);
-        if similarity > greatest {
-            greatest = similarity;
-            nearest = Some(name);
+        if similarity > greatest_similarity {
+            greatest_similarity = similarity;
+            nearest_name = Some(name);
         }
     }
-    nearest
+    nearest_name
 }
 
 /// Returns the similarity of a typed name to a valid one, from 0 to 1.
@@ -38,12 +38,12 @@ fn similarity(typed: &str, name: &str) -> f64 {
             return 0.95;
         }
     }
-    let measured = strsim::jaro_winkler(typed, name)
+    let similarity = strsim::jaro_winkler(typed, name)
         .min(strsim::normalized_damerau_levenshtein(typed, name) + 0.45);
     // Both measures are low for a short word with one wrong letter, so that it is counted as
     // similar.
     let has_one_typo = typed.len() >= 3 && strsim::damerau_levenshtein(typed, name) == 1;
-    if has_one_typo { measured.max(0.9) } else { measured }
+    if has_one_typo { similarity.max(0.9) } else { similarity }
 }
 
 #[cfg(test)]
@@ -62,16 +62,19 @@ mod tests {
             "damper_2_friction_n",
             "damper_1_friction_n",
         ];
-        let near = |typed: &str| nearest(typed, valid);
-        assert_eq!(near("unbalance_mas_kg"), Some("unbalance_mass_kg"));
-        assert_eq!(near("Unbalance_Mass_kg"), Some("unbalance_mass_kg"));
-        assert_eq!(near("frame_mass"), Some("frame_mass_kg"));
-        assert_eq!(near("damping"), Some("damping_n_s_per_m"));
-        assert_eq!(near("damper_1_friction"), Some("damper_1_friction_n"));
-        assert_eq!(near("spring_stifness_n_per_m"), Some("spring_stiffness_n_per_m"));
-        assert_eq!([near("rnu"), near("runn"), near("rum")], [Some("run"); 3]);
-        assert_eq!(near("colour"), None);
-        assert_eq!([near(""), near("r"), near("man")], [None; 3]);
-        assert_eq!(near(&"damping".repeat(1000)), None);
+        let nearest_valid = |typed: &str| nearest(typed, valid);
+        assert_eq!(nearest_valid("unbalance_mas_kg"), Some("unbalance_mass_kg"));
+        assert_eq!(nearest_valid("Unbalance_Mass_kg"), Some("unbalance_mass_kg"));
+        assert_eq!(nearest_valid("frame_mass"), Some("frame_mass_kg"));
+        assert_eq!(nearest_valid("damping"), Some("damping_n_s_per_m"));
+        assert_eq!(nearest_valid("damper_1_friction"), Some("damper_1_friction_n"));
+        assert_eq!(nearest_valid("spring_stifness_n_per_m"), Some("spring_stiffness_n_per_m"));
+        assert_eq!(
+            [nearest_valid("rnu"), nearest_valid("runn"), nearest_valid("rum")],
+            [Some("run"); 3]
+        );
+        assert_eq!(nearest_valid("colour"), None);
+        assert_eq!([nearest_valid(""), nearest_valid("r"), nearest_valid("man")], [None; 3]);
+        assert_eq!(nearest_valid(&"damping".repeat(1000)), None);
     }
 }

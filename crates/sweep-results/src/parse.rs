@@ -32,15 +32,15 @@ enum Token {
     Number(f64),
     Word(String),
     Text(String),
-    Sign(&'static str),
+    Symbol(&'static str),
     End,
 }
 
 /// The operators and separators. The first match is taken, so that `<=` stands before `<`.
-const SIGNS: [&str; 13] = ["<=", ">=", "==", "!=", "<", ">", "(", ")", "+", "-", "*", "/", ","];
+const SYMBOLS: [&str; 13] = ["<=", ">=", "==", "!=", "<", ">", "(", ")", "+", "-", "*", "/", ","];
 
 /// Operators of other languages, and the ones to use.
-const FOREIGN: [(&str, &str); 5] =
+const FOREIGN_OPERATORS: [(&str, &str); 5] =
     [("&&", "and"), ("||", "or"), ("!", "not"), ("=", "=="), ("<>", "!=")];
 
 /// The functions: an aggregate, or `None` for a function of single rows.
@@ -80,12 +80,12 @@ const COMPARISONS: [(&str, ComparisonOperator); 6] = [
 type BinaryNode = fn(Box<ExpressionNode>, Box<ExpressionNode>) -> ExpressionNode;
 
 /// The operators of sums.
-const SUMS: [(&str, BinaryNode); 2] = [
+const SUM_OPERATORS: [(&str, BinaryNode); 2] = [
     ("+", |left, right| ExpressionNode::Binary(|a, b| a + b, left, right)),
     ("-", |left, right| ExpressionNode::Binary(|a, b| a - b, left, right)),
 ];
 /// The operators of products.
-const PRODUCTS: [(&str, BinaryNode); 2] = [
+const PRODUCT_OPERATORS: [(&str, BinaryNode); 2] = [
     ("*", |left, right| ExpressionNode::Binary(|a, b| a * b, left, right)),
     ("/", |left, right| ExpressionNode::Binary(|a, b| a / b, left, right)),
 ];
@@ -105,62 +105,75 @@ fn tokenize(text: &str) -> Result<Vec<SpannedToken>, ExpressionError> {
         let expected = format!("expected at most {MAX_TEXT_BYTES} characters");
         return error_at("the expression is too long", 0..MAX_TEXT_BYTES.min(1), expected);
     }
-    let mut found = Vec::new();
-    let mut at = 0;
-    while let Some(first) = text[at..].chars().next() {
-        let rest = &text[at..];
+    let mut tokens = Vec::new();
+    let mut offset = 0;
+    while let Some(first) = text[offset..].chars().next() {
+        let remaining = &text[offset..];
         let (token, length) = if first.is_whitespace() {
-            at += first.len_utf8();
+            offset += first.len_utf8();
             continue;
         } else if first.is_ascii_digit() || first == '.' {
-            let length = number_length(rest);
-            let number = rest[..length].parse::<f64>().ok().filter(|number| number.is_finite());
+            let length = number_length(remaining);
+            let number =
+                remaining[..length].parse::<f64>().ok().filter(|number| number.is_finite());
             let Some(number) = number else {
-                let title = format!("`{}` is not a number", &rest[..length]);
-                return error_at(title, at..at + length, "expected a number such as 1.5 or 2e-3");
+                let title = format!("`{}` is not a number", &remaining[..length]);
+                return error_at(
+                    title,
+                    offset..offset + length,
+                    "expected a number such as 1.5 or 2e-3",
+                );
             };
             (Token::Number(number), length)
         } else if first.is_alphabetic() || first == '_' {
-            let ends = |c: char| !(c.is_alphanumeric() || c == '_');
-            let length = rest.find(ends).unwrap_or(rest.len());
-            (Token::Word(rest[..length].to_owned()), length)
+            let is_end_of_word = |letter: char| !(letter.is_alphanumeric() || letter == '_');
+            let length = remaining.find(is_end_of_word).unwrap_or(remaining.len());
+            (Token::Word(remaining[..length].to_owned()), length)
         } else if first == '"' || first == '\'' {
-            let Some(end) = rest[1..].find(first) else {
-                let span = at..text.len();
+            let Some(quote_length) = remaining[1..].find(first) else {
+                let span = offset..text.len();
                 return error_at(
                     "a text without an end",
                     span,
                     format!("expected a closing {first}"),
                 );
             };
-            (Token::Text(rest[1..=end].to_owned()), end + 2)
-        } else if let Some((foreign, own)) = FOREIGN.iter().find(|(foreign, _)| {
-            rest.starts_with(foreign) && !(rest.starts_with("==") || rest.starts_with("!="))
-        }) {
+            (Token::Text(remaining[1..=quote_length].to_owned()), quote_length + 2)
+        } else if let Some((foreign, replacement)) =
+            FOREIGN_OPERATORS.iter().find(|(foreign, _)| {
+                remaining.starts_with(foreign)
+                    && !(remaining.starts_with("==") || remaining.starts_with("!="))
+            })
+        {
             let title = format!("`{foreign}` is not part of an expression");
-            return error_at(title, at..at + foreign.len(), format!("expected `{own}`"));
-        } else if let Some(sign) = SIGNS.iter().find(|sign| rest.starts_with(*sign)) {
-            (Token::Sign(sign), sign.len())
+            return error_at(
+                title,
+                offset..offset + foreign.len(),
+                format!("expected `{replacement}`"),
+            );
+        } else if let Some(symbol) = SYMBOLS.iter().find(|symbol| remaining.starts_with(*symbol)) {
+            (Token::Symbol(symbol), symbol.len())
         } else {
             let title = format!("`{first}` is not part of an expression");
             let expected = "expected columns, numbers, `<`, `and`, ...";
-            return error_at(title, at..at + first.len_utf8(), expected);
+            return error_at(title, offset..offset + first.len_utf8(), expected);
         };
-        found.push((token, at..at + length));
-        at += length;
+        tokens.push((token, offset..offset + length));
+        offset += length;
     }
-    found.push((Token::End, text.len()..text.len()));
-    Ok(found)
+    tokens.push((Token::End, text.len()..text.len()));
+    Ok(tokens)
 }
 
 /// Returns the length of the number at the beginning of a text. All characters count that cannot
 /// begin another token, so that `1.5.2` and `2kg` are each one invalid number.
 fn number_length(text: &str) -> usize {
     let mut previous = ' ';
-    text.find(|c: char| {
-        let is_exponent_sign = matches!(c, '+' | '-') && matches!(previous, 'e' | 'E');
-        let continues = c.is_alphanumeric() || c == '.' || c == '_' || is_exponent_sign;
-        previous = c;
+    text.find(|letter: char| {
+        let is_exponent_sign = matches!(letter, '+' | '-') && matches!(previous, 'e' | 'E');
+        let continues =
+            letter.is_alphanumeric() || letter == '.' || letter == '_' || is_exponent_sign;
+        previous = letter;
         !continues
     })
     .unwrap_or(text.len())
@@ -180,22 +193,22 @@ impl Condition {
     pub fn conjuncts(&self) -> Vec<&str> {
         let Ok(tokens) = tokenize(&self.text) else { return vec![&self.text] };
         let mut depth = 0_usize;
-        let mut parts = Vec::new();
+        let mut conjuncts = Vec::new();
         let mut start = 0;
         for (token, span) in tokens {
             match token {
-                Token::Sign("(") => depth += 1,
-                Token::Sign(")") => depth = depth.saturating_sub(1),
+                Token::Symbol("(") => depth += 1,
+                Token::Symbol(")") => depth = depth.saturating_sub(1),
                 Token::Word(word) if depth == 0 && word == "or" => return vec![&self.text],
                 Token::Word(word) if depth == 0 && word == "and" => {
-                    parts.push(self.text[start..span.start].trim());
+                    conjuncts.push(self.text[start..span.start].trim());
                     start = span.end;
                 }
                 _ => {}
             }
         }
-        parts.push(self.text[start..].trim());
-        parts
+        conjuncts.push(self.text[start..].trim());
+        conjuncts
     }
 }
 
@@ -203,10 +216,10 @@ impl Condition {
 struct Parser<'a> {
     tokens: Vec<SpannedToken>,
     /// The index of the next token.
-    next: usize,
+    next_index: usize,
     columns: &'a [Column],
     /// The names of the columns read so far.
-    used: Vec<String>,
+    used_columns: Vec<String>,
     aggregates: Vec<(Aggregate, ExpressionNode)>,
     by_row: bool,
     in_aggregate: bool,
@@ -217,30 +230,30 @@ struct Parser<'a> {
 pub(crate) fn parse_expression(
     text: &str,
     columns: &[Column],
-    wanted: CellKind,
+    expected_kind: CellKind,
 ) -> Result<Condition, ExpressionError> {
     let mut parser = Parser { tokens: tokenize(text)?, columns, ..Parser::default() };
-    let root = parser.disjunction()?;
+    let root = parser.parse_disjunction()?;
     let (token, span) = parser.peek().clone();
     if token != Token::End {
         let expected = "expected `and`, `or`, a comparison, or the end";
         return error_at("the expression goes on after its end", span, expected);
     }
-    if root.kind != wanted {
-        let (not, expected) = match wanted {
+    if root.kind != expected_kind {
+        let (objection, expected) = match expected_kind {
             CellKind::Flag => {
                 ("neither holds nor fails", "expected a comparison, as in `ratio_max < 1.5`")
             }
             _ => ("cannot be minimised", "expected a number, as in `max(ratio_max)`"),
         };
-        let title = format!("the expression is {}, which {not}", root.kind.name());
+        let title = format!("the expression is {}, which {objection}", root.kind.name());
         return error_at(title, root.span, expected);
     }
-    let Parser { used, aggregates, by_row, .. } = parser;
+    let Parser { used_columns, aggregates, by_row, .. } = parser;
     let by_row = by_row || aggregates.is_empty();
     Ok(Condition {
         text: text.trim().to_owned(),
-        columns: used,
+        columns: used_columns,
         root: root.node,
         aggregates,
         by_row,
@@ -249,55 +262,63 @@ pub(crate) fn parse_expression(
 
 impl Parser<'_> {
     fn peek(&self) -> &SpannedToken {
-        &self.tokens[self.next.min(self.tokens.len() - 1)]
+        &self.tokens[self.next_index.min(self.tokens.len() - 1)]
     }
 
     fn next_token(&mut self) -> SpannedToken {
         let token = self.peek().clone();
-        self.next += 1;
+        self.next_index += 1;
         token
     }
 
-    fn accepts_word(&mut self, word: &'static str) -> bool {
+    fn accept_word(&mut self, word: &'static str) -> bool {
         self.accept_any(&[(word, ())]).is_some()
     }
 
     /// Consumes the next token and returns its name and meaning, if it is one of these.
-    fn accept_any<T: Copy>(&mut self, known: &[(&'static str, T)]) -> Option<(&'static str, T)> {
-        let next = match &self.peek().0 {
+    fn accept_any<T: Copy>(&mut self, names: &[(&'static str, T)]) -> Option<(&'static str, T)> {
+        let next_name = match &self.peek().0 {
             Token::Word(word) => word.as_str(),
-            Token::Sign(sign) => sign,
+            Token::Symbol(symbol) => symbol,
             _ => return None,
         };
-        let found = known.iter().find(|(name, _)| *name == next).copied()?;
-        self.next += 1;
-        Some(found)
+        let accepted = names.iter().find(|(name, _)| *name == next_name).copied()?;
+        self.next_index += 1;
+        Some(accepted)
     }
 
-    fn disjunction(&mut self) -> ParseResult {
-        self.binary_operators(Self::conjunction, CellKind::Flag, &[("or", ExpressionNode::Or)])
+    fn parse_disjunction(&mut self) -> ParseResult {
+        self.parse_binary_operators(
+            Self::parse_conjunction,
+            CellKind::Flag,
+            &[("or", ExpressionNode::Or)],
+        )
     }
 
-    fn conjunction(&mut self) -> ParseResult {
-        self.binary_operators(Self::negation, CellKind::Flag, &[("and", ExpressionNode::And)])
+    fn parse_conjunction(&mut self) -> ParseResult {
+        self.parse_binary_operators(
+            Self::parse_negation,
+            CellKind::Flag,
+            &[("and", ExpressionNode::And)],
+        )
     }
 
     /// Parses operands of one type, joined by left-associative operators of that type.
-    fn binary_operators(
+    fn parse_binary_operators(
         &mut self,
         operand: fn(&mut Self) -> ParseResult,
         kind: CellKind,
-        known: &[(&'static str, BinaryNode)],
+        operators: &[(&'static str, BinaryNode)],
     ) -> ParseResult {
         let mut left = operand(self)?;
-        while let Some((word, node)) = self.accept_any(known) {
+        while let Some((word, node)) = self.accept_any(operators) {
             let right = operand(self)?;
             let rule = match kind {
                 CellKind::Flag => format!("`{word}` joins what is true or false"),
                 _ => "only numbers are calculated with".to_owned(),
             };
-            for side in [&left, &right] {
-                expect(side, kind, &rule)?;
+            for operand_node in [&left, &right] {
+                expect_kind(operand_node, kind, &rule)?;
             }
             let span = left.span.start..right.span.end;
             left = TypedNode { node: node(Box::new(left.node), Box::new(right.node)), kind, span };
@@ -305,13 +326,13 @@ impl Parser<'_> {
         Ok(left)
     }
 
-    fn negation(&mut self) -> ParseResult {
+    fn parse_negation(&mut self) -> ParseResult {
         let start = self.peek().1.start;
-        if !self.accepts_word("not") {
-            return self.comparison();
+        if !self.accept_word("not") {
+            return self.parse_comparison();
         }
-        let inner = self.nested(Self::negation)?;
-        expect(&inner, CellKind::Flag, "`not` turns true into false")?;
+        let inner = self.parse_nested(Self::parse_negation)?;
+        expect_kind(&inner, CellKind::Flag, "`not` turns true into false")?;
         let span = start..inner.span.end;
         Ok(TypedNode {
             node: ExpressionNode::Not(Box::new(inner.node)),
@@ -320,21 +341,21 @@ impl Parser<'_> {
         })
     }
 
-    fn comparison(&mut self) -> ParseResult {
-        let left = self.sum()?;
-        if self.accepts_word("is") {
-            let negated = self.accepts_word("not");
-            let end = self.peek().1.clone();
-            if !self.accepts_word("null") {
-                return error_at("`is` asks for null", end, "expected `null` or `not null`");
+    fn parse_comparison(&mut self) -> ParseResult {
+        let left = self.parse_sum()?;
+        if self.accept_word("is") {
+            let is_negated = self.accept_word("not");
+            let null_span = self.peek().1.clone();
+            if !self.accept_word("null") {
+                return error_at("`is` asks for null", null_span, "expected `null` or `not null`");
             }
-            let span = left.span.start..end.end;
+            let span = left.span.start..null_span.end;
             let node = ExpressionNode::IsNull(Box::new(left.node));
-            let node = if negated { ExpressionNode::Not(Box::new(node)) } else { node };
+            let node = if is_negated { ExpressionNode::Not(Box::new(node)) } else { node };
             return Ok(TypedNode { node, kind: CellKind::Flag, span });
         }
         let Some((_, comparison)) = self.accept_any(&COMPARISONS) else { return Ok(left) };
-        let right = self.sum()?;
+        let right = self.parse_sum()?;
         if left.kind != right.kind {
             let title = format!("{} is compared with {}", left.kind.name(), right.kind.name());
             let expected = match left.kind {
@@ -343,57 +364,59 @@ impl Parser<'_> {
             };
             return error_at(title, right.span, expected);
         }
-        let second = self.peek().1.clone();
+        let second_span = self.peek().1.clone();
         if self.accept_any(&COMPARISONS).is_some() {
             let expected = "expected `and`: write `a < x and x < b`";
-            return error_at("a comparison of three values", second, expected);
+            return error_at("a comparison of three values", second_span, expected);
         }
         let span = left.span.start..right.span.end;
         let node = ExpressionNode::Compare(comparison, Box::new(left.node), Box::new(right.node));
         Ok(TypedNode { node, kind: CellKind::Flag, span })
     }
 
-    fn sum(&mut self) -> ParseResult {
-        self.binary_operators(Self::product, CellKind::Number, &SUMS)
+    fn parse_sum(&mut self) -> ParseResult {
+        self.parse_binary_operators(Self::parse_product, CellKind::Number, &SUM_OPERATORS)
     }
 
-    fn product(&mut self) -> ParseResult {
-        self.binary_operators(Self::factor, CellKind::Number, &PRODUCTS)
+    fn parse_product(&mut self) -> ParseResult {
+        self.parse_binary_operators(Self::parse_factor, CellKind::Number, &PRODUCT_OPERATORS)
     }
 
-    fn factor(&mut self) -> ParseResult {
+    fn parse_factor(&mut self) -> ParseResult {
         let (token, span) = self.next_token();
-        let typed = |node, kind| Ok(TypedNode { node, kind, span: span.clone() });
+        let typed_node = |node, kind| Ok(TypedNode { node, kind, span: span.clone() });
         match token {
             Token::Number(number) => {
-                typed(ExpressionNode::Literal(Cell::Number(number)), CellKind::Number)
+                typed_node(ExpressionNode::Literal(Cell::Number(number)), CellKind::Number)
             }
-            Token::Text(text) => typed(ExpressionNode::Literal(Cell::Text(text)), CellKind::Text),
-            Token::Sign("-") => {
-                let inner = self.nested(Self::factor)?;
-                expect(&inner, CellKind::Number, "only a number has a sign")?;
+            Token::Text(text) => {
+                typed_node(ExpressionNode::Literal(Cell::Text(text)), CellKind::Text)
+            }
+            Token::Symbol("-") => {
+                let inner = self.parse_nested(Self::parse_factor)?;
+                expect_kind(&inner, CellKind::Number, "only a number has a sign")?;
                 let span = span.start..inner.span.end;
                 let node = ExpressionNode::Unary(|number| -number, Box::new(inner.node));
                 Ok(TypedNode { node, kind: CellKind::Number, span })
             }
-            Token::Sign("(") => {
-                let inner = self.nested(Self::disjunction)?;
-                let end = self.closing_parenthesis()?;
+            Token::Symbol("(") => {
+                let inner = self.parse_nested(Self::parse_disjunction)?;
+                let end = self.accept_closing_parenthesis()?;
                 Ok(TypedNode { span: span.start..end, ..inner })
             }
             Token::Word(word) if word == "true" || word == "false" => {
-                typed(ExpressionNode::Literal(Cell::Flag(word == "true")), CellKind::Flag)
+                typed_node(ExpressionNode::Literal(Cell::Flag(word == "true")), CellKind::Flag)
             }
-            Token::Word(word) if self.peek().0 == Token::Sign("(") => {
+            Token::Word(word) if self.peek().0 == Token::Symbol("(") => {
                 match FUNCTIONS.iter().find(|(name, _)| *name == word) {
-                    Some((name, aggregate)) => self.function(name, *aggregate, span),
-                    None => unknown_function(word, span),
+                    Some((name, aggregate)) => self.parse_function(name, *aggregate, span),
+                    None => unknown_function_error(word, span),
                 }
             }
-            Token::Word(word) => self.column(&word, span),
-            Token::Sign(_) | Token::End => {
+            Token::Word(word) => self.parse_column(&word, span),
+            Token::Symbol(_) | Token::End => {
                 let title = match token {
-                    Token::Sign(sign) => format!("`{sign}` where a value should be"),
+                    Token::Symbol(symbol) => format!("`{symbol}` where a value should be"),
                     _ => "the expression ends too early".to_owned(),
                 };
                 error_at(title, span, "expected a column, a number or `(`")
@@ -401,7 +424,7 @@ impl Parser<'_> {
         }
     }
 
-    fn column(&mut self, word: &str, span: Range<usize>) -> ParseResult {
+    fn parse_column(&mut self, word: &str, span: Range<usize>) -> ParseResult {
         let Some(column) = self.columns.iter().find(|column| column.name == word) else {
             let names = self.columns.iter().map(|column| column.name.clone());
             let names = names.chain(FUNCTIONS.map(|(name, _)| name.to_owned())).collect();
@@ -413,39 +436,39 @@ impl Parser<'_> {
             });
         };
         self.by_row |= !self.in_aggregate;
-        let known = self.used.iter().position(|used| used == word);
-        let place = known.unwrap_or_else(|| {
-            self.used.push(word.to_owned());
-            self.used.len() - 1
+        let known_index = self.used_columns.iter().position(|used_column| used_column == word);
+        let index = known_index.unwrap_or_else(|| {
+            self.used_columns.push(word.to_owned());
+            self.used_columns.len() - 1
         });
-        Ok(TypedNode { node: ExpressionNode::Column(place), kind: column.kind, span })
+        Ok(TypedNode { node: ExpressionNode::Column(index), kind: column.kind, span })
     }
 
-    fn function(
+    fn parse_function(
         &mut self,
         word: &str,
         mut aggregate: Option<Aggregate>,
         span: Range<usize>,
     ) -> ParseResult {
-        self.next += 1;
+        self.next_index += 1;
         if aggregate.is_some() && self.in_aggregate {
             let title = format!("`{word}` within another function over all rows");
             return error_at(title, span, "expected a value of single rows");
         }
-        let outer = self.in_aggregate;
+        let was_in_aggregate = self.in_aggregate;
         self.in_aggregate |= aggregate.is_some();
-        let inner = self.nested(Self::disjunction);
-        self.in_aggregate = outer;
+        let inner = self.parse_nested(Self::parse_disjunction);
+        self.in_aggregate = was_in_aggregate;
         let inner = inner?;
         if let Some(Aggregate::Quantile(probability)) = &mut aggregate {
-            *probability = self.probability()?;
+            *probability = self.parse_probability()?;
         }
-        let end = self.closing_parenthesis()?;
-        let wanted = match aggregate {
+        let end = self.accept_closing_parenthesis()?;
+        let expected_kind = match aggregate {
             Some(Aggregate::Count | Aggregate::Share) => CellKind::Flag,
             _ => CellKind::Number,
         };
-        expect(&inner, wanted, &format!("`{word}` takes {}", wanted.name()))?;
+        expect_kind(&inner, expected_kind, &format!("`{word}` takes {}", expected_kind.name()))?;
         let node = match aggregate {
             Some(aggregate) => {
                 self.aggregates.push((aggregate, inner.node));
@@ -457,10 +480,10 @@ impl Parser<'_> {
     }
 
     /// Parses the probability of a quantile.
-    fn probability(&mut self) -> Result<f64, ExpressionError> {
+    fn parse_probability(&mut self) -> Result<f64, ExpressionError> {
         let expected = "expected a comma and a number from 0 to 1, as in `quantile(x, 0.95)`";
-        let (sign, span) = self.next_token();
-        if sign != Token::Sign(",") {
+        let (comma, span) = self.next_token();
+        if comma != Token::Symbol(",") {
             return error_at("`quantile` takes a number and a part of all rows", span, expected);
         }
         match self.next_token() {
@@ -479,16 +502,16 @@ impl Parser<'_> {
     }
 
     /// Consumes a closing parenthesis and returns its end.
-    fn closing_parenthesis(&mut self) -> Result<usize, ExpressionError> {
+    fn accept_closing_parenthesis(&mut self) -> Result<usize, ExpressionError> {
         let (token, span) = self.next_token();
-        if token == Token::Sign(")") {
+        if token == Token::Symbol(")") {
             return Ok(span.end);
         }
         error_at("a parenthesis without an end", span, "expected `)`")
     }
 
     /// Parses a nested expression, up to the greatest depth.
-    fn nested(&mut self, parse: fn(&mut Self) -> ParseResult) -> ParseResult {
+    fn parse_nested(&mut self, parse: fn(&mut Self) -> ParseResult) -> ParseResult {
         if self.depth == MAX_DEPTH {
             let span = self.peek().1.clone();
             let expected = format!("expected at most {MAX_DEPTH} levels");
@@ -501,7 +524,7 @@ impl Parser<'_> {
     }
 }
 
-fn unknown_function(word: String, span: Range<usize>) -> ParseResult {
+fn unknown_function_error(word: String, span: Range<usize>) -> ParseResult {
     let names = FUNCTIONS.map(|(name, _)| name.to_owned());
     Err(ExpressionError {
         title: format!("unknown function `{word}`"),
@@ -512,12 +535,16 @@ fn unknown_function(word: String, span: Range<usize>) -> ParseResult {
 }
 
 /// Returns an error that states a rule if a node has another type than the wanted one.
-fn expect(found: &TypedNode, wanted: CellKind, rule: &str) -> Result<(), ExpressionError> {
-    if found.kind == wanted {
+fn expect_kind(
+    node: &TypedNode,
+    expected_kind: CellKind,
+    rule: &str,
+) -> Result<(), ExpressionError> {
+    if node.kind == expected_kind {
         return Ok(());
     }
-    let expected = format!("expected {}, found {}", wanted.name(), found.kind.name());
-    error_at(rule, found.span.clone(), expected)
+    let expected = format!("expected {}, found {}", expected_kind.name(), node.kind.name());
+    error_at(rule, node.span.clone(), expected)
 }
 
 #[cfg(test)]
@@ -529,13 +556,13 @@ mod tests {
     fn parse_error(text: &str) -> (String, String) {
         let table = sample::table();
         let error = Condition::parse(text, &table).unwrap_err();
-        let at = text.get(error.span.clone()).unwrap_or("").to_owned();
-        (at, format!("{}: {}", error.title, error.expected))
+        let text_at_error = text.get(error.span.clone()).unwrap_or("").to_owned();
+        (text_at_error, format!("{}: {}", error.title, error.expected))
     }
 
     #[test]
     fn errors_have_positions_and_reasons() {
-        for (text, at, part) in [
+        for (text, text_at_error, message_part) in [
             ("ratio_mx < 1.5", "ratio_mx", "unknown column `ratio_mx`"),
             ("sqrt(ratio_max) > 0", "sqrt", "unknown function `sqrt`: expected one of abs, count"),
             ("ratio_max = 1.5", "=", "expected `==`"),
@@ -561,9 +588,9 @@ mod tests {
             ("quantile(ratio_max, 95) < 1", "95", "0.95 for 95 %"),
             ("", "", "ends too early"),
         ] {
-            let (found, message) = parse_error(text);
-            assert_eq!(found, at, "{text}: {message}");
-            assert!(message.contains(part), "{text}: {message}");
+            let (text_found, message) = parse_error(text);
+            assert_eq!(text_found, text_at_error, "{text}: {message}");
+            assert!(message.contains(message_part), "{text}: {message}");
         }
         let deep = format!("{}reliable{}", "(".repeat(100), ")".repeat(100));
         assert!(parse_error(&deep).1.contains("too deeply"));

@@ -62,10 +62,10 @@ pub fn check(
     max_offenders: usize,
 ) -> Result<Checked, ResultsError> {
     let results = condition.aggregate(table, filter)?;
-    let known_value = |result: &AggregateValue| {
+    let value_or_null = |result: &AggregateValue| {
         if result.is_complete || allow_null { result.value.clone() } else { Cell::Null }
     };
-    let aggregates: Vec<Cell> = results.iter().map(known_value).collect();
+    let aggregates: Vec<Cell> = results.iter().map(value_or_null).collect();
     let mut checked = Checked {
         expression: condition.text.clone(),
         by_row: condition.by_row,
@@ -74,9 +74,12 @@ pub fn check(
         folded: results.into_iter().map(|result| result.value).collect(),
         ..Checked::default()
     };
-    let worse = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
-    let order = condition.columns.iter().enumerate().find_map(worse);
-    let mut offenders = WorstRows::new(order.map(|(_, worse)| worse), max_offenders);
+    let index_and_direction = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
+    let order_column = condition.columns.iter().enumerate().find_map(index_and_direction);
+    let mut offenders = WorstRows::new(
+        order_column.map(|(_, index_and_direction)| index_and_direction),
+        max_offenders,
+    );
     let mut truth_of_file = None;
     let key_columns = table.places();
     let names = [&condition.column_names()[..], &key_columns].concat();
@@ -96,11 +99,12 @@ pub fn check(
         if allow_null && truth.is_none() {
             return Ok(());
         }
-        let value = order.and_then(|(column, _)| context.row.cell(column).number());
+        let value = order_column.and_then(|(column, _)| context.row.cell(column).number());
         offenders.insert(value, || {
-            let first_key = condition.columns.len();
-            let others = (0..first_key).filter(|&column| !key_columns.contains(&names[column]));
-            let columns = (first_key..names.len()).chain(others);
+            let first_key_column = condition.columns.len();
+            let other_columns =
+                (0..first_key_column).filter(|&column| !key_columns.contains(&names[column]));
+            let columns = (first_key_column..names.len()).chain(other_columns);
             let cells = columns
                 .map(|column| (names[column].to_owned(), context.row.cell(column)))
                 .collect();
@@ -137,7 +141,10 @@ mod tests {
         let result = checked("ratio_max < 2", None, false);
         assert!(!result.holds && result.by_row);
         assert_eq!((result.rows, result.failing, result.undefined), (6, 2, 1));
-        assert_eq!(result.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [2, 3, 4]);
+        assert_eq!(
+            result.offenders.iter().map(|offender| offender.row).collect::<Vec<_>>(),
+            [2, 3, 4]
+        );
         let first = &result.offenders[0];
         let names: Vec<&str> = first.cells.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["point", "unbalance_mass_kg", "damping_n_s_per_m", "ratio_max"]);
@@ -151,7 +158,10 @@ mod tests {
         // The gaps are 0.009, 0.0085, 0.0075, null, 0.006, 0.0088 m.
         let result = checked("min_gap_nonlinear_m > 0.0089", None, false);
         assert_eq!((result.failing, result.undefined), (4, 1));
-        assert_eq!(result.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [4, 2, 1]);
+        assert_eq!(
+            result.offenders.iter().map(|offender| offender.row).collect::<Vec<_>>(),
+            [4, 2, 1]
+        );
     }
 
     #[test]
@@ -193,9 +203,9 @@ mod tests {
             assert!(!result.by_row);
             assert_eq!(result.holds, holds, "{text}: {result:?}");
         }
-        let mixed = checked("ratio_max <= max(ratio_max)", None, true);
-        assert!(mixed.holds && mixed.by_row);
-        assert_eq!(mixed.folded, [Cell::Number(4.0)]);
+        let by_row_with_aggregate = checked("ratio_max <= max(ratio_max)", None, true);
+        assert!(by_row_with_aggregate.holds && by_row_with_aggregate.by_row);
+        assert_eq!(by_row_with_aggregate.folded, [Cell::Number(4.0)]);
         let filtered = checked("max(ratio_max) == 2.5", Some("not sensitive"), true);
         assert!(filtered.holds, "{filtered:?}");
     }
@@ -210,7 +220,7 @@ mod tests {
     #[test]
     fn a_conjunction_is_split_at_its_outermost_ands() {
         let table = sample::table();
-        for (text, parts) in [
+        for (text, conjuncts) in [
             ("ratio_max < 2", &["ratio_max < 2"][..]),
             ("ratio_max < 2 and reliable", &["ratio_max < 2", "reliable"]),
             (
@@ -222,9 +232,9 @@ mod tests {
             ("status == ' and ' and reliable", &["status == ' and '", "reliable"]),
         ] {
             let condition = Condition::parse(text, &table).unwrap();
-            assert_eq!(condition.conjuncts(), parts);
-            for part in condition.conjuncts() {
-                Condition::parse(part, &table).unwrap();
+            assert_eq!(condition.conjuncts(), conjuncts);
+            for conjunct in condition.conjuncts() {
+                Condition::parse(conjunct, &table).unwrap();
             }
         }
     }
@@ -270,7 +280,7 @@ mod tests {
         assert!(checked("max(ratio_max) < 9 or count(true) == 6", None, false).holds);
         assert!(checked("share(status == \"ok\") > 0.8", None, false).holds);
         // An aggregate of no values is unknown even with --allow-null.
-        let nothing = checked("max(ratio_max) < 9", Some("ratio_max is null"), true);
-        assert!(!nothing.holds && nothing.folded_rows == [0], "{nothing:?}");
+        let without_values = checked("max(ratio_max) < 9", Some("ratio_max is null"), true);
+        assert!(!without_values.holds && without_values.folded_rows == [0], "{without_values:?}");
     }
 }

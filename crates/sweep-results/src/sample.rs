@@ -70,12 +70,12 @@ pub(crate) fn plan() -> Value {
 /// Returns the columns of a map of two masses by three dampings.
 pub(crate) fn map(ratios: &[Option<f64>]) -> Vec<ColumnData> {
     let rows = ratios.len();
-    let masses: Vec<_> = (0..rows).map(|i| Some(if i < 3 { 0.1 } else { 0.2 })).collect();
-    let dampings: Vec<_> = (0..rows).map(|i| Some(60.0 + 10.0 * (i % 3) as f64)).collect();
+    let masses: Vec<_> = (0..rows).map(|row| Some(if row < 3 { 0.1 } else { 0.2 })).collect();
+    let dampings: Vec<_> = (0..rows).map(|row| Some(60.0 + 10.0 * (row % 3) as f64)).collect();
     let reliable: Vec<_> = ratios.iter().map(|ratio| ratio.map(|ratio| ratio < 2.0)).collect();
     let status: Vec<_> =
         ratios.iter().map(|ratio| if ratio.is_some() { "ok" } else { "diverged" }).collect();
-    let sensitive: Vec<_> = (0..rows).map(|i| Some(i == 4)).collect();
+    let sensitive: Vec<_> = (0..rows).map(|row| Some(row == 4)).collect();
     let gaps: Vec<_> = ratios.iter().map(|ratio| ratio.map(|ratio| 0.01 - ratio * 1e-3)).collect();
     vec![
         ("point", "1", Arc::new(UInt64Array::from_iter_values(0..rows as u64))),

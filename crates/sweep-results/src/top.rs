@@ -22,14 +22,19 @@ pub fn top(
     count: usize,
 ) -> Result<Vec<Vec<Cell>>, ResultsError> {
     let path = table.path().display();
-    let read: Vec<&str> = columns.iter().copied().chain(order.map(|(name, _)| name)).collect();
+    let read_columns: Vec<&str> =
+        columns.iter().copied().chain(order.map(|(name, _)| name)).collect();
     let describe_unknown = |name: &&str| {
-        let near = nearest(name, table.columns.iter().map(|column| column.name.as_str()));
-        let meant = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
-        format!("{path} has no column `{name}`{meant}")
+        let nearest_name = nearest(name, table.columns.iter().map(|column| column.name.as_str()));
+        let suggestion = nearest_name
+            .map_or_else(String::new, |nearest_name| format!("; did you mean `{nearest_name}`?"));
+        format!("{path} has no column `{name}`{suggestion}")
     };
-    let unknown: Vec<String> =
-        read.iter().filter(|name| table.column(name).is_none()).map(describe_unknown).collect();
+    let unknown: Vec<String> = read_columns
+        .iter()
+        .filter(|name| table.column(name).is_none())
+        .map(describe_unknown)
+        .collect();
     if !unknown.is_empty() {
         return Err(ResultsError::Refused(unknown.join("\n")));
     }
@@ -41,7 +46,7 @@ pub fn top(
         )));
     }
     let mut worst = WorstRows::new(order.map(|(_, worse)| worse), count);
-    for_each_row(table, &read, filter, |context| {
+    for_each_row(table, &read_columns, filter, |context| {
         let row = &context.row;
         let value = order.and_then(|_| match row.cell(columns.len()) {
             Cell::Flag(flag) => Some(f64::from(u8::from(flag))),
@@ -113,7 +118,8 @@ mod tests {
 
     #[test]
     fn rows_without_a_value_come_last() {
-        let numbers = |values: &[f64]| values.iter().map(|v| Cell::Number(*v)).collect::<Vec<_>>();
+        let numbers =
+            |values: &[f64]| values.iter().map(|value| Cell::Number(*value)).collect::<Vec<_>>();
         assert_eq!(ratios(None, Worse::Greater, 2), numbers(&[4.0, 2.5]));
         assert_eq!(ratios(None, Worse::Less, 3), numbers(&[1.0, 1.2, 1.5]));
         assert_eq!(ratios(None, Worse::Less, 9).last(), Some(&Cell::Null));

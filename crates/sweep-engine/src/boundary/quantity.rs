@@ -206,7 +206,7 @@ pub fn margin(goal: &Goal, row: &RecordBatch) -> Result<Option<f64>, ArrowError>
     if !goal.is_constraint() {
         return Ok(Some(number));
     }
-    let slack = goal.slack(row)?.map(|slack| slack.part);
+    let slack = goal.slack(row)?.map(|slack| slack.relative);
     // The condition itself decides at its limits, where the slack is 0.
     Ok(Some(match (number == 0.0, slack) {
         (true, slack) => slack.unwrap_or(1.0).max(f64::MIN_POSITIVE),

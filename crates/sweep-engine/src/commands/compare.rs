@@ -277,7 +277,7 @@ fn boundary(moved: &BoundaryShift) -> String {
             format!("{count} along {axis}, none moved out of its bracket")
         }
         (Some(farthest), Some([least, greatest])) => {
-            let place = moved.keys.iter().zip(&farthest.place);
+            let place = moved.keys.iter().zip(&farthest.key_values);
             let place: Vec<String> =
                 place.map(|(name, value)| format!("{name} {}", short(*value))).collect();
             let [from, to] = farthest.bracket.map(|ends| span(ends, short));
@@ -431,7 +431,7 @@ fn to_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
             "mean": moved.mean_range(),
             "certain": moved.count_certain(),
             "crossings": moved.crossings.iter().map(|crossing| json!({
-                "place": crossing.place, "number": crossing.number, "at": crossing.at,
+                "place": crossing.key_values, "number": crossing.number, "at": crossing.positions,
                 "bracket": crossing.bracket,
                 "by": crossing.shift_range(),
                 "at_least": crossing.certain_shift(),

@@ -117,10 +117,10 @@ fn slack_lines<M: Model>(
     let known = study.conditions.iter().zip(slacks);
     let mut known: Vec<(&str, Slack)> =
         known.filter_map(|(goal, slack)| Some((goal.text(), slack?))).collect();
-    known.sort_by(|a, b| a.1.part.total_cmp(&b.1.part));
+    known.sort_by(|a, b| a.1.relative.total_cmp(&b.1.relative));
     let mut text = String::new();
-    for (k, (condition, Slack { distance, part })) in known.into_iter().enumerate() {
-        let percent = short(100.0 * part);
+    for (k, (condition, Slack { distance, relative })) in known.into_iter().enumerate() {
+        let percent = short(100.0 * relative);
         let name = if k == 0 { "binds" } else { "" };
         text.line(name, format!("{condition}: slack {}, {percent} %", short(distance)));
     }

@@ -12,11 +12,13 @@ use sweep_files::ResultTable;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BoundaryCrossing {
     /// The values of the other axes.
-    pub place: Vec<f64>,
+    #[serde(rename = "place")]
+    pub key_values: Vec<f64>,
     /// The index of the crossing among those along the second axis, from 1.
     pub number: usize,
     /// The estimated position in either file, within its bracket.
-    pub at: [f64; 2],
+    #[serde(rename = "at")]
+    pub positions: [f64; 2],
     /// The bracket in either file.
     pub bracket: [[f64; 2]; 2],
 }
@@ -25,7 +27,7 @@ impl BoundaryCrossing {
     /// Returns the least and the greatest shift that the brackets allow.
     pub fn shift_range(&self) -> [f64; 2] {
         let [[first_low, first_high], [second_low, second_high]] = self.bracket;
-        if self.at[0] == self.at[1] && self.bracket[0] == self.bracket[1] {
+        if self.positions[0] == self.positions[1] && self.bracket[0] == self.bracket[1] {
             return [0.0; 2];
         }
         [second_low - first_high, second_high - first_low]
@@ -45,7 +47,7 @@ pub struct BoundaryShift {
     pub axis: String,
     /// The unit of the second axis.
     pub unit: String,
-    /// The names of the axes of [`BoundaryCrossing::place`].
+    /// The names of the axes of [`BoundaryCrossing::key_values`].
     pub keys: Vec<String>,
     /// The crossings that are in both files, in order.
     pub crossings: Vec<BoundaryCrossing>,
@@ -58,7 +60,8 @@ impl BoundaryShift {
     /// Returns the crossing with the greatest certain shift; if several have it, that with the
     /// greatest estimated shift.
     pub fn farthest(&self) -> Option<&BoundaryCrossing> {
-        let estimated = |crossing: &BoundaryCrossing| (crossing.at[1] - crossing.at[0]).abs();
+        let estimated =
+            |crossing: &BoundaryCrossing| (crossing.positions[1] - crossing.positions[0]).abs();
         self.crossings.iter().max_by(|a, b| {
             a.certain_shift()
                 .total_cmp(&b.certain_shift())
@@ -73,7 +76,9 @@ impl BoundaryShift {
             return None;
         }
         let count = self.crossings.len() as f64;
-        let sum = |end: usize| self.crossings.iter().map(|one| one.shift_range()[end]).sum::<f64>();
+        let sum = |end: usize| {
+            self.crossings.iter().map(|crossing| crossing.shift_range()[end]).sum::<f64>()
+        };
         Some([sum(0) / count, sum(1) / count])
     }
 
@@ -84,16 +89,16 @@ impl BoundaryShift {
 }
 
 /// A crossing in one file.
-struct Bracketed {
-    at: f64,
+struct BracketedCrossing {
+    position: f64,
     bracket: [f64; 2],
 }
 
 /// The crossings of both files along one line of the second axis.
 #[derive(Default)]
 struct LineCrossings {
-    place: Vec<f64>,
-    by_file: [Vec<Bracketed>; 2],
+    key_values: Vec<f64>,
+    by_file: [Vec<BracketedCrossing>; 2],
 }
 
 /// The lines, sorted by their places.
@@ -108,16 +113,16 @@ fn pair_crossings(
 ) -> BoundaryShift {
     let mut crossings = Vec::new();
     let mut unmatched_lines = Vec::new();
-    for LineCrossings { place, by_file: [first, second] } in lines.into_values() {
+    for LineCrossings { key_values, by_file: [first, second] } in lines.into_values() {
         if first.len() != second.len() {
-            unmatched_lines.push((place, [first.len(), second.len()]));
+            unmatched_lines.push((key_values, [first.len(), second.len()]));
             continue;
         }
-        for (k, (first, second)) in first.into_iter().zip(second).enumerate() {
+        for (index, (first, second)) in first.into_iter().zip(second).enumerate() {
             crossings.push(BoundaryCrossing {
-                place: place.clone(),
-                number: k + 1,
-                at: [first.at, second.at],
+                key_values: key_values.clone(),
+                number: index + 1,
+                positions: [first.position, second.position],
                 bracket: [first.bracket, second.bracket],
             });
         }
@@ -127,13 +132,13 @@ fn pair_crossings(
 }
 
 /// Returns integers that sort in the same order as the numbers.
-fn sort_key(place: &[f64]) -> Vec<u64> {
+fn sort_key(values: &[f64]) -> Vec<u64> {
     let key = |value: &f64| {
         let bits = (value + 0.0).to_bits();
         // The bits of negative numbers sort in reverse order.
         if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
     };
-    place.iter().map(key).collect()
+    values.iter().map(key).collect()
 }
 
 /// Compares two boundary files.
@@ -142,10 +147,13 @@ pub(super) fn compare_boundaries(
     second: &ResultTable,
 ) -> Result<Option<BoundaryShift>, ResultsError> {
     let names = first.axes();
-    let others = second.axes();
+    let names_in_second = second.axes();
     let [_, axis, ..] = names[..] else { return Ok(None) };
-    let keys: Vec<&str> =
-        names.iter().copied().filter(|name| *name != axis && others.contains(name)).collect();
+    let keys: Vec<&str> = names
+        .iter()
+        .copied()
+        .filter(|name| *name != axis && names_in_second.contains(name))
+        .collect();
     let mut lines = CrossingsByLine::new();
     for (file, table) in [first, second].into_iter().enumerate() {
         let bracket_columns = ["_low", "_high"].map(|suffix| {
@@ -154,19 +162,19 @@ pub(super) fn compare_boundaries(
             });
             column.map(|column| column.name.as_str()).unwrap_or_default()
         });
-        let mut read = keys.clone();
-        read.extend([axis, bracket_columns[0], bracket_columns[1]]);
-        table.file().each_row(&read, |row| {
+        let mut column_names = keys.clone();
+        column_names.extend([axis, bracket_columns[0], bracket_columns[1]]);
+        table.file().each_row(&column_names, |row| {
             let number = |column: usize| row.cell(column).number();
-            let place: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
-            let Some(place) = place else { return Ok(()) };
+            let key_values: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
+            let Some(key_values) = key_values else { return Ok(()) };
             let line = lines
-                .entry(sort_key(&place))
-                .or_insert_with(|| LineCrossings { place, ..LineCrossings::default() });
+                .entry(sort_key(&key_values))
+                .or_insert_with(|| LineCrossings { key_values, ..LineCrossings::default() });
             let axis_column = keys.len();
             if let (Some(low), Some(high)) = (number(axis_column + 1), number(axis_column + 2)) {
-                let at = number(axis_column).unwrap_or(f64::midpoint(low, high));
-                line.by_file[file].push(Bracketed { at, bracket: [low, high] });
+                let position = number(axis_column).unwrap_or(f64::midpoint(low, high));
+                line.by_file[file].push(BracketedCrossing { position, bracket: [low, high] });
             }
             Ok::<(), ResultsError>(())
         })?;
@@ -187,26 +195,27 @@ pub(super) fn compare_maps(
     if keys.len() < 2 || first.plan.as_ref()?.get("design").is_some() {
         return None;
     }
-    let mut others = keys.to_vec();
-    let axis = others.remove(1);
+    let mut other_keys = keys.to_vec();
+    let axis = other_keys.remove(1);
     let mut rows_by_line: BTreeMap<Vec<u64>, (Vec<f64>, Vec<&SharedRow>)> = BTreeMap::new();
     for row in shared {
-        let mut place = row.key.clone();
-        place.remove(1);
-        let line = rows_by_line.entry(sort_key(&place)).or_insert_with(|| (place, Vec::new()));
+        let mut key_values = row.key.clone();
+        key_values.remove(1);
+        let line =
+            rows_by_line.entry(sort_key(&key_values)).or_insert_with(|| (key_values, Vec::new()));
         line.1.push(row);
     }
     let mut lines = CrossingsByLine::new();
-    for (key, (place, mut rows)) in rows_by_line {
+    for (key, (key_values, mut rows)) in rows_by_line {
         rows.sort_by(|a, b| a.key[1].total_cmp(&b.key[1]));
         let by_file = [0, 1].map(|file| {
             rows.windows(2)
                 .filter_map(|pair| find_crossing(pair[0], pair[1], file, limit))
                 .collect()
         });
-        lines.insert(key, LineCrossings { place, by_file });
+        lines.insert(key, LineCrossings { key_values, by_file });
     }
-    Some(pair_crossings(first, &axis, others, lines))
+    Some(pair_crossings(first, &axis, other_keys, lines))
 }
 
 /// Finds the crossing between two neighbours in one file, by a straight line through the logarithms
@@ -216,13 +225,13 @@ fn find_crossing(
     above: &SharedRow,
     file: usize,
     limit: f64,
-) -> Option<Bracketed> {
+) -> Option<BracketedCrossing> {
     let low = below.ratio[file]?;
     let high = above.ratio[file]?;
     if (low < limit) == (high < limit) {
         return None;
     }
     let bracket = [below.key[1], above.key[1]];
-    let part = (limit / low).ln() / (high / low).ln();
-    Some(Bracketed { at: bracket[0] + part * (bracket[1] - bracket[0]), bracket })
+    let share = (limit / low).ln() / (high / low).ln();
+    Some(BracketedCrossing { position: bracket[0] + share * (bracket[1] - bracket[0]), bracket })
 }

@@ -12,11 +12,11 @@ const MAX_CELLS: u64 = 100_000_000;
 #[derive(Debug)]
 pub(super) struct ComparedFile {
     /// The row groups, with the key columns first.
-    groups: Vec<Rows>,
+    row_groups: Vec<Rows>,
     /// The number of rows.
     pub(super) rows: usize,
     /// The number of key columns.
-    keys: usize,
+    key_count: usize,
     /// The columns after the key columns.
     columns: Vec<Column>,
 }
@@ -41,12 +41,12 @@ pub(super) fn single_value(table: &ResultTable, name: &str) -> Result<Option<f64
     let mut value = None;
     for rows in table.file().read(&[name])? {
         let rows = rows?;
-        for at in 0..rows.count {
-            let found = rows.row(at).cell(0).number();
-            if found.is_none() || value.is_some_and(|value| Some(value) != found) {
+        for row in 0..rows.count {
+            let row_value = rows.row(row).cell(0).number();
+            if row_value.is_none() || value.is_some_and(|value| Some(value) != row_value) {
                 return Ok(None);
             }
-            value = found;
+            value = row_value;
         }
     }
     Ok(value)
@@ -59,33 +59,34 @@ impl ComparedFile {
     /// [`ResultsError::Refused`], [`ResultsError::File`].
     pub(super) fn read(
         table: &ResultTable,
-        other: &ResultTable,
+        other_table: &ResultTable,
         keys: &[String],
     ) -> Result<Self, ResultsError> {
-        let in_both = |column: &Column| {
-            let counterpart = other.column(&column.name);
-            let has_same_kind = counterpart.is_some_and(|other| other.kind == column.kind);
+        let is_in_both = |column: &Column| {
+            let counterpart = other_table.column(&column.name);
+            let has_same_kind =
+                counterpart.is_some_and(|other_table| other_table.kind == column.kind);
             has_same_kind && column.name != "point" && !keys.contains(&column.name)
         };
         let mut columns = table.columns.clone();
-        columns.retain(in_both);
-        let cells = table.rows().saturating_mul((columns.len() + keys.len()) as u64);
-        if cells > MAX_CELLS {
+        columns.retain(is_in_both);
+        let cell_count = table.rows().saturating_mul((columns.len() + keys.len()) as u64);
+        if cell_count > MAX_CELLS {
             return Err(ResultsError::Refused(format!(
-                "{} has {cells} cells, more than the {MAX_CELLS} that are kept in memory",
+                "{} has {cell_count} cells, more than the {MAX_CELLS} that are kept in memory",
                 table.path().display()
             )));
         }
         let names = keys.iter().chain(columns.iter().map(|column| &column.name));
         let names: Vec<&str> = names.map(String::as_str).collect();
-        let groups = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
-        let rows = groups.iter().map(|group| group.count).sum();
-        Ok(Self { groups, rows, keys: keys.len(), columns })
+        let row_groups = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
+        let rows = row_groups.iter().map(|group| group.count).sum();
+        Ok(Self { row_groups, rows, key_count: keys.len(), columns })
     }
 
     /// Iterates over the columns, each with its position in [`ComparedFile::cell`].
     pub(super) fn columns(&self) -> impl Iterator<Item = (usize, &Column)> {
-        (self.keys..).zip(&self.columns)
+        (self.key_count..).zip(&self.columns)
     }
 
     /// Returns the position of the column of a name.
@@ -95,14 +96,14 @@ impl ComparedFile {
 
     /// Returns the cell of a row in the column at a position.
     pub(super) fn cell(&self, position: usize, row: usize) -> Cell {
-        let group = self.groups.partition_point(|group| group.first <= row as u64) - 1;
-        let group = &self.groups[group];
+        let group = self.row_groups.partition_point(|group| group.first <= row as u64) - 1;
+        let group = &self.row_groups[group];
         group.row(row - group.first as usize).cell(position)
     }
 
     /// Returns the values of a row's key columns.
     fn key_values(&self, row: usize) -> Vec<f64> {
-        (0..self.keys).map(|key| self.cell(key, row).number().unwrap_or(f64::NAN)).collect()
+        (0..self.key_count).map(|key| self.cell(key, row).number().unwrap_or(f64::NAN)).collect()
     }
 
     /// Returns a row's key values rounded to nine digits, because grids with different numbers of

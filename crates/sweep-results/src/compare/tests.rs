@@ -47,10 +47,11 @@ fn flips_are_found_and_sensitive_rows_are_separate() {
     };
     assert_eq!(flips(false), [(1, Flip::Lost), (2, Flip::Gained), (3, Flip::Defined)]);
     assert_eq!(flips(true), [(4, Flip::Gained)]);
-    let lost = |comparison: &Comparison| comparison.shared.iter().filter(|row| row.is_lost).count();
-    assert_eq!(lost(&comparison), 1);
+    let count_lost =
+        |comparison: &Comparison| comparison.shared.iter().filter(|row| row.is_lost).count();
+    assert_eq!(count_lost(&comparison), 1);
     ratios[0] = None; // reliable before
-    assert_eq!(lost(&compare(&map(&RATIOS), &map(&ratios)).unwrap()), 2);
+    assert_eq!(count_lost(&compare(&map(&RATIOS), &map(&ratios)).unwrap()), 2);
     let greatest = comparison.greatest(3, false, SharedRow::ratio_deviation);
     assert_eq!(greatest.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [3, 2, 1]);
     assert!((greatest[1].ratio_deviation() - 1.0).abs() < 1e-12, "2.5 to 1.25 is a factor of two");
@@ -127,8 +128,8 @@ fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
     let comparison = compare(&map(&RATIOS), &with_spin(&[350.0; 6])).unwrap();
     assert_eq!(comparison.fixed, [(1, "forcing_rad_per_s".to_owned(), 350.0)]);
     assert_eq!(comparison.shared.len(), 6);
-    let two = with_spin(&[300.0, 300.0, 300.0, 350.0, 350.0, 350.0]);
-    let refused = compare(&map(&RATIOS), &two).unwrap_err();
+    let with_two_values = with_spin(&[300.0, 300.0, 300.0, 350.0, 350.0, 350.0]);
+    let refused = compare(&map(&RATIOS), &with_two_values).unwrap_err();
     assert!(matches!(refused, ResultsError::Refused(_)));
     assert!(
         refused.to_string().contains("only the second has the axis `forcing_rad_per_s`"),
@@ -165,20 +166,25 @@ fn rows_with_equal_keys_are_paired_in_order() {
 
 /// Returns a boundary file with a mass for each position; brackets are 0.5 wide, `None` is a line
 /// without a crossing.
-fn boundary(at: &[Option<f64>]) -> ResultTable {
-    let rows = at.len();
-    let shifted = |offset: f64| at.iter().map(|at| at.map(|at| at + offset)).collect::<Vec<_>>();
-    let masses: Vec<_> = (0..rows).map(|i| Some(0.1 + 0.1 * i as f64)).collect();
-    let crossing = at.iter().map(|at| u64::from(at.is_some()));
+fn boundary(positions: &[Option<f64>]) -> ResultTable {
+    let rows = positions.len();
+    let shifted = |offset: f64| {
+        positions
+            .iter()
+            .map(|positions| positions.map(|positions| positions + offset))
+            .collect::<Vec<_>>()
+    };
+    let masses: Vec<_> = (0..rows).map(|k| Some(0.1 + 0.1 * k as f64)).collect();
+    let crossing = positions.iter().map(|positions| u64::from(positions.is_some()));
     let columns: Vec<ColumnData> = vec![
         ("unbalance_mass_kg", "kg", numbers(&masses)),
-        ("damping_n_s_per_m", "N s/m", numbers(at)),
+        ("damping_n_s_per_m", "N s/m", numbers(positions)),
         ("damping_low_n_s_per_m", "N s/m", numbers(&shifted(-0.25))),
         ("damping_high_n_s_per_m", "N s/m", numbers(&shifted(0.25))),
         ("crossing", "1", Arc::new(UInt64Array::from_iter_values(crossing))),
     ];
-    let about = json!({ "quantity": "ratio_max", "limit": 2.0 });
-    file(columns, &[(key::PLAN, sample::plan()), (key::BOUNDARY, about)])
+    let settings = json!({ "quantity": "ratio_max", "limit": 2.0 });
+    file(columns, &[(key::PLAN, sample::plan()), (key::BOUNDARY, settings)])
 }
 
 #[test]

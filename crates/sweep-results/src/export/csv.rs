@@ -14,7 +14,7 @@ const WRITE_SIZE: usize = 1 << 16;
 /// stores a word only once however many rows have it.
 pub(super) fn write(
     table: &ResultTable,
-    write: &mut dyn FnMut(&str) -> Result<(), FileError>,
+    append: &mut dyn FnMut(&str) -> Result<(), FileError>,
 ) -> Result<(), FileError> {
     let version = table.file().value(key::VERSION).unwrap_or("of another version");
     let mut text = format!("{EXPORTED_CSV}{}\n", escape_comment(version));
@@ -46,12 +46,12 @@ pub(super) fn write(
             text.push(if column + 1 < names.len() { ',' } else { '\n' });
         }
         if text.len() >= WRITE_SIZE {
-            write(&text)?;
+            append(&text)?;
             text.clear();
         }
         Ok::<(), FileError>(())
     })?;
-    write(&text)
+    append(&text)
 }
 
 /// Formats a number with the fewest digits that parse to the same number, with an exponent if that
@@ -70,15 +70,15 @@ fn format_number(number: f64) -> String {
 fn escape_comment(text: &str) -> String {
     let mut line = String::with_capacity(text.len());
     let mut is_cell_start = false;
-    let mut chars = text.chars().peekable();
-    while let Some(c) = chars.next() {
-        let c = if c.is_control() && c != '\t' { ' ' } else { c };
-        let is_number = c == '-' && chars.peek().is_some_and(char::is_ascii_digit);
-        if is_cell_start && "=+-@".contains(c) && !is_number {
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let letter = if letter.is_control() && letter != '\t' { ' ' } else { letter };
+        let is_number = letter == '-' && letters.peek().is_some_and(char::is_ascii_digit);
+        if is_cell_start && "=+-@".contains(letter) && !is_number {
             line.push('\'');
         }
-        line.push(c);
-        is_cell_start = ",;\t\"".contains(c) || (is_cell_start && c == ' ');
+        line.push(letter);
+        is_cell_start = ",;\t\"".contains(letter) || (is_cell_start && letter == ' ');
     }
     line
 }
@@ -111,11 +111,11 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines[0].starts_with("# exported by sweep "), "{}", lines[0]);
         assert!(lines.iter().any(|line| line.starts_with("# damping_n_s_per_m [N s/m]")));
-        let head = lines.iter().position(|line| !line.starts_with('#')).unwrap();
-        assert!(lines[head].starts_with("point,unbalance_mass_kg,damping_n_s_per_m,"));
-        assert_eq!(lines[head + 1], "0,0.1,60,1,1,1,1,true,false,0.009000000000000001,ok");
-        assert_eq!(lines[head + 4], "3,0.2,60,,1,,,,false,,diverged");
-        assert_eq!(lines.len(), head + 7);
+        let heading_line = lines.iter().position(|line| !line.starts_with('#')).unwrap();
+        assert!(lines[heading_line].starts_with("point,unbalance_mass_kg,damping_n_s_per_m,"));
+        assert_eq!(lines[heading_line + 1], "0,0.1,60,1,1,1,1,true,false,0.009000000000000001,ok");
+        assert_eq!(lines[heading_line + 4], "3,0.2,60,,1,,,,false,,diverged");
+        assert_eq!(lines.len(), heading_line + 7);
     }
 
     #[test]
@@ -126,12 +126,12 @@ mod tests {
         sample::write(&path, vec![("status", "", sample::texts(&vec![word.as_str(); 100]))], &[]);
         let mut longest = 0;
         let mut total = 0;
-        let mut count = |text: &str| {
+        let mut count_bytes = |text: &str| {
             longest = text.len().max(longest);
             total += text.len();
             Ok(())
         };
-        write(&ResultTable::open(&path).unwrap(), &mut count).unwrap();
+        write(&ResultTable::open(&path).unwrap(), &mut count_bytes).unwrap();
         assert!(total > 100 << 18 && longest < 2 << 18, "{total} {longest}");
     }
 

@@ -136,8 +136,12 @@ fn write_columns(workbook: &mut Workbook, table: &ResultTable) -> Result<(), Xls
         let texts = table.columns.iter().map(text);
         texts.max_by_key(|text| text.chars().count()).unwrap_or_default()
     };
-    let widest = [longest(|c| &c.name), longest(|c| &c.unit), longest(|c| &c.description)];
-    sheet.set_widths(widest.into_iter())?;
+    let longest_texts = [
+        longest(|column| &column.name),
+        longest(|column| &column.unit),
+        longest(|column| &column.description),
+    ];
+    sheet.set_widths(longest_texts.into_iter())?;
     sheet.write_row(["column", "unit", "description"].map(text_cell))?;
     for column in &table.columns {
         let texts = [&column.name, &column.unit, &column.description];
@@ -195,11 +199,12 @@ mod tests {
 
     /// Extracts a file of the workbook, which is a ZIP archive. Its data follow the local header.
     fn extract(archive: &[u8], name: &str) -> String {
-        let at = archive.windows(name.len()).position(|part| part == name.as_bytes()).unwrap();
-        let extra = u16::from_le_bytes([archive[at - 2], archive[at - 1]]);
+        let name_offset =
+            archive.windows(name.len()).position(|window| window == name.as_bytes()).unwrap();
+        let extra_length = u16::from_le_bytes([archive[name_offset - 2], archive[name_offset - 1]]);
         let mut text = String::new();
-        let packed = &archive[at + name.len() + usize::from(extra)..];
-        flate2::read::DeflateDecoder::new(packed).read_to_string(&mut text).unwrap();
+        let compressed = &archive[name_offset + name.len() + usize::from(extra_length)..];
+        flate2::read::DeflateDecoder::new(compressed).read_to_string(&mut text).unwrap();
         text
     }
 
@@ -229,9 +234,9 @@ mod tests {
 
     #[test]
     fn the_plan_is_listed_by_paths() {
-        let mut leaves = Vec::new();
-        collect_leaves(&sample::plan(), &mut leaves);
-        let paths: Vec<&str> = leaves.iter().map(|(path, _)| path.as_str()).collect();
+        let mut settings = Vec::new();
+        collect_leaves(&sample::plan(), &mut settings);
+        let paths: Vec<&str> = settings.iter().map(|(path, _)| path.as_str()).collect();
         assert!(paths.contains(&"machine.body.mass_kg"), "{paths:?}");
         assert!(paths.contains(&"axis.1.values"), "{paths:?}");
     }
