@@ -19,7 +19,7 @@ use lane_ode::{Failure, Simd};
 use washer_model::{Channel, ModelKind, instant_count};
 use washer_row::{Status, Trajectory};
 
-use crate::point::{Answer, NoPoint, PointScenario, check, motion};
+use crate::point::{Answer, PointError, PointScenario, check, motion};
 use crate::setup::Setup;
 
 #[derive(Default)]
@@ -68,7 +68,7 @@ pub extern "C" fn setup() -> usize {
 }
 
 /// Writes an answer from the setup and the input, and returns its length; 0 without a setup.
-fn answer(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
+fn answer_with_setup(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
     let ModuleState { input, output, setup } = &mut *state();
     output.clear();
     if let Some(setup) = setup {
@@ -77,13 +77,13 @@ fn answer(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
     output.len()
 }
 
-/// Answers points of `values` numbers each by both models at the quick level.
+/// Answers points of `value_count` numbers each by both models at the quick level.
 #[unsafe(no_mangle)]
-pub extern "C" fn quick(values: usize) -> usize {
-    answer(|setup, input, output| {
-        let points: Vec<&[f64]> = input.chunks_exact(values.max(1)).collect();
-        for found in crate::quick(setup, &points) {
-            write_answer(output, &found, setup);
+pub extern "C" fn quick(value_count: usize) -> usize {
+    answer_with_setup(|setup, input, output| {
+        let points: Vec<&[f64]> = input.chunks_exact(value_count.max(1)).collect();
+        for answer in crate::quick(setup, &points) {
+            write_answer(output, &answer, setup);
         }
     })
 }
@@ -91,40 +91,42 @@ pub extern "C" fn quick(values: usize) -> usize {
 /// Answers one point with a checked error.
 #[unsafe(no_mangle)]
 pub extern "C" fn checked() -> usize {
-    answer(|setup, input, output| write_answer(output, &check(setup, input), setup))
+    answer_with_setup(|setup, input, output| write_answer(output, &check(setup, input), setup))
 }
 
 /// Writes the motion of a model (0 nonlinear, 1 linear) at a point and a refinement level; the
 /// quick level if there is none at this index. Output: the code, the failure and its time (s), the
 /// number of instants; for each instant the channels and the gap.
 #[unsafe(no_mangle)]
-pub extern "C" fn history(model: usize, place: usize, every_s: f64) -> usize {
+pub extern "C" fn history(model: usize, level_index: usize, every_s: f64) -> usize {
     let model = if model == 0 { ModelKind::Nonlinear } else { ModelKind::Linear };
-    answer(|setup, input, output| match motion(setup, input, model, Some(place), every_s) {
-        Err(why) => output.push(code(Some(&why))),
-        Ok(motion) => {
-            let [failure, time_s] = failure(motion.failure);
-            output.extend([1.0, failure, time_s, motion.gaps_m.len() as f64]);
-            for (channels, gap_m) in motion.channels.iter().zip(&motion.gaps_m) {
-                output.extend(channels);
-                output.push(*gap_m);
+    answer_with_setup(|setup, input, output| {
+        match motion(setup, input, model, Some(level_index), every_s) {
+            Err(reason) => output.push(point_code(Some(&reason))),
+            Ok(motion) => {
+                let [failure, time_s] = failure_code(motion.failure);
+                output.extend([1.0, failure, time_s, motion.gaps_m.len() as f64]);
+                for (channels, gap_m) in motion.channels.iter().zip(&motion.gaps_m) {
+                    output.extend(channels);
+                    output.push(*gap_m);
+                }
             }
         }
     })
 }
 
-/// Writes the growth of disturbances at a point of `values` numbers, at the constant speeds (rpm)
-/// that follow it in the input. Output: the code; for each speed the growth of the fastest
+/// Writes the growth of disturbances at a point of `value_count` numbers, at the constant speeds
+/// (rpm) that follow it in the input. Output: the code; for each speed the growth of the fastest
 /// disturbance (1/s; NaN without a periodic response), its frequency (cycles per minute), its kind
 /// as an index into [`washer_model::Kind::ALL`], and 1 if the response is on the curve of a machine
 /// that runs up, else 0.
 #[unsafe(no_mangle)]
-pub extern "C" fn growth(values: usize) -> usize {
-    answer(|setup, input, output| {
-        let Some((values, speeds_rpm)) = input.split_at_checked(values) else { return };
-        let found = crate::growth(setup, values, speeds_rpm);
-        output.push(code(found.as_ref().err()));
-        for disturbance in found.unwrap_or_default() {
+pub extern "C" fn growth(value_count: usize) -> usize {
+    answer_with_setup(|setup, input, output| {
+        let Some((values, speeds_rpm)) = input.split_at_checked(value_count) else { return };
+        let disturbances = crate::growth(setup, values, speeds_rpm);
+        output.push(point_code(disturbances.as_ref().err()));
+        for disturbance in disturbances.unwrap_or_default() {
             output.extend(disturbance.map_or([f64::NAN; 4], |(disturbance, is_on_curve)| {
                 let [kind, on_curve] =
                     [disturbance.kind() as u8, u8::from(is_on_curve)].map(f64::from);
@@ -134,20 +136,20 @@ pub extern "C" fn growth(values: usize) -> usize {
     })
 }
 
-/// Writes the largest attractor of a point of `values` numbers at the constant speeds (rpm) that
-/// follow it in the input. Output: the code; the speed at which the tub turns farthest (NaN if no
-/// attractor was found), the attractor's kind as an index into
+/// Writes the largest attractor of a point of `value_count` numbers at the constant speeds (rpm)
+/// that follow it in the input. Output: the code; the speed at which the tub turns farthest (NaN if
+/// no attractor was found), the attractor's kind as an index into
 /// [`washer_model::Ending::KIND_NAMES`], and the largest deviation of each channel (m, rad).
 #[unsafe(no_mangle)]
-pub extern "C" fn dwell(values: usize) -> usize {
-    answer(|setup, input, output| {
-        let Some((values, speeds_rpm)) = input.split_at_checked(values) else { return };
-        let found = crate::dwell(setup, values, speeds_rpm);
-        output.push(code(found.as_ref().err()));
-        match found.ok().flatten() {
-            Some(dwelt) => {
-                output.extend([dwelt.speed_rpm, dwelt.kind as f64]);
-                output.extend(dwelt.deviations);
+pub extern "C" fn dwell(value_count: usize) -> usize {
+    answer_with_setup(|setup, input, output| {
+        let Some((values, speeds_rpm)) = input.split_at_checked(value_count) else { return };
+        let largest_attractor = crate::dwell(setup, values, speeds_rpm);
+        output.push(point_code(largest_attractor.as_ref().err()));
+        match largest_attractor.ok().flatten() {
+            Some(attractor) => {
+                output.extend([attractor.speed_rpm, attractor.kind as f64]);
+                output.extend(attractor.deviations);
             }
             None => output.extend([f64::NAN; 2 + Channel::ALL.len()]),
         }
@@ -157,50 +159,50 @@ pub extern "C" fn dwell(values: usize) -> usize {
 /// Writes the speeds (rpm) at a point, every `every_s` from 0 to the end.
 #[unsafe(no_mangle)]
 pub extern "C" fn speeds(every_s: f64) -> usize {
-    answer(|setup, input, output| {
+    answer_with_setup(|setup, input, output| {
         if let Ok(scenario) = PointScenario::new(setup, input) {
-            let places = 0..instant_count(setup.rule.end_s, every_s);
-            let times_s = places.map(|k| k as f64 * every_s);
+            let instants = 0..instant_count(setup.rule.end_s, every_s);
+            let times_s = instants.map(|k| k as f64 * every_s);
             output.extend(scenario.spin.speeds_rpm(times_s));
         }
     })
 }
 
-fn code(why: Option<&NoPoint>) -> f64 {
-    match why {
+fn point_code(reason: Option<&PointError>) -> f64 {
+    match reason {
         None => 1.0,
-        Some(NoPoint::Impossible) => 0.0,
-        Some(NoPoint::NoEquilibrium) => -1.0,
+        Some(PointError::Impossible) => 0.0,
+        Some(PointError::NoEquilibrium) => -1.0,
     }
 }
 
 /// Returns the code and the time (s) of a failure; codes follow the order of [`Failure`].
-fn failure(failure: Option<(Failure, f64)>) -> [f64; 2] {
-    failure.map_or([0.0, f64::NAN], |(why, time_s)| [1.0 + f64::from(why as u8), time_s])
+fn failure_code(failure: Option<(Failure, f64)>) -> [f64; 2] {
+    failure.map_or([0.0, f64::NAN], |(reason, time_s)| [1.0 + f64::from(reason as u8), time_s])
 }
 
-fn write_answer(output: &mut Vec<f64>, found: &Result<Answer, NoPoint>, setup: &Setup) {
-    let metrics = setup.rule.measures.per_model().count();
-    output.push(code(found.as_ref().err()));
-    let Ok(answer) = found else {
+fn write_answer(output: &mut Vec<f64>, result: &Result<Answer, PointError>, setup: &Setup) {
+    let metric_count = setup.rule.measures.per_model().count();
+    output.push(point_code(result.as_ref().err()));
+    let Ok(answer) = result else {
         let channels = Channel::ALL.len();
-        let width = 2 + 2 * (7 + channels + metrics) + channels;
-        output.resize(output.len() + width, f64::NAN);
+        let number_count = 2 + 2 * (7 + channels + metric_count) + channels;
+        output.resize(output.len() + number_count, f64::NAN);
         return;
     };
-    let Answer { outcome, amplitudes, ratios, places, levels, errors } = answer;
+    let Answer { outcome, amplitudes, ratios, level_indices, levels, errors } = answer;
     output.push(f64::from(u8::from(outcome.sensitive == Some(true))));
     for (model, run) in [&outcome.nonlinear, &outcome.linear].into_iter().enumerate() {
         let error = errors[model].unwrap_or(f64::NAN);
-        output.extend([places[model] as f64, f64::from(levels[model] as u8), error]);
-        let Trajectory { status, fail_time_s, steps, min_gap_m, metrics: found, .. } = run;
+        output.extend([level_indices[model] as f64, f64::from(levels[model] as u8), error]);
+        let Trajectory { status, fail_time_s, steps, min_gap_m, metrics, .. } = run;
         // Failures of runs come first, in the order of `Failure`.
         let failure = f64::from((*status as u8).min(Status::StepLimit as u8));
-        let or_none = |value: &Option<f64>| value.unwrap_or(f64::NAN);
-        output.extend([failure, or_none(fail_time_s), *steps as f64, or_none(min_gap_m)]);
+        let or_nan = |value: &Option<f64>| value.unwrap_or(f64::NAN);
+        output.extend([failure, or_nan(fail_time_s), *steps as f64, or_nan(min_gap_m)]);
         output.extend(amplitudes[model]);
-        let found = found.iter().copied().chain(std::iter::repeat(f64::NAN));
-        output.extend(found.take(metrics));
+        let metrics = metrics.iter().copied().chain(std::iter::repeat(f64::NAN));
+        output.extend(metrics.take(metric_count));
     }
     output.extend(ratios.iter().map(|ratio| ratio.unwrap_or(f64::NAN)));
     output.push(outcome.static_sag_m.unwrap_or(f64::NAN));

@@ -23,5 +23,5 @@ mod numbers;
 mod point;
 mod setup;
 
-pub use point::{Answer, NoPoint, PointHistory, check, dwell, growth, motion, quick};
+pub use point::{Answer, PointError, PointHistory, check, dwell, growth, motion, quick};
 pub use setup::{Setup, Sliders};

@@ -50,8 +50,8 @@ impl NumberWalk<'_> {
 
     /// Writes or reads an element of `all` as its index.
     pub(crate) fn choice<T: Clone + PartialEq>(&mut self, value: &mut T, all: &[T]) -> Option<()> {
-        let place = all.iter().position(|known| known == value).unwrap_or(all.len());
-        *value = all.get(self.count(place)?)?.clone();
+        let index = all.iter().position(|known| known == value).unwrap_or(all.len());
+        *value = all.get(self.count(index)?)?.clone();
         Some(())
     }
 
@@ -61,13 +61,13 @@ impl NumberWalk<'_> {
         values: &mut Vec<T>,
         all: &[T],
     ) -> Option<()> {
-        self.sized(values, all.first()?)?;
+        self.resize(values, all.first()?)?;
         values.iter_mut().try_for_each(|value| self.choice(value, all))
     }
 
     /// Writes the length of a list, or reads a length and resizes the list. Its elements are
     /// written or read separately.
-    pub(crate) fn sized<T: Clone>(&mut self, list: &mut Vec<T>, blank: &T) -> Option<()> {
+    pub(crate) fn resize<T: Clone>(&mut self, list: &mut Vec<T>, blank: &T) -> Option<()> {
         list.resize(self.count(list.len())?, blank.clone());
         Some(())
     }

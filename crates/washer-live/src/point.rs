@@ -15,7 +15,7 @@ use crate::setup::Setup;
 
 /// The reason why a point has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NoPoint {
+pub enum PointError {
     /// A number of the machine is out of its range.
     Impossible,
     /// The machine has no static equilibrium.
@@ -33,7 +33,7 @@ pub struct Answer {
     /// The ratios, as if every channel were compared.
     pub ratios: Vec<Option<f64>>,
     /// The index of the refinement level of each model's numbers.
-    pub places: [usize; 2],
+    pub level_indices: [usize; 2],
     /// The name of the refinement level of each model's numbers.
     pub levels: [Level; 2],
     /// The estimated relative error of each model's numbers, if it is known.
@@ -44,21 +44,22 @@ impl Answer {
     fn new(
         outcome: Outcome,
         amplitudes: [Deviations; 2],
-        places: [usize; 2],
-        refinement: &[RefinementLevels; 2],
+        level_indices: [usize; 2],
+        levels_of_models: &[RefinementLevels; 2],
         limits: RatioLimits,
     ) -> Self {
         let with_all_channels = |run: &Trajectory, amplitudes: &Deviations| match run.status {
             Status::Ok => Trajectory { amplitudes: amplitudes.to_vec(), ..run.clone() },
-            failed => Trajectory::failed(failed),
+            failure => Trajectory::failed(failure),
         };
         let nonlinear = with_all_channels(&outcome.nonlinear, &amplitudes[0]);
         let linear = with_all_channels(&outcome.linear, &amplitudes[1]);
-        let mut compared = Outcome::new(outcome.point, nonlinear, linear);
-        compared.compare_turns(&Channel::ALL);
-        let Verdict { ratios, .. } = Verdict::new(&compared, Channel::ALL.len(), limits);
-        let levels = [0, 1].map(|model| refinement[model].levels[places[model]].level);
-        Self { outcome, amplitudes, ratios, places, levels, errors: [None; 2] }
+        let mut all_channels_outcome = Outcome::new(outcome.point, nonlinear, linear);
+        all_channels_outcome.compare_turns(&Channel::ALL);
+        let Verdict { ratios, .. } =
+            Verdict::new(&all_channels_outcome, Channel::ALL.len(), limits);
+        let levels = [0, 1].map(|model| levels_of_models[model].levels[level_indices[model]].level);
+        Self { outcome, amplitudes, ratios, level_indices, levels, errors: [None; 2] }
     }
 }
 
@@ -84,14 +85,14 @@ pub(crate) struct PointScenario {
 impl PointScenario {
     /// Returns the scenario with these values of the setup's sliders; sliders without a value keep
     /// that of the setup.
-    pub(crate) fn new(setup: &Setup, values: &[f64]) -> Result<Self, NoPoint> {
+    pub(crate) fn new(setup: &Setup, values: &[f64]) -> Result<Self, PointError> {
         let Setup { machine, spin, rule, .. } = setup;
         let machine = machine.clone();
         let spin = spin.clone();
         let mut scenario = Self { machine, spin, window_s: rule.window_s };
         for (parameter, &value) in setup.sliders.parameters.iter().zip(values) {
             if !parameter.range().contains(value) {
-                return Err(NoPoint::Impossible);
+                return Err(PointError::Impossible);
             }
             match parameter.target() {
                 Target::Window(edge) => scenario.window_s[edge] = value,
@@ -99,10 +100,10 @@ impl PointScenario {
             }
         }
         let [from_s, to_s] = scenario.window_s;
-        let window_is_sound = from_s < to_s && to_s <= setup.rule.end_s;
+        let is_window_valid = from_s < to_s && to_s <= setup.rule.end_s;
         let violations = [scenario.machine.violations(), scenario.spin.violations()].concat();
-        if !window_is_sound || !violations.is_empty() {
-            return Err(NoPoint::Impossible);
+        if !is_window_valid || !violations.is_empty() {
+            return Err(PointError::Impossible);
         }
         Ok(scenario)
     }
@@ -115,115 +116,120 @@ impl PointScenario {
 
 /// Returns the refinement levels of both models at these values.
 fn refinement_levels<'a>(setup: &'a Setup, values: &[f64]) -> &'a [RefinementLevels; 2] {
-    let further = setup.sliders.parameters.iter().zip(values).skip(setup.sliders.axes);
+    let other_sliders = setup.sliders.parameters.iter().zip(values).skip(setup.sliders.axes);
     let has_moved = |(parameter, value): (&washer_model::Parameter, &f64)| {
         parameter.get(&setup.machine, &setup.spin) != Some(*value)
     };
-    if further.into_iter().any(has_moved) { &setup.wide_levels } else { &setup.levels }
+    if other_sliders.into_iter().any(has_moved) { &setup.wide_levels } else { &setup.levels }
 }
 
 /// Prepares a point.
 ///
 /// # Errors
-/// [`NoPoint`].
-fn ready_point(setup: &Setup, values: &[f64]) -> Result<Point, NoPoint> {
+/// [`PointError`].
+fn prepare_point(setup: &Setup, values: &[f64]) -> Result<Point, PointError> {
     let scenario = PointScenario::new(setup, values)?;
     let timing = scenario.timing(setup);
     let mut points = prepare(Simd::Scalar, &[(scenario.machine, scenario.spin)], &timing);
-    points.pop().and_then(Result::ok).ok_or(NoPoint::NoEquilibrium)
+    points.pop().and_then(Result::ok).ok_or(PointError::NoEquilibrium)
 }
 
 /// Integrates both models at some points at the quick level, in lanes, without an error estimate.
-pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
-    let ready = points.iter();
-    let ready = ready.map(|values| (refinement_levels(setup, values), ready_point(setup, values)));
-    let ready: Vec<_> = ready.collect();
+pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, PointError>> {
+    let prepared = points.iter();
+    let prepared =
+        prepared.map(|values| (refinement_levels(setup, values), prepare_point(setup, values)));
+    let prepared: Vec<_> = prepared.collect();
     let rule = RowRule { accuracy: f64::INFINITY, ..setup.rule.clone() };
-    let mut found: Vec<Result<Answer, NoPoint>> = Vec::with_capacity(points.len());
+    let mut answers: Vec<Result<Answer, PointError>> = Vec::with_capacity(points.len());
     // Points with the same refinement levels are integrated together in lanes.
-    for group in ready.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
+    for group in prepared.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
         let levels = group[0].0;
-        let sound: Vec<&Point> =
-            group.iter().filter_map(|(_, ready)| ready.as_ref().ok()).collect();
-        let places = [0, 1].map(|model| quick_level_index(&levels[model]));
-        let [nonlinear, linear] = [0, 1]
-            .map(|model| run_method(model, levels[model].method(places[model]), &sound, &rule));
-        let mut pairs = nonlinear.into_iter().zip(linear);
+        let valid_points: Vec<&Point> =
+            group.iter().filter_map(|(_, prepared)| prepared.as_ref().ok()).collect();
+        let level_indices = [0, 1].map(|model| quick_level_index(&levels[model]));
+        let [nonlinear, linear] = [0, 1].map(|model| {
+            run_method(model, levels[model].method(level_indices[model]), &valid_points, &rule)
+        });
+        let mut run_pairs = nonlinear.into_iter().zip(linear);
         let answer = |(nonlinear, linear): (LevelRun, LevelRun)| {
             let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
             let mut outcome = Outcome::new(0, nonlinear.trajectory, linear.trajectory);
             outcome.compare_turns(&rule.channels);
-            Answer::new(outcome, amplitudes, places, levels, rule.limits)
+            Answer::new(outcome, amplitudes, level_indices, levels, rule.limits)
         };
-        found.extend(group.iter().map(|(_, ready)| match ready {
-            Ok(_) => pairs.next().map(answer).ok_or(NoPoint::NoEquilibrium),
-            Err(why) => Err(*why),
+        answers.extend(group.iter().map(|(_, prepared)| match prepared {
+            Ok(_) => run_pairs.next().map(answer).ok_or(PointError::NoEquilibrium),
+            Err(error) => Err(*error),
         }));
     }
-    found
+    answers
 }
 
 /// Computes a point as a row of the map: each model is refined until two levels agree.
 ///
 /// # Errors
-/// [`NoPoint`].
-pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
-    let point = ready_point(setup, values)?;
+/// [`PointError`].
+pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
+    let point = prepare_point(setup, values)?;
     let levels = refinement_levels(setup, values);
     let rule = &setup.rule;
-    let with = RefinementRule { levels, demand: Demand::Row, rule };
+    let refinement_rule = RefinementRule { levels, demand: Demand::Row, rule };
     let mut refinement = RowRefinement::default();
     let outcome = loop {
-        match refinement.next(0, &point, with) {
+        match refinement.next(0, &point, refinement_rule) {
             Next::Done(outcome) => break *outcome,
-            Next::Runs(wanted) => {
-                for (model, place) in wanted {
+            Next::Runs(requests) => {
+                for (model, level_index) in requests {
                     let model_levels = &levels[model];
-                    let perturbed = model_levels.is_perturbed(place).then(|| point.perturbed());
-                    let started = perturbed.as_ref().unwrap_or(&point);
-                    for run in run_method(model, model_levels.method(place), &[started], rule) {
-                        refinement.take((model, place), run, &point, with);
+                    let perturbed =
+                        model_levels.is_perturbed(level_index).then(|| point.perturbed());
+                    let start_point = perturbed.as_ref().unwrap_or(&point);
+                    for run in
+                        run_method(model, model_levels.method(level_index), &[start_point], rule)
+                    {
+                        refinement.take((model, level_index), run, &point, refinement_rule);
                     }
                 }
             }
         }
     };
-    let finest = [0, 1].map(|model| refinement.finest(model, &point, with));
-    let [Some(nonlinear), Some(linear)] = finest else { return Err(NoPoint::NoEquilibrium) };
+    let finest = [0, 1].map(|model| refinement.finest(model, &point, refinement_rule));
+    let [Some(nonlinear), Some(linear)] = finest else { return Err(PointError::NoEquilibrium) };
     let finest = [nonlinear, linear];
     let amplitudes = finest.map(|(run, ..)| run.amplitudes);
-    let places = finest.map(|(_, place, _)| place);
-    let answer = Answer::new(outcome, amplitudes, places, levels, rule.limits);
+    let level_indices = finest.map(|(_, level_index, _)| level_index);
+    let answer = Answer::new(outcome, amplitudes, level_indices, levels, rule.limits);
     Ok(Answer { errors: finest.map(|(.., error)| error), ..answer })
 }
 
 fn run_method(model: usize, method: &Method, points: &[&Point], rule: &RowRule) -> Vec<LevelRun> {
-    let found =
+    let runs =
         integrate_points(Simd::best(), ModelKind::ALL[model], method, points, rule, Cancel::Never);
-    found.unwrap_or_default()
+    runs.unwrap_or_default()
 }
 
 /// Returns the index of the quick level: the second, which is accurate enough for most rows, or the
 /// first if no modes are capped.
 fn quick_level_index(levels: &RefinementLevels) -> usize {
-    usize::from(levels.levels.get(1).is_some_and(|second| second.level.is_capped()))
+    usize::from(levels.levels.get(1).is_some_and(|second_level| second_level.level.is_capped()))
 }
 
 /// Integrates the motion of one model at a point, at a refinement level or else at the quick one,
 /// every `every_s` from 0 to the end.
 ///
 /// # Errors
-/// [`NoPoint`].
+/// [`PointError`].
 pub fn motion(
     setup: &Setup,
     values: &[f64],
     model: ModelKind,
-    place: Option<usize>,
+    level_index: Option<usize>,
     every_s: f64,
-) -> Result<PointHistory, NoPoint> {
-    let point = ready_point(setup, values)?;
+) -> Result<PointHistory, PointError> {
+    let point = prepare_point(setup, values)?;
     let levels = &refinement_levels(setup, values)[model as usize];
-    let level = place.and_then(|place| levels.levels.get(place));
+    let level = level_index.and_then(|level_index| levels.levels.get(level_index));
     let level = level.unwrap_or(&levels.levels[quick_level_index(levels)]);
     let history = history(model, &level.method, &point, &Start::default(), every_s);
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
@@ -236,16 +242,17 @@ pub fn motion(
 /// a response.
 ///
 /// # Errors
-/// [`NoPoint`].
+/// [`PointError`].
 pub fn growth(
     setup: &Setup,
     values: &[f64],
     speeds_rpm: &[f64],
-) -> Result<Vec<Option<(Disturbance, bool)>>, NoPoint> {
-    let point = ready_point(setup, values)?;
+) -> Result<Vec<Option<(Disturbance, bool)>>, PointError> {
+    let point = prepare_point(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-    let disturbance = |first: &Response| (first.disturbance(), first.is_on_curve);
+    let disturbance =
+        |first_response: &Response| (first_response.disturbance(), first_response.is_on_curve);
     let answers = respond(&dwells, Cancel::Never).into_iter();
     Ok(answers.map(|answer| answer.ok()?.first().map(disturbance)).collect())
 }
@@ -254,16 +261,17 @@ pub fn growth(
 /// starts; `None` if none was found.
 ///
 /// # Errors
-/// [`NoPoint`].
+/// [`PointError`].
 pub fn dwell(
     setup: &Setup,
     values: &[f64],
     speeds_rpm: &[f64],
-) -> Result<Option<DwellPeaks>, NoPoint> {
-    let point = ready_point(setup, values)?;
+) -> Result<Option<DwellPeaks>, PointError> {
+    let point = prepare_point(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-    let carried = vec![None; dwells.len()];
-    let found = find_endings(Simd::best(), &dwells, &carried, &Starts::default(), Cancel::Never);
-    Ok(DwellPeaks::from_endings(speeds_rpm, &found))
+    let no_carried_states = vec![None; dwells.len()];
+    let endings =
+        find_endings(Simd::best(), &dwells, &no_carried_states, &Starts::default(), Cancel::Never);
+    Ok(DwellPeaks::from_endings(speeds_rpm, &endings))
 }

@@ -50,8 +50,9 @@ impl Setup {
 
     /// Decodes a setup from [`Self::to_numbers`]; `None` for other numbers.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        let direct = || RefinementLevels::direct(Level::Rk4, Method::without_numbers(Level::Rk4));
-        let levels = [0, 1].map(|_| direct());
+        let direct_levels =
+            || RefinementLevels::direct(Level::Rk4, Method::without_numbers(Level::Rk4));
+        let levels = [0, 1].map(|_| direct_levels());
         let mut setup = Self {
             machine: Machine::paper(),
             spin: Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() },
@@ -103,8 +104,8 @@ impl Setup {
         measures.dampers = machine.dampers.len();
         walk.choices(&mut self.sliders.parameters, &parameters)?;
         self.sliders.axes = walk.count(self.sliders.axes)?;
-        let mut all = self.levels.iter_mut().chain(&mut self.wide_levels);
-        all.try_for_each(|levels| walk_levels(walk, levels))
+        let mut all_levels = self.levels.iter_mut().chain(&mut self.wide_levels);
+        all_levels.try_for_each(|levels| walk_levels(walk, levels))
     }
 }
 
@@ -118,8 +119,8 @@ fn walk_profile(walk: &mut NumberWalk<'_>, spin: &mut Spin) -> Option<()> {
         *spin = match Profile::ALL.get(code) {
             Some(&profile) => Spin::Ramped { profile, peak_rpm: 0.0, ramp_s: 0.0 },
             None => {
-                let none = vec![0.0; code - Profile::ALL.len()];
-                Spin::Table { time_s: none.clone(), speed_rpm: none }
+                let zeros = vec![0.0; code - Profile::ALL.len()];
+                Spin::Table { time_s: zeros.clone(), speed_rpm: zeros }
             }
         };
     }
@@ -138,13 +139,13 @@ fn walk_rule(walk: &mut NumberWalk<'_>, rule: &mut RowRule) -> Option<()> {
 
 /// Writes or reads the refinement levels, of which there are at least two.
 fn walk_levels(walk: &mut NumberWalk<'_>, levels: &mut RefinementLevels) -> Option<()> {
-    let mut list = levels.levels.clone();
-    walk.sized(&mut list, &levels.levels[0])?;
-    list.iter_mut().try_for_each(|level| walk_level(walk, level))?;
-    if list.len() < 2 {
+    let mut resized = levels.levels.clone();
+    walk.resize(&mut resized, &levels.levels[0])?;
+    resized.iter_mut().try_for_each(|level| walk_level(walk, level))?;
+    if resized.len() < 2 {
         return None;
     }
-    *levels = RefinementLevels::checked(list, None);
+    *levels = RefinementLevels::checked(resized, None);
     Some(())
 }
 
