@@ -17,43 +17,44 @@ typedef struct washer washer;
 typedef struct washer_setup {
     const char *model;   /* "nonlinear" or "linear" */
     const char *profile; /* "cycloidal", "triangular", "ramp" or "table" */
-    double peak_rpm;     /* of every profile but "table" */
-    double ramp_s;       /* likewise */
-    const double *time_s;    /* of "table": increasing, the first 0 */
-    const double *speed_rpm; /* of "table": speeds at these times, linear in between */
-    size_t spin_points;
-    /* parameters that differ from the paper's machine, as in `sweep parameters` */
+    double peak_rpm;     /* the greatest speed of every profile but "table" */
+    double ramp_s;       /* the duration of the run-up of every profile but "table" */
+    const double *time_s;    /* the times of the profile "table": rising, the first 0 */
+    const double *speed_rpm; /* the speeds at these times, linear in between */
+    size_t spin_points;      /* the number of times, and of speeds */
+    /* the names and values of parameters that differ from the paper's machine, as in
+     * `sweep parameters` */
     const char *const *names;
     const double *values;
-    size_t constants;
+    size_t constants; /* the number of names, and of values */
 } washer_setup;
 
 enum washer_status {
     WASHER_OK = 0,
     WASHER_NULL = 1,           /* a pointer that must not be null is, or a text is not UTF-8 */
-    WASHER_UNKNOWN_NAME = 2,   /* no such model, profile or parameter */
-    WASHER_OUT_OF_RANGE = 3,   /* a machine or spin that cannot be */
+    WASHER_UNKNOWN_NAME = 2,   /* a model, profile or parameter with this name does not exist */
+    WASHER_OUT_OF_RANGE = 3,   /* the machine or the spin is impossible */
     WASHER_NO_EQUILIBRIUM = 4, /* the springs cannot carry the machine */
 };
 
-/* Makes a machine; on WASHER_OK, *made must go to washer_free. */
-enum washer_status washer_new(const washer_setup *setup, washer **made);
+/* Makes a machine. On WASHER_OK, *machine_out must be freed by washer_free. */
+enum washer_status washer_new(const washer_setup *setup, washer **machine_out);
 void washer_free(washer *machine);
 
-/* Numbers of a state: 20. */
+/* Returns the length of a state: 20. */
 size_t washer_dimension(void);
-/* At rest in static equilibrium: where trajectories start. */
+/* Writes the state at rest in static equilibrium, from which trajectories start. */
 void washer_initial_state(const washer *machine, double *x);
-/* dx = f(t, x). The order of arguments is that of right-hand sides in other programs. */
+/* Computes dx = f(t, x). Other integrators pass the arguments in this order too. */
 void washer_rhs(double t_s, const double *x, double *dx, washer *machine);
-/* df/dx, row by row: jacobian[row * dimension + column]. */
+/* Computes the Jacobian df/dx, row by row: jacobian[row * dimension + column]. */
 void washer_jacobian(double t_s, const double *x, double *jacobian, washer *machine);
 
-/* What is observed: deviations from equilibrium (m, rad). */
+/* Returns the number of channels, which are deviations from equilibrium (m, rad). */
 size_t washer_channels(void);
-/* NULL from washer_channels() on; the text lives forever. */
+/* Returns the name of a channel, which is never freed; NULL from washer_channels() on. */
 const char *washer_channel_name(size_t channel);
-/* All channels and their rates per second. */
+/* Computes all channels and their rates per second. */
 void washer_outputs(double t_s, const double *x, double *values, double *rates, washer *machine);
 
 #ifdef __cplusplus

@@ -63,7 +63,7 @@ pub enum WasherStatus {
 ///
 /// # Safety
 /// `text` is null or points at a text that ends with a zero byte.
-unsafe fn text<'a>(text: *const c_char) -> Result<&'a str, WasherStatus> {
+unsafe fn read_text<'a>(text: *const c_char) -> Result<&'a str, WasherStatus> {
     if text.is_null() {
         return Err(WasherStatus::Null);
     }
@@ -75,7 +75,7 @@ unsafe fn text<'a>(text: *const c_char) -> Result<&'a str, WasherStatus> {
 ///
 /// # Safety
 /// `first` is null or points at `count` values.
-unsafe fn array<'a, T>(first: *const T, count: usize) -> Result<&'a [T], WasherStatus> {
+unsafe fn read_array<'a, T>(first: *const T, count: usize) -> Result<&'a [T], WasherStatus> {
     match (first.is_null(), count) {
         (_, 0) => Ok(&[]),
         (true, _) => Err(WasherStatus::Null),
@@ -88,13 +88,13 @@ unsafe fn array<'a, T>(first: *const T, count: usize) -> Result<&'a [T], WasherS
 ///
 /// # Safety
 /// `setup` points at texts and arrays as `washer_new` requires them.
-unsafe fn make(setup: &WasherSetup) -> Result<WasherEquations, WasherStatus> {
+unsafe fn make_equations(setup: &WasherSetup) -> Result<WasherEquations, WasherStatus> {
     // SAFETY (of all five): the caller's promise.
-    let (model, profile) = unsafe { (text(setup.model)?, text(setup.profile)?) };
-    let time_s = unsafe { array(setup.time_s, setup.spin_points)? };
-    let speed_rpm = unsafe { array(setup.speed_rpm, setup.spin_points)? };
-    let names = unsafe { array(setup.names, setup.constants)? };
-    let values = unsafe { array(setup.values, setup.constants)? };
+    let (model, profile) = unsafe { (read_text(setup.model)?, read_text(setup.profile)?) };
+    let time_s = unsafe { read_array(setup.time_s, setup.spin_points)? };
+    let speed_rpm = unsafe { read_array(setup.speed_rpm, setup.spin_points)? };
+    let names = unsafe { read_array(setup.names, setup.constants)? };
+    let values = unsafe { read_array(setup.values, setup.constants)? };
 
     let model = ModelKind::named(model).ok_or(WasherStatus::UnknownName)?;
     let peak_rpm = setup.peak_rpm;
@@ -109,7 +109,7 @@ unsafe fn make(setup: &WasherSetup) -> Result<WasherEquations, WasherStatus> {
     let mut machine = Machine::paper();
     for (&name, &value) in names.iter().zip(values) {
         // SAFETY: the caller's promise.
-        let name = unsafe { text(name)? };
+        let name = unsafe { read_text(name)? };
         let parameter =
             Parameter::find(name, &machine, &spin).map_err(|_| WasherStatus::UnknownName)?;
         parameter.set(&mut machine, &mut spin, value);
@@ -129,21 +129,21 @@ unsafe fn make(setup: &WasherSetup) -> Result<WasherEquations, WasherStatus> {
 /// Makes a machine.
 ///
 /// # Safety
-/// `setup` is null or points at a setup whose texts and arrays are null or valid; `made` is null or
-/// can be written.
+/// `setup` is null or points at a setup whose texts and arrays are null or valid; `machine_out` is
+/// null or can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn washer_new(
     setup: *const WasherSetup,
-    made: *mut *mut WasherEquations,
+    machine_out: *mut *mut WasherEquations,
 ) -> WasherStatus {
-    if setup.is_null() || made.is_null() {
+    if setup.is_null() || machine_out.is_null() {
         return WasherStatus::Null;
     }
     // SAFETY: not null, and the caller's promise.
-    match unsafe { make(&*setup) } {
-        Ok(washer) => {
+    match unsafe { make_equations(&*setup) } {
+        Ok(equations) => {
             // SAFETY: not null, and the caller's promise.
-            unsafe { *made = Box::into_raw(Box::new(washer)) };
+            unsafe { *machine_out = Box::into_raw(Box::new(equations)) };
             WasherStatus::Ok
         }
         Err(status) => status,
@@ -266,12 +266,12 @@ mod tests {
     }
 
     fn status(setup: &WasherSetup) -> WasherStatus {
-        let mut made = ptr::null_mut();
+        let mut machine = ptr::null_mut();
         // SAFETY: everything that the setup points at lives until here.
-        let status = unsafe { washer_new(setup, &raw mut made) };
-        assert_eq!(status == WasherStatus::Ok, !made.is_null());
+        let status = unsafe { washer_new(setup, &raw mut machine) };
+        assert_eq!(status == WasherStatus::Ok, !machine.is_null());
         // SAFETY: made above, or null.
-        unsafe { washer_free(made) };
+        unsafe { washer_free(machine) };
         status
     }
 
@@ -284,14 +284,14 @@ mod tests {
             WasherStatus::UnknownName
         );
         let names = [c"unbalance_mass_kg".as_ptr()];
-        let with = |names: &[*const c_char; 1], value: &f64| {
+        let status_with = |names: &[*const c_char; 1], value: &f64| {
             status(&WasherSetup { names: names.as_ptr(), values: value, constants: 1, ..setup() })
         };
-        assert_eq!(with(&names, &0.7), WasherStatus::Ok);
-        assert_eq!(with(&names, &-0.7), WasherStatus::OutOfRange);
-        assert_eq!(with(&[c"unbalance".as_ptr()], &0.7), WasherStatus::UnknownName);
+        assert_eq!(status_with(&names, &0.7), WasherStatus::Ok);
+        assert_eq!(status_with(&names, &-0.7), WasherStatus::OutOfRange);
+        assert_eq!(status_with(&[c"unbalance".as_ptr()], &0.7), WasherStatus::UnknownName);
         assert_eq!(
-            with(&[c"spring_stiffness_n_per_m".as_ptr()], &1e-3),
+            status_with(&[c"spring_stiffness_n_per_m".as_ptr()], &1e-3),
             WasherStatus::NoEquilibrium
         );
         assert_eq!(status(&WasherSetup { constants: 1, ..setup() }), WasherStatus::Null);
@@ -315,23 +315,23 @@ mod tests {
     #[test]
     fn the_jacobian_agrees_with_differences_of_the_right_hand_side() {
         for model in [c"nonlinear", c"linear"] {
-            let mut made = ptr::null_mut();
+            let mut machine = ptr::null_mut();
             let setup = WasherSetup { model: model.as_ptr(), ..setup() };
             // SAFETY: setup and arrays live until the machine is freed.
             unsafe {
-                assert_eq!(washer_new(&raw const setup, &raw mut made), WasherStatus::Ok);
+                assert_eq!(washer_new(&raw const setup, &raw mut machine), WasherStatus::Ok);
                 let mut x = [0.0; STATE_LEN];
-                washer_initial_state(made, x.as_mut_ptr());
+                washer_initial_state(machine, x.as_mut_ptr());
                 x.iter_mut().enumerate().for_each(|(i, x)| *x += 1e-3 * (i as f64).sin());
                 let mut jacobian = [[0.0_f64; STATE_LEN]; STATE_LEN];
-                washer_jacobian(20.0, x.as_ptr(), jacobian.as_mut_ptr().cast(), made);
+                washer_jacobian(20.0, x.as_ptr(), jacobian.as_mut_ptr().cast(), machine);
                 for j in 0..STATE_LEN {
                     let step = 1e-5;
                     let mut column = [[0.0; STATE_LEN]; 2];
                     for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
                         let mut shifted = x;
                         shifted[j] += sign * step;
-                        washer_rhs(20.0, shifted.as_ptr(), column[side].as_mut_ptr(), made);
+                        washer_rhs(20.0, shifted.as_ptr(), column[side].as_mut_ptr(), machine);
                     }
                     let largest =
                         (0..STATE_LEN).fold(1.0_f64, |m, i| m.max(f64::abs(jacobian[i][j])));
@@ -341,7 +341,7 @@ mod tests {
                         assert!(error < 1e-6, "{model:?} [{i}][{j}]: {} {slope}", jacobian[i][j]);
                     }
                 }
-                washer_free(made);
+                washer_free(machine);
             }
         }
     }
