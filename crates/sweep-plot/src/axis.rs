@@ -6,7 +6,7 @@ use super::label;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AxisScale {
     /// Whether the scale is logarithmic.
-    pub(crate) log: bool,
+    pub(crate) is_log: bool,
     /// The value at position 0.
     pub(crate) from: f64,
     /// The value at position 1.
@@ -23,15 +23,15 @@ pub(crate) struct Tick {
 impl AxisScale {
     /// Returns a linear scale.
     pub(crate) const fn linear(from: f64, to: f64) -> Self {
-        Self { log: false, from, to }
+        Self { is_log: false, from, to }
     }
 
     /// Returns a logarithmic scale; from 1 to 10 if an end is not positive and finite.
-    pub(crate) const fn log(from: f64, to: f64) -> Self {
+    pub(crate) const fn logarithmic(from: f64, to: f64) -> Self {
         if has_logarithm(from) && has_logarithm(to) {
-            Self { log: true, from, to }
+            Self { is_log: true, from, to }
         } else {
-            Self { log: true, from: 1.0, to: 10.0 }
+            Self { is_log: true, from: 1.0, to: 10.0 }
         }
     }
 
@@ -39,14 +39,14 @@ impl AxisScale {
     /// if there are none.
     pub(crate) fn around(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extremes(values).unwrap_or((0.0, 1.0));
-        let room = if high > low { 0.05 * (high - low) } else { 0.05 * high.abs().max(1.0) };
-        Self::linear(low - room, high + room)
+        let margin = if high > low { 0.05 * (high - low) } else { 0.05 * high.abs().max(1.0) };
+        Self::linear(low - margin, high + margin)
     }
 
     /// Returns the coordinate of a value along the axis: its logarithm on a logarithmic scale,
     /// otherwise the value itself.
     pub(crate) fn coordinate(self, value: f64) -> f64 {
-        if self.log { value.ln() } else { value }
+        if self.is_log { value.ln() } else { value }
     }
 
     /// Returns the position of a value: 0 at the start of the scale, 1 at its end.
@@ -60,7 +60,7 @@ impl AxisScale {
     pub(crate) fn ticks(self, count: usize) -> Vec<Tick> {
         let low = self.from.min(self.to);
         let high = self.from.max(self.to);
-        if self.log { log_ticks(low, high, count) } else { even_ticks(low, high, count) }
+        if self.is_log { log_ticks(low, high, count) } else { linear_ticks(low, high, count) }
     }
 }
 
@@ -71,8 +71,8 @@ pub(crate) const fn has_logarithm(value: f64) -> bool {
 
 /// Returns the least and the greatest of the finite values.
 pub fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let known = values.filter(|value| value.is_finite()).map(|value| (value, value));
-    known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
+    let finite = values.filter(|value| value.is_finite()).map(|value| (value, value));
+    finite.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
 }
 
 /// A distance between ticks: 1, 2 or 5 times a power of ten.
@@ -86,21 +86,21 @@ impl TickStep {
     /// Yields every step that a page can need in rising order: from 1e-15 to 5e15 in the axis'
     /// unit.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
-        let steps_of_power = |power| [1, 2, 5].map(|mantissa| Self { mantissa, power });
-        (-15..=15).flat_map(steps_of_power)
+        let steps_at_power = |power| [1, 2, 5].map(|mantissa| Self { mantissa, power });
+        (-15..=15).flat_map(steps_at_power)
     }
 
-    /// Returns the shortest step that is not shorter than `rough`, a positive number.
-    fn at_least(rough: f64) -> Self {
-        let power = rough.log10().floor() as i32;
-        let factor = rough / 10_f64.powi(power);
+    /// Returns the shortest step that is not shorter than `min_length`, a positive number.
+    fn at_least(min_length: f64) -> Self {
+        let power = min_length.log10().floor() as i32;
+        let factor = min_length / 10_f64.powi(power);
         match [1, 2, 5].into_iter().find(|&step| f64::from(step) >= factor) {
             Some(mantissa) => Self { mantissa, power },
             None => Self { mantissa: 1, power: power + 1 },
         }
     }
 
-    fn shorter(self) -> Self {
+    fn next_shorter(self) -> Self {
         match self.mantissa {
             5 => Self { mantissa: 2, ..self },
             2 => Self { mantissa: 1, ..self },
@@ -120,21 +120,21 @@ impl TickStep {
     }
 }
 
-fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
-    let rough = (high - low) / count.max(1) as f64;
-    if !(rough > 0.0 && rough.is_finite()) {
+fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
+    let wanted_length = (high - low) / count.max(1) as f64;
+    if !(wanted_length > 0.0 && wanted_length.is_finite()) {
         return Vec::new();
     }
-    let finest = f64::EPSILON * low.abs().max(high.abs());
-    let mut step = TickStep::at_least(SLACK * rough);
+    let shortest_length = f64::EPSILON * low.abs().max(high.abs());
+    let mut step = TickStep::at_least(STEP_TOLERANCE * wanted_length);
     // A step may give fewer than `MIN_TICKS` ticks. Then shorter ones are tried, as long as the
     // labels of neighbouring ticks differ.
-    while step.length() > finest {
+    while step.length() > shortest_length {
         let length = step.length();
         let decimals = step.decimals();
-        let first = (low / length - 1e-9).ceil() as i64;
-        let last = (high / length + 1e-9).floor() as i64;
-        if last - first + 1 >= MIN_TICKS {
+        let first_multiple = (low / length - 1e-9).ceil() as i64;
+        let last_multiple = (high / length + 1e-9).floor() as i64;
+        if last_multiple - first_multiple + 1 >= MIN_TICKS {
             let tick = |k: i64| {
                 let value = k as f64 * length;
                 let label = match decimals {
@@ -143,9 +143,9 @@ fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
                 };
                 Tick { value, label }
             };
-            return (first..=last).map(tick).collect();
+            return (first_multiple..=last_multiple).map(tick).collect();
         }
-        step = step.shorter();
+        step = step.next_shorter();
     }
     Vec::new()
 }
@@ -157,11 +157,11 @@ pub(crate) const MIN_TICKS: i64 = 3;
 /// Factor of the wanted step that a round step must reach. Basis: rounding of the range must not
 /// choose a step twice as long. It is just below 1; half of it would allow steps that are half as
 /// long as wanted.
-pub(crate) const SLACK: f64 = 0.999;
+pub(crate) const STEP_TOLERANCE: f64 = 0.999;
 
 /// Returns the candidate sets of ticks of a logarithmic scale, from sparse to dense; empty sets if
 /// an end has no logarithm.
-pub(crate) fn log_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
+pub(crate) fn log_tick_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
     if !has_logarithm(low) || !has_logarithm(high) {
         return Default::default();
     }
@@ -178,22 +178,22 @@ pub(crate) fn log_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
             powers.flat_map(|power| factors.iter().map(move |factor| factor * 10_f64.powi(power)));
         values
             .filter(|value| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(value))
-            .map(|value| Tick { value, label: label::significant(value, 2) })
+            .map(|value| Tick { value, label: label::format_significant(value, 2) })
             .collect()
     })
 }
 
 fn log_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
-    let [mut best, denser @ ..] = log_sets(low, high);
-    let apart = best.len().div_ceil(count.max(2) + 1);
-    best = best.into_iter().step_by(apart.max(1)).collect();
-    for set in denser {
-        if best.len() >= 2 && set.len() > count.max(2) + 1 {
+    let [mut ticks, denser_sets @ ..] = log_tick_sets(low, high);
+    let stride = ticks.len().div_ceil(count.max(2) + 1);
+    ticks = ticks.into_iter().step_by(stride.max(1)).collect();
+    for set in denser_sets {
+        if ticks.len() >= 2 && set.len() > count.max(2) + 1 {
             break;
         }
-        best = set;
+        ticks = set;
     }
-    if best.len() < 2 { even_ticks(low, high, count) } else { best }
+    if ticks.len() < 2 { linear_ticks(low, high, count) } else { ticks }
 }
 
 /// Returns whether values are spaced more evenly by their logarithms than by themselves; false for
@@ -202,12 +202,12 @@ pub(crate) fn is_log_spaced(values: &[f64]) -> bool {
     if values.len() < 3 || values.iter().any(|&value| value <= 0.0) {
         return false;
     }
-    let spread = |position: &dyn Fn(f64) -> f64| {
+    let step_ratio = |position: &dyn Fn(f64) -> f64| {
         let steps = values.windows(2).map(|pair| position(pair[1]) - position(pair[0]));
         extremes(steps).map_or(f64::INFINITY, |(least, greatest)| greatest / least)
     };
     // A linear axis is easier to read, so the logarithm must fit clearly better.
-    spread(&f64::ln) * 1.2 < spread(&|value| value)
+    step_ratio(&f64::ln) * 1.2 < step_ratio(&|value| value)
 }
 
 #[cfg(test)]
@@ -231,34 +231,38 @@ mod tests {
         assert_eq!(labels(AxisScale::linear(-0.3, 0.3), 3), ["-0.2", "0.0", "0.2"]);
         assert_eq!(labels(AxisScale::linear(-48.0, 48.0), 3), ["-40", "-20", "0", "20", "40"]);
         assert_eq!(labels(AxisScale::linear(-1.1e15, 0.0), 3), ["-1e15", "-5e14", "0"]);
-        assert_eq!(labels(AxisScale::log(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
-        assert_eq!(labels(AxisScale::log(1.0, 9.0), 4), ["1", "2", "5"]);
+        assert_eq!(labels(AxisScale::logarithmic(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
+        assert_eq!(labels(AxisScale::logarithmic(1.0, 9.0), 4), ["1", "2", "5"]);
         assert!(labels(AxisScale::linear(1.0, 1.0), 5).is_empty());
     }
 
     #[test]
     fn a_log_scale_over_many_decades_has_few_ticks() {
-        assert_eq!(labels(AxisScale::log(1e-3, 1e12), 5).len(), 6);
-        assert!(labels(AxisScale::log(1e-100, 1e100), 5).len() <= 6);
+        assert_eq!(labels(AxisScale::logarithmic(1e-3, 1e12), 5).len(), 6);
+        assert!(labels(AxisScale::logarithmic(1e-100, 1e100), 5).len() <= 6);
     }
 
     #[test]
     fn a_log_scale_with_an_invalid_end_runs_from_1_to_10() {
         for (from, to) in [(0.0, 1.0), (-1.0, 2.0), (1.0, f64::INFINITY), (f64::NAN, 2.0)] {
-            assert_eq!(AxisScale::log(from, to), AxisScale::log(1.0, 10.0), "{from} to {to}");
-            assert!(log_sets(from, to).iter().all(Vec::is_empty), "{from} to {to}");
+            assert_eq!(
+                AxisScale::logarithmic(from, to),
+                AxisScale::logarithmic(1.0, 10.0),
+                "{from} to {to}"
+            );
+            assert!(log_tick_sets(from, to).iter().all(Vec::is_empty), "{from} to {to}");
         }
     }
 
     #[test]
     fn extreme_ends_give_at_most_16_ticks() {
-        let least = f64::from_bits(1);
-        let tiny = f64::MIN_POSITIVE;
+        let least_subnormal = f64::from_bits(1);
+        let least_normal = f64::MIN_POSITIVE;
         let ends = [
             0.0,
-            least,
-            -least,
-            tiny,
+            least_subnormal,
+            -least_subnormal,
+            least_normal,
             1.0,
             1e15,
             1e16 + 2.0,
@@ -273,7 +277,7 @@ mod tests {
         for (&from, &to) in ends.iter().flat_map(|from| ends.iter().map(move |to| (from, to))) {
             // Pairs of neighbouring floats are tried too: no tick label can tell them apart.
             for to in [to, from.next_up(), from * (1.0 + 1e-15), from + to] {
-                for scale in [AxisScale::linear(from, to), AxisScale::log(from, to)] {
+                for scale in [AxisScale::linear(from, to), AxisScale::logarithmic(from, to)] {
                     let ticks = scale.ticks(6).len();
                     assert!(ticks <= 16, "{scale:?}: {ticks}");
                 }
@@ -283,11 +287,11 @@ mod tests {
 
     #[test]
     fn tick_steps_rise_and_shorter_returns_the_one_before() {
-        let all: Vec<TickStep> = TickStep::all().collect();
-        for pair in all.windows(2) {
+        let steps: Vec<TickStep> = TickStep::all().collect();
+        for pair in steps.windows(2) {
             assert!(pair[0].length() < pair[1].length());
-            assert_eq!(pair[1].shorter(), pair[0]);
-            assert_eq!(TickStep::at_least(SLACK * pair[1].length()), pair[1]);
+            assert_eq!(pair[1].next_shorter(), pair[0]);
+            assert_eq!(TickStep::at_least(STEP_TOLERANCE * pair[1].length()), pair[1]);
         }
     }
 

@@ -20,9 +20,9 @@ impl Buckets {
     }
 
     /// Returns the first row of a bucket, one past the last row of the bucket before it.
-    fn start(self, bucket: usize) -> usize {
+    fn start(self, index: usize) -> usize {
         // Rows times buckets can exceed 64 bits if the metadata claims too many rows.
-        (bucket as u128 * self.rows as u128 / self.count.max(1) as u128) as usize
+        (index as u128 * self.rows as u128 / self.count.max(1) as u128) as usize
     }
 }
 
@@ -39,20 +39,20 @@ pub(crate) enum KeptValues {
 /// A column while it is decimated.
 pub(crate) struct Decimator {
     buckets: Buckets,
-    keep: KeptValues,
+    rule: KeptValues,
     /// The number of rows so far.
     row: usize,
     /// The bucket of the next row.
     bucket: usize,
     least: Option<(usize, f64)>,
     greatest: Option<(usize, f64)>,
-    kept: Vec<f64>,
+    kept_values: Vec<f64>,
 }
 
 impl Decimator {
-    pub(crate) fn new(buckets: Buckets, keep: KeptValues) -> Self {
-        let kept = Vec::with_capacity(2 * buckets.count);
-        Self { buckets, keep, row: 0, bucket: 0, least: None, greatest: None, kept }
+    pub(crate) fn new(buckets: Buckets, rule: KeptValues) -> Self {
+        let kept_values = Vec::with_capacity(2 * buckets.count);
+        Self { buckets, rule, row: 0, bucket: 0, least: None, greatest: None, kept_values }
     }
 
     /// Adds the next row's value. Rows beyond the announced number are ignored.
@@ -60,11 +60,11 @@ impl Decimator {
         if self.bucket == self.buckets.count {
             return;
         }
-        let [start, end] = [0, 1].map(|k| self.buckets.start(self.bucket + k));
-        match self.keep {
+        let [start_row, end_row] = [0, 1].map(|k| self.buckets.start(self.bucket + k));
+        match self.rule {
             KeptValues::Instants => {
-                for instant in [start, (start + end) / 2] {
-                    self.kept.extend((self.row == instant).then_some(value));
+                for kept_row in [start_row, (start_row + end_row) / 2] {
+                    self.kept_values.extend((self.row == kept_row).then_some(value));
                 }
             }
             KeptValues::Extremes if value.is_finite() => {
@@ -78,12 +78,12 @@ impl Decimator {
             KeptValues::Extremes => {}
         }
         self.row += 1;
-        if self.row == end {
-            if self.keep == KeptValues::Extremes {
-                let ends = [self.least.take(), self.greatest.take()];
-                let mut ends = ends.map(|end| end.unwrap_or((0, f64::NAN)));
-                ends.sort_by_key(|(row, _)| *row);
-                self.kept.extend(ends.map(|(_, value)| value));
+        if self.row == end_row {
+            if self.rule == KeptValues::Extremes {
+                let extremes = [self.least.take(), self.greatest.take()];
+                let mut extremes = extremes.map(|extreme| extreme.unwrap_or((0, f64::NAN)));
+                extremes.sort_by_key(|(row, _)| *row);
+                self.kept_values.extend(extremes.map(|(_, value)| value));
             }
             self.bucket += 1;
         }
@@ -91,7 +91,7 @@ impl Decimator {
 
     /// Returns two values for each bucket.
     pub(crate) fn finish(self) -> Vec<f64> {
-        self.kept
+        self.kept_values
     }
 }
 
@@ -99,8 +99,8 @@ impl Decimator {
 mod tests {
     use super::*;
 
-    fn decimated(values: &[f64], count: usize, keep: KeptValues) -> Vec<f64> {
-        let mut decimator = Decimator::new(Buckets::new(values.len(), count), keep);
+    fn decimated(values: &[f64], count: usize, rule: KeptValues) -> Vec<f64> {
+        let mut decimator = Decimator::new(Buckets::new(values.len(), count), rule);
         values.iter().for_each(|value| decimator.push(*value));
         decimator.finish()
     }
@@ -126,12 +126,17 @@ mod tests {
     fn buckets_cover_every_row_once() {
         for rows in [1_u32, 3, 499, 500, 501, 12_345] {
             let values: Vec<f64> = (0..rows).map(f64::from).collect();
-            let kept = decimated(&values, 500, KeptValues::Extremes);
-            assert_eq!(kept.len(), 2 * 500.min(rows as usize));
-            let starts: Vec<f64> = kept.chunks(2).map(|pair| pair[0]).collect();
-            let ends: Vec<f64> = kept.chunks(2).map(|pair| pair[1]).collect();
-            assert_eq!((starts[0], ends[ends.len() - 1]), (0.0, f64::from(rows - 1)));
-            assert!(starts[1..].iter().zip(&ends).all(|(start, end)| *start == end + 1.0));
+            let decimated_values = decimated(&values, 500, KeptValues::Extremes);
+            assert_eq!(decimated_values.len(), 2 * 500.min(rows as usize));
+            let first_values: Vec<f64> = decimated_values.chunks(2).map(|pair| pair[0]).collect();
+            let last_values: Vec<f64> = decimated_values.chunks(2).map(|pair| pair[1]).collect();
+            assert_eq!(
+                (first_values[0], last_values[last_values.len() - 1]),
+                (0.0, f64::from(rows - 1))
+            );
+            assert!(
+                first_values[1..].iter().zip(&last_values).all(|(start, end)| *start == end + 1.0)
+            );
         }
     }
 }

@@ -4,11 +4,11 @@
 use std::rc::Rc;
 
 use super::axis::{AxisScale, extremes, has_logarithm};
-use super::colour::{BOTH as BOTH_SIDES, ColourScale, UNSTABLE_SHADE};
+use super::colour::{BOTH_SIDES, ColourScale, UNSTABLE_SHADE};
 use super::decimate::envelope;
 use super::frame::{
-    BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LegendSymbol, Panel, TICK_SIZE, heading, legend,
-    legend_height,
+    BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LegendSymbol, Panel, TICK_SIZE, draw_heading,
+    draw_legend, legend_height,
 };
 use super::label::Label;
 use super::raster::text_width;
@@ -21,7 +21,7 @@ pub struct Chart {
     pub subtitle: String,
     pub x_label: Label,
     /// Whether the x axis is logarithmic.
-    pub x_log: bool,
+    pub is_x_log: bool,
     /// The panels, from top to bottom.
     pub panels: Vec<ChartPanel>,
     /// Vertical lines through all panels.
@@ -34,7 +34,7 @@ pub struct Chart {
     pub shade_meaning: String,
 }
 
-/// A panel of a chart: curves over the common x axis with a y axis of their own.
+/// A panel of a chart: curves over the common x axis, with the panel's own y axis.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ChartPanel {
     /// The short name by which options and pages choose the panel.
@@ -43,9 +43,11 @@ pub struct ChartPanel {
     #[serde(flatten)]
     pub label: Label,
     /// Whether the panel is drawn in a picture, and shown when a page opens.
-    pub shown: bool,
+    #[serde(rename = "shown")]
+    pub is_shown: bool,
     /// Whether the y axis is logarithmic.
-    pub log: bool,
+    #[serde(rename = "log")]
+    pub is_log: bool,
     /// The range of the y axis; by default the range of the series and levels.
     pub range: Option<(f64, f64)>,
     /// The height in a picture, px.
@@ -66,7 +68,7 @@ impl ChartPanel {
     /// Returns a panel of these curves that is shown, linear, and 420 px high.
     pub fn new(name: &str, label: Label, series: Vec<Series>) -> Self {
         let name = name.to_owned();
-        Self { name, label, series, shown: true, height: 420.0, ..Self::default() }
+        Self { name, label, series, is_shown: true, height: 420.0, ..Self::default() }
     }
 }
 
@@ -131,27 +133,36 @@ const OVERLAP_MEANING: &str = "both, one over the other";
 
 /// Draws the panels of a chart that are shown.
 pub(crate) fn draw(chart: &Chart) -> Scene {
-    let panels: Vec<&ChartPanel> = chart.panels.iter().filter(|panel| panel.shown).collect();
-    let entries = entries(chart, &panels);
+    let panels: Vec<&ChartPanel> = chart.panels.iter().filter(|panel| panel.is_shown).collect();
+    let legend_entries = legend_entries(chart, &panels);
     let width = FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
-    let legend_height = legend_height(&entries, width);
+    let legend_height = legend_height(&legend_entries, width);
     let heights: f64 = panels.iter().map(|panel| panel.height + PANEL_GAP).sum();
-    let labels = chart.marks.iter().map(|mark| text_width(&mark.label, TICK_SIZE, false) + 22.0);
-    let strip = labels.fold(0.0, f64::max);
-    let total = HEADING_HEIGHT + strip + heights + BOTTOM_MARGIN + legend_height + 4.0;
-    let mut scene = Scene::new(FIGURE_WIDTH, total, format!("{}. {}", chart.title, chart.subtitle));
-    heading(&mut scene, &chart.title, &chart.subtitle);
-    let xs = x_scale(chart);
-    let mut y = HEADING_HEIGHT + strip;
+    let label_lengths =
+        chart.marks.iter().map(|mark| text_width(&mark.label, TICK_SIZE, false) + 22.0);
+    let label_height = label_lengths.fold(0.0, f64::max);
+    let total_height =
+        HEADING_HEIGHT + label_height + heights + BOTTOM_MARGIN + legend_height + 4.0;
+    let mut scene =
+        Scene::new(FIGURE_WIDTH, total_height, format!("{}. {}", chart.title, chart.subtitle));
+    draw_heading(&mut scene, &chart.title, &chart.subtitle);
+    let x_scale = x_scale(chart);
+    let mut y = HEADING_HEIGHT + label_height;
     for (index, &content) in panels.iter().enumerate() {
-        let panel =
-            Panel { x: LEFT_MARGIN, y, width, height: content.height, xs, ys: y_scale(content) };
+        let panel = Panel {
+            x: LEFT_MARGIN,
+            y,
+            width,
+            height: content.height,
+            x_scale,
+            y_scale: y_scale(content),
+        };
         panel.draw_grid_lines(&mut scene);
         let mut dots = Vec::new();
         scene.clipped(panel.outline(), |scene| {
             dots = draw_panel(scene, chart, content, &panel);
         });
-        if !has_values(content) {
+        if !has_visible_points(content) {
             panel.write_centred(&mut scene, NO_VALUES_TEXT);
         }
         draw_marks(&mut scene, chart, &panel, index == 0);
@@ -160,31 +171,31 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
         panel.draw_frame(&mut scene, last, true);
         // Dots are drawn after the frame and without clipping, so that they are whole at the edge
         // too.
-        let within = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
-        for (place, radius, colour) in dots.into_iter().filter(|([_, y], ..)| within(*y)) {
-            scene.fill(Outline::circle(place, radius), colour);
+        let is_in_panel = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
+        for (position, radius, colour) in dots.into_iter().filter(|([_, y], ..)| is_in_panel(*y)) {
+            scene.fill(Outline::circle(position, radius), colour);
         }
-        panel.y_label(&mut scene, &content.label.to_string(), 62.0);
+        panel.draw_y_label(&mut scene, &content.label.to_string(), 62.0);
         if last {
-            panel.x_label(&mut scene, &chart.x_label.to_string());
+            panel.draw_x_label(&mut scene, &chart.x_label.to_string());
         }
         y += content.height + PANEL_GAP;
     }
-    legend(&mut scene, &entries, LEFT_MARGIN, y - PANEL_GAP + BOTTOM_MARGIN, width);
+    draw_legend(&mut scene, &legend_entries, LEFT_MARGIN, y - PANEL_GAP + BOTTOM_MARGIN, width);
     scene
 }
 
 /// Returns the scale of the x axis: the range of all series, with a margin if all are dots.
 pub(crate) fn x_scale(chart: &Chart) -> AxisScale {
-    let all = || chart.panels.iter().flat_map(|panel| &panel.series);
-    let xs = all().flat_map(|series| series.x.iter().copied());
-    if !chart.x_log && all().all(|series| series.style == Style::Dots) {
+    let all_series = || chart.panels.iter().flat_map(|panel| &panel.series);
+    let xs = all_series().flat_map(|series| series.x.iter().copied());
+    if !chart.is_x_log && all_series().all(|series| series.style == Style::Dots) {
         return AxisScale::around(xs);
     }
-    if chart.x_log {
+    if chart.is_x_log {
         let positive = xs.filter(|x| has_logarithm(*x));
         let (low, high) = extremes(positive).unwrap_or((1.0, 10.0));
-        return AxisScale::log(low, if high > low { high } else { 10.0 * low });
+        return AxisScale::logarithmic(low, if high > low { high } else { 10.0 * low });
     }
     let (low, high) = extremes(xs).unwrap_or((0.0, 1.0));
     // If all series have only one x, it is in the middle, so that its dots are whole.
@@ -198,16 +209,20 @@ pub(crate) fn x_scale(chart: &Chart) -> AxisScale {
 /// Returns the scale of a panel's y axis: its given range, or the range of its series and levels.
 pub(crate) fn y_scale(panel: &ChartPanel) -> AxisScale {
     if let Some((low, high)) = panel.range {
-        return if panel.log { AxisScale::log(low, high) } else { AxisScale::linear(low, high) };
+        return if panel.is_log {
+            AxisScale::logarithmic(low, high)
+        } else {
+            AxisScale::linear(low, high)
+        };
     }
-    let bands = panel.series.iter().flat_map(|series| match &series.style {
+    let value_lists = panel.series.iter().flat_map(|series| match &series.style {
         Style::Band(low, high) => [&low[..], &high[..]],
         _ => [&series.y[..], &[]],
     });
-    let values = bands.flatten().copied().chain(panel.levels.iter().map(|(value, _)| *value));
-    if panel.log {
+    let values = value_lists.flatten().copied().chain(panel.levels.iter().map(|(value, _)| *value));
+    if panel.is_log {
         let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
-        AxisScale::log(low / 1.15, high * 1.15)
+        AxisScale::logarithmic(low / 1.15, high * 1.15)
     } else {
         AxisScale::around(values)
     }
@@ -217,8 +232,8 @@ pub(crate) fn y_scale(panel: &ChartPanel) -> AxisScale {
 const NO_VALUES_TEXT: &str = "no values to show";
 
 /// Returns whether a panel has a point of a line, a dot or a star to draw.
-fn has_values(panel: &ChartPanel) -> bool {
-    let is_shown = |y: &f64| y.is_finite() && (!panel.log || *y > 0.0);
+fn has_visible_points(panel: &ChartPanel) -> bool {
+    let is_shown = |y: &f64| y.is_finite() && (!panel.is_log || *y > 0.0);
     let has_points = |series: &Series| {
         let has_any = |ys: &[f64]| ys.iter().any(is_shown);
         match &series.style {
@@ -244,7 +259,7 @@ fn draw_panel(
         }
         let mut areas = Outline::default();
         for range in ranges {
-            let [from, to] = range.map(|x| panel.at_x(x));
+            let [from, to] = range.map(|x| panel.x_pixel(x));
             // A shade narrower than 1 px would not be visible.
             areas.add_rectangle(from, panel.y, (to - from).max(1.0), panel.height);
         }
@@ -252,47 +267,48 @@ fn draw_panel(
     }
     for series in &content.series {
         let xs = &series.x;
-        let at = |ys: &[f64], k: usize| {
-            (xs[k].is_finite() && ys[k].is_finite()).then(|| panel.at(xs[k], ys[k]))
+        let pixel = |ys: &[f64], k: usize| {
+            (xs[k].is_finite() && ys[k].is_finite()).then(|| panel.pixel(xs[k], ys[k]))
         };
         if let Style::Band(low, high) = &series.style {
-            let both: Vec<_> = (0..xs.len()).map(|k| at(low, k).zip(at(high, k))).collect();
+            let edges: Vec<_> = (0..xs.len()).map(|k| pixel(low, k).zip(pixel(high, k))).collect();
             let mut outline = Outline::default();
-            for run in both.split(Option::is_none).filter(|run| !run.is_empty()) {
-                let (mut area, mut back): (Vec<[f64; 2]>, Vec<[f64; 2]>) =
+            for run in edges.split(Option::is_none).filter(|run| !run.is_empty()) {
+                let (mut low_points, mut high_points): (Vec<[f64; 2]>, Vec<[f64; 2]>) =
                     run.iter().flatten().copied().unzip();
                 // The band at an isolated point is as wide as its dot.
-                for side in [&mut area, &mut back] {
+                for side in [&mut low_points, &mut high_points] {
                     if let [[x, y]] = side[..] {
                         *side = vec![[x - ISOLATED_RADIUS, y], [x + ISOLATED_RADIUS, y]];
                     }
                 }
-                area.extend(back.into_iter().rev());
-                outline.add_polygon(&area);
+                low_points.extend(high_points.into_iter().rev());
+                outline.add_polygon(&low_points);
             }
             scene.fill(outline, series.colour.with_alpha(90));
         }
         if series.style == Style::Dots {
-            let places = (0..xs.len()).filter_map(|k| at(&series.y, k));
-            dots.extend(places.map(|place| (place, DOT_RADIUS, series.colour)));
+            let points = (0..xs.len()).filter_map(|k| pixel(&series.y, k));
+            dots.extend(points.map(|point| (point, DOT_RADIUS, series.colour)));
             continue;
         }
-        let kept = envelope(xs, &series.y, panel.xs.from, panel.xs.to, panel.width as usize);
-        let places: Vec<_> = kept.into_iter().map(|k| at(&series.y, k)).collect();
+        let indices =
+            envelope(xs, &series.y, panel.x_scale.from, panel.x_scale.to, panel.width as usize);
+        let points: Vec<_> = indices.into_iter().map(|k| pixel(&series.y, k)).collect();
         let mut outline = Outline::default();
-        let isolated = outline.add_runs(&places);
-        scene.line(outline, stroke(series));
-        dots.extend(isolated.into_iter().map(|place| (place, ISOLATED_RADIUS, series.colour)));
+        let isolated = outline.add_runs(&points);
+        scene.line(outline, series_stroke(series));
+        dots.extend(isolated.into_iter().map(|point| (point, ISOLATED_RADIUS, series.colour)));
     }
     for (value, _) in &content.levels {
-        let y = panel.at_y(*value);
+        let y = panel.y_pixel(*value);
         scene.line(Outline::line(&[[panel.x, y], [panel.x + panel.width, y]]), level_stroke());
     }
     dots
 }
 
 /// Returns the stroke of a series' line.
-pub(crate) fn stroke(series: &Series) -> Stroke {
+pub(crate) fn series_stroke(series: &Series) -> Stroke {
     match series.style {
         Style::Solid(width) => Stroke::solid(series.colour, width),
         Style::Dashed => Stroke::dashed(series.colour, 1.8, &[8.0, 5.0]),
@@ -319,56 +335,60 @@ const STAR_RADIUS: f64 = 10.0;
 type Rectangle = [f64; 4];
 
 /// Draws all stars, then their labels. A label is placed where it covers no star and no earlier
-/// label; among such places the one that the fewest curves cross is taken.
+/// label; among such positions, that with the fewest curves across it is chosen.
 fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
-    let mut taken: Vec<Rectangle> = Vec::new();
+    let mut occupied: Vec<Rectangle> = Vec::new();
     for (x, y, _) in &content.stars {
-        let [x, y] = panel.at(*x, *y);
+        let [x, y] = panel.pixel(*x, *y);
         scene.fill(Outline::star([x, y], STAR_RADIUS), INK);
-        taken.push([x - STAR_RADIUS, y - STAR_RADIUS, x + STAR_RADIUS, y + STAR_RADIUS]);
+        occupied.push([x - STAR_RADIUS, y - STAR_RADIUS, x + STAR_RADIUS, y + STAR_RADIUS]);
     }
     for (x, y, label) in &content.stars {
-        let [x, y] = panel.at(*x, *y);
+        let [x, y] = panel.pixel(*x, *y);
         let width = text_width(label, TICK_SIZE, true);
         // The candidates lie on both sides of the star, from close to it to farther above and
         // below.
         let sides = [x - STAR_RADIUS - 2.0 - width, x + STAR_RADIUS + 2.0];
         let heights = [-6.0, 18.0, -24.0, 36.0, -42.0, 54.0];
-        let places = heights.iter().flat_map(|dy| sides.map(|left| [left, y + dy]));
+        let candidates = heights.iter().flat_map(|dy| sides.map(|left| [left, y + dy]));
         let extent = |[left, base]: [f64; 2]| [left, base - TICK_SIZE, left + width, base + 4.0];
-        let free = |place: &[f64; 2]| {
-            let [left, top, right, bottom] = extent(*place);
+        let is_free = |position: &[f64; 2]| {
+            let [left, top, right, bottom] = extent(*position);
             left > panel.x
                 && right < panel.x + panel.width
                 && top > panel.y
                 && bottom < panel.y + panel.height
-                && taken.iter().all(|other| {
-                    right < other[0] || left > other[2] || bottom < other[1] || top > other[3]
+                && occupied.iter().all(|rectangle| {
+                    right < rectangle[0]
+                        || left > rectangle[2]
+                        || bottom < rectangle[1]
+                        || top > rectangle[3]
                 })
         };
-        let place =
-            places.filter(free).min_by_key(|place| lines_through(content, panel, extent(*place)));
-        let place = place.unwrap_or([sides[1], y + 18.0]);
-        taken.push(extent(place));
-        let text = Text::new(label.clone(), place, TICK_SIZE).bold();
+        let position = candidates
+            .filter(is_free)
+            .min_by_key(|position| count_curves_through(content, panel, extent(*position)));
+        let position = position.unwrap_or([sides[1], y + 18.0]);
+        occupied.push(extent(position));
+        let text = Text::new(label.clone(), position, TICK_SIZE).bold();
         scene.text(Text { halo: Some(PAPER), ..text });
     }
 }
 
 /// Returns the number of curves of a panel that pass through a rectangle.
-fn lines_through(content: &ChartPanel, panel: &Panel, extent: Rectangle) -> usize {
-    let runs_through = |series: &&Series| {
-        let places = series.x.iter().zip(&series.y).map(|(&x, &y)| panel.at(x, y));
-        let places: Vec<[f64; 2]> = places.collect();
-        places.windows(2).any(|pair| intersects([pair[0], pair[1]], extent))
+fn count_curves_through(content: &ChartPanel, panel: &Panel, extent: Rectangle) -> usize {
+    let passes_through = |series: &&Series| {
+        let points = series.x.iter().zip(&series.y).map(|(&x, &y)| panel.pixel(x, y));
+        let points: Vec<[f64; 2]> = points.collect();
+        points.windows(2).any(|pair| intersects([pair[0], pair[1]], extent))
     };
-    content.series.iter().filter(runs_through).count()
+    content.series.iter().filter(passes_through).count()
 }
 
 /// Returns whether a part of a line segment lies within a rectangle (Liang-Barsky clipping).
 fn intersects([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Rectangle) -> bool {
-    let mut first = 0.0_f64;
-    let mut last = 1.0_f64;
+    let mut entry = 0.0_f64;
+    let mut exit = 1.0_f64;
     for (k, (low, high)) in [(left, right), (top, bottom)].into_iter().enumerate() {
         let step = to[k] - from[k];
         if step == 0.0 {
@@ -377,38 +397,38 @@ fn intersects([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Rectangle) 
             }
             continue;
         }
-        let [one, other] = [(low - from[k]) / step, (high - from[k]) / step];
-        first = first.max(one.min(other));
-        last = last.min(one.max(other));
+        let [at_low, at_high] = [(low - from[k]) / step, (high - from[k]) / step];
+        entry = entry.max(at_low.min(at_high));
+        exit = exit.min(at_low.max(at_high));
     }
     // A segment with a NaN end belongs to a gap of the curve.
-    from.iter().chain(&to).all(|part| part.is_finite()) && first <= last
+    from.iter().chain(&to).all(|coordinate| coordinate.is_finite()) && entry <= exit
 }
 
-/// Draws the marks through a panel, and their labels above it if `labelled`. A label that would
+/// Draws the marks through a panel, and their labels above it if `is_labelled`. A label that would
 /// cover the one before it is moved to the right.
-fn draw_marks(scene: &mut Scene, chart: &Chart, panel: &Panel, labelled: bool) {
-    let mut free = f64::NEG_INFINITY;
+fn draw_marks(scene: &mut Scene, chart: &Chart, panel: &Panel, is_labelled: bool) {
+    let mut next_free_x = f64::NEG_INFINITY;
     for mark in &chart.marks {
-        let x = panel.at_x(mark.x);
+        let x = panel.x_pixel(mark.x);
         scene.line(Outline::line(&[[x, panel.y], [x, panel.y + panel.height]]), mark_stroke());
-        let aside = x.max(free);
-        if labelled && aside <= panel.x + panel.width + 8.0 {
-            free = aside + TICK_SIZE + 2.0;
-            let leader = Outline::line(&[[x, panel.y], [aside, panel.y - 12.0]]);
+        let label_x = x.max(next_free_x);
+        if is_labelled && label_x <= panel.x + panel.width + 8.0 {
+            next_free_x = label_x + TICK_SIZE + 2.0;
+            let leader = Outline::line(&[[x, panel.y], [label_x, panel.y - 12.0]]);
             scene.line(leader, Stroke::solid(MUTED, 1.2));
             scene.text(
-                Text::new(mark.label.clone(), [aside + 5.0, panel.y - 16.0], TICK_SIZE).upright(),
+                Text::new(mark.label.clone(), [label_x + 5.0, panel.y - 16.0], TICK_SIZE).rotated(),
             );
         }
     }
 }
 
-fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, String)> {
+fn legend_entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, String)> {
     let mut entries: Vec<(LegendSymbol, String)> = Vec::new();
-    let mut add = |sign: LegendSymbol, name: &str| {
-        if !name.is_empty() && !entries.iter().any(|(_, known)| known == name) {
-            entries.push((sign, name.to_owned()));
+    let mut add = |symbol: LegendSymbol, name: &str| {
+        if !name.is_empty() && !entries.iter().any(|(_, known_name)| known_name == name) {
+            entries.push((symbol, name.to_owned()));
         }
     };
     for panel in panels {
@@ -418,21 +438,21 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, String)>
                 add(LegendSymbol::Shape(dot, true, series.colour), &series.name);
                 continue;
             }
-            let mut stroke = stroke(series);
+            let mut stroke = series_stroke(series);
             stroke.width = stroke.width.max(2.2);
             add(LegendSymbol::Line(stroke), &series.name);
         }
         if let [.., under, over] = &panel.series[..]
             && over.colour.alpha < 255
         {
-            let both = Stroke::solid(over.colour.over(under.colour), 2.2);
-            add(LegendSymbol::Line(both), OVERLAP_MEANING);
+            let overlap = Stroke::solid(over.colour.over(under.colour), 2.2);
+            add(LegendSymbol::Line(overlap), OVERLAP_MEANING);
         }
         for (_, meaning) in &panel.levels {
             add(LegendSymbol::Line(level_stroke()), meaning);
         }
         if !panel.mixed.is_empty() {
-            add(LegendSymbol::Area(BOTH_SIDES), MIXED);
+            add(LegendSymbol::Area(BOTH_SIDES), MIXED_MEANING);
         }
         if !panel.stars.is_empty() {
             add(LegendSymbol::Shape(Outline::star([0.0, 0.0], 9.0), true, INK), STAR_MEANING);
@@ -448,12 +468,12 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, String)>
 }
 
 /// The legend entry of [`ChartPanel::mixed`].
-pub const MIXED: &str = "both: reliable and unreliable points";
+pub const MIXED_MEANING: &str = "both: reliable and unreliable points";
 
 /// Returns whether positive values span more than a factor of ten, which calls for a logarithmic
 /// axis.
 pub fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
-    ColourScale::amplitude(values).scale.log
+    ColourScale::without_limit(values).axis.is_log
 }
 
 #[cfg(test)]
@@ -463,10 +483,11 @@ mod tests {
     #[test]
     fn labels_of_stars_avoid_the_curves() {
         let speeds: Vec<f64> = (0..=30).map(|k| 10.0 * f64::from(k)).collect();
-        let flat = |y: f64| Series::new("", INK, speeds.clone(), vec![y; 31], Style::Solid(2.0));
+        let horizontal =
+            |y: f64| Series::new("", INK, speeds.clone(), vec![y; 31], Style::Solid(2.0));
         // The second curve lies at the place that the first star's label prefers.
-        let mut series = vec![flat(147.8), flat(154.0), flat(162.1)];
-        series.push(Series { y: speeds.clone(), ..flat(0.0) });
+        let mut series = vec![horizontal(147.8), horizontal(154.0), horizontal(162.1)];
+        series.push(Series { y: speeds.clone(), ..horizontal(0.0) });
         let stars = [147.8, 162.1].map(|at| (at, at, format!("{at} Hz"))).to_vec();
         let panel = ChartPanel {
             stars,
@@ -477,16 +498,16 @@ mod tests {
             title: String::new(),
             subtitle: String::new(),
             x_label: Label::new("Speed", "Hz"),
-            x_log: false,
+            is_x_log: false,
             panels: vec![panel],
             marks: Vec::new(),
             mark_meaning: String::new(),
             shades: Vec::new(),
             shade_meaning: String::new(),
         };
-        let drawn = draw(&chart);
-        let labels = drawn.items.iter().filter_map(|item| match item {
-            crate::scene::Item::Text(text) if text.halo.is_some() => Some(text),
+        let scene = draw(&chart);
+        let labels = scene.items.iter().filter_map(|item| match item {
+            crate::scene::SceneItem::Text(text) if text.halo.is_some() => Some(text),
             _ => None,
         });
         let content = &chart.panels[0];
@@ -499,15 +520,15 @@ mod tests {
             y,
             width: FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN,
             height: content.height,
-            xs,
-            ys,
+            x_scale: xs,
+            y_scale: ys,
         };
         let mut count = 0;
         for text in labels {
-            let [left, base] = text.at;
+            let [left, base] = text.position;
             let width = text_width(&text.text, TICK_SIZE, true);
             let extent = [left, base - TICK_SIZE, left + width, base + 4.0];
-            assert_eq!(lines_through(content, &panel, extent), 0, "{}", text.text);
+            assert_eq!(count_curves_through(content, &panel, extent), 0, "{}", text.text);
             count += 1;
         }
         assert_eq!(count, 2);

@@ -1,7 +1,7 @@
 //! Colours that people with any colour vision can tell apart, and scales from values to colours.
 
 use super::axis::{AxisScale, Tick, extremes};
-use super::label::significant;
+use super::label::format_significant;
 use super::scene::Colour;
 
 /// The colours of the good side of a limit, from the end of the scale to the limit. Basis: the
@@ -16,7 +16,7 @@ const GOOD_COLOURS: [u32; 5] = [0xe1_ed_f8, 0xcf_e1_f2, 0xb5_d4_e9, 0x93_c3_df, 
 const BAD_COLOURS: [u32; 5] = [0xe8_86_66, 0xd6_60_4d, 0xc4_3c_3c, 0xb2_18_2b, 0x67_00_1f];
 
 /// The colours below the centre of a scale without a limit, from its end to the centre. Basis: the
-/// blues of ColorBrewer's RdBu; the centre is light grey and both sides darken alike.
+/// blues of ColorBrewer's RdBu; the centre is light grey and both sides darken equally.
 const LOW_COLOURS: [u32; 5] = [0x05_30_61, 0x21_66_ac, 0x43_93_c3, 0x92_c5_de, 0xf2_f2_f2];
 /// The colours above the centre of a scale without a limit: the reds of ColorBrewer's RdBu.
 const HIGH_COLOURS: [u32; 5] = [0xf2_f2_f2, 0xf4_a5_82, 0xd6_60_4d, 0xb2_18_2b, 0x67_00_1f];
@@ -48,7 +48,7 @@ pub const NONLINEAR: Colour = DISTINCT[0];
 pub const LINEAR: Colour = DISTINCT[1];
 /// The colour of cells with points on both sides of a limit: Okabe and Ito's yellow, which no scale
 /// here has.
-pub(crate) const BOTH: Colour = Colour::hex(0xf0e442);
+pub(crate) const BOTH_SIDES: Colour = Colour::hex(0xf0e442);
 /// The colour of dots on the good side of a limit: a blue that is dark enough for a dot on paper.
 pub(crate) const GOOD_SIDE: Colour = Colour::hex(0x3182bd);
 /// The colour of dots on the bad side of a limit.
@@ -66,56 +66,66 @@ pub(crate) const COLOUR_STEPS: usize = 64;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ColourScale {
     /// The range of values from the first colour to the last.
-    pub(crate) scale: AxisScale,
-    /// The value in the middle of a diverging scale; both of its sides have half of the colours,
-    /// whatever their extent. `None` for a sequential scale, from dark to light.
+    pub(crate) axis: AxisScale,
+    /// The value in the middle of a diverging scale; each of its sides has half of the colours,
+    /// even if the sides differ in extent. `None` for a sequential scale, from dark to light.
     pub(crate) centre: Option<f64>,
     /// Whether low values are the bad ones, which are red.
-    reversed: bool,
+    is_reversed: bool,
     /// Whether the centre is not a limit, so that values near it are grey.
-    neutral: bool,
+    is_neutral: bool,
 }
 
 impl ColourScale {
-    const fn sequential(scale: AxisScale) -> Self {
-        Self { scale, centre: None, reversed: false, neutral: false }
+    const fn sequential(axis: AxisScale) -> Self {
+        Self { axis, centre: None, is_reversed: false, is_neutral: false }
     }
 
-    const fn diverging(scale: AxisScale, limit: f64, reversed: bool) -> Self {
-        Self { scale, centre: Some(limit), reversed, neutral: false }
+    const fn diverging(axis: AxisScale, limit: f64, is_reversed: bool) -> Self {
+        Self { axis, centre: Some(limit), is_reversed, is_neutral: false }
     }
 
     /// Returns the scale of ratios around a limit, logarithmic.
-    pub(crate) fn ratio(values: impl Iterator<Item = f64>, limit: f64, reversed: bool) -> Self {
+    pub(crate) fn ratio(values: impl Iterator<Item = f64>, limit: f64, is_reversed: bool) -> Self {
         let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((limit, limit));
-        let scale = AxisScale::log(low.min(limit / 2.0), high.max(limit * 2.0));
-        Self::diverging(scale, limit, reversed)
+        let axis = AxisScale::logarithmic(low.min(limit / 2.0), high.max(limit * 2.0));
+        Self::diverging(axis, limit, is_reversed)
     }
 
     /// Returns the scale of factors, which reaches as far below 1 as above it.
-    pub(crate) fn factor(values: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn around_one(values: impl Iterator<Item = f64>) -> Self {
         let farthest = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
-        let most = values.filter(|value| *value > 0.0).fold(MIN_FACTOR_END, farthest);
-        Self { neutral: true, ..Self::diverging(AxisScale::log(1.0 / most, most), 1.0, false) }
+        let scale_end = values.filter(|value| *value > 0.0).fold(MIN_FACTOR_END, farthest);
+        Self {
+            is_neutral: true,
+            ..Self::diverging(AxisScale::logarithmic(1.0 / scale_end, scale_end), 1.0, false)
+        }
     }
 
-    /// Returns the scale of differences, which reaches as far below 0 as above it. `reversed` if
+    /// Returns the scale of differences, which reaches as far below 0 as above it. `is_reversed` if
     /// less is worse.
-    pub(crate) fn difference(values: impl Iterator<Item = f64>, reversed: bool) -> Self {
+    pub(crate) fn around_zero(values: impl Iterator<Item = f64>, is_reversed: bool) -> Self {
         let farthest = |so_far: f64, value: f64| so_far.max(value.abs());
-        let most = values.filter(|value| value.is_finite()).fold(0.0, farthest);
-        let most = if most > 0.0 { most } else { 1.0 };
-        Self { neutral: true, ..Self::diverging(AxisScale::linear(-most, most), 0.0, reversed) }
+        let scale_end = values.filter(|value| value.is_finite()).fold(0.0, farthest);
+        let scale_end = if scale_end > 0.0 { scale_end } else { 1.0 };
+        Self {
+            is_neutral: true,
+            ..Self::diverging(AxisScale::linear(-scale_end, scale_end), 0.0, is_reversed)
+        }
     }
 
     /// Returns the scale of values with a limit, which is in the middle. Values that lie on one
-    /// side of it have all colours of a sequential scale. `reversed` if less is worse.
-    pub(crate) fn about(values: impl Iterator<Item = f64>, limit: f64, reversed: bool) -> Self {
+    /// side of it have all colours of a sequential scale. `is_reversed` if less is worse.
+    pub(crate) fn with_limit(
+        values: impl Iterator<Item = f64>,
+        limit: f64,
+        is_reversed: bool,
+    ) -> Self {
         match extremes(values) {
             Some((low, high)) if low < limit && high > limit => {
-                Self::diverging(AxisScale::linear(low, high), limit, reversed)
+                Self::diverging(AxisScale::linear(low, high), limit, is_reversed)
             }
-            found => Self::sequential_over(found.unwrap_or((0.0, 1.0))),
+            extremes => Self::sequential_over(extremes.unwrap_or((0.0, 1.0))),
         }
     }
 
@@ -127,14 +137,14 @@ impl ColourScale {
 
     /// Returns the scale of values without a limit: logarithmic if all are positive and span more
     /// than a factor of ten.
-    pub(crate) fn amplitude(values: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn without_limit(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extremes(values).unwrap_or((0.5, 1.0));
         if low <= 0.0 {
             return Self::sequential_over((low, high));
         }
         let (low, high) = if high > low { (low, high) } else { (0.9 * low, 1.1 * low) };
         Self::sequential(if high > 10.0 * low {
-            AxisScale::log(low, high)
+            AxisScale::logarithmic(low, high)
         } else {
             AxisScale::linear(low, high)
         })
@@ -145,13 +155,13 @@ impl ColourScale {
     pub(crate) fn position(&self, value: f64) -> f64 {
         let position = match self.centre {
             Some(centre) => {
-                let offset = self.scale.coordinate(value) - self.scale.coordinate(centre);
-                let [low, centre, high] = [self.scale.from, centre, self.scale.to]
-                    .map(|value| self.scale.coordinate(value));
-                let half = if offset < 0.0 { centre - low } else { high - centre };
-                0.5 + 0.5 * offset / half
+                let offset = self.axis.coordinate(value) - self.axis.coordinate(centre);
+                let [low, centre, high] =
+                    [self.axis.from, centre, self.axis.to].map(|value| self.axis.coordinate(value));
+                let half_length = if offset < 0.0 { centre - low } else { high - centre };
+                0.5 + 0.5 * offset / half_length
             }
-            None => self.scale.position(value),
+            None => self.axis.position(value),
         };
         position.clamp(0.0, 1.0)
     }
@@ -163,39 +173,43 @@ impl ColourScale {
 
     /// Returns the colour of a step.
     pub(crate) fn colour(&self, step: usize) -> Colour {
-        let place = (step as f64 + 0.5) / COLOUR_STEPS as f64;
+        let position = (step as f64 + 0.5) / COLOUR_STEPS as f64;
         if self.centre.is_none() {
-            return blend(&VIRIDIS, place);
+            return blend(&VIRIDIS, position);
         }
-        let place = if self.reversed { 1.0 - place } else { place };
-        let [below, above] = if self.neutral {
+        let position = if self.is_reversed { 1.0 - position } else { position };
+        let [below, above] = if self.is_neutral {
             [&LOW_COLOURS, &HIGH_COLOURS]
         } else {
             [&GOOD_COLOURS, &BAD_COLOURS]
         };
-        if place < 0.5 { blend(below, 2.0 * place) } else { blend(above, 2.0 * place - 1.0) }
+        if position < 0.5 {
+            blend(below, 2.0 * position)
+        } else {
+            blend(above, 2.0 * position - 1.0)
+        }
     }
 
     /// Returns the ticks of the colour bar.
     pub(crate) fn ticks(&self) -> Vec<Tick> {
-        let Some(centre) = self.centre else { return self.scale.ticks(6) };
-        let mut ticks = AxisScale { to: centre, ..self.scale }.ticks(3);
-        ticks.extend(AxisScale { from: centre, ..self.scale }.ticks(4));
+        let Some(centre) = self.centre else { return self.axis.ticks(6) };
+        let mut ticks = AxisScale { to: centre, ..self.axis }.ticks(3);
+        ticks.extend(AxisScale { from: centre, ..self.axis }.ticks(4));
         ticks.retain(|tick| (self.position(tick.value) - 0.5).abs() > 0.04);
-        ticks.push(Tick { value: centre, label: significant(centre, 3) });
+        ticks.push(Tick { value: centre, label: format_significant(centre, 3) });
         ticks
     }
 }
 
-/// Returns the colour at `place` (0 to 1) between evenly spaced anchors.
-fn blend(anchors: &[u32], place: f64) -> Colour {
-    let along = place.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
-    let first = (along as usize).min(anchors.len() - 2);
-    let part = along - first as f64;
-    let from = Colour::hex(anchors[first]).rgb;
-    let to = Colour::hex(anchors[first + 1]).rgb;
+/// Returns the colour at `share` (0 to 1) between evenly spaced anchors.
+fn blend(anchors: &[u32], share: f64) -> Colour {
+    let position = share.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
+    let lower = (position as usize).min(anchors.len() - 2);
+    let weight = position - lower as f64;
+    let from = Colour::hex(anchors[lower]).rgb;
+    let to = Colour::hex(anchors[lower + 1]).rgb;
     let rgb = std::array::from_fn(|k| {
-        (f64::from(from[k]) * (1.0 - part) + f64::from(to[k]) * part).round() as u8
+        (f64::from(from[k]) * (1.0 - weight) + f64::from(to[k]) * weight).round() as u8
     });
     Colour { rgb, alpha: 255 }
 }
@@ -221,48 +235,51 @@ mod tests {
 
     #[test]
     fn lightness_falls_along_a_scale_and_jumps_at_the_limit() {
-        let limit = ColourScale::ratio([1.0, 9.0].into_iter(), 2.0, false);
-        let light = |level| {
-            let [red, green, blue] = limit.colour(level).rgb.map(f64::from);
+        let scale = ColourScale::ratio([1.0, 9.0].into_iter(), 2.0, false);
+        let luminance = |level| {
+            let [red, green, blue] = scale.colour(level).rgb.map(f64::from);
             0.2126 * red + 0.7152 * green + 0.0722 * blue
         };
-        assert!((1..COLOUR_STEPS).all(|level| light(level) < light(level - 1)));
-        assert!(light(COLOUR_STEPS / 2 - 1) - light(COLOUR_STEPS / 2) > 8.0, "a step at the limit");
+        assert!((1..COLOUR_STEPS).all(|level| luminance(level) < luminance(level - 1)));
+        assert!(
+            luminance(COLOUR_STEPS / 2 - 1) - luminance(COLOUR_STEPS / 2) > 8.0,
+            "a step at the limit"
+        );
     }
 
     #[test]
     fn values_on_one_side_of_the_limit_have_all_colours() {
-        let scale = ColourScale::about([0.004, 0.012].into_iter(), 0.0, true);
+        let scale = ColourScale::with_limit([0.004, 0.012].into_iter(), 0.0, true);
         assert_eq!([0.004, 0.012].map(|gap| scale.position(gap)), [0.0, 1.0]);
-        let mixed = ColourScale::about([-0.001, 0.012].into_iter(), 0.0, true);
+        let mixed = ColourScale::with_limit([-0.001, 0.012].into_iter(), 0.0, true);
         assert_eq!([-0.001, 0.0, 0.012].map(|gap| mixed.position(gap)), [0.0, 0.5, 1.0]);
-        assert!(ColourScale::amplitude([3.0, 3.0].into_iter()).position(3.0).is_finite());
+        assert!(ColourScale::without_limit([3.0, 3.0].into_iter()).position(3.0).is_finite());
     }
 
     #[test]
     fn small_changes_are_nearly_grey() {
-        let spread = |scale: &ColourScale, value: f64| {
+        let saturation = |scale: &ColourScale, value: f64| {
             let rgb = scale.colour(scale.step(value)).rgb;
             rgb.iter().max().unwrap() - rgb.iter().min().unwrap()
         };
-        let factors = ColourScale::factor([0.9995, 1.0005].into_iter());
-        assert!([0.9995, 1.0, 1.0005].iter().all(|factor| spread(&factors, *factor) < 24));
-        let factors = ColourScale::factor([0.5, 1.1].into_iter());
-        assert!(spread(&factors, 1.0) < 24 && spread(&factors, 0.5) > 70);
+        let factors = ColourScale::around_one([0.9995, 1.0005].into_iter());
+        assert!([0.9995, 1.0, 1.0005].iter().all(|factor| saturation(&factors, *factor) < 24));
+        let factors = ColourScale::around_one([0.5, 1.1].into_iter());
+        assert!(saturation(&factors, 1.0) < 24 && saturation(&factors, 0.5) > 70);
         assert_eq!(factors.position(2.0), 1.0, "as far above 1 as below it");
-        let gaps = ColourScale::difference([-0.001, 0.004].into_iter(), true);
-        assert!(spread(&gaps, 0.0) < 24);
+        let gaps = ColourScale::around_zero([-0.001, 0.004].into_iter(), true);
+        assert!(saturation(&gaps, 0.0) < 24);
         assert_eq!([-0.004, 0.0, 0.004].map(|gap| gaps.position(gap)), [0.0, 0.5, 1.0]);
         let [red, _, blue] = gaps.colour(gaps.step(-0.003)).rgb;
         assert!(red > blue, "a gap that got smaller is worse");
-        let same = ColourScale::difference([0.0, 0.0].into_iter(), true);
+        let same = ColourScale::around_zero([0.0, 0.0].into_iter(), true);
         assert!(same.position(0.0).is_finite());
     }
 
     #[test]
     fn values_beyond_a_lower_limit_are_red() {
         let [red, _, blue] =
-            ColourScale::about([-0.004, 0.008].into_iter(), 0.0, true).colour(0).rgb;
+            ColourScale::with_limit([-0.004, 0.008].into_iter(), 0.0, true).colour(0).rgb;
         assert!(red > blue);
     }
 }

@@ -11,7 +11,7 @@ type GridNode = (usize, usize);
 type GridEdge = (GridNode, (usize, usize));
 
 /// Returns the edge between two nodes.
-fn edge(a: GridNode, b: GridNode) -> GridEdge {
+fn edge_between(a: GridNode, b: GridNode) -> GridEdge {
     let (first, (x, y)) = (a.min(b), a.max(b));
     (first, (y, x))
 }
@@ -54,14 +54,16 @@ fn segments_in_square(
     let nodes = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
     let corners = nodes.map(|(i, j)| value(i, j));
     let above = corners.map(|corner| corner >= 0.0);
-    let known: Vec<usize> = (0..4).filter(|&k| corners[k].is_finite()).collect();
-    if known.len() < 3 {
+    let known_corners: Vec<usize> = (0..4).filter(|&k| corners[k].is_finite()).collect();
+    if known_corners.len() < 3 {
         return Vec::new();
     }
-    let sides = (0..known.len()).map(|k| (known[k], known[(k + 1) % known.len()]));
-    let crossed = sides.filter(|&(from, to)| above[from] != above[to]);
-    let crossed: Vec<GridEdge> = crossed.map(|(from, to)| edge(nodes[from], nodes[to])).collect();
-    match crossed[..] {
+    let sides = (0..known_corners.len())
+        .map(|k| (known_corners[k], known_corners[(k + 1) % known_corners.len()]));
+    let crossed_sides = sides.filter(|&(from, to)| above[from] != above[to]);
+    let crossed_sides: Vec<GridEdge> =
+        crossed_sides.map(|(from, to)| edge_between(nodes[from], nodes[to])).collect();
+    match crossed_sides[..] {
         [from, to] => vec![(from, to)],
         [a, b, c, d] => {
             // At a saddle the mean of the corners decides which pair of opposite corners is
@@ -81,27 +83,27 @@ fn crossing(
 ) -> [f64; 2] {
     let start = value(from.0, from.1);
     let end = value(x, y);
-    let part = start / (start - end);
-    [xs[from.0] + part * (xs[x] - xs[from.0]), ys[from.1] + part * (ys[y] - ys[from.1])]
+    let share = start / (start - end);
+    [xs[from.0] + share * (xs[x] - xs[from.0]), ys[from.1] + share * (ys[y] - ys[from.1])]
 }
 
 /// Joins segments into lines; open lines come first, from one of their ends.
 fn join_segments(links: &mut BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridEdge>> {
-    let ends: Vec<GridEdge> =
+    let line_ends: Vec<GridEdge> =
         links.iter().filter(|(_, next)| next.len() == 1).map(|(&edge, _)| edge).collect();
-    let all: Vec<GridEdge> = links.keys().copied().collect();
+    let edges: Vec<GridEdge> = links.keys().copied().collect();
     let mut lines = Vec::new();
-    for start in ends.into_iter().chain(all) {
+    for start in line_ends.into_iter().chain(edges) {
         let mut line = vec![start];
-        let mut here = start;
-        while let Some(next) = links.get_mut(&here).and_then(Vec::pop) {
-            if let Some(back) = links.get_mut(&next)
-                && let Some(place) = back.iter().position(|&edge| edge == here)
+        let mut current = start;
+        while let Some(next) = links.get_mut(&current).and_then(Vec::pop) {
+            if let Some(links_back) = links.get_mut(&next)
+                && let Some(index) = links_back.iter().position(|&edge| edge == current)
             {
-                back.remove(place);
+                links_back.remove(index);
             }
             line.push(next);
-            here = next;
+            current = next;
         }
         if line.len() > 1 {
             lines.push(line);
@@ -114,17 +116,17 @@ fn join_segments(links: &mut BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridE
 /// Doubling it doubles the size of figures with ragged boundaries.
 pub(crate) const MAX_POINTS: usize = 100_000;
 
-/// Removes the shortest lines of all cuts until at most `room` points are left.
-pub(crate) fn leave_out_shortest(lines: &mut [Vec<Vec<[f64; 2]>>], room: usize) {
+/// Removes the shortest lines of all cuts until at most `max_points` points are left.
+pub(crate) fn remove_shortest(lines: &mut [Vec<Vec<[f64; 2]>>], max_points: usize) {
     let mut lengths: Vec<usize> = lines.iter().flatten().map(Vec::len).collect();
     lengths.sort_unstable_by(|a, b| b.cmp(a));
     let mut points = 0;
-    let kept = lengths.iter().take_while(|length| {
+    let kept_count = lengths.iter().take_while(|length| {
         points += **length;
-        points <= room
+        points <= max_points
     });
-    let kept = kept.count();
-    if let Some(longest_left_out) = lengths.get(kept) {
+    let kept_count = kept_count.count();
+    if let Some(longest_left_out) = lengths.get(kept_count) {
         for cut in lines {
             cut.retain(|line| line.len() > *longest_left_out);
         }
@@ -144,8 +146,8 @@ mod tests {
         let lines = zero_lines(&numbers(6), &numbers(5), |i, j| 2.0 * i as f64 + j as f64 - 5.5);
         assert_eq!(lines.len(), 1);
         assert!(lines[0].iter().all(|[x, y]| (2.0 * x + y - 5.5).abs() < 1e-12));
-        let on_the_rim = |[x, y]: [f64; 2]| x == 0.0 || x == 5.0 || y == 0.0 || y == 4.0;
-        assert!(on_the_rim(lines[0][0]) && on_the_rim(*lines[0].last().unwrap()));
+        let is_on_border = |[x, y]: [f64; 2]| x == 0.0 || x == 5.0 || y == 0.0 || y == 4.0;
+        assert!(is_on_border(lines[0][0]) && is_on_border(*lines[0].last().unwrap()));
     }
 
     #[test]
@@ -178,14 +180,14 @@ mod tests {
 
     #[test]
     fn no_line_is_drawn_beside_unknown_values() {
-        let unknown = |i: usize, j: usize| (i, j) == (2, 1) || (i, j) == (2, 2);
-        let value = |i: usize, j: usize| if unknown(i, j) { f64::NAN } else { i as f64 - 1.5 };
+        let is_unknown = |i: usize, j: usize| (i, j) == (2, 1) || (i, j) == (2, 2);
+        let value = |i: usize, j: usize| if is_unknown(i, j) { f64::NAN } else { i as f64 - 1.5 };
         let lines = zero_lines(&numbers(5), &numbers(6), value);
         assert!(lines.iter().flatten().all(|point| point.iter().all(|c| c.is_finite())));
         assert!(lines.iter().flatten().all(|[_, y]| *y <= 0.5 || *y >= 3.0 - 0.5));
-        let reach: f64 =
+        let total_extent: f64 =
             lines.iter().map(|line| (line[0][1] - line[line.len() - 1][1]).abs()).sum();
-        assert!(reach > 1.9, "the line runs on where all corners are known: {lines:?}");
+        assert!(total_extent > 1.9, "the line runs on where all corners are known: {lines:?}");
     }
 
     #[test]
@@ -198,11 +200,11 @@ mod tests {
     fn the_shortest_lines_are_removed_first() {
         let line = |points: usize| vec![[0.0, 0.0]; points];
         let mut cuts = [vec![line(2), line(7)], vec![line(4), line(2)]];
-        leave_out_shortest(&mut cuts, 12);
+        remove_shortest(&mut cuts, 12);
         assert_eq!(cuts, [vec![line(7)], vec![line(4)]]);
-        leave_out_shortest(&mut cuts, 11);
+        remove_shortest(&mut cuts, 11);
         assert_eq!(cuts.iter().flatten().count(), 2);
-        leave_out_shortest(&mut cuts, 3);
+        remove_shortest(&mut cuts, 3);
         assert_eq!(cuts.iter().flatten().count(), 0);
     }
 }

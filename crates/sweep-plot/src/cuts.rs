@@ -34,51 +34,52 @@ pub(crate) struct Cuts {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cut {
     /// The position of the cut's value in the picks, for each axis beyond the second.
-    pub(crate) rest: Vec<usize>,
+    pub(crate) other_picks: Vec<usize>,
     /// The name that distinguishes it from the other cuts.
     pub(crate) name: Option<String>,
 }
 
 impl Cuts {
-    /// Returns the cuts of a picture: one for each value of the third axis unless `at` fixes it.
-    /// Every axis after the third has one value, its first unless `at` gives another.
+    /// Returns the cuts of a picture: one for each value of the third axis unless
+    /// `requested_values` fixes it. Every axis after the third has one value, its first unless
+    /// `requested_values` gives another.
     ///
     /// # Errors
     /// The errors of [`fixed_values`].
     pub(crate) fn for_picture(
         source: &FigureFile,
         axes: &[SweptAxis],
-        at: &NamedPoint,
+        requested_values: &NamedPoint,
     ) -> Result<Self> {
-        let extra = axes.get(2..).unwrap_or_default();
-        let fixed_values = fixed_values(source, extra, at)?;
+        let further_axes = axes.get(2..).unwrap_or_default();
+        let fixed_values = fixed_values(source, further_axes, requested_values)?;
         // The third axis becomes panels unless it is fixed.
         let is_free = fixed_values.first() == Some(&None);
-        let mut counts = vec![1; extra.len()];
-        if let Some(axis) = extra.first().filter(|_| is_free) {
+        let mut counts = vec![1; further_axes.len()];
+        if let Some(axis) = further_axes.first().filter(|_| is_free) {
             counts[0] = axis.values.len().min(MAX_PANELS);
         }
-        let picks = picks(extra, &fixed_values, &counts);
-        let fixed = extra.iter().zip(&picks).skip(usize::from(is_free));
+        let picks = picks(further_axes, &fixed_values, &counts);
+        let fixed = further_axes.iter().zip(&picks).skip(usize::from(is_free));
         let mut notes: Vec<String> =
             fixed.map(|(axis, pick)| axis.format_value(axis.values[pick[0]])).collect();
-        let mut cuts = vec![Cut { rest: vec![0; extra.len()], name: None }];
-        if let Some(axis) = extra.first().filter(|_| is_free) {
+        let mut cuts = vec![Cut { other_picks: vec![0; further_axes.len()], name: None }];
+        if let Some(axis) = further_axes.first().filter(|_| is_free) {
             if picks[0].len() < axis.values.len() {
                 notes.push(omission_note(axis, picks[0].len()));
             }
-            let named = |(place, pick): (usize, &usize)| {
-                let mut rest = vec![0; extra.len()];
-                rest[0] = place;
-                Cut { rest, name: Some(axis.format_value(axis.values[*pick])) }
+            let cut_at_pick = |(position, pick): (usize, &usize)| {
+                let mut other_picks = vec![0; further_axes.len()];
+                other_picks[0] = position;
+                Cut { other_picks, name: Some(axis.format_value(axis.values[*pick])) }
             };
-            cuts = picks[0].iter().enumerate().map(named).collect();
+            cuts = picks[0].iter().enumerate().map(cut_at_pick).collect();
         }
         Ok(Self { picks, cuts, notes })
     }
 
-    /// Returns the cuts of a page of at most `most` cells. If not all cuts fit, it shows those at
-    /// the fixed values and at evenly picked values of the other axes. The page opens with the
+    /// Returns the cuts of a page of at most `max_cells` cells. If not all cuts fit, it shows those
+    /// at the fixed values and at evenly picked values of the other axes. The page opens with the
     /// fixed values, or else with the first cut.
     ///
     /// # Errors
@@ -86,17 +87,17 @@ impl Cuts {
     pub(crate) fn for_page(
         source: &FigureFile,
         axes: &[SweptAxis],
-        at: &NamedPoint,
-        most: usize,
+        requested_values: &NamedPoint,
+        max_cells: usize,
     ) -> Result<Self> {
-        let extra = axes.get(2..).unwrap_or_default();
-        let fixed_values = fixed_values(source, extra, at)?;
-        let side = |axis: &SweptAxis| axis.values.len().min(MIN_CELLS_ALONG_AXIS);
-        let most_cuts = (most / axes.iter().take(2).map(side).product::<usize>()).max(1);
-        let mut counts: Vec<usize> = extra.iter().map(|axis| axis.values.len()).collect();
+        let further_axes = axes.get(2..).unwrap_or_default();
+        let fixed_values = fixed_values(source, further_axes, requested_values)?;
+        let min_cells = |axis: &SweptAxis| axis.values.len().min(MIN_CELLS_ALONG_AXIS);
+        let max_cuts = (max_cells / axes.iter().take(2).map(min_cells).product::<usize>()).max(1);
+        let mut counts: Vec<usize> = further_axes.iter().map(|axis| axis.values.len()).collect();
         let too_many = |counts: &[usize]| {
             let cuts = counts.iter().try_fold(1_usize, |cuts, count| cuts.checked_mul(*count));
-            cuts.is_none_or(|cuts| cuts > most_cuts)
+            cuts.is_none_or(|cuts| cuts > max_cuts)
         };
         if too_many(&counts) {
             for (count, _) in counts.iter_mut().zip(&fixed_values).filter(|(_, pin)| pin.is_some())
@@ -108,75 +109,83 @@ impl Cuts {
             let Some(greatest) = counts.iter_mut().max().filter(|count| **count > 1) else { break };
             *greatest -= 1;
         }
-        let picks = picks(extra, &fixed_values, &counts);
-        let some = extra.iter().zip(&picks).filter(|(axis, pick)| pick.len() < axis.values.len());
-        let notes = some.map(|(axis, pick)| omission_note(axis, pick.len())).collect();
-        let place = |(pick, pin): (&Vec<usize>, &Option<usize>)| {
-            pin.and_then(|pin| pick.iter().position(|known| *known == pin)).unwrap_or(0)
+        let picks = picks(further_axes, &fixed_values, &counts);
+        let cut_short =
+            further_axes.iter().zip(&picks).filter(|(axis, pick)| pick.len() < axis.values.len());
+        let notes = cut_short.map(|(axis, pick)| omission_note(axis, pick.len())).collect();
+        let pick_of_pin = |(pick, pin): (&Vec<usize>, &Option<usize>)| {
+            pin.and_then(|pin| pick.iter().position(|index| *index == pin)).unwrap_or(0)
         };
-        let rest = picks.iter().zip(&fixed_values).map(place).collect();
-        Ok(Self { picks, cuts: vec![Cut { rest, name: None }], notes })
+        let other_picks = picks.iter().zip(&fixed_values).map(pick_of_pin).collect();
+        Ok(Self { picks, cuts: vec![Cut { other_picks, name: None }], notes })
     }
 }
 
 /// Returns the indices of the values shown for each axis: the fixed value if not all values fit, or
 /// else `counts` of them, evenly picked.
-fn picks(extra: &[SweptAxis], fixed_values: &[Option<usize>], counts: &[usize]) -> Vec<Vec<usize>> {
+fn picks(
+    further_axes: &[SweptAxis],
+    fixed_values: &[Option<usize>],
+    counts: &[usize],
+) -> Vec<Vec<usize>> {
     let pick = |((axis, pin), &count): ((&SweptAxis, &Option<usize>), &usize)| match pin {
         Some(pin) if count < axis.values.len() => vec![*pin],
         _ => even_indices(axis.values.len(), count),
     };
-    extra.iter().zip(fixed_values).zip(counts).map(pick).collect()
+    further_axes.iter().zip(fixed_values).zip(counts).map(pick).collect()
 }
 
-/// Returns `count` indices below `all`, spread evenly from the first to the last.
-fn even_indices(all: usize, count: usize) -> Vec<usize> {
+/// Returns `count` indices below `length`, spread evenly from the first to the last.
+fn even_indices(length: usize, count: usize) -> Vec<usize> {
     let last = (count - 1).max(1);
-    (0..count).map(|k| (k * (all - 1) + last / 2) / last).collect()
+    (0..count).map(|k| (k * (length - 1) + last / 2) / last).collect()
 }
 
-fn omission_note(axis: &SweptAxis, shown: usize) -> String {
-    format!("{shown} of {} values of {}", axis.values.len(), axis.words.to_lowercase())
+fn omission_note(axis: &SweptAxis, shown_count: usize) -> String {
+    format!("{shown_count} of {} values of {}", axis.values.len(), axis.words.to_lowercase())
 }
 
-/// Returns the index of the value of each axis that `at` fixes.
+/// Returns the index of the value of each axis that `requested_values` fixes.
 ///
 /// # Errors
-/// [`PlotError::Unfit`] if `at` names no axis beyond the second, or a value that its axis does not
-/// have; [`PlotError::NotAGrid`] for an axis with more values than are kept.
-///
-/// # Errors
-/// [`PlotError::Unfit`] when `--at` names no axis beyond the second, or a value that its axis
-/// does not have; [`PlotError::NotAGrid`] for an axis of more values than are kept.
+/// [`PlotError::Unfit`] if `requested_values` names no axis beyond the second, or a value that its
+/// axis does not have; [`PlotError::NotAGrid`] for an axis with more values than are kept.
 fn fixed_values(
     source: &FigureFile,
-    extra: &[SweptAxis],
-    at: &NamedPoint,
+    further_axes: &[SweptAxis],
+    requested_values: &NamedPoint,
 ) -> Result<Vec<Option<usize>>> {
-    if let Some(endless) = extra.iter().find(|axis| !axis.complete) {
-        let reason = format!("axis `{}` has too many values to choose from", endless.name);
+    if let Some(incomplete) = further_axes.iter().find(|axis| !axis.is_complete) {
+        let reason = format!("axis `{}` has too many values to choose from", incomplete.name);
         return Err(PlotError::NotAGrid { path: source.path.clone(), reason });
     }
-    let mut fixed_values = vec![None; extra.len()];
-    for (name, value) in at {
-        let missing = |what, known: String| {
-            source.unknown_name("--at", format!("{name}={value}"), what, known)
+    let mut fixed_values = vec![None; further_axes.len()];
+    for (name, value) in requested_values {
+        let unknown_error = |what, valid_values: String| {
+            source.unknown_name("--at", format!("{name}={value}"), what, valid_values)
         };
-        let place = extra.iter().position(|axis| axis.name == *name).ok_or_else(|| {
-            let known = list_names(extra.iter().map(|axis| axis.name.as_str()));
-            missing("axis beyond the second", known)
-        })?;
-        let values = &extra[place].values;
-        let near = values.iter().position(|&known| SweptAxis::is_near(known, *value));
-        fixed_values[place] = Some(near.ok_or_else(|| {
-            let phrase = |value: &f64| label::significant(*value, 6);
-            let known = match &values[..] {
+        let axis_index =
+            further_axes.iter().position(|axis| axis.name == *name).ok_or_else(|| {
+                let valid_values = list_names(further_axes.iter().map(|axis| axis.name.as_str()));
+                unknown_error("axis beyond the second", valid_values)
+            })?;
+        let values = &further_axes[axis_index].values;
+        let value_index =
+            values.iter().position(|&valid_values| SweptAxis::is_same_value(valid_values, *value));
+        fixed_values[axis_index] = Some(value_index.ok_or_else(|| {
+            let format_value = |value: &f64| label::format_significant(*value, 6);
+            let valid_values = match &values[..] {
                 [first, .., last] if values.len() > MAX_LISTED => {
-                    format!("{} of them from {} to {}", values.len(), phrase(first), phrase(last))
+                    format!(
+                        "{} of them from {} to {}",
+                        values.len(),
+                        format_value(first),
+                        format_value(last)
+                    )
                 }
-                few => few.iter().map(phrase).collect::<Vec<_>>().join(", "),
+                all => all.iter().map(format_value).collect::<Vec<_>>().join(", "),
             };
-            missing("value of that axis", known)
+            unknown_error("value of that axis", valid_values)
         })?);
     }
     Ok(fixed_values)

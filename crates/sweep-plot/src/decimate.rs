@@ -13,28 +13,32 @@ pub(crate) fn envelope(xs: &[f64], ys: &[f64], from: f64, to: f64, buckets: usiz
     let bucket = |index: usize| {
         (((xs[index] - from) / (to - from) * buckets as f64) as usize).min(buckets - 1)
     };
-    let mut kept = Vec::with_capacity(2 * buckets + 2);
-    let finite = |index: usize| ys[index].is_finite();
-    let all: Vec<usize> = (0..xs.len()).collect();
-    for run in
-        all.chunk_by(|&a, &b| finite(a) == finite(b) && (!finite(a) || bucket(a) == bucket(b)))
-    {
+    let mut kept_indices = Vec::with_capacity(2 * buckets + 2);
+    let is_finite = |index: usize| ys[index].is_finite();
+    let indices: Vec<usize> = (0..xs.len()).collect();
+    for run in indices.chunk_by(|&a, &b| {
+        is_finite(a) == is_finite(b) && (!is_finite(a) || bucket(a) == bucket(b))
+    }) {
         let start = run[0];
         let end = run[run.len() - 1];
-        if !finite(start) {
-            kept.push(start);
+        if !is_finite(start) {
+            kept_indices.push(start);
             continue;
         }
-        let least = run.iter().fold(start, |least, &k| if ys[k] < ys[least] { k } else { least });
-        let greatest = run.iter().fold(start, |most, &k| if ys[k] > ys[most] { k } else { most });
-        let mut marks = vec![least, greatest];
-        marks.extend((start == 0 || !finite(start - 1)).then_some(start));
-        marks.extend((end + 1 == xs.len() || !finite(end + 1)).then_some(end));
-        marks.sort_unstable();
-        marks.dedup();
-        kept.extend(marks);
+        let least = run
+            .iter()
+            .fold(start, |least, &index| if ys[index] < ys[least] { index } else { least });
+        let greatest = run.iter().fold(start, |greatest_so_far, &index| {
+            if ys[index] > ys[greatest_so_far] { index } else { greatest_so_far }
+        });
+        let mut run_indices = vec![least, greatest];
+        run_indices.extend((start == 0 || !is_finite(start - 1)).then_some(start));
+        run_indices.extend((end + 1 == xs.len() || !is_finite(end + 1)).then_some(end));
+        run_indices.sort_unstable();
+        run_indices.dedup();
+        kept_indices.extend(run_indices);
     }
-    kept
+    kept_indices
 }
 
 #[cfg(test)]
@@ -46,10 +50,14 @@ mod tests {
         let xs: Vec<f64> = (0..100_000).map(|k| f64::from(k) * 1e-3).collect();
         let mut ys: Vec<f64> = xs.iter().map(|x| (40.0 * x).sin()).collect();
         ys[54_321] = 7.0;
-        let kept = envelope(&xs, &ys, 0.0, 100.0, 500);
-        assert!(kept.len() <= 1002 && kept.contains(&54_321), "{}", kept.len());
-        assert!(kept.windows(2).all(|pair| pair[0] < pair[1]));
-        assert_eq!((kept[0], *kept.last().unwrap()), (0, 99_999));
+        let kept_indices = envelope(&xs, &ys, 0.0, 100.0, 500);
+        assert!(
+            kept_indices.len() <= 1002 && kept_indices.contains(&54_321),
+            "{}",
+            kept_indices.len()
+        );
+        assert!(kept_indices.windows(2).all(|pair| pair[0] < pair[1]));
+        assert_eq!((kept_indices[0], *kept_indices.last().unwrap()), (0, 99_999));
     }
 
     #[test]
@@ -57,8 +65,8 @@ mod tests {
         let xs: Vec<f64> = (0..10_000).map(f64::from).collect();
         let mut ys = vec![1.0; 10_000];
         ys[5000..6000].fill(f64::NAN);
-        let kept = envelope(&xs, &ys, 0.0, 10_000.0, 10);
-        assert_eq!(kept.iter().filter(|&&k| !ys[k].is_finite()).count(), 1);
+        let kept_indices = envelope(&xs, &ys, 0.0, 10_000.0, 10);
+        assert_eq!(kept_indices.iter().filter(|&&k| !ys[k].is_finite()).count(), 1);
         assert_eq!(envelope(&xs[..20], &ys[..20], 0.0, 20.0, 10).len(), 20);
     }
 }

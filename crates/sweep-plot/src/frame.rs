@@ -32,25 +32,25 @@ pub(crate) struct Panel {
     pub(crate) width: f64,
     pub(crate) height: f64,
     /// The scale from left to right.
-    pub(crate) xs: AxisScale,
+    pub(crate) x_scale: AxisScale,
     /// The scale from bottom to top.
-    pub(crate) ys: AxisScale,
+    pub(crate) y_scale: AxisScale,
 }
 
 impl Panel {
     /// Returns the pixel of a pair of values.
-    pub(crate) fn at(&self, x: f64, y: f64) -> [f64; 2] {
-        [self.at_x(x), self.at_y(y)]
+    pub(crate) fn pixel(&self, x: f64, y: f64) -> [f64; 2] {
+        [self.x_pixel(x), self.y_pixel(y)]
     }
 
     /// Returns the horizontal pixel of an x value.
-    pub(crate) fn at_x(&self, x: f64) -> f64 {
-        self.x + self.xs.position(x) * self.width
+    pub(crate) fn x_pixel(&self, x: f64) -> f64 {
+        self.x + self.x_scale.position(x) * self.width
     }
 
     /// Returns the vertical pixel of a y value.
-    pub(crate) fn at_y(&self, y: f64) -> f64 {
-        self.y + (1.0 - self.ys.position(y)) * self.height
+    pub(crate) fn y_pixel(&self, y: f64) -> f64 {
+        self.y + (1.0 - self.y_scale.position(y)) * self.height
     }
 
     /// Returns the edge of the panel.
@@ -59,22 +59,22 @@ impl Panel {
     }
 
     fn x_ticks(&self) -> Vec<Tick> {
-        self.xs.ticks((self.width / 75.0) as usize)
+        self.x_scale.ticks((self.width / 75.0) as usize)
     }
 
     fn y_ticks(&self) -> Vec<Tick> {
-        self.ys.ticks((self.height / 36.0).max(3.0) as usize)
+        self.y_scale.ticks((self.height / 36.0).max(3.0) as usize)
     }
 
     /// Draws faint lines at the ticks; the data is drawn over them.
     pub(crate) fn draw_grid_lines(&self, scene: &mut Scene) {
         let mut lines = Outline::default();
         for tick in self.x_ticks() {
-            let x = self.at_x(tick.value);
+            let x = self.x_pixel(tick.value);
             lines.add_line(&[[x, self.y], [x, self.y + self.height]]);
         }
         for tick in self.y_ticks() {
-            let y = self.at_y(tick.value);
+            let y = self.y_pixel(tick.value);
             lines.add_line(&[[self.x, y], [self.x + self.width, y]]);
         }
         scene.line(lines, Stroke::solid(FAINT, 1.0));
@@ -87,34 +87,42 @@ impl Panel {
             let width = text_width(&tick.label, TICK_SIZE, false);
             let left = self.x - NUMBER_OVERHANG;
             let right = self.x + self.width + NUMBER_OVERHANG;
-            let middle = self.at_x(tick.value).min(right - width / 2.0).max(left + width / 2.0);
+            let middle = self.x_pixel(tick.value).min(right - width / 2.0).max(left + width / 2.0);
             (middle, width, tick.label)
         });
         let numbers: Vec<_> = numbers.collect();
-        let chosen = |every: usize, first: usize| numbers.iter().skip(first).step_by(every);
-        let fits = |&(every, first): &(usize, usize)| {
-            chosen(every, first)
-                .zip(chosen(every, first).skip(1))
-                .all(|(one, next)| (next.0 - one.0).abs() >= (one.1 + next.1) / 2.0 + NUMBER_GAP)
+        let every_nth = |stride: usize, first: usize| numbers.iter().skip(first).step_by(stride);
+        let fits = |&(stride, first): &(usize, usize)| {
+            every_nth(stride, first).zip(every_nth(stride, first).skip(1)).all(
+                |(number, next_number)| {
+                    (next_number.0 - number.0).abs()
+                        >= (number.1 + next_number.1) / 2.0 + NUMBER_GAP
+                },
+            )
         };
-        let choices = (1..=numbers.len()).flat_map(|every| (0..every).map(move |k| (every, k)));
-        let best = choices.filter(fits).max_by_key(|&(every, first)| {
-            (chosen(every, first).count(), std::cmp::Reverse((every, first)))
+        let choices = (1..=numbers.len()).flat_map(|stride| (0..stride).map(move |k| (stride, k)));
+        let best = choices.filter(fits).max_by_key(|&(stride, first)| {
+            (every_nth(stride, first).count(), std::cmp::Reverse((stride, first)))
         });
-        let Some((every, first)) = best else { return Vec::new() };
-        chosen(every, first).map(|(middle, _, number)| (*middle, number.clone())).collect()
+        let Some((stride, first)) = best else { return Vec::new() };
+        every_nth(stride, first).map(|(middle, _, number)| (*middle, number.clone())).collect()
     }
 
     /// Draws the edge, ticks and numbers. An axis shared with the panel below or to the left has no
     /// numbers here.
     pub(crate) fn draw_frame(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
-        let numbers = self.x_ticks().into_iter().map(|tick| (self.at_x(tick.value), tick.label));
+        let numbers = self.x_ticks().into_iter().map(|tick| (self.x_pixel(tick.value), tick.label));
         self.draw_frame_with(scene, numbers.filter(|_| x_numbers).collect(), y_numbers);
     }
 
     /// Draws the same as [`Self::draw_frame`] for a panel with close neighbours: numbers that would
     /// touch are left out.
-    pub(crate) fn draw_frame_beside(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
+    pub(crate) fn draw_frame_beside_neighbours(
+        &self,
+        scene: &mut Scene,
+        x_numbers: bool,
+        y_numbers: bool,
+    ) {
         let numbers = if x_numbers { self.numbers_that_fit() } else { Vec::new() };
         self.draw_frame_with(scene, numbers, y_numbers);
     }
@@ -125,7 +133,7 @@ impl Panel {
         scene.line(self.outline(), stroke.clone());
         let mut marks = Outline::default();
         for tick in self.x_ticks() {
-            let x = self.at_x(tick.value);
+            let x = self.x_pixel(tick.value);
             marks.add_line(&[[x, bottom], [x, bottom + 5.0]]);
         }
         for (x, number) in x_numbers {
@@ -133,11 +141,11 @@ impl Panel {
             scene.text(text.anchor(Anchor::Middle));
         }
         for tick in self.y_ticks() {
-            let y = self.at_y(tick.value);
+            let y = self.y_pixel(tick.value);
             marks.add_line(&[[self.x - 5.0, y], [self.x, y]]);
             if y_numbers {
-                let at = [self.x - 9.0, y + 0.35 * TICK_SIZE];
-                scene.text(Text::new(tick.label, at, TICK_SIZE).anchor(Anchor::End));
+                let position = [self.x - 9.0, y + 0.35 * TICK_SIZE];
+                scene.text(Text::new(tick.label, position, TICK_SIZE).anchor(Anchor::End));
             }
         }
         scene.line(marks, stroke);
@@ -145,56 +153,56 @@ impl Panel {
 
     /// Writes a line of text in the middle of the panel: the reason for an empty panel.
     pub(crate) fn write_centred(&self, scene: &mut Scene, text: &str) {
-        let at = [self.x + self.width / 2.0, self.y + self.height / 2.0 + 0.35 * LABEL_SIZE];
-        let text = Text::new(text, at, LABEL_SIZE).anchor(Anchor::Middle);
+        let position = [self.x + self.width / 2.0, self.y + self.height / 2.0 + 0.35 * LABEL_SIZE];
+        let text = Text::new(text, position, LABEL_SIZE).anchor(Anchor::Middle);
         scene.text(Text { colour: MUTED, ..text });
     }
 
     /// Writes the label of the x axis.
-    pub(crate) fn x_label(&self, scene: &mut Scene, label: &str) {
-        let at = [self.x + self.width / 2.0, self.y + self.height + 44.0];
-        scene.text(Text::new(label, at, LABEL_SIZE).anchor(Anchor::Middle));
+    pub(crate) fn draw_x_label(&self, scene: &mut Scene, label: &str) {
+        let position = [self.x + self.width / 2.0, self.y + self.height + 44.0];
+        scene.text(Text::new(label, position, LABEL_SIZE).anchor(Anchor::Middle));
     }
 
     /// Writes the label of the y axis, `distance` px left of the panel; in two lines if it is
     /// longer than the panel is high.
-    pub(crate) fn y_label(&self, scene: &mut Scene, label: &str, distance: f64) {
+    pub(crate) fn draw_y_label(&self, scene: &mut Scene, label: &str, distance: f64) {
         let fits = |text: &str| text_width(text, LABEL_SIZE, false) <= self.height;
         // A unit, in brackets, stays on one line.
-        let words_end = label.rfind(" (").map_or(label.len(), |place| place + 1);
-        let spaces = label[..words_end].match_indices(' ').map(|(place, _)| place);
-        let split = { spaces }.rfind(|&place| fits(&label[..place]));
-        let lines = match split {
-            Some(place) if !fits(label) => vec![&label[..place], &label[place + 1..]],
+        let words_end = label.rfind(" (").map_or(label.len(), |index| index + 1);
+        let spaces = label[..words_end].match_indices(' ').map(|(index, _)| index);
+        let break_index = { spaces }.rfind(|&index| fits(&label[..index]));
+        let lines = match break_index {
+            Some(index) if !fits(label) => vec![&label[..index], &label[index + 1..]],
             _ => vec![label],
         };
-        let first = self.x - distance - (lines.len() - 1) as f64 * 0.62 * LABEL_SIZE;
+        let first_x = self.x - distance - (lines.len() - 1) as f64 * 0.62 * LABEL_SIZE;
         for (k, line) in lines.into_iter().enumerate() {
-            let at = [first + 1.2 * LABEL_SIZE * k as f64, self.y + self.height / 2.0];
-            scene.text(Text::new(line, at, LABEL_SIZE).anchor(Anchor::Middle).upright());
+            let position = [first_x + 1.2 * LABEL_SIZE * k as f64, self.y + self.height / 2.0];
+            scene.text(Text::new(line, position, LABEL_SIZE).anchor(Anchor::Middle).rotated());
         }
     }
 }
 
 /// Writes the title, and below it the subtitle, shortened to fit.
-pub(crate) fn heading(scene: &mut Scene, title: &str, subtitle: &str) {
-    let room = scene.width - 40.0;
+pub(crate) fn draw_heading(scene: &mut Scene, title: &str, subtitle: &str) {
+    let max_width = scene.width - 40.0;
     scene.text(
-        Text::new(cut_to_fit(title, TITLE_SIZE, true, room), [20.0, 32.0], TITLE_SIZE).bold(),
+        Text::new(cut_to_fit(title, TITLE_SIZE, true, max_width), [20.0, 32.0], TITLE_SIZE).bold(),
     );
-    let subtitle = cut_to_fit(subtitle, TICK_SIZE, false, room);
+    let subtitle = cut_to_fit(subtitle, TICK_SIZE, false, max_width);
     scene.text(Text { colour: MUTED, ..Text::new(subtitle, [20.0, 55.0], TICK_SIZE) });
 }
 
-/// Height of [`heading`], px.
+/// Height of [`draw_heading`], px.
 pub(crate) const HEADING_HEIGHT: f64 = 72.0;
 
-/// Returns `text`, cut short to fit `room` px.
-fn cut_to_fit(text: &str, size: f64, bold: bool, room: f64) -> String {
+/// Returns `text`, cut short to fit `max_width` px.
+fn cut_to_fit(text: &str, size: f64, bold: bool, max_width: f64) -> String {
     let mut shown: String = text.to_owned();
-    while text_width(&shown, size, bold) > room {
-        let kept = shown.trim_end_matches('…').chars().count().saturating_sub(1);
-        shown = shown.chars().take(kept).collect::<String>().trim_end().to_owned() + "…";
+    while text_width(&shown, size, bold) > max_width {
+        let kept_letters = shown.trim_end_matches('…').chars().count().saturating_sub(1);
+        shown = shown.chars().take(kept_letters).collect::<String>().trim_end().to_owned() + "…";
     }
     shown
 }
@@ -216,26 +224,26 @@ pub(crate) enum LegendSymbol {
 }
 
 /// Height of a row of a legend, px.
-const LEGEND_ROW: f64 = 25.0;
+const LEGEND_ROW_HEIGHT: f64 = 25.0;
 
 /// Returns the height of a legend in `width` px, px.
 pub(crate) fn legend_height(entries: &[(LegendSymbol, String)], width: f64) -> f64 {
-    LEGEND_ROW * lay_out(entries, width).last().map_or(0, |(_, row)| row + 1) as f64
+    LEGEND_ROW_HEIGHT * lay_out_legend(entries, width).last().map_or(0, |(_, row)| row + 1) as f64
 }
 
 /// Draws a legend below `y`, px.
-pub(crate) fn legend(
+pub(crate) fn draw_legend(
     scene: &mut Scene,
     entries: &[(LegendSymbol, String)],
     x: f64,
     y: f64,
     width: f64,
 ) {
-    for ((sign, text), (offset, row)) in entries.iter().zip(lay_out(entries, width)) {
+    for ((symbol, text), (offset, row)) in entries.iter().zip(lay_out_legend(entries, width)) {
         let x = x + offset;
-        let y = y + LEGEND_ROW / 2.0 + row as f64 * LEGEND_ROW;
+        let y = y + LEGEND_ROW_HEIGHT / 2.0 + row as f64 * LEGEND_ROW_HEIGHT;
         let area = Outline::rectangle(x, y - 8.0, 28.0, 16.0);
-        match sign {
+        match symbol {
             LegendSymbol::Line(stroke) => {
                 scene.line(Outline::line(&[[x, y], [x + 28.0, y]]), stroke.clone())
             }
@@ -243,12 +251,12 @@ pub(crate) fn legend(
                 scene.fill(area.clone(), *colour);
                 scene.line(area, Stroke::solid(MUTED, 1.0));
             }
-            LegendSymbol::Failed => failed(scene, area),
+            LegendSymbol::Failed => draw_failed_area(scene, area),
             LegendSymbol::Hatched(hatch) => {
                 scene.hatch(area.clone(), hatch);
                 scene.line(area, Stroke::solid(MUTED, 1.0));
             }
-            LegendSymbol::Undefined => undefined(scene, &[[x, y - 8.0, 28.0, 16.0]]),
+            LegendSymbol::Undefined => draw_undefined_cells(scene, &[[x, y - 8.0, 28.0, 16.0]]),
             LegendSymbol::Shape(outline, filled, colour) => {
                 let outline = outline.moved([x + 14.0, y]);
                 if *filled {
@@ -263,49 +271,49 @@ pub(crate) fn legend(
 }
 
 /// Returns the horizontal offset (px) and the row of each entry.
-fn lay_out(entries: &[(LegendSymbol, String)], width: f64) -> Vec<(f64, usize)> {
+fn lay_out_legend(entries: &[(LegendSymbol, String)], width: f64) -> Vec<(f64, usize)> {
     let mut x = 0.0;
     let mut row = 0;
-    let place = |(_, text): &(LegendSymbol, String)| {
-        let taken = 36.0 + text_width(text, TICK_SIZE, false);
-        if x > 0.0 && x + taken > width {
+    let next_position = |(_, text): &(LegendSymbol, String)| {
+        let entry_width = 36.0 + text_width(text, TICK_SIZE, false);
+        if x > 0.0 && x + entry_width > width {
             (x, row) = (0.0, row + 1);
         }
-        let place = (x, row);
-        x += taken + 26.0;
-        place
+        let next_position = (x, row);
+        x += entry_width + 26.0;
+        next_position
     };
-    entries.iter().map(place).collect()
+    entries.iter().map(next_position).collect()
 }
 
 /// Draws an area of failed points: grey and hatched.
-pub(crate) fn failed(scene: &mut Scene, area: Outline) {
+pub(crate) fn draw_failed_area(scene: &mut Scene, area: Outline) {
     scene.fill_crisp(area.clone(), FAILED);
     scene.hatch(area, &failed_hatch());
 }
 
 /// Returns the hatch of cells with failed points.
 pub(crate) fn failed_hatch() -> Hatch {
-    Hatch { strokes: vec![Stroke::solid(INK, 1.2)], spacing: 9.0, falling: false }
+    Hatch { strokes: vec![Stroke::solid(INK, 1.2)], spacing: 9.0, is_falling: false }
 }
 
 /// Returns the hatch of cells with chaotic motion: light and dark lines, which show on every
 /// colour.
 pub(crate) fn sensitive_hatch() -> Hatch {
     let strokes = vec![Stroke::solid(INK, 2.4), Stroke::solid(PAPER, 1.0)];
-    Hatch { strokes, spacing: 7.0, falling: true }
+    Hatch { strokes, spacing: 7.0, is_falling: true }
 }
 
 /// Draws cells `[x, y, width, height]` of undefined points: white with a dot in the middle.
-pub(crate) fn undefined(scene: &mut Scene, cells: &[[f64; 4]]) {
-    let mut area = Outline::default();
+pub(crate) fn draw_undefined_cells(scene: &mut Scene, cells: &[[f64; 4]]) {
+    let mut areas = Outline::default();
     let mut dots = Outline::default();
     for &[x, y, width, height] in cells {
-        area.add_rectangle(x, y, width, height);
+        areas.add_rectangle(x, y, width, height);
         let side = 4.0_f64.min(0.4 * width.min(height));
         dots.add_rectangle(x + (width - side) / 2.0, y + (height - side) / 2.0, side, side);
     }
-    scene.fill_crisp(area.clone(), PAPER);
-    scene.line(area, Stroke::solid(FAINT, 1.0));
+    scene.fill_crisp(areas.clone(), PAPER);
+    scene.line(areas, Stroke::solid(FAINT, 1.0));
     scene.fill(dots, MUTED);
 }

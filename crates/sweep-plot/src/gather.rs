@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use super::error::{PlotError, Result};
 use super::grid::Grid;
 use super::read::{ColumnFacts, FigureFile, FigureRow, is_ratio};
-use super::table::{FigureColumn, FigureTable, NONE, SEVERAL, Values, Words};
+use super::table::{FigureColumn, FigureTable, NO_WORD, SEVERAL_WORDS, Values, Words};
 use sweep_parameter::Worse;
 
 /// The least, the least positive and the greatest finite value of a column over all rows of a file.
@@ -19,7 +19,7 @@ pub(crate) struct ValueRange([f64; 3]);
 
 impl ValueRange {
     /// The range of no values.
-    const NONE: Self = Self([f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY]);
+    const EMPTY: Self = Self([f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY]);
 
     fn add(&mut self, value: f64) {
         let [low, least_positive, high] = &mut self.0;
@@ -39,7 +39,7 @@ impl ValueRange {
 
 /// The number of a cell's points of each kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Counts {
+pub(crate) struct PointCounts {
     pub(crate) points: u32,
     /// Points whose verdict is reliable.
     pub(crate) reliable: u32,
@@ -53,11 +53,11 @@ pub(crate) struct Counts {
 
 /// The sides of a limit on which the points of each cell lie.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Sides {
+pub(crate) struct CellSides {
     /// Whether a cell has points on both sides of the limit.
-    pub(crate) both: Vec<bool>,
+    pub(crate) is_divided: Vec<bool>,
     /// Whether a cell has points that did not fail and yet have no value.
-    pub(crate) undefined: Vec<bool>,
+    pub(crate) has_undefined: Vec<bool>,
     /// The mean of each cell's values; the geometric mean of ratios.
     pub(crate) mean: Vec<f64>,
 }
@@ -69,18 +69,18 @@ pub(crate) struct CellMap {
     pub(crate) table: FigureTable,
     pub(crate) grid: Grid,
     /// The number of points of each kind in each cell.
-    pub(crate) counts: Vec<Counts>,
+    pub(crate) counts: Vec<PointCounts>,
     /// The range of each column over all rows, and the sides of its limit in each cell; no sides
     /// without a limit, or if each cell is one point.
-    pub(crate) seen: BTreeMap<String, (ValueRange, Option<Sides>)>,
+    pub(crate) ranges_and_sides: BTreeMap<String, (ValueRange, Option<CellSides>)>,
     /// The number of rows of the file by status.
     pub(crate) statuses: BTreeMap<String, usize>,
 }
 
 /// The status of a row whose file has none.
-const UNKNOWN: &str = "unknown";
+const UNKNOWN_STATUS: &str = "unknown";
 /// The status of a point with a result.
-pub(crate) const OK: &str = "ok";
+pub(crate) const OK_STATUS: &str = "ok";
 
 impl CellMap {
     /// Reads the named columns of a map file into the cells of a grid.
@@ -91,48 +91,54 @@ impl CellMap {
     pub(crate) fn read(source: FigureFile, grid: Grid, columns: &[String]) -> Result<Self> {
         let names = grid.axes.iter().map(|axis| axis.swept.name.as_str());
         let names = names.chain(["status", "reliable", "sensitive", "ratio_max"]);
-        let shown: Vec<&ColumnFacts> =
+        let shown_facts: Vec<&ColumnFacts> =
             source.columns.iter().filter(|column| columns.contains(&column.name)).collect();
-        let names: Vec<&str> = names.chain(shown.iter().map(|facts| facts.name.as_str())).collect();
-        let mut collector = CellCollector::new(&source, &grid, &shown);
+        let names: Vec<&str> =
+            names.chain(shown_facts.iter().map(|facts| facts.name.as_str())).collect();
+        let mut collector = CellCollector::new(&source, &grid, &shown_facts);
         source.each_row(&names, |row| collector.add(row))?;
         let CellCollector { columns, counts, statuses, .. } = collector;
-        let mut seen = BTreeMap::new();
-        let mut kept = Vec::with_capacity(columns.len());
-        for CellColumn { facts, mut values, extent, dividing, .. } in columns {
+        let mut ranges_and_sides = BTreeMap::new();
+        let mut figure_columns = Vec::with_capacity(columns.len());
+        for CellColumn { facts, mut values, range, sides, .. } in columns {
             if let Values::Words(words) = &mut values {
                 words.sort();
             }
-            seen.insert(facts.name.clone(), (extent, dividing.map(SideCollector::sides)));
-            kept.push(FigureColumn { facts: facts.clone(), values });
+            ranges_and_sides.insert(facts.name.clone(), (range, sides.map(SideCollector::finish)));
+            figure_columns.push(FigureColumn { facts: facts.clone(), values });
         }
-        let table = FigureTable { rows: grid.cells(), columns: kept, source, bucket_rows: None };
-        Ok(Self { table, grid, counts, seen, statuses })
+        let table = FigureTable {
+            rows: grid.cell_count(),
+            columns: figure_columns,
+            source,
+            bucket_rows: None,
+        };
+        Ok(Self { table, grid, counts, ranges_and_sides, statuses })
     }
 
-    /// Returns the cell at index `x` of the first axis, `y` of the second and `rest` of the others,
-    /// if the file has a point in it.
-    pub(crate) fn cell(&self, x: usize, y: usize, rest: &[usize]) -> Option<usize> {
-        Some(self.grid.cell(x, y, rest)).filter(|&cell| self.filled(cell))
+    /// Returns the cell at index `x` of the first axis, `y` of the second and `others` of the
+    /// others, if the file has a point in it.
+    pub(crate) fn cell(&self, x: usize, y: usize, others: &[usize]) -> Option<usize> {
+        Some(self.grid.cell(x, y, others)).filter(|&cell| self.has_points(cell))
     }
 
     /// Returns whether the file has a point in the cell.
-    pub(crate) fn filled(&self, cell: usize) -> bool {
+    pub(crate) fn has_points(&self, cell: usize) -> bool {
         self.counts[cell].points > 0
     }
 
     /// Returns the status of a cell's points; `None` if they differ.
-    pub(crate) fn status(&self, cell: usize) -> Option<&str> {
+    pub(crate) fn common_status(&self, cell: usize) -> Option<&str> {
         let words = self.table.column("status").and_then(FigureColumn::words)?;
         match words.codes.get(cell) {
-            Some(&SEVERAL) => None,
-            _ => Some(words.get(cell).unwrap_or(UNKNOWN)),
+            Some(&SEVERAL_WORDS) => None,
+            _ => Some(words.get(cell).unwrap_or(UNKNOWN_STATUS)),
         }
     }
 
     /// Returns the number of failed rows of the file.
-    pub(crate) fn failed(&self) -> usize {
-        self.statuses.iter().filter(|(status, _)| *status != OK).map(|(_, rows)| rows).sum()
+    pub(crate) fn count_failed(&self) -> usize {
+        self.statuses.iter().filter(|(status, _)| *status != OK_STATUS).map(|(_, rows)| rows).sum()
     }
 }
 
@@ -161,51 +167,51 @@ impl CellReduction {
 /// A column while its rows are collected into cells.
 struct CellColumn<'a> {
     facts: &'a ColumnFacts,
-    rule: CellReduction,
+    reduction: CellReduction,
     values: Values,
-    extent: ValueRange,
-    dividing: Option<SideCollector>,
+    range: ValueRange,
+    sides: Option<SideCollector>,
 }
 
 /// The sides of a limit while rows are collected.
 struct SideCollector {
     /// The limit in the column's own unit.
-    level: f64,
+    limit: f64,
     /// Whether the mean is taken of logarithms.
-    log: bool,
+    is_log: bool,
     /// Whether a cell has points below the limit, and at or above it.
-    sides: Vec<[bool; 2]>,
-    undefined: Vec<bool>,
+    sides_reached: Vec<[bool; 2]>,
+    has_undefined: Vec<bool>,
     /// The sum and the count of the values or their logarithms.
     sums: Vec<(f64, u32)>,
 }
 
 impl SideCollector {
-    fn new(level: f64, log: bool, cells: usize) -> Self {
-        let sides = vec![[false; 2]; cells];
-        let undefined = vec![false; cells];
-        Self { level, log, sides, undefined, sums: vec![(0.0, 0); cells] }
+    fn new(limit: f64, is_log: bool, cells: usize) -> Self {
+        let sides_reached = vec![[false; 2]; cells];
+        let has_undefined = vec![false; cells];
+        Self { limit, is_log, sides_reached, has_undefined, sums: vec![(0.0, 0); cells] }
     }
 
-    fn add(&mut self, cell: usize, value: f64, failed: bool) {
-        let even = if self.log { value.ln() } else { value };
-        if even.is_finite() {
-            self.sides[cell][usize::from(value >= self.level)] = true;
+    fn add(&mut self, cell: usize, value: f64, has_failed: bool) {
+        let coordinate = if self.is_log { value.ln() } else { value };
+        if coordinate.is_finite() {
+            self.sides_reached[cell][usize::from(value >= self.limit)] = true;
             let (sum, count) = self.sums[cell];
-            self.sums[cell] = (sum + even, count + 1);
-        } else if !failed {
-            self.undefined[cell] = true;
+            self.sums[cell] = (sum + coordinate, count + 1);
+        } else if !has_failed {
+            self.has_undefined[cell] = true;
         }
     }
 
-    fn sides(self) -> Sides {
+    fn finish(self) -> CellSides {
         let mean = |(sum, count): (f64, u32)| {
             let mean = sum / f64::from(count);
-            if self.log { mean.exp() } else { mean }
+            if self.is_log { mean.exp() } else { mean }
         };
-        Sides {
-            both: self.sides.into_iter().map(|sides| sides == [true; 2]).collect(),
-            undefined: self.undefined,
+        CellSides {
+            is_divided: self.sides_reached.into_iter().map(|sides| sides == [true; 2]).collect(),
+            has_undefined: self.has_undefined,
             mean: self.sums.into_iter().map(mean).collect(),
         }
     }
@@ -216,106 +222,108 @@ struct CellCollector<'a> {
     source: &'a FigureFile,
     grid: &'a Grid,
     columns: Vec<CellColumn<'a>>,
-    counts: Vec<Counts>,
+    counts: Vec<PointCounts>,
     /// The first row of each cell.
-    first: Vec<usize>,
+    first_rows: Vec<usize>,
     /// The greatest ratio of each cell so far.
-    greatest: Vec<f64>,
+    greatest_ratios: Vec<f64>,
     /// The number of rows by status.
     statuses: BTreeMap<String, usize>,
     /// The last value of each axis and its index: rows in grid order repeat values.
-    last: Vec<(f64, Option<usize>)>,
+    last_values: Vec<(f64, Option<usize>)>,
     /// The limit of the ratio, if the file has no verdicts.
-    limit: Option<f64>,
+    ratio_limit: Option<f64>,
 }
 
 impl<'a> CellCollector<'a> {
     fn new(source: &'a FigureFile, grid: &'a Grid, columns: &[&'a ColumnFacts]) -> Self {
-        let cells = grid.cells();
+        let cell_count = grid.cell_count();
         let columns = columns.iter().map(|&facts| CellColumn {
-            rule: CellReduction::for_column(facts),
+            reduction: CellReduction::for_column(facts),
             values: match facts.is_number() {
-                true => Values::Numbers(vec![f64::NAN; cells]),
-                false => Values::Words(Words::none(cells)),
+                true => Values::Numbers(vec![f64::NAN; cell_count]),
+                false => Values::Words(Words::none(cell_count)),
             },
-            extent: ValueRange::NONE,
+            range: ValueRange::EMPTY,
             // A cell of one point needs no sides: its value is its mean.
-            dividing: { source.limit(facts) }
-                .filter(|_| grid.merged())
-                .map(|level| SideCollector::new(level, is_ratio(facts), cells)),
+            sides: { source.column_limit(facts) }
+                .filter(|_| grid.merges_points())
+                .map(|level| SideCollector::new(level, is_ratio(facts), cell_count)),
             facts,
         });
         Self {
             source,
             grid,
             columns: columns.collect(),
-            counts: vec![Counts::default(); cells],
-            first: vec![0; cells],
-            greatest: vec![f64::NAN; cells],
+            counts: vec![PointCounts::default(); cell_count],
+            first_rows: vec![0; cell_count],
+            greatest_ratios: vec![f64::NAN; cell_count],
             statuses: BTreeMap::new(),
-            last: vec![(f64::NAN, None); grid.axes.len()],
-            limit: source.column("reliable").is_none().then(|| source.ratio_limit()),
+            last_values: vec![(f64::NAN, None); grid.axes.len()],
+            ratio_limit: source.column("reliable").is_none().then(|| source.ratio_limit()),
         }
     }
 
     /// Adds a row: the values of the axes, the status of the point, and the columns.
     fn add(&mut self, row: FigureRow<'_>) -> Result<()> {
         let mut cell = Some(0);
-        for (column, (axis, last)) in self.grid.axes.iter().zip(&mut self.last).enumerate() {
+        for (column, (axis, last_value)) in
+            self.grid.axes.iter().zip(&mut self.last_values).enumerate()
+        {
             let value = row.number(column);
-            if value != last.0 {
-                *last = (value, axis.place(value));
+            if value != last_value.0 {
+                *last_value = (value, axis.cell_index(value));
             }
-            cell = cell.zip(last.1).map(|(cell, place)| cell * axis.values.len() + place);
+            cell = cell.zip(last_value.1).map(|(cell, index)| cell * axis.values.len() + index);
         }
-        let own = self.last.len();
-        let status = row.word(own);
-        let named = status.unwrap_or(UNKNOWN);
-        match self.statuses.get_mut(named) {
+        let axis_count = self.last_values.len();
+        let status = row.word(axis_count);
+        let status_name = status.unwrap_or(UNKNOWN_STATUS);
+        match self.statuses.get_mut(status_name) {
             Some(rows) => *rows += 1,
-            None => drop(self.statuses.insert(named.to_owned(), 1)),
+            None => drop(self.statuses.insert(status_name.to_owned(), 1)),
         }
-        let failed = status != Some(OK);
-        let is_worst = cell.map(|cell| self.count(cell, row, failed)).transpose()?;
-        for (column, gathered) in (own + 4..).zip(&mut self.columns) {
-            gathered.add((row, column), cell.zip(is_worst), failed);
+        let has_failed = status != Some(OK_STATUS);
+        let is_worst = cell.map(|cell| self.count(cell, row, has_failed)).transpose()?;
+        for (column, collector) in (axis_count + 4..).zip(&mut self.columns) {
+            collector.add((row, column), cell.zip(is_worst), has_failed);
         }
         Ok(())
     }
 
     /// Counts the kind of a row's point. Returns whether its ratio is the greatest of its cell so
     /// far.
-    fn count(&mut self, cell: usize, row: FigureRow<'_>, failed: bool) -> Result<bool> {
-        let own = self.last.len();
+    fn count(&mut self, cell: usize, row: FigureRow<'_>, has_failed: bool) -> Result<bool> {
+        let axis_count = self.last_values.len();
         let counts = &mut self.counts[cell];
         let is_full = |points| counts.points as usize >= points;
         if counts.points == 0 {
-            self.first[cell] = row.index();
-        } else if self.grid.points(cell).is_some_and(is_full) {
+            self.first_rows[cell] = row.index();
+        } else if self.grid.point_count(cell).is_some_and(is_full) {
             return Err(self.repeated_point(cell, row.index()));
         }
-        let [verdict, sensitive] = [1, 2].map(|k| row.word(own + k));
-        let ratio = row.number(own + 3);
-        let verdict = match self.limit {
-            None => verdict.map(|word| word == "true"),
+        let [is_reliable, sensitive] = [1, 2].map(|k| row.word(axis_count + k));
+        let ratio = row.number(axis_count + 3);
+        let is_reliable = match self.ratio_limit {
+            None => is_reliable.map(|word| word == "true"),
             Some(limit) => (!ratio.is_nan()).then_some(ratio < limit),
         };
         counts.points += 1;
-        counts.failed += u32::from(failed);
+        counts.failed += u32::from(has_failed);
         counts.sensitive += u32::from(sensitive == Some("true"));
-        counts.reliable += u32::from(verdict == Some(true));
-        counts.unreliable += u32::from(verdict == Some(false));
-        let known = &mut self.greatest[cell];
-        let is_worst = ratio > *known || (known.is_nan() && !ratio.is_nan());
+        counts.reliable += u32::from(is_reliable == Some(true));
+        counts.unreliable += u32::from(is_reliable == Some(false));
+        let greatest_ratio = &mut self.greatest_ratios[cell];
+        let is_worst = ratio > *greatest_ratio || (greatest_ratio.is_nan() && !ratio.is_nan());
         if is_worst {
-            *known = ratio;
+            *greatest_ratio = ratio;
         }
         Ok(is_worst)
     }
 
     fn repeated_point(&self, cell: usize, row: usize) -> PlotError {
-        let first = self.first[cell];
-        let reason = match self.grid.points(cell) {
+        let first = self.first_rows[cell];
+        let reason = match self.grid.point_count(cell) {
             Some(1) => format!("rows {first} and {row} are the same point"),
             _ => format!("some rows between {first} and {row} are the same point"),
         };
@@ -330,34 +338,39 @@ impl CellColumn<'_> {
         &mut self,
         (row, column): (FigureRow<'_>, usize),
         cell: Option<(usize, bool)>,
-        failed: bool,
+        has_failed: bool,
     ) {
         match &mut self.values {
-            Values::Numbers(kept) => {
+            Values::Numbers(numbers) => {
                 let value = row.number(column);
-                self.extent.add(value);
+                self.range.add(value);
                 let Some((cell, is_worst)) = cell else { return };
-                let known = kept[cell];
-                let takes = match self.rule {
-                    CellReduction::Least => value < known,
+                let current = numbers[cell];
+                let is_replaced = match self.reduction {
+                    CellReduction::Least => value < current,
                     CellReduction::AtGreatestRatio => is_worst,
-                    CellReduction::Greatest | CellReduction::Common => value > known,
+                    CellReduction::Greatest | CellReduction::Common => value > current,
                 };
-                if takes || known.is_nan() {
-                    kept[cell] = value;
+                if is_replaced || current.is_nan() {
+                    numbers[cell] = value;
                 }
-                if let Some(dividing) = &mut self.dividing {
-                    dividing.add(cell, value, failed);
+                if let Some(dividing) = &mut self.sides {
+                    dividing.add(cell, value, has_failed);
                 }
             }
             Values::Words(words) => {
                 let Some((cell, is_worst)) = cell else { return };
                 let code = words.code(row.word(column));
-                let known = &mut words.codes[cell];
-                if *known == NONE || (self.rule == CellReduction::AtGreatestRatio && is_worst) {
-                    *known = code;
-                } else if self.rule == CellReduction::Common && code != NONE && code != *known {
-                    *known = SEVERAL;
+                let current = &mut words.codes[cell];
+                if *current == NO_WORD
+                    || (self.reduction == CellReduction::AtGreatestRatio && is_worst)
+                {
+                    *current = code;
+                } else if self.reduction == CellReduction::Common
+                    && code != NO_WORD
+                    && code != *current
+                {
+                    *current = SEVERAL_WORDS;
                 }
             }
         }

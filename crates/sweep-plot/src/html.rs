@@ -13,14 +13,14 @@ use std::rc::Rc;
 
 use serde_json::{Value, json};
 
-use super::axis::{AxisScale, MIN_TICKS, SLACK, Tick, TickStep, log_sets};
-use super::chart::{Chart, ChartPanel, DOT_RADIUS, Series, Style, stroke, x_scale, y_scale};
-use super::colour::{BOTH, COLOUR_STEPS, FAILED, UNSTABLE_SHADE};
+use super::axis::{AxisScale, MIN_TICKS, STEP_TOLERANCE, Tick, TickStep, log_tick_sets};
+use super::chart::{Chart, ChartPanel, DOT_RADIUS, Series, Style, series_stroke, x_scale, y_scale};
+use super::colour::{BOTH_SIDES, COLOUR_STEPS, FAILED, UNSTABLE_SHADE};
 use super::contour::MAX_POINTS;
 use super::cuts::Cuts;
 use super::error::Result;
 use super::frame::{LegendSymbol, failed_hatch};
-use super::gather::{CellMap, Counts};
+use super::gather::{CellMap, PointCounts};
 use super::grid::GridAxis;
 use super::layer::{self, DividingLimit, Layer, ShownColumn};
 use super::model::{Figures, LivePart};
@@ -33,29 +33,29 @@ use crate::escape;
 use sweep_parameter::Worse;
 
 /// The template of a page: placeholders in double braces.
-const PAGE: &str = include_str!("html/page.html");
+const PAGE_TEMPLATE: &str = include_str!("html/page.html");
 /// The templates of elements that scripts copy.
-const PARTS: &str = include_str!("html/parts.html");
+const ELEMENT_TEMPLATES: &str = include_str!("html/parts.html");
 /// The template of a page without scripts.
-const SHEET: &str = include_str!("html/sheet.html");
+const PRINTABLE_PAGE_TEMPLATE: &str = include_str!("html/sheet.html");
 /// The style sheet of all pages.
-const STYLE: &str = include_str!("html/style.css");
+const STYLE_SHEET: &str = include_str!("html/style.css");
 /// The script of parts that all figures share.
-const CORE: &str = include_str!("html/core.js");
+const CORE_SCRIPT: &str = include_str!("html/core.js");
 /// The script of charts.
-const CHART: &str = include_str!("html/chart.js");
+const CHART_SCRIPT: &str = include_str!("html/chart.js");
 /// The script of a map's colour bar.
-const BAR: &str = include_str!("html/bar.js");
+const COLOUR_BAR_SCRIPT: &str = include_str!("html/bar.js");
 /// The script that draws the cells of a map.
-const CELLS: &str = include_str!("html/cells.js");
+const CELLS_SCRIPT: &str = include_str!("html/cells.js");
 /// The script of maps.
-const MAP: &str = include_str!("html/map.js");
+const MAP_SCRIPT: &str = include_str!("html/map.js");
 /// The script of designs.
-const DESIGN: &str = include_str!("html/design.js");
+const DESIGN_SCRIPT: &str = include_str!("html/design.js");
 /// The script of the table of a map's point.
-const REPORT: &str = include_str!("html/report.js");
+const REPORT_SCRIPT: &str = include_str!("html/report.js");
 /// The script that starts the page.
-const START: &str = include_str!("html/start.js");
+const START_SCRIPT: &str = include_str!("html/start.js");
 
 /// Maximum size of the cell values of a page, bytes. Basis: a page of at most 10 MB. Doubling it
 /// doubles the cells of large maps and the size of their pages.
@@ -90,13 +90,14 @@ pub(crate) fn map_page(
     model: &dyn Figures,
 ) -> Result<String> {
     let source = &map.table.source;
-    let first = layer::requested_one(source, options)?;
-    let all = layer::all(source);
-    let room = MAX_POINTS / all.len();
-    let layers = all.iter().map(|shown| Ok(layer_json(map, shown, shown.layer(map)?, room)));
+    let first_column = layer::requested_column(source, options)?;
+    let columns = layer::all_columns(source);
+    let max_points = MAX_POINTS / columns.len();
+    let layers =
+        columns.iter().map(|column| Ok(layer_json(map, column, column.layer(map)?, max_points)));
     let layers = layers.collect::<Result<Vec<Value>>>()?;
     let traces = match &options.traces {
-        Some(folder) => histories::read(folder, map, model)?,
+        Some(folder) => histories::read_histories(folder, map, model)?,
         None => Value::Null,
     };
     let title = "Where the linear model can be trusted";
@@ -111,24 +112,27 @@ pub(crate) fn map_page(
         "rows": rows_json(source),
         "layers": layers,
         "first": {
-            "column": first.as_ref().map_or(layer::STATUS, ShownColumn::column),
-            "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.rest),
+            "column": first_column.as_ref().map_or(layer::STATUS, ShownColumn::name),
+            "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.other_picks),
         },
         "palettes": {
-            "kinds": figures::map::kinds(map),
+            "kinds": figures::map::status_colours(map),
             "failed": FAILED.css(),
         },
-        "legend": legend_json(&figures::map::legend(map, None)),
+        "legend": legend_json(&figures::map::map_legend_entries(map, None)),
         "traces": traces,
     });
-    if map.grid.merged() {
+    if map.grid.merges_points() {
         data["counts"] = counts_json(map);
     }
-    let axes = map.grid.axes.iter().map(|axis| (axis.swept.name.as_str(), axis.swept.log));
+    let axes = map.grid.axes.iter().map(|axis| (axis.swept.name.as_str(), axis.swept.is_log));
     let axes: Vec<(&str, bool)> = axes.collect();
     let summary = report::run_summary(source, model) + &report::cautions(map, model);
-    let scripts = [&[CORE, CHART, BAR, CELLS, MAP][..], &[REPORT, START]];
-    Ok(page(title, data, scripts, model.live_part(&axes), source, &summary))
+    let scripts = [
+        &[CORE_SCRIPT, CHART_SCRIPT, COLOUR_BAR_SCRIPT, CELLS_SCRIPT, MAP_SCRIPT][..],
+        &[REPORT_SCRIPT, START_SCRIPT],
+    ];
+    Ok(write_page(title, data, scripts, model.live_part(&axes), source, &summary))
 }
 
 /// Writes the metadata of the file, without entries that would fill the page, such as a list of a
@@ -138,11 +142,11 @@ fn provenance(source: &FigureFile) -> String {
         let text = value.as_str().map_or_else(|| format!("{value:#}"), str::to_owned);
         let mut lines: Vec<String> = text.lines().map(escape).collect();
         if text.len() > MAX_ENTRY_CHARACTERS {
-            let head: String = text.chars().take(MAX_ENTRY_CHARACTERS / 8).collect();
+            let beginning: String = text.chars().take(MAX_ENTRY_CHARACTERS / 8).collect();
             let length = text.len();
             lines = vec![format!(
                 "{} ... ({length} characters in all; the file has them)",
-                escape(&head)
+                escape(&beginning)
             )];
         }
         format!("<dt>{}</dt><dd><pre tabindex=\"0\">{}</pre></dd>\n", escape(key), lines.join("\n"))
@@ -160,7 +164,7 @@ const MAX_ENTRY_CHARACTERS: usize = 100_000;
 
 /// Returns the live part of a page over these axes, and the summary of the run that it needs, in
 /// HTML.
-fn computed(
+fn live_part_and_summary(
     source: &FigureFile,
     axes: &[(&str, bool)],
     model: &dyn Figures,
@@ -183,100 +187,113 @@ pub(crate) fn chart_page(
         "kind": "chart",
         "title": chart.title,
         "subtitle": chart.subtitle,
-        "chart": chart_json(chart, curve),
+        "chart": chart_json(chart, encode_curve),
     });
-    let (live_part, summary) = computed(source, &[(axis, chart.x_log)], model);
-    page(&chart.title, data, [&[CORE, CHART], &[START]], live_part, source, &summary)
+    let (live_part, summary) = live_part_and_summary(source, &[(axis, chart.is_x_log)], model);
+    write_page(
+        &chart.title,
+        data,
+        [&[CORE_SCRIPT, CHART_SCRIPT], &[START_SCRIPT]],
+        live_part,
+        source,
+        &summary,
+    )
 }
 
 /// Adds the picture that a page shows where scripts are switched off.
 pub(crate) fn add_still_picture(page: &[u8], picture: &[u8]) -> Vec<u8> {
-    let picture = embed::bytes(picture.iter().copied());
+    let encoded = embed::encode_bytes(picture.iter().copied());
     // The placeholder precedes the data, which might hold the same text.
-    String::from_utf8_lossy(page).replacen("{{still}}", &picture, 1).into_bytes()
+    String::from_utf8_lossy(page).replacen("{{still}}", &encoded, 1).into_bytes()
 }
 
 /// Writes a page of this HTML body without scripts, to be read and printed.
-pub fn sheet(title: &str, body: &str) -> String {
-    SHEET.replace("{{title}}", &escape(title)).replace("{{style}}", STYLE).replace("{{body}}", body)
+pub fn printable_page(title: &str, body: &str) -> String {
+    PRINTABLE_PAGE_TEMPLATE
+        .replace("{{title}}", &escape(title))
+        .replace("{{style}}", STYLE_SHEET)
+        .replace("{{body}}", body)
 }
 
 /// Writes an HTML table under a heading; nothing without rows.
-pub fn table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
+pub fn html_table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    fn row<T: AsRef<str>>(cells: &[T], cell: &str) -> String {
-        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escape(text.as_ref())));
+    fn table_row<T: AsRef<str>>(cells: &[T], element: &str) -> String {
+        let cells =
+            cells.iter().map(|text| format!("<{element}>{}</{element}>", escape(text.as_ref())));
         format!("<tr>{}</tr>\n", cells.collect::<String>())
     }
-    let all: String = rows.iter().map(|cells| row(cells, "td")).collect();
-    let head = if heads.iter().all(|head| head.is_empty()) { "" } else { &row(heads, "th") };
+    let table_rows: String = rows.iter().map(|cells| table_row(cells, "td")).collect();
+    let heading =
+        if heads.iter().all(|head| head.is_empty()) { "" } else { &table_row(heads, "th") };
     format!(
-        "<h2>{}</h2>\n<table><thead>{head}</thead><tbody>\n{all}</tbody></table>\n",
+        "<h2>{}</h2>\n<table><thead>{heading}</thead><tbody>\n{table_rows}</tbody></table>\n",
         escape(title)
     )
 }
 
 /// Returns an SVG picture as an HTML image, so that names within it do not clash with those of the
 /// page.
-pub(crate) fn picture(svg: &[u8]) -> String {
-    let data = embed::bytes(svg.iter().copied());
-    format!("<img alt=\"figure\" src=\"data:image/svg+xml;base64,{data}\">")
+pub(crate) fn svg_image(svg: &[u8]) -> String {
+    let encoded = embed::encode_bytes(svg.iter().copied());
+    format!("<img alt=\"figure\" src=\"data:image/svg+xml;base64,{encoded}\">")
 }
 
 /// Writes a page of these data with a `summary` of the run, in HTML. Scripts of a live page come
 /// between the two groups of scripts.
-fn page(
+fn write_page(
     title: &str,
     mut data: Value,
-    [first, last]: [&[&str]; 2],
+    [scripts_before, scripts_after]: [&[&str]; 2],
     live_part: Option<LivePart>,
     source: &FigureFile,
     summary: &str,
 ) -> String {
-    let (scripts, parts) = live_part.map_or((&[][..], ""), |live_part| {
+    let (scripts, templates) = live_part.map_or((&[][..], ""), |live_part| {
         data["live"] = live_part.data;
-        (live_part.scripts, live_part.parts)
+        (live_part.scripts, live_part.templates)
     });
-    let scripts = [first, scripts, last].concat();
+    let scripts = [scripts_before, scripts, scripts_after].concat();
     // The distances of linear ticks with the decimals of their labels, and the rule that chooses
     // one.
     let steps: Value =
         TickStep::all().map(|step| json!([step.length(), step.decimals()])).collect();
-    data["ticks"] = json!({ "steps": steps, "slack": SLACK, "least": MIN_TICKS });
-    data["both"] = json!(BOTH.css());
+    data["ticks"] = json!({ "steps": steps, "slack": STEP_TOLERANCE, "least": MIN_TICKS });
+    data["both"] = json!(BOTH_SIDES.css());
     data["shade"] = json!(format!("{}{:02x}", UNSTABLE_SHADE.css(), UNSTABLE_SHADE.alpha));
     // A brace in the file's text must not look like a placeholder.
-    let texts = [summary, &provenance(source)].map(|text| text.replace('{', "&#123;"));
+    let escaped_texts = [summary, &provenance(source)].map(|text| text.replace('{', "&#123;"));
     // Within a script element only `<` could end the element or start a comment.
     let data = data.to_string().replace('<', "\\u003c");
-    PAGE.replace("{{title}}", &escape(title))
-        .replace("{{style}}", STYLE)
-        .replace("{{about}}", &texts[0])
-        .replace("{{provenance}}", &texts[1])
-        .replace("{{parts}}", &[PARTS, parts].concat())
+    PAGE_TEMPLATE
+        .replace("{{title}}", &escape(title))
+        .replace("{{style}}", STYLE_SHEET)
+        .replace("{{about}}", &escaped_texts[0])
+        .replace("{{provenance}}", &escaped_texts[1])
+        .replace("{{parts}}", &[ELEMENT_TEMPLATES, templates].concat())
         .replace("{{script}}", &scripts.concat())
         .replace("{{data}}", &data)
 }
 
 /// Returns the sets of ticks of a logarithmic axis, from sparse to dense; null for a linear one.
 fn log_ticks_json(scale: AxisScale) -> Value {
-    if !scale.log {
+    if !scale.is_log {
         return Value::Null;
     }
-    let sets = log_sets(scale.from.min(scale.to), scale.from.max(scale.to));
+    let sets = log_tick_sets(scale.from.min(scale.to), scale.from.max(scale.to));
     json!(sets.map(|set| set.into_iter().map(tick_json).collect::<Vec<_>>()))
 }
 
 fn tick_json(tick: Tick) -> Value {
-    json!([embed::rounded(tick.value), tick.label])
+    json!([embed::round_to_six_digits(tick.value), tick.label])
 }
 
 /// Returns the rows of the table of a point: name, words, unit, and the columns of both models and
 /// of their ratio.
 fn rows_json(source: &FigureFile) -> Value {
-    let row = |quantity: layer::QuantityColumns<'_>| {
+    let row_json = |quantity: layer::QuantityColumns<'_>| {
         let column = |k: usize| quantity.columns.get(k).map(|(_, facts)| &facts.name);
         let ratio = quantity.is_channel.then(|| format!("ratio_{}", quantity.name));
         json!({
@@ -286,7 +303,7 @@ fn rows_json(source: &FigureFile) -> Value {
             "columns": [column(0), column(1), ratio.as_ref()],
         })
     };
-    layer::quantities(source).into_iter().map(row).collect()
+    layer::quantities(source).into_iter().map(row_json).collect()
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
@@ -297,35 +314,35 @@ fn axis_json(axis: &GridAxis) -> Value {
 
 /// Returns every column of numbers as 32-bit floats in grid order, NaN where the file has no value.
 fn columns_json(table: &FigureTable) -> Value {
-    let numbers = |column: &FigureColumn| {
+    let encode_numbers = |column: &FigureColumn| {
         let (unit, factor) = label::display_unit(&column.facts.unit);
         let data = json!({
             "unit": unit,
             "factor": factor,
             "description": column.facts.description,
-            "data": embed::floats(column.numbers()?.iter().copied()),
+            "data": embed::encode_floats(column.numbers()?.iter().copied()),
         });
         Some((column.facts.name.clone(), data))
     };
-    table.columns.iter().filter_map(numbers).collect()
+    table.columns.iter().filter_map(encode_numbers).collect()
 }
 
 /// Returns the columns of words as codes in grid order: 255 for no word, 254 for several words in a
 /// cell.
 fn codes_json(table: &FigureTable) -> Value {
-    let words = |column: &FigureColumn| {
+    let encode_words = |column: &FigureColumn| {
         let words = column.words()?;
-        let data =
-            json!({ "data": embed::bytes(words.codes.iter().copied()), "words": words.names });
+        let codes = embed::encode_bytes(words.codes.iter().copied());
+        let data = json!({ "data": codes, "words": words.names });
         Some((column.facts.name.clone(), data))
     };
-    table.columns.iter().filter_map(words).collect()
+    table.columns.iter().filter_map(encode_words).collect()
 }
 
 /// Returns the number of points of each kind in each cell.
 fn counts_json(map: &CellMap) -> Value {
-    let encode = |count: fn(&Counts) -> u32| {
-        embed::floats(map.counts.iter().map(|cell| f64::from(count(cell))))
+    let encode = |count: fn(&PointCounts) -> u32| {
+        embed::encode_floats(map.counts.iter().map(|cell| f64::from(count(cell))))
     };
     json!({
         "points": encode(|cell| cell.points),
@@ -338,7 +355,7 @@ fn counts_json(map: &CellMap) -> Value {
 
 /// Returns the entries of a legend: the style of the symbol and its text.
 fn legend_json(entries: &[(LegendSymbol, String)]) -> Value {
-    let hatched = |hatch: &Hatch| {
+    let hatched_style = |hatch: &Hatch| {
         let [ink, paper] = [INK, PAPER].map(Colour::css);
         let lines = match hatch.strokes.len() {
             1 => format!("135deg,{ink} 0 1px,transparent 1px 6px"),
@@ -346,84 +363,91 @@ fn legend_json(entries: &[(LegendSymbol, String)]) -> Value {
         };
         format!("background:repeating-linear-gradient({lines})")
     };
-    let style = |sign: &LegendSymbol| match sign {
+    let style = |symbol: &LegendSymbol| match symbol {
         // The line of a boundary is dark between light edges, to show on any ground.
         LegendSymbol::Line(_) => {
             "height:6px;background:#1b1f24;border:solid #ffffff;border-width:1.5px 0".to_owned()
         }
         LegendSymbol::Area(colour) => format!("background:{}", colour.css()),
-        LegendSymbol::Failed => format!("{} {}", hatched(&failed_hatch()), FAILED.css()),
-        LegendSymbol::Hatched(hatch) => hatched(hatch),
+        LegendSymbol::Failed => format!("{} {}", hatched_style(&failed_hatch()), FAILED.css()),
+        LegendSymbol::Hatched(hatch) => hatched_style(hatch),
         _ => "background:radial-gradient(circle,var(--muted) 2px,var(--paper) 2.5px);\
               outline:1px solid var(--faint)"
             .to_owned(),
     };
-    entries.iter().map(|(sign, words)| json!([style(sign), words])).collect()
+    entries.iter().map(|(symbol, text)| json!([style(symbol), text])).collect()
 }
 
-fn layer_json(map: &CellMap, shown: &ShownColumn, layer: Layer, room: usize) -> Value {
-    let (AxisScale { log, from, to }, limit) = (layer.scale.scale, layer.scale.centre);
-    let middle = limit.unwrap_or(if log { (from * to).sqrt() } else { 0.5 * (from + to) });
-    let colours = (0..COLOUR_STEPS).map(|level| layer.scale.colour(level).css());
+fn layer_json(map: &CellMap, column: &ShownColumn, layer: Layer, max_points: usize) -> Value {
+    let (AxisScale { is_log, from, to }, limit) = (layer.scale.axis, layer.scale.centre);
+    let middle = limit.unwrap_or(if is_log { (from * to).sqrt() } else { 0.5 * (from + to) });
+    let colours = (0..COLOUR_STEPS).map(|step| layer.scale.colour(step).css());
     let ticks = layer.scale.ticks().into_iter().map(tick_json);
     let mut data = json!({
-        "group": shown.group.name(),
-        "groupWords": shown.group.words(),
-        "channel": shown.channel,
-        "words": shown.short_name(),
-        "worse": shown.worse().map(Worse::name),
+        "group": column.group.name(),
+        "groupWords": column.group.in_words(),
+        "channel": column.channel,
+        "words": column.short_name(),
+        "worse": column.worse().map(Worse::name),
         "title": layer.title,
         "label": layer.label,
-        "column": shown.column(),
-        "scale": { "log": log, "stops": [from, middle, to], "limit": limit },
+        "column": column.name(),
+        "scale": { "log": is_log, "stops": [from, middle, to], "limit": limit },
         "colours": colours.collect::<Value>(),
         "ticks": ticks.collect::<Value>(),
-        "nonlinear": layer.nonlinear,
-        "lines": layer.level.as_ref().map(|level| level_json(map, &layer, level, room)),
+        "nonlinear": layer.is_nonlinear,
+        "lines": layer.limit.as_ref().map(|limit| limit_lines_json(map, &layer, limit, max_points)),
     });
-    if let Some(sides) = &layer.divided {
-        data["both"] = json!(embed::bits(&sides.both));
-        data["undefined"] = json!(embed::bits(&sides.undefined));
+    if let Some(sides) = &layer.sides {
+        data["both"] = json!(embed::encode_bits(&sides.is_divided));
+        data["undefined"] = json!(embed::encode_bits(&sides.has_undefined));
     }
-    data["legend"] = legend_json(&figures::map::legend(map, Some(layer)));
+    data["legend"] = legend_json(&figures::map::map_legend_entries(map, Some(layer)));
     data
 }
 
 /// Returns the lines of a limit in data coordinates, for each cut in grid order.
-fn level_json(map: &CellMap, layer: &Layer, level: &DividingLimit, room: usize) -> Value {
+fn limit_lines_json(
+    map: &CellMap,
+    layer: &Layer,
+    limit: &DividingLimit,
+    max_points: usize,
+) -> Value {
     let cuts: usize = map.grid.axes[2..].iter().map(|axis| axis.values.len()).product();
-    let ys = map.grid.axes[1].values.len();
-    let cell = |cut: usize, x: usize, y: usize| (x * ys + y) * cuts + cut;
-    let lines = figures::map::level_lines(map, (layer, level), cuts, cell, room);
-    let flat = |line: &Vec<[f64; 2]>| -> Vec<f64> {
-        line.iter().flatten().map(|value| embed::rounded(*value)).collect()
+    let row_count = map.grid.axes[1].values.len();
+    let cell = |cut: usize, x: usize, y: usize| (x * row_count + y) * cuts + cut;
+    let lines = figures::map::limit_lines(map, (layer, limit), cuts, cell, max_points);
+    let flatten = |line: &Vec<[f64; 2]>| -> Vec<f64> {
+        line.iter().flatten().map(|value| embed::round_to_six_digits(*value)).collect()
     };
-    lines.iter().map(|cut| cut.iter().map(flat).collect::<Value>()).collect()
+    lines.iter().map(|lines_of_cut| lines_of_cut.iter().map(flatten).collect::<Value>()).collect()
 }
 
 /// Encodes a curve's values to seven digits.
-fn curve(values: &[f64]) -> Value {
-    json!(embed::floats(values.iter().copied()))
+fn encode_curve(values: &[f64]) -> Value {
+    json!(embed::encode_floats(values.iter().copied()))
 }
 
-/// Encodes a chart; `curve` encodes the values of its curves.
-fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
+/// Encodes a chart; `encode_curve` encodes the values of its curves.
+fn chart_json(chart: &Chart, encode_curve: fn(&[f64]) -> Value) -> Value {
     let mut grids: Vec<&Rc<Vec<f64>>> = Vec::new();
     for series in chart.panels.iter().flat_map(|panel| &panel.series) {
         if !grids.contains(&&series.x) {
             grids.push(&series.x);
         }
     }
-    let panels = chart.panels.iter().map(|panel| panel_json(panel, &grids, curve));
-    let marks = chart.marks.iter().map(|mark| json!([embed::rounded(mark.x), mark.label]));
-    let xs = x_scale(chart);
+    let panels = chart.panels.iter().map(|panel| panel_json(panel, &grids, encode_curve));
+    let marks =
+        chart.marks.iter().map(|mark| json!([embed::round_to_six_digits(mark.x), mark.label]));
+    let x_scale = x_scale(chart);
+    let grids = grids.iter().map(|grid| embed::encode_floats(grid.iter().copied()));
     json!({
         "xWords": chart.x_label.words,
         "xUnit": chart.x_label.unit,
-        "xLog": chart.x_log,
-        "xRange": [xs.from, xs.to],
-        "xTicks": log_ticks_json(xs),
-        "grids": grids.iter().map(|grid| embed::floats(grid.iter().copied())).collect::<Value>(),
+        "xLog": chart.is_x_log,
+        "xRange": [x_scale.from, x_scale.to],
+        "xTicks": log_ticks_json(x_scale),
+        "grids": grids.collect::<Value>(),
         "panels": panels.collect::<Value>(),
         "marks": marks.collect::<Vec<_>>(),
         "markMeaning": chart.mark_meaning,
@@ -432,35 +456,42 @@ fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
     })
 }
 
-fn panel_json(panel: &ChartPanel, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Value) -> Value {
-    let stars = panel
-        .stars
-        .iter()
-        .map(|(x, y, label)| json!([embed::rounded(*x), embed::rounded(*y), label]));
+fn panel_json(
+    panel: &ChartPanel,
+    grids: &[&Rc<Vec<f64>>],
+    encode_curve: fn(&[f64]) -> Value,
+) -> Value {
+    let stars = panel.stars.iter().map(|(x, y, label)| {
+        json!([embed::round_to_six_digits(*x), embed::round_to_six_digits(*y), label])
+    });
     let mut data = json!(panel);
     data["ticks"] = log_ticks_json(y_scale(panel));
     data["stars"] = stars.collect();
-    let encode = |series| series_json(series, grids, curve);
+    let encode = |series| series_json(series, grids, encode_curve);
     data["series"] = panel.series.iter().map(encode).collect();
     data
 }
 
-fn series_json(series: &Series, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Value) -> Value {
-    let stroke = stroke(series);
-    let dots = series.style == Style::Dots;
+fn series_json(
+    series: &Series,
+    grids: &[&Rc<Vec<f64>>],
+    encode_curve: fn(&[f64]) -> Value,
+) -> Value {
+    let stroke = series_stroke(series);
+    let is_dots = series.style == Style::Dots;
     let [low, high] = match &series.style {
-        Style::Band(low, high) => [low, high].map(|side| curve(side)),
+        Style::Band(low, high) => [low, high].map(|side| encode_curve(side)),
         _ => [Value::Null, Value::Null],
     };
     json!({
         "name": series.name,
         "colour": if series.colour == INK { "ink".to_owned() } else { series.colour.css() },
         "grid": grids.iter().position(|grid| **grid == series.x),
-        "alpha": embed::rounded(f64::from(series.colour.alpha) / 255.0),
-        "width": if dots { 2.0 * DOT_RADIUS } else { stroke.width },
+        "alpha": embed::round_to_six_digits(f64::from(series.colour.alpha) / 255.0),
+        "width": if is_dots { 2.0 * DOT_RADIUS } else { stroke.width },
         "dashed": !stroke.dash.is_empty(),
-        "dots": dots,
-        "y": curve(&series.y),
+        "dots": is_dots,
+        "y": encode_curve(&series.y),
         "low": low,
         "high": high,
     })

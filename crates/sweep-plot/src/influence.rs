@@ -9,38 +9,38 @@ pub(crate) struct RankInfluence {
     ///
     /// C. Spearman, The proof and measurement of association between two things, American Journal
     /// of Psychology 15 (1904), 72-101.
-    pub(crate) rank: f64,
+    pub(crate) rank_correlation: f64,
     /// The root of the share of the ranks' variance that the parameter alone explains, from 0 to 1.
-    /// It is the magnitude of `rank` for a quantity that only rises or only falls, and larger for
-    /// one that does both. `None` for too few points.
+    /// It is the magnitude of `rank_correlation` for a quantity that only rises or only falls, and
+    /// larger for one that does both. `None` for too few points.
     ///
     /// The square is the correlation ratio without the bias of bins: T. L. Kelley, An unbiased
     /// correlation ratio measure, Proceedings of the National Academy of Sciences 21 (1935),
     /// 554-559.
-    pub(crate) any: Option<f64>,
+    pub(crate) root_correlation_ratio: Option<f64>,
 }
 
 impl RankInfluence {
     /// Returns the influence of `x` on `y` over pairs that have both values.
     pub(crate) fn new(x: &[f64], y: &[f64]) -> Option<Self> {
-        let both = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
-        let (x, y): (Vec<f64>, Vec<f64>) = both.unzip();
+        let pairs = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
+        let (x, y): (Vec<f64>, Vec<f64>) = pairs.unzip();
         let x_ranks = ranks(&x);
         let y_ranks = ranks(&y);
         Some(Self {
-            rank: correlation(&x_ranks, &y_ranks)?,
-            any: correlation_ratio(&x_ranks, &y_ranks),
+            rank_correlation: correlation(&x_ranks, &y_ranks)?,
+            root_correlation_ratio: correlation_ratio(&x_ranks, &y_ranks),
         })
     }
 
     /// Returns the larger of both measures, which orders the parameters.
-    pub(crate) fn size(self) -> f64 {
-        self.rank.abs().max(self.any.unwrap_or_default())
+    pub(crate) fn strength(self) -> f64 {
+        self.rank_correlation.abs().max(self.root_correlation_ratio.unwrap_or_default())
     }
 }
 
 /// Returns the magnitude of a rank correlation that chance alone exceeds in one of twenty samples
-/// of so many points, if the quantity does not depend on the parameter.
+/// of this number of points, if the quantity does not depend on the parameter.
 pub(crate) fn chance_correlation(points: usize) -> f64 {
     if points < 2 { 1.0 } else { (1.96 / ((points - 1) as f64).sqrt()).min(1.0) }
 }
@@ -50,11 +50,12 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut ranks = vec![0.0; values.len()];
-    for run in order.chunk_by(|&a, &b| values[a] == values[b]) {
+    for ties in order.chunk_by(|&a, &b| values[a] == values[b]) {
         // A run of m values after k others has the ranks k + 1 to k + m.
-        let before = order.partition_point(|&other| values[other] < values[run[0]]);
-        let rank = before as f64 + (run.len() + 1) as f64 / 2.0;
-        run.iter().for_each(|&place| ranks[place] = rank);
+        let lower_count =
+            order.partition_point(|&other_index| values[other_index] < values[ties[0]]);
+        let rank = lower_count as f64 + (ties.len() + 1) as f64 / 2.0;
+        ties.iter().for_each(|&index| ranks[index] = rank);
     }
     ranks
 }
@@ -79,36 +80,37 @@ const MIN_IN_BIN: usize = 10;
 /// Returns the root of the corrected correlation ratio of ranks, over bins of equally many points.
 /// Equal values of `x` share a bin.
 fn correlation_ratio(x: &[f64], y: &[f64]) -> Option<f64> {
-    let points = x.len();
-    let most = (points / MIN_IN_BIN).min(MAX_BINS);
-    if most < 2 {
+    let point_count = x.len();
+    let bin_count = (point_count / MIN_IN_BIN).min(MAX_BINS);
+    if bin_count < 2 {
         return None;
     }
-    let mut sums = vec![(0_usize, 0.0); most];
+    let mut sums = vec![(0_usize, 0.0); bin_count];
     for (x, y) in x.iter().zip(y) {
-        let bin = ((x - 0.5) / points as f64 * most as f64) as usize;
-        let (count, sum) = &mut sums[bin.min(most - 1)];
+        let bin = ((x - 0.5) / point_count as f64 * bin_count as f64) as usize;
+        let (count, sum) = &mut sums[bin.min(bin_count - 1)];
         (*count, *sum) = (*count + 1, *sum + y);
     }
-    let mean = (points + 1) as f64 / 2.0;
-    let filled: Vec<(usize, f64)> = sums.into_iter().filter(|(count, _)| *count > 0).collect();
-    let between =
-        filled.iter().map(|(count, sum)| *count as f64 * (sum / *count as f64 - mean).powi(2));
+    let mean = (point_count + 1) as f64 / 2.0;
+    let filled_bins: Vec<(usize, f64)> = sums.into_iter().filter(|(count, _)| *count > 0).collect();
+    let between_bins =
+        filled_bins.iter().map(|(count, sum)| *count as f64 * (sum / *count as f64 - mean).powi(2));
     let total: f64 = y.iter().map(|y| (y - mean).powi(2)).sum();
-    let bins = filled.len();
-    if bins < 2 || bins >= points || total <= 0.0 {
+    let filled_count = filled_bins.len();
+    if filled_count < 2 || filled_count >= point_count || total <= 0.0 {
         return None;
     }
-    let share = between.sum::<f64>() / total;
-    let corrected = 1.0 - (1.0 - share) * (points - 1) as f64 / (points - bins) as f64;
-    Some(corrected.max(0.0).sqrt())
+    let explained_share = between_bins.sum::<f64>() / total;
+    let corrected_share = 1.0
+        - (1.0 - explained_share) * (point_count - 1) as f64 / (point_count - filled_count) as f64;
+    Some(corrected_share.max(0.0).sqrt())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn line(count: i32) -> Vec<f64> {
+    fn rising(count: i32) -> Vec<f64> {
         (0..count).map(f64::from).collect()
     }
 
@@ -120,39 +122,49 @@ mod tests {
     #[test]
     fn the_rank_correlation_agrees_with_a_hand_calculation() {
         // Differences of ranks 0, 1, -1, 0: 1 - 6 * 2 / (4 * 15).
-        let found = RankInfluence::new(&[1.0, 2.0, 3.0, 4.0], &[10.0, 30.0, 20.0, 900.0]).unwrap();
-        assert!((found.rank - 0.8).abs() < 1e-12);
-        assert_eq!(found.any, None, "four points are too few for bins");
+        let influence =
+            RankInfluence::new(&[1.0, 2.0, 3.0, 4.0], &[10.0, 30.0, 20.0, 900.0]).unwrap();
+        assert!((influence.rank_correlation - 0.8).abs() < 1e-12);
+        assert_eq!(influence.root_correlation_ratio, None, "four points are too few for bins");
         assert_eq!(RankInfluence::new(&[1.0, 1.0], &[1.0, 2.0]), None);
     }
 
     #[test]
     fn a_hill_has_a_correlation_ratio_but_no_rank_correlation() {
-        let x = line(400);
-        let up: Vec<f64> = x.iter().map(|x| (0.1 * x).exp()).collect();
-        let found = RankInfluence::new(&x, &up).unwrap();
-        assert!(found.rank == 1.0 && found.any.unwrap() > 0.99, "{found:?}");
+        let x = rising(400);
+        let exponential: Vec<f64> = x.iter().map(|x| (0.1 * x).exp()).collect();
+        let influence = RankInfluence::new(&x, &exponential).unwrap();
+        assert!(
+            influence.rank_correlation == 1.0 && influence.root_correlation_ratio.unwrap() > 0.99,
+            "{influence:?}"
+        );
         let hill: Vec<f64> = x.iter().map(|x| -(x - 199.5).abs()).collect();
-        let found = RankInfluence::new(&x, &hill).unwrap();
-        assert!(found.rank.abs() < 1e-3 && found.any.unwrap() > 0.99, "{found:?}");
+        let influence = RankInfluence::new(&x, &hill).unwrap();
+        assert!(
+            influence.rank_correlation.abs() < 1e-3
+                && influence.root_correlation_ratio.unwrap() > 0.99,
+            "{influence:?}"
+        );
     }
 
     #[test]
     fn an_independent_quantity_correlates_less_than_by_chance() {
         // Multiples of nearly the golden section modulo 1 have no order left.
-        let x = line(400);
+        let x = rising(400);
         let y: Vec<f64> = x.iter().map(|x| (x * 0.618_033_988_749_895).fract()).collect();
-        let found = RankInfluence::new(&x, &y).unwrap();
+        let influence = RankInfluence::new(&x, &y).unwrap();
         assert!(
-            found.rank.abs() < chance_correlation(400) && found.any.unwrap() < 0.2,
-            "{found:?}"
+            influence.rank_correlation.abs() < chance_correlation(400)
+                && influence.root_correlation_ratio.unwrap() < 0.2,
+            "{influence:?}"
         );
         assert!((chance_correlation(400) - 0.098).abs() < 1e-3);
     }
 
     #[test]
     fn pairs_without_a_value_are_left_out() {
-        let found = RankInfluence::new(&[1.0, 2.0, 3.0, 4.0], &[1.0, f64::NAN, 3.0, 4.0]).unwrap();
-        assert_eq!(found.rank, 1.0);
+        let influence =
+            RankInfluence::new(&[1.0, 2.0, 3.0, 4.0], &[1.0, f64::NAN, 3.0, 4.0]).unwrap();
+        assert_eq!(influence.rank_correlation, 1.0);
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// The units that name suffixes consist of: `_n_s_per_m` is N s/m, `_kg_m2` is kg m².
-const BASES: [(&str, &str); 8] = [
+const UNIT_SUFFIXES: [(&str, &str); 8] = [
     ("n", "N"),
     ("m", "m"),
     ("kg", "kg"),
@@ -15,10 +15,10 @@ const BASES: [(&str, &str); 8] = [
 ];
 
 /// Returns the unit, with its power, that a part of a name stands for.
-fn unit_from_part(word: &str) -> Option<String> {
-    let stem = word.trim_end_matches(['2', '3']);
-    let (_, unit) = BASES.iter().find(|(base, _)| *base == stem)?;
-    let power = match &word[stem.len()..] {
+fn unit_from_part(part: &str) -> Option<String> {
+    let stem = part.trim_end_matches(['2', '3']);
+    let (_, unit) = UNIT_SUFFIXES.iter().find(|(base, _)| *base == stem)?;
+    let power = match &part[stem.len()..] {
         "" => "",
         "2" => "²",
         "3" => "³",
@@ -30,24 +30,27 @@ fn unit_from_part(word: &str) -> Option<String> {
 /// Splits a name into its words and its unit, which is empty if the name has none.
 fn split_unit(name: &str) -> (Vec<&str>, String) {
     let mut words: Vec<&str> = name.split('_').collect();
-    let mut parts = [Vec::new(), Vec::new()];
+    let mut units_by_side = [Vec::new(), Vec::new()];
     // The parts are read from the end: a denominator comes before its `per`.
-    let mut is_over = false;
+    let mut is_denominator = false;
     while let [_, .., word] = words[..] {
         match unit_from_part(word) {
-            Some(unit) => parts[usize::from(is_over)].insert(0, unit),
-            None if word == "per" && !is_over && !parts[0].is_empty() => is_over = true,
+            Some(unit) => units_by_side[usize::from(is_denominator)].insert(0, unit),
+            None if word == "per" && !is_denominator && !units_by_side[0].is_empty() => {
+                is_denominator = true
+            }
             None => break,
         }
         words.pop();
     }
-    let [mut below, mut above] = parts.map(|units| units.join(" "));
-    if !is_over {
-        std::mem::swap(&mut below, &mut above);
-    } else if above.is_empty() {
-        above = "1".to_owned();
+    let [mut denominator, mut numerator] = units_by_side.map(|units| units.join(" "));
+    if !is_denominator {
+        std::mem::swap(&mut denominator, &mut numerator);
+    } else if numerator.is_empty() {
+        numerator = "1".to_owned();
     }
-    let unit = if below.is_empty() { above } else { format!("{above}/{below}") };
+    let unit =
+        if denominator.is_empty() { numerator } else { format!("{numerator}/{denominator}") };
     (words, unit)
 }
 
@@ -58,8 +61,8 @@ pub fn unit_of_name(name: &str) -> String {
 
 /// Returns the name of a parameter or column in words, without its unit: `unbalance_mass_kg` is
 /// "Unbalance mass".
-pub fn words(name: &str) -> String {
-    capitalised(&split_unit(name).0.join(" "))
+pub fn name_in_words(name: &str) -> String {
+    capitalise(&split_unit(name).0.join(" "))
 }
 
 /// Splits a column's name into its words, without unit and model, and the model: `min_gap_linear_m`
@@ -81,12 +84,12 @@ pub fn split_model(name: &str) -> (String, &'static str) {
 
 /// Returns the name of a result's column in words, without unit and model: `nonlinear_body_front_y`
 /// is "Body front, vertical".
-pub fn quantity(name: &str) -> String {
-    capitalised(&channel(&split_model(name).0.replace(' ', "_")))
+pub fn quantity_in_words(name: &str) -> String {
+    capitalise(&channel_in_words(&split_model(name).0.replace(' ', "_")))
 }
 
 /// Returns a channel's name in words: `body_front_y` is "body front, vertical".
-pub fn channel(name: &str) -> String {
+pub fn channel_in_words(name: &str) -> String {
     for (suffix, words) in [("_y", ", vertical"), ("_z", ", horizontal")] {
         if let Some(stem) = name.strip_suffix(suffix) {
             return stem.replace('_', " ") + words;
@@ -106,7 +109,7 @@ pub fn unit_of_channel(name: &str) -> &'static str {
 }
 
 /// Returns the text with a capital first letter.
-pub fn capitalised(text: &str) -> String {
+pub fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
@@ -138,7 +141,7 @@ pub fn with_unit(words: &str, unit: &str) -> String {
 
 /// Returns words, a value to four digits and its unit: "damping 140 N s/m".
 pub fn with_value(words: &str, value: f64, unit: &str) -> String {
-    format!("{words} {} {unit}", significant(value, 4)).trim().to_owned()
+    format!("{words} {} {unit}", format_significant(value, 4)).trim().to_owned()
 }
 
 /// Returns the unit in which small motions are shown, and the factor from `unit` to it.
@@ -151,23 +154,25 @@ pub fn display_unit(unit: &str) -> (&str, f64) {
 }
 
 /// Returns a number to `digits` significant digits, without trailing zeros.
-pub fn significant(value: f64, digits: usize) -> String {
+pub fn format_significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".to_owned() } else { "–".to_owned() };
     }
     // The exponent is taken after rounding: 9.996 to three digits is 10.0.
     let scientific = format!("{value:.*e}", digits.saturating_sub(1));
-    let exponent: i32 =
-        scientific.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or_default();
+    let exponent: i32 = scientific
+        .split_once('e')
+        .and_then(|(_, exponent_text)| exponent_text.parse().ok())
+        .unwrap_or_default();
     if !(-4..7).contains(&exponent) {
         return scientific;
     }
     let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or_default();
-    trimmed(&format!("{value:.decimals$}")).to_owned()
+    trim_decimals(&format!("{value:.decimals$}")).to_owned()
 }
 
 /// Returns a number without the zeros at the end of its decimals.
-pub fn trimmed(number: &str) -> &str {
+pub fn trim_decimals(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
@@ -177,7 +182,7 @@ mod tests {
 
     #[test]
     fn names_are_split_into_words_and_units() {
-        for (name, plain, unit) in [
+        for (name, words, unit) in [
             ("unbalance_mass_kg", "Unbalance mass", "kg"),
             ("damping_n_s_per_m", "Damping", "N s/m"),
             ("spring_stiffness_n_per_m", "Spring stiffness", "N/m"),
@@ -193,9 +198,9 @@ mod tests {
             ("ratio_max", "Ratio max", ""),
             ("s", "S", ""),
         ] {
-            assert_eq!((words(name).as_str(), unit_of_name(name).as_str()), (plain, unit));
+            assert_eq!((name_in_words(name).as_str(), unit_of_name(name).as_str()), (words, unit));
         }
-        assert_eq!(channel("end_front_z"), "end front, horizontal");
+        assert_eq!(channel_in_words("end_front_z"), "end front, horizontal");
         assert_eq!(split_model("min_gap_linear_m"), ("least gap".to_owned(), "linear"));
         assert_eq!(
             split_model("stop_2_force_nonlinear_n"),
@@ -206,7 +211,7 @@ mod tests {
             ("ratio_max", "Greatest ratio"),
             ("min_gap_nonlinear_m", "Least gap"),
         ] {
-            assert_eq!(quantity(name), words);
+            assert_eq!(quantity_in_words(name), words);
         }
         assert_eq!(split_model("static_sag_m"), ("static sag".to_owned(), ""));
     }
@@ -222,7 +227,7 @@ mod tests {
             (0.0, "0"),
             (f64::NAN, "–"),
         ] {
-            assert_eq!(significant(value, 3), text);
+            assert_eq!(format_significant(value, 3), text);
         }
     }
 }

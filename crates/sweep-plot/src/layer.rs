@@ -5,8 +5,8 @@ use sweep_parameter::{Worse, named};
 use super::PlotOptions;
 use super::colour::ColourScale;
 use super::error::{PlotError, Result};
-use super::gather::{CellMap, Sides};
-use super::label::{self, capitalised};
+use super::gather::{CellMap, CellSides};
+use super::label::{self, capitalise};
 use super::read::{ColumnFacts, FigureFile, FigureKind};
 
 /// A column of numbers that a map can show.
@@ -14,7 +14,7 @@ use super::read::{ColumnFacts, FigureFile, FigureKind};
 pub(crate) struct ShownColumn {
     facts: ColumnFacts,
     /// The group of columns that it belongs to.
-    pub(crate) group: Group,
+    pub(crate) group: ColumnGroup,
     /// The channel, if the column is one of a channel.
     pub(crate) channel: Option<String>,
 }
@@ -22,7 +22,7 @@ pub(crate) struct ShownColumn {
 named! {
     /// The group of a column, in the order in which a page offers them. The names are those of a
     /// page, and the prefixes of a channel's columns.
-    pub(crate) enum Group {
+    pub(crate) enum ColumnGroup {
         /// A ratio of both models.
         Ratio = "ratio",
         Nonlinear = "nonlinear",
@@ -31,9 +31,9 @@ named! {
     }
 }
 
-impl Group {
+impl ColumnGroup {
     /// Returns the group in words, for a list to choose from.
-    pub(crate) const fn words(self) -> &'static str {
+    pub(crate) const fn in_words(self) -> &'static str {
         match self {
             Self::Ratio => "ratio, nonlinear / linear",
             Self::Nonlinear => "amplitude, nonlinear model",
@@ -54,11 +54,11 @@ pub(crate) struct Layer {
     pub(crate) values: Vec<f64>,
     pub(crate) scale: ColourScale,
     /// Whether the values depend on the nonlinear motion, which may be chaotic.
-    pub(crate) nonlinear: bool,
+    pub(crate) is_nonlinear: bool,
     /// The limit whose line is drawn, if there is one.
-    pub(crate) level: Option<DividingLimit>,
+    pub(crate) limit: Option<DividingLimit>,
     /// The sides of the limit on which the points lie, in cells of several points.
-    pub(crate) divided: Option<Sides>,
+    pub(crate) sides: Option<CellSides>,
 }
 
 /// A limit that divides the map.
@@ -67,40 +67,40 @@ pub(crate) struct DividingLimit {
     /// The limit in displayed units.
     pub(crate) value: f64,
     /// Whether distances from the limit are taken of logarithms.
-    pub(crate) log: bool,
+    pub(crate) is_log: bool,
     /// The bad side.
     pub(crate) worse: Worse,
     /// The name of the line.
-    pub(crate) line: String,
+    pub(crate) line_name: String,
     /// The meaning of the side above the limit, in the picture and in the legend.
-    pub(crate) above: [String; 2],
+    pub(crate) above_meanings: [String; 2],
     /// The meaning of the side below the limit, in the picture and in the legend.
-    pub(crate) below: [String; 2],
+    pub(crate) below_meanings: [String; 2],
     /// The legend entry of cells with points on both sides.
-    pub(crate) both: String,
+    pub(crate) both_meaning: String,
 }
 
 impl DividingLimit {
     /// Returns the signed distance of a value from the limit; zero or more is above it.
     pub(crate) fn offset(&self, value: f64) -> f64 {
-        if self.log { (value / self.value).ln() } else { value - self.value }
+        if self.is_log { (value / self.value).ln() } else { value - self.value }
     }
 }
 
 impl Layer {
     /// Returns whether a cell has points on both sides of the limit.
-    pub(crate) fn both(&self, cell: usize) -> bool {
-        self.divided.as_ref().is_some_and(|divided| divided.both[cell])
+    pub(crate) fn is_divided(&self, cell: usize) -> bool {
+        self.sides.as_ref().is_some_and(|sides| sides.is_divided[cell])
     }
 
     /// Returns whether a cell of several points has some that did not fail and yet have no value.
-    pub(crate) fn undefined(&self, cell: usize) -> bool {
-        self.divided.as_ref().is_some_and(|divided| divided.undefined[cell])
+    pub(crate) fn has_undefined(&self, cell: usize) -> bool {
+        self.sides.as_ref().is_some_and(|sides| sides.has_undefined[cell])
     }
 
     /// Returns the value that the line of the limit follows: the mean of the cell's points.
-    pub(crate) fn typical(&self, cell: usize) -> f64 {
-        self.divided.as_ref().map_or(self.values[cell], |divided| divided.mean[cell])
+    pub(crate) fn mean_value(&self, cell: usize) -> f64 {
+        self.sides.as_ref().map_or(self.values[cell], |sides| sides.mean[cell])
     }
 }
 
@@ -117,19 +117,21 @@ pub(crate) struct QuantityColumns<'a> {
 
 /// Returns all quantities of a file but ratios: channels, then the others in file order.
 pub(crate) fn quantities(source: &FigureFile) -> Vec<QuantityColumns<'_>> {
-    let mut found: Vec<QuantityColumns<'_>> = Vec::new();
-    for shown in all(source).into_iter().filter(|shown| shown.group != Group::Ratio) {
-        let Some(facts) = source.column(shown.column()) else { continue };
-        let (words, model) = match &shown.channel {
-            Some(channel) => (label::channel(channel), shown.group.name()),
+    let mut quantities: Vec<QuantityColumns<'_>> = Vec::new();
+    for column in
+        all_columns(source).into_iter().filter(|column| column.group != ColumnGroup::Ratio)
+    {
+        let Some(facts) = source.column(column.name()) else { continue };
+        let (words, model) = match &column.channel {
+            Some(channel) => (label::channel_in_words(channel), column.group.name()),
             None => label::split_model(&facts.name),
         };
-        match found.iter_mut().find(|quantity| quantity.words == words) {
+        match quantities.iter_mut().find(|quantity| quantity.words == words) {
             Some(quantity) => quantity.columns.push((model, facts)),
             None => {
-                let is_channel = shown.channel.is_some();
-                let name = shown.channel.unwrap_or_else(|| words.replace(' ', "_"));
-                found.push(QuantityColumns {
+                let is_channel = column.channel.is_some();
+                let name = column.channel.unwrap_or_else(|| words.replace(' ', "_"));
+                quantities.push(QuantityColumns {
                     name,
                     words,
                     is_channel,
@@ -138,20 +140,20 @@ pub(crate) fn quantities(source: &FigureFile) -> Vec<QuantityColumns<'_>> {
             }
         }
     }
-    found
+    quantities
 }
 
-/// Returns the one column that the options request; `None` for the status, which has no values.
+/// Returns the single column that the options request; `None` for the status, which has no values.
 ///
 /// # Errors
-/// The errors of [`requested`]; [`PlotError::Unfit`] for several columns.
-pub(crate) fn requested_one(
+/// The errors of [`requested_columns`]; [`PlotError::Unfit`] for several columns.
+pub(crate) fn requested_column(
     source: &FigureFile,
     options: &PlotOptions,
 ) -> Result<Option<ShownColumn>> {
-    let mut requested = requested(source, options)?;
-    match requested.len() {
-        0 | 1 => Ok(requested.pop().flatten()),
+    let mut columns = requested_columns(source, options)?;
+    match columns.len() {
+        0 | 1 => Ok(columns.pop().flatten()),
         _ => Err(PlotError::Unfit(
             "a map over two axes shows one column at a time: give `--quantity` once".to_owned(),
         )),
@@ -163,21 +165,23 @@ pub(crate) fn requested_one(
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a column that the file does not have.
-pub(crate) fn requested(
+pub(crate) fn requested_columns(
     source: &FigureFile,
     options: &PlotOptions,
 ) -> Result<Vec<Option<ShownColumn>>> {
-    let mut all = all(source);
+    let mut columns = all_columns(source);
     if options.quantity.is_empty() {
-        all.truncate(1);
-        return Ok(all.into_iter().map(Some).collect());
+        columns.truncate(1);
+        return Ok(columns.into_iter().map(Some).collect());
     }
-    let known =
-        || all.iter().map(ShownColumn::column).chain([STATUS]).collect::<Vec<_>>().join(", ");
-    let find = |name: &String| match all.iter().find(|shown| shown.column() == name) {
+    let known_names =
+        || columns.iter().map(ShownColumn::name).chain([STATUS]).collect::<Vec<_>>().join(", ");
+    let find = |name: &String| match columns.iter().find(|column| column.name() == name) {
         None if name == STATUS => Ok(None),
-        None => Err(source.unknown_name("--quantity", name, "column of numbers to show", known())),
-        shown => Ok(shown.cloned()),
+        None => {
+            Err(source.unknown_name("--quantity", name, "column of numbers to show", known_names()))
+        }
+        column => Ok(column.cloned()),
     };
     options.quantity.iter().map(find).collect()
 }
@@ -187,36 +191,44 @@ pub(crate) const STATUS: &str = "status";
 
 /// Returns all columns that a map file can show, in the order in which a page offers them: every
 /// column of numbers but axes and counts.
-pub(crate) fn all(source: &FigureFile) -> Vec<ShownColumn> {
-    let axes = super::swept::columns(source);
-    let numbers = source.numeric().filter(|column| {
+pub(crate) fn all_columns(source: &FigureFile) -> Vec<ShownColumn> {
+    let axes = super::swept::axis_columns(source);
+    let number_columns = source.numeric().filter(|column| {
         let is_count = ["point", "steps_", "rejected_", "starts"];
-        !axes.contains(column) && !is_count.iter().any(|start| column.name.starts_with(start))
+        !axes.contains(column) && !is_count.iter().any(|prefix| column.name.starts_with(prefix))
     });
-    let mut all: Vec<ShownColumn> = numbers.map(ShownColumn::new).collect();
-    all.sort_by_key(|shown| {
-        let is = |column| shown.column() == column;
-        (!is("ratio_change"), shown.group as usize, !is("ratio_max"), shown.channel.is_some())
+    let mut shown: Vec<ShownColumn> = number_columns.map(ShownColumn::new).collect();
+    shown.sort_by_key(|shown| {
+        let is_named = |column| shown.name() == column;
+        (
+            !is_named("ratio_change"),
+            shown.group as usize,
+            !is_named("ratio_max"),
+            shown.channel.is_some(),
+        )
     });
-    all
+    shown
 }
 
 impl ShownColumn {
     fn new(facts: &ColumnFacts) -> Self {
         let name = facts.name.as_str();
-        let split =
-            |group: &Group| Some((*group, name.strip_prefix(group.name())?.strip_prefix('_')?));
-        let found = Group::ALL.iter().find_map(split).filter(|(_, rest)| *rest != "change");
-        let (group, channel) = found.map_or((Group::Other, None), |(group, rest)| {
-            // Differences of two files have max_a and max_b.
-            let not_channels = ["max", "min", "max_a", "max_b"];
-            (group, (!not_channels.contains(&rest)).then(|| rest.to_owned()))
-        });
+        let split_off_group = |group: &ColumnGroup| {
+            Some((*group, name.strip_prefix(group.name())?.strip_prefix('_')?))
+        };
+        let group_and_channel =
+            ColumnGroup::ALL.iter().find_map(split_off_group).filter(|(_, rest)| *rest != "change");
+        let (group, channel) =
+            group_and_channel.map_or((ColumnGroup::Other, None), |(group, rest)| {
+                // Differences of two files have max_a and max_b.
+                let not_channels = ["max", "min", "max_a", "max_b"];
+                (group, (!not_channels.contains(&rest)).then(|| rest.to_owned()))
+            });
         Self { facts: facts.clone(), group, channel }
     }
 
     /// Returns the name of the column.
-    pub(crate) fn column(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.facts.name
     }
 
@@ -227,7 +239,7 @@ impl ShownColumn {
 
     /// Returns whether the verdict depends on this column alone.
     pub(crate) fn is_verdict(&self, source: &FigureFile) -> bool {
-        self.column() == "ratio_max" && source.column("ratio_min").is_none()
+        self.name() == "ratio_max" && source.column("ratio_min").is_none()
     }
 
     /// Returns the layer of a map that was read with this column.
@@ -235,39 +247,39 @@ impl ShownColumn {
     /// # Errors
     /// [`PlotError::Undrawable`] if the file does not have the column.
     pub(crate) fn layer(&self, map: &CellMap) -> Result<Layer> {
-        let numbers = map.table.numbers(self.column())?;
+        let values = map.table.numbers(self.name())?;
         let (unit, factor) = label::display_unit(&self.facts.unit);
-        let (extent, sides) = &map.seen[self.column()];
-        let extent = extent.values().map(|value| value * factor);
+        let (range, sides) = &map.ranges_and_sides[self.name()];
+        let range = range.values().map(|value| value * factor);
         let source = &map.table.source;
-        let ratio = self.group == Group::Ratio;
+        let is_ratio = self.group == ColumnGroup::Ratio;
         // A linear model at rest gives an infinite ratio, which has no place on any scale.
-        let value = |value: f64| {
-            if ratio && !(value > 0.0 && value.is_finite()) { f64::NAN } else { value }
+        let or_nan = |value: f64| {
+            if is_ratio && !(value > 0.0 && value.is_finite()) { f64::NAN } else { value }
         };
         let is_less_worse = self.worse() == Some(Worse::Less);
-        let scale = match (source.kind, source.limit(&self.facts)) {
-            (FigureKind::DIFFERENCES, _) if self.column() == "ratio_change" => {
-                ColourScale::factor(extent)
+        let scale = match (source.kind, source.column_limit(&self.facts)) {
+            (FigureKind::DIFFERENCES, _) if self.name() == "ratio_change" => {
+                ColourScale::around_one(range)
             }
-            (FigureKind::DIFFERENCES, _) if !ratio => {
-                ColourScale::difference(extent, is_less_worse)
+            (FigureKind::DIFFERENCES, _) if !is_ratio => {
+                ColourScale::around_zero(range, is_less_worse)
             }
-            (_, Some(limit)) if ratio => ColourScale::ratio(extent, limit, is_less_worse),
-            (_, Some(limit)) => ColourScale::about(extent, limit * factor, is_less_worse),
-            (_, None) => ColourScale::amplitude(extent),
+            (_, Some(limit)) if is_ratio => ColourScale::ratio(range, limit, is_less_worse),
+            (_, Some(limit)) => ColourScale::with_limit(range, limit * factor, is_less_worse),
+            (_, None) => ColourScale::without_limit(range),
         };
-        let (title, words) = self.words(source);
-        let level = self.level(source);
+        let (title, label) = self.title_and_label(source);
+        let limit = self.dividing_limit(source);
         Ok(Layer {
-            nonlinear: self.group == Group::Ratio
-                || label::split_model(self.column()).1 != "linear",
+            is_nonlinear: self.group == ColumnGroup::Ratio
+                || label::split_model(self.name()).1 != "linear",
             title,
-            label: label::with_unit(&words, unit),
-            values: numbers.iter().map(|number| value(number * factor)).collect(),
-            level: level.filter(|_| scale.centre.is_some()),
+            label: label::with_unit(&label, unit),
+            values: values.iter().map(|number| or_nan(number * factor)).collect(),
+            limit: limit.filter(|_| scale.centre.is_some()),
             scale,
-            divided: sides.as_ref().map(|sides| Sides {
+            sides: sides.as_ref().map(|sides| CellSides {
                 mean: sides.mean.iter().map(|mean| mean * factor).collect(),
                 ..sides.clone()
             }),
@@ -276,27 +288,27 @@ impl ShownColumn {
 
     /// Returns the column in words for a list to choose from, beside its group.
     pub(crate) fn short_name(&self) -> String {
-        match (self.group, &self.channel, label::split_model(self.column())) {
-            (_, Some(channel), _) => capitalised(&label::channel(channel)),
-            (Group::Ratio, None, _) => {
-                format!("{} ratio", capitalised(self.worse().unwrap_or(Worse::Greater).extreme()))
+        match (self.group, &self.channel, label::split_model(self.name())) {
+            (_, Some(channel), _) => capitalise(&label::channel_in_words(channel)),
+            (ColumnGroup::Ratio, None, _) => {
+                format!("{} ratio", capitalise(self.worse().unwrap_or(Worse::Greater).extreme()))
             }
-            (_, None, (words, "")) => capitalised(&words),
-            (_, None, (words, model)) => format!("{}, {model} model", capitalised(&words)),
+            (_, None, (words, "")) => capitalise(&words),
+            (_, None, (words, model)) => format!("{}, {model} model", capitalise(&words)),
         }
     }
 
     /// Returns the title of the figure, and the label of the colours without unit.
-    pub(crate) fn words(&self, source: &FigureFile) -> (String, String) {
-        let compared = source.compared();
+    pub(crate) fn title_and_label(&self, source: &FigureFile) -> (String, String) {
+        let compared = source.compared_quantity();
         // The description of a column of differences says which file is divided by which.
         let description = self.facts.description.split(';').next().unwrap_or_default();
-        match (self.group, self.channel.as_deref().map(label::channel)) {
-            (Group::Ratio, None) if source.kind == FigureKind::DIFFERENCES => (
-                capitalised(description),
+        match (self.group, self.channel.as_deref().map(label::channel_in_words)) {
+            (ColumnGroup::Ratio, None) if source.kind == FigureKind::DIFFERENCES => (
+                capitalise(description),
                 format!("largest ratio of {compared}, nonlinear / linear"),
             ),
-            (Group::Ratio, None) => {
+            (ColumnGroup::Ratio, None) => {
                 let (title, which) = match self.worse() {
                     Some(Worse::Less) => ("Where the linear model over-estimates", "least"),
                     _ if self.is_verdict(source) => {
@@ -306,50 +318,53 @@ impl ShownColumn {
                 };
                 (title.to_owned(), format!("{which} ratio of {compared}, nonlinear / linear"))
             }
-            (Group::Ratio, Some(channel)) => (
+            (ColumnGroup::Ratio, Some(channel)) => (
                 format!("Ratio of {compared}: {channel}"),
                 format!("ratio of {compared}, nonlinear / linear"),
             ),
-            (group @ (Group::Nonlinear | Group::Linear), Some(channel)) => {
-                (capitalised(&format!("{}: {channel}", group.words())), group.words().to_owned())
-            }
+            (group @ (ColumnGroup::Nonlinear | ColumnGroup::Linear), Some(channel)) => (
+                capitalise(&format!("{}: {channel}", group.in_words())),
+                group.in_words().to_owned(),
+            ),
             _ => {
                 let title = match source.kind {
-                    FigureKind::DIFFERENCES => capitalised(description),
+                    FigureKind::DIFFERENCES => capitalise(description),
                     _ => self.short_name(),
                 };
-                (title, label::split_model(self.column()).0)
+                (title, label::split_model(self.name()).0)
             }
         }
     }
 
     /// Returns the limit that divides the values, if there is one.
-    pub(crate) fn level(&self, source: &FigureFile) -> Option<DividingLimit> {
-        let limit = source.limit(&self.facts)?;
+    pub(crate) fn dividing_limit(&self, source: &FigureFile) -> Option<DividingLimit> {
+        let limit = source.column_limit(&self.facts)?;
         let worse = self.worse().unwrap_or(Worse::Greater);
         let (unit, factor) = label::display_unit(&self.facts.unit);
         let value = limit * factor;
-        let log = self.group == Group::Ratio;
+        let is_log = self.group == ColumnGroup::Ratio;
         let phrase = label::with_value("", value, unit);
-        let what = if log { "ratio".to_owned() } else { label::split_model(self.column()).0 };
-        let [above, below] = [format!("{what} above {phrase}"), format!("{what} below {phrase}")];
-        let mut level = DividingLimit {
+        let quantity = if is_log { "ratio".to_owned() } else { label::split_model(self.name()).0 };
+        let [above_meaning, below_meaning] =
+            [format!("{quantity} above {phrase}"), format!("{quantity} below {phrase}")];
+        let mut limit = DividingLimit {
             value,
-            log,
+            is_log,
             worse,
-            line: format!("boundary: {what} {phrase}"),
-            above: [above, format!("{what} {phrase} or more")],
-            below: [below.clone(), below],
-            both: "both: points on either side".to_owned(),
+            line_name: format!("boundary: {quantity} {phrase}"),
+            above_meanings: [above_meaning, format!("{quantity} {phrase} or more")],
+            below_meanings: [below_meaning.clone(), below_meaning],
+            both_meaning: "both: points on either side".to_owned(),
         };
         if self.is_verdict(source) {
-            level.above = [
+            limit.above_meanings = [
                 "linear model unreliable".to_owned(),
                 format!("unreliable: ratio {phrase} or more"),
             ];
-            level.below = ["linear model reliable".to_owned(), format!("reliable: below {phrase}")];
-            level.both = "both: reliable and unreliable points".to_owned();
+            limit.below_meanings =
+                ["linear model reliable".to_owned(), format!("reliable: below {phrase}")];
+            limit.both_meaning = "both: reliable and unreliable points".to_owned();
         }
-        Some(level)
+        Some(limit)
     }
 }

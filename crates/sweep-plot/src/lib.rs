@@ -45,8 +45,8 @@ use std::path::{Path, PathBuf};
 pub use axis::extremes;
 pub use colour::{DISTINCT, FAILED, LINEAR, NONLINEAR};
 pub use error::PlotError;
-pub use html::{embed, sheet, table};
-pub use label::{capitalised, quantity, significant, words};
+pub use html::{embed, html_table, printable_page};
+pub use label::{capitalise, format_significant, name_in_words, quantity_in_words};
 pub use model::{CommonFigures, Figures, LivePart};
 pub use scene::{Colour, INK, MUTED};
 pub use share::Share;
@@ -93,7 +93,7 @@ pub struct PlotOptions {
     pub quantity: Vec<String>,
     /// Maps of three axes or more: fixed values of axes beyond the second, by name. Other kinds
     /// whose rows belong to points: values of the points that are drawn.
-    pub at: Vec<(String, f64)>,
+    pub fixed_values: Vec<(String, f64)>,
     /// Maps as a picture: a boundary file over the same axes, whose curve is drawn too.
     pub boundary: Option<PathBuf>,
     /// Maps as a page: a folder of trace files. A click on a point with a trace shows its history.
@@ -138,8 +138,9 @@ pub fn render(
     let mut bytes = draw_figure(source, options, model, format)?;
     if format == Format::Html {
         // The page shows this picture where scripts are switched off.
-        let still = draw_figure(open_source(input, options, model)?, options, model, Format::Png)?;
-        bytes = html::add_still_picture(&bytes, &still);
+        let still_picture =
+            draw_figure(open_source(input, options, model)?, options, model, Format::Png)?;
+        bytes = html::add_still_picture(&bytes, &still_picture);
     }
     Ok(Output::begin(output, format)?.finish(&bytes)?)
 }
@@ -148,12 +149,12 @@ pub fn render(
 ///
 /// # Errors
 /// The errors of [`render`].
-pub fn described(input: &Path, model: &dyn Figures) -> Result<(String, String), PlotError> {
+pub fn describe_as_html(input: &Path, model: &dyn Figures) -> Result<(String, String), PlotError> {
     let options = PlotOptions::default();
     let source = open_source(input, &options, model)?;
     let plan_summary = html::run_summary(&source, model);
     let svg = draw_figure(source, &options, model, Format::Svg)?;
-    Ok((html::picture(&svg), plan_summary))
+    Ok((html::svg_image(&svg), plan_summary))
 }
 
 fn open_source(input: &Path, options: &PlotOptions, model: &dyn Figures) -> Result<FigureFile> {
@@ -209,7 +210,7 @@ fn is_scattered(source: &FigureFile, options: &PlotOptions) -> Result<bool> {
     if source.kind != FigureKind::MAP || source.design_method().is_none() {
         return Ok(false);
     }
-    Ok(options.view.is_some() || !swept::is_whole(source)?)
+    Ok(options.view.is_some() || !swept::is_whole_grid(source)?)
 }
 
 fn draw_design(
@@ -242,22 +243,23 @@ fn draw_map(
 ) -> Result<Vec<u8>> {
     let axes = swept::axes(&source)?;
     if format != Format::Html && axes.len() > 1 {
-        let shown = layer::requested_one(&source, options)?;
-        let columns = shown.iter().map(|shown| shown.column()).chain([layer::STATUS]);
+        let shown_column = layer::requested_column(&source, options)?;
+        let columns =
+            shown_column.iter().map(|shown_column| shown_column.name()).chain([layer::STATUS]);
         let columns: Vec<String> = columns.map(str::to_owned).collect();
-        let cuts = Cuts::for_picture(&source, &axes, &options.at)?;
+        let cuts = Cuts::for_picture(&source, &axes, &options.fixed_values)?;
         let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
         let map = CellMap::read(source, grid, &columns)?;
         let overlay = options.boundary.as_ref();
         let overlay =
             overlay.map(|path| read_overlay(path, &axes, &map.table.source)).transpose()?;
-        let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref())?;
+        let scene = figures::map::draw(&map, &cuts, shown_column.as_ref(), overlay.as_ref())?;
         return encode_image(&scene, format);
     }
     let columns = html::page_columns(&source, &axes);
-    let most = html::max_cells(columns.len());
-    let cuts = Cuts::for_page(&source, &axes, &options.at, most)?;
-    let grid = Grid::new(&axes, &cuts.picks, most);
+    let cell_limit = html::max_cells(columns.len());
+    let cuts = Cuts::for_page(&source, &axes, &options.fixed_values, cell_limit)?;
+    let grid = Grid::new(&axes, &cuts.picks, cell_limit);
     let map = CellMap::read(source, grid, &columns)?;
     if axes.len() == 1 {
         let chart = figures::curves::chart(&map, options)?;
@@ -269,13 +271,22 @@ fn draw_map(
 /// Reads the boundary file that is drawn over a map with these axes.
 fn read_overlay(path: &Path, axes: &[SweptAxis], map: &FigureFile) -> Result<Overlay> {
     let source = FigureFile::open(path, map.model_kinds)?;
-    source.expect(FigureKind::BOUNDARY, "--boundary", "`sweep boundary` writes a boundary file")?;
+    source.expect_kind(
+        FigureKind::BOUNDARY,
+        "--boundary",
+        "`sweep boundary` writes a boundary file",
+    )?;
     let table = FigureTable::read(source)?;
-    let line = figures::boundary::overlay(&table, [&axes[0].name, &axes[1].name])?;
-    let moved: NamedPoint = axes.iter().map(|axis| (axis.name.clone(), 0.0)).collect();
-    let files = [(map, &moved), (&table.source, &moved)];
-    together::check_agreement("--boundary", path, files, &figures::boundary::follows_from(&table))?;
-    Ok(line)
+    let overlay = figures::boundary::overlay(&table, [&axes[0].name, &axes[1].name])?;
+    let axes_as_point: NamedPoint = axes.iter().map(|axis| (axis.name.clone(), 0.0)).collect();
+    let files = [(map, &axes_as_point), (&table.source, &axes_as_point)];
+    together::check_agreement(
+        "--boundary",
+        path,
+        files,
+        &figures::boundary::plan_sections(&table),
+    )?;
+    Ok(overlay)
 }
 
 /// Draws the differences between two maps as a picture.
@@ -305,24 +316,34 @@ fn encode_image(scene: &Scene, format: Format) -> Result<Vec<u8>> {
 
 /// Rejects options that have no effect on this kind of file or this format.
 fn check_options(source: &FigureFile, options: &PlotOptions, format: Format) -> Result<()> {
-    let is = |kind| source.kind == kind;
-    let map = is(FigureKind::MAP) || is(FigureKind::DIFFERENCES);
-    let design = is(FigureKind::DESIGN);
+    let is_kind = |kind| source.kind == kind;
+    let is_map = is_kind(FigureKind::MAP) || is_kind(FigureKind::DIFFERENCES);
+    let is_design = is_kind(FigureKind::DESIGN);
     let is_page = format == Format::Html;
-    let with_points = source.model_kinds.kinds.iter().filter(|kind| kind.has_points);
-    let with_points: String = with_points.map(|kind| format!(", {} files", kind.name)).collect();
-    let designs = "designs: results of a grid file with [design]";
-    source.reject_option("--quantity", !options.quantity.is_empty(), map || design, "maps")?;
-    let at = !options.at.is_empty();
-    source.reject_option("--at", at, source.kind.has_points, &format!("maps{with_points}"))?;
-    let boundary = options.boundary.is_some();
-    let traces = options.traces.is_some();
+    let point_kinds = source.model_kinds.kinds.iter().filter(|kind| kind.has_points);
+    let point_kinds: String = point_kinds.map(|kind| format!(", {} files", kind.name)).collect();
+    let design_files = "designs: results of a grid file with [design]";
+    source.reject_option(
+        "--quantity",
+        !options.quantity.is_empty(),
+        is_map || is_design,
+        "maps",
+    )?;
+    let has_fixed_values = !options.fixed_values.is_empty();
+    source.reject_option(
+        "--at",
+        has_fixed_values,
+        source.kind.has_points,
+        &format!("maps{point_kinds}"),
+    )?;
+    let has_boundary = options.boundary.is_some();
+    let has_traces = options.traces.is_some();
     source.reject_option(
         "--boundary",
-        boundary,
-        map && !is_page,
+        has_boundary,
+        is_map && !is_page,
         "maps drawn as .svg, .pdf or .png",
     )?;
-    source.reject_option("--view", options.view.is_some(), design, designs)?;
-    source.reject_option("--traces", traces, map && is_page, "maps drawn as .html")
+    source.reject_option("--view", options.view.is_some(), is_design, design_files)?;
+    source.reject_option("--traces", has_traces, is_map && is_page, "maps drawn as .html")
 }

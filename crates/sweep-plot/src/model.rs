@@ -70,7 +70,7 @@ pub struct LivePart {
     /// The scripts; one of them has the function `createLive`.
     pub scripts: &'static [&'static str],
     /// The templates of elements that the scripts copy, in HTML.
-    pub parts: &'static str,
+    pub templates: &'static str,
 }
 
 /// The figures of a model without its own figures.

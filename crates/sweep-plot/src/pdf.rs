@@ -1,7 +1,7 @@
 //! A scene as PDF 1.7, with the typeface embedded and its text selectable.
 //!
-//! A page of our own few shapes needs nine kinds of objects, so that a crate for PDF would write
-//! less than half of this module.
+//! A figure needs nine kinds of PDF objects, which is so little that using a crate for PDF would
+//! save less than half of this module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -11,57 +11,60 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use ttf_parser::GlyphId;
 
-use super::raster::{BOLD, REGULAR, advance, face, text_width};
-use super::scene::{Anchor, Colour, Item, Outline, PathSegment, Scene, Stroke, Text};
-use super::svg::{halo_width, hundredths, number};
+use super::raster::{BOLD_FONT, REGULAR_FONT, glyph_advance, text_width, typeface};
+use super::scene::{Anchor, Colour, Outline, PathSegment, Scene, SceneItem, Stroke, Text};
+use super::svg::{format_pixels, halo_width, to_hundredths};
 use sweep_files::PDF_START;
 
 /// Points (1/72 in) to a pixel of the scene (1/96 in), as in CSS.
 const POINTS_PER_PIXEL: f64 = 0.75;
 
-/// The width of the line around neighbouring areas of one map, px. Basis: viewers smooth edges, and
-/// leave a seam between areas that only touch. Doubling it blurs the edges of cells.
-const SEAM: f64 = 0.25;
+/// The width of the line around neighbouring areas of a map, px. Basis: viewers smooth edges, which
+/// leaves a seam between areas that only touch. Doubling it blurs the edges of cells.
+const SEAM_WIDTH: f64 = 0.25;
 
 /// Returns the scene as the bytes of a PDF document of one page. The same scene gives the same
 /// bytes.
 pub(crate) fn write(scene: &Scene) -> Vec<u8> {
     let mut page = Page::default();
-    let width = number(scene.width * POINTS_PER_PIXEL);
-    let height = number(scene.height * POINTS_PER_PIXEL);
+    let width = format_pixels(scene.width * POINTS_PER_PIXEL);
+    let height = format_pixels(scene.height * POINTS_PER_PIXEL);
     // Scenes have y downwards.
     let scale = POINTS_PER_PIXEL;
     page.add(&format!("{scale} 0 0 -{scale} 0 {height} cm 1 j"));
-    scene.items.iter().for_each(|item| page.item(item));
+    scene.items.iter().for_each(|item| page.add_item(item));
     let mut objects = Objects::default();
-    let catalogue = objects.reserve();
-    let pages = objects.reserve();
-    let sheet = objects.reserve();
-    let content = objects.stream("", page.content.as_bytes());
-    let fonts: Vec<String> = page
+    let catalogue_object = objects.reserve();
+    let pages_object = objects.reserve();
+    let page_object = objects.reserve();
+    let content_object = objects.add_stream("", page.operators.as_bytes());
+    let font_entries: Vec<String> = page
         .glyphs
         .iter()
-        .map(|(bold, glyphs)| format!("/{} {} 0 R", font_name(*bold), objects.font(*bold, glyphs)))
+        .map(|(bold, glyphs)| {
+            format!("/{} {} 0 R", font_name(*bold), objects.add_font(*bold, glyphs))
+        })
         .collect();
-    let states = page.alphas.iter().map(|alpha| {
-        let opacity = number(f64::from(*alpha) / 255.0);
+    let graphics_states = page.alphas.iter().map(|alpha| {
+        let opacity = format_pixels(f64::from(*alpha) / 255.0);
         format!("/A{alpha} << /ca {opacity} /CA {opacity} >>")
     });
-    let states: Vec<String> = states.collect();
-    objects.set(catalogue, &format!("<< /Type /Catalog /Pages {pages} 0 R >>"));
-    objects.set(pages, &format!("<< /Type /Pages /Kids [{sheet} 0 R] /Count 1 >>"));
+    let graphics_states: Vec<String> = graphics_states.collect();
+    objects.set(catalogue_object, &format!("<< /Type /Catalog /Pages {pages_object} 0 R >>"));
+    objects.set(pages_object, &format!("<< /Type /Pages /Kids [{page_object} 0 R] /Count 1 >>"));
     objects.set(
-        sheet,
+        page_object,
         &format!(
-            "<< /Type /Page /Parent {pages} 0 R /MediaBox [0 0 {width} {height}] /Contents \
-             {content} 0 R /Resources << /Font << {} >> /ExtGState << {} >> >> >>",
-            fonts.join(" "),
-            states.join(" ")
+            "<< /Type /Page /Parent {pages_object} 0 R /MediaBox [0 0 {width} {height}] /Contents \
+             {content_object} 0 R /Resources << /Font << {} >> /ExtGState << {} >> >> >>",
+            font_entries.join(" "),
+            graphics_states.join(" ")
         ),
     );
     let title = hexadecimal_utf_16(&scene.description);
-    let information = objects.add(&format!("<< /Title <FEFF{title}> /Producer (sweep plot) >>"));
-    objects.document(catalogue, information)
+    let information_object =
+        objects.add(&format!("<< /Title <FEFF{title}> /Producer (sweep plot) >>"));
+    objects.finish(catalogue_object, information_object)
 }
 
 /// Returns the name of a weight's font in the page's resources.
@@ -72,7 +75,7 @@ const fn font_name(bold: bool) -> &'static str {
 /// The content of a page, and the resources that it refers to.
 #[derive(Default)]
 struct Page {
-    content: String,
+    operators: String,
     /// The glyphs that are set in each weight, with their letters.
     glyphs: BTreeMap<bool, BTreeMap<u16, char>>,
     alphas: BTreeSet<u8>,
@@ -81,112 +84,115 @@ struct Page {
 impl Page {
     /// Adds a line of operators.
     fn add(&mut self, operators: &str) {
-        self.content.push_str(operators);
-        self.content.push('\n');
+        self.operators.push_str(operators);
+        self.operators.push('\n');
     }
 
-    fn item(&mut self, item: &Item) {
+    fn add_item(&mut self, item: &SceneItem) {
         match item {
-            Item::Fill { outline, colour, crisp } => {
-                self.paint(*colour);
-                let mut close = "f";
+            SceneItem::Fill { outline, colour, crisp } => {
+                self.set_colour(*colour);
+                let mut operator = "f";
                 if *crisp && colour.alpha == 255 {
-                    self.add(&format!("[] 0 d {} w", number(SEAM)));
-                    close = "B";
+                    self.add(&format!("[] 0 d {} w", format_pixels(SEAM_WIDTH)));
+                    operator = "B";
                 }
-                self.path(outline, close);
+                self.add_path(outline, operator);
             }
-            Item::Line { outline, stroke } => {
+            SceneItem::Line { outline, stroke } => {
                 let Stroke { colour, width, dash } = stroke;
-                self.paint(*colour);
-                let dash: Vec<String> = dash.iter().map(|length| number(*length)).collect();
-                self.add(&format!("[{}] 0 d {} w", dash.join(" "), number(*width)));
-                self.path(outline, "S");
+                self.set_colour(*colour);
+                let dash: Vec<String> = dash.iter().map(|length| format_pixels(*length)).collect();
+                self.add(&format!("[{}] 0 d {} w", dash.join(" "), format_pixels(*width)));
+                self.add_path(outline, "S");
             }
-            Item::Text(text) => self.text(text),
-            Item::Clip(outline) => {
+            SceneItem::Text(text) => self.add_text(text),
+            SceneItem::Clip(outline) => {
                 self.add("q");
                 if outline.0.is_empty() {
                     self.add("0 0 0 0 re");
                 }
-                self.path(outline, "W n");
+                self.add_path(outline, "W n");
             }
-            Item::Unclip => self.add("Q"),
+            SceneItem::Unclip => self.add("Q"),
         }
     }
 
     /// Sets the colour of areas and lines.
-    fn paint(&mut self, colour: Colour) {
+    fn set_colour(&mut self, colour: Colour) {
         self.alphas.insert(colour.alpha);
-        let part = |value: u8| format!("{:.4}", f64::from(value) / 255.0);
-        let [r, g, b] = colour.rgb.map(part);
+        let component = |value: u8| format!("{:.4}", f64::from(value) / 255.0);
+        let [r, g, b] = colour.rgb.map(component);
         self.add(&format!("/A{} gs {r} {g} {b} rg {r} {g} {b} RG", colour.alpha));
     }
 
     /// Adds an outline and the operator that paints it.
-    fn path(&mut self, outline: &Outline, operator: &str) {
-        let mut start = [0; 2];
-        let mut here = start;
+    fn add_path(&mut self, outline: &Outline, operator: &str) {
+        let mut start_point = [0; 2];
+        let mut current_point = start_point;
         for segment in &outline.0 {
             match *segment {
                 PathSegment::Move(point) => {
-                    here = hundredths(point);
-                    start = here;
-                    let _ = write!(self.content, "{} m ", place(here));
+                    current_point = to_hundredths(point);
+                    start_point = current_point;
+                    let _ = write!(self.operators, "{} m ", format_point(current_point));
                 }
                 PathSegment::Line(point) => {
-                    // Most points of a long history are where the one before is.
-                    let there = hundredths(point);
-                    if there != here {
-                        let _ = write!(self.content, "{} l ", place(there));
+                    // Most points of a long history have the same position as the one before.
+                    let next_point = to_hundredths(point);
+                    if next_point != current_point {
+                        let _ = write!(self.operators, "{} l ", format_point(next_point));
                     }
-                    here = there;
+                    current_point = next_point;
                 }
                 PathSegment::Close => {
-                    self.content.push_str("h ");
-                    here = start;
+                    self.operators.push_str("h ");
+                    current_point = start_point;
                 }
             }
         }
         self.add(operator);
     }
 
-    fn text(&mut self, text: &Text) {
-        let face = face(text.bold);
+    fn add_text(&mut self, text: &Text) {
+        let face = typeface(text.bold);
         let glyphs = self.glyphs.entry(text.bold).or_default();
-        let mut shown = String::new();
+        let mut glyph_codes = String::new();
         for letter in text.text.chars() {
             let GlyphId(glyph) = face.glyph_index(letter).unwrap_or_default();
             glyphs.insert(glyph, letter);
-            let _ = write!(shown, "{glyph:04X}");
+            let _ = write!(glyph_codes, "{glyph:04X}");
         }
         let width = text_width(&text.text, text.size, text.bold);
-        let back = match text.anchor {
+        let anchor_offset = match text.anchor {
             Anchor::Start => 0.0,
             Anchor::Middle => width / 2.0,
             Anchor::End => width,
         };
-        let [x, y] = text.at;
-        let matrix = if text.upright {
-            format!("0 -1 -1 0 {} {}", number(x), number(y + back))
+        let [x, y] = text.position;
+        let matrix = if text.is_rotated {
+            format!("0 -1 -1 0 {} {}", format_pixels(x), format_pixels(y + anchor_offset))
         } else {
-            format!("1 0 0 -1 {} {}", number(x - back), number(y))
+            format!("1 0 0 -1 {} {}", format_pixels(x - anchor_offset), format_pixels(y))
         };
-        let size = number(text.size);
+        let size = format_pixels(text.size);
         let font = font_name(text.bold);
-        let set = format!("/{font} {size} Tf {matrix} Tm <{shown}> Tj ET");
+        let text_operators = format!("/{font} {size} Tf {matrix} Tm <{glyph_codes}> Tj ET");
         if let Some(halo) = text.halo {
-            self.paint(halo);
-            self.add(&format!("[] 0 d {} w BT 1 Tr {set}", number(halo_width(text.size))));
+            self.set_colour(halo);
+            self.add(&format!(
+                "[] 0 d {} w BT 1 Tr {text_operators}",
+                format_pixels(halo_width(text.size))
+            ));
         }
-        self.paint(text.colour);
-        self.add(&format!("BT 0 Tr {set}"));
+        self.set_colour(text.colour);
+        self.add(&format!("BT 0 Tr {text_operators}"));
     }
 }
 
 /// Returns a place in hundredths of a pixel as two numbers of pixels.
-fn place(hundredths: [i64; 2]) -> String {
-    let [x, y] = hundredths.map(|value| number(value as f64 / 100.0));
+fn format_point(hundredths: [i64; 2]) -> String {
+    let [x, y] = hundredths.map(|value| format_pixels(value as f64 / 100.0));
     format!("{x} {y}")
 }
 
@@ -212,15 +218,15 @@ impl Objects {
     }
 
     /// Adds a compressed stream with further entries and returns its number.
-    fn stream(&mut self, entries: &str, bytes: &[u8]) -> usize {
+    fn add_stream(&mut self, entries: &str, bytes: &[u8]) -> usize {
         let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
         // Writing to memory cannot fail.
         let _ = encoder.write_all(bytes);
-        let packed = encoder.finish().unwrap_or_default();
-        let length = packed.len();
+        let compressed = encoder.finish().unwrap_or_default();
+        let length = compressed.len();
         let mut object =
             format!("<< /Filter /FlateDecode {entries}/Length {length} >>\nstream\n").into_bytes();
-        object.extend(packed);
+        object.extend(compressed);
         object.extend(b"\nendstream");
         self.0.push(object);
         self.0.len()
@@ -228,30 +234,30 @@ impl Objects {
 
     /// Adds a weight of the typeface with the widths and letters of its glyphs; returns the font's
     /// number.
-    fn font(&mut self, bold: bool, glyphs: &BTreeMap<u16, char>) -> usize {
-        let face = face(bold);
+    fn add_font(&mut self, bold: bool, glyphs: &BTreeMap<u16, char>) -> usize {
+        let face = typeface(bold);
         let units = f64::from(face.units_per_em());
         let thousandths = |value: f64| (1000.0 * value / units).round() as i64;
-        let bytes = if bold { BOLD } else { REGULAR };
-        let file = self.stream(&format!("/Length1 {} ", bytes.len()), bytes);
+        let bytes = if bold { BOLD_FONT } else { REGULAR_FONT };
+        let file = self.add_stream(&format!("/Length1 {} ", bytes.len()), bytes);
         let name = if bold { "SWEEPP+NotoSans-Bold" } else { "SWEEPP+NotoSans-Regular" };
         let bounds = face.global_bounding_box();
         let [left, bottom, right, top] = [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max]
             .map(|value| thousandths(f64::from(value)));
         let ascent = thousandths(f64::from(face.ascender()));
         let descent = thousandths(f64::from(face.descender()));
-        let capitals = face.capital_height().unwrap_or(face.ascender());
-        let capitals = thousandths(f64::from(capitals));
+        let capital_height = face.capital_height().unwrap_or(face.ascender());
+        let capital_height = thousandths(f64::from(capital_height));
         let descriptor = self.add(&format!(
             "<< /Type /FontDescriptor /FontName /{name} /Flags 4 /FontBBox [{left} {bottom} \
              {right} {top}] /ItalicAngle 0 /Ascent {ascent} /Descent {descent} /CapHeight \
-             {capitals} /StemV {} /FontFile2 {file} 0 R >>",
+             {capital_height} /StemV {} /FontFile2 {file} 0 R >>",
             if bold { 140 } else { 80 }
         ));
         let mut widths = String::new();
         let mut letters = String::new();
         for (glyph, letter) in glyphs {
-            let width = thousandths(f64::from(advance(face, *letter)));
+            let width = thousandths(f64::from(glyph_advance(face, *letter)));
             let _ = write!(widths, "{glyph} [{width}] ");
             let code = hexadecimal_utf_16(&letter.to_string());
             let _ = writeln!(letters, "1 beginbfchar <{glyph:04X}> <{code}> endbfchar");
@@ -261,39 +267,40 @@ impl Objects {
              (Adobe) /Ordering (Identity) /Supplement 0 >> /FontDescriptor {descriptor} 0 R \
              /CIDToGIDMap /Identity /DW 0 /W [{widths}] >>"
         ));
-        let map = format!(
+        let character_map = format!(
             "/CIDInit /ProcSet findresource begin\n12 dict begin\nbegincmap\n/CIDSystemInfo << \
              /Registry (Adobe) /Ordering (UCS) /Supplement 0 >> def\n/CMapName \
              /Adobe-Identity-UCS def\n/CMapType 2 def\n1 begincodespacerange <0000> <FFFF> \
              endcodespacerange\n{letters}endcmap\nCMapName currentdict /CMap defineresource \
              pop\nend\nend\n"
         );
-        let map = self.stream("", map.as_bytes());
+        let character_map = self.add_stream("", character_map.as_bytes());
         self.add(&format!(
             "<< /Type /Font /Subtype /Type0 /BaseFont /{name} /Encoding /Identity-H \
-             /DescendantFonts [{descendant} 0 R] /ToUnicode {map} 0 R >>"
+             /DescendantFonts [{descendant} 0 R] /ToUnicode {character_map} 0 R >>"
         ))
     }
 
     /// Returns the document: the objects, and the table of their places.
-    fn document(self, catalogue: usize, information: usize) -> Vec<u8> {
-        let mut out = PDF_START.to_vec();
+    fn finish(self, catalogue_object: usize, information_object: usize) -> Vec<u8> {
+        let mut bytes = PDF_START.to_vec();
         let mut table = String::new();
         for (k, object) in self.0.iter().enumerate() {
             // Every entry of the table has 20 bytes.
-            let _ = writeln!(table, "{:010} 00000 n ", out.len());
-            out.extend(format!("{} 0 obj\n", k + 1).bytes());
-            out.extend(object);
-            out.extend(b"\nendobj\n");
+            let _ = writeln!(table, "{:010} 00000 n ", bytes.len());
+            bytes.extend(format!("{} 0 obj\n", k + 1).bytes());
+            bytes.extend(object);
+            bytes.extend(b"\nendobj\n");
         }
-        let start = out.len();
+        let table_offset = bytes.len();
         let count = self.0.len() + 1;
         let trailer = format!(
             "xref\n0 {count}\n0000000000 65535 f \n{table}trailer\n<< /Size {count} /Root \
-             {catalogue} 0 R /Info {information} 0 R >>\nstartxref\n{start}\n%%EOF\n"
+             {catalogue_object} 0 R /Info {information_object} 0 R \
+             >>\nstartxref\n{table_offset}\n%%EOF\n"
         );
-        out.extend(trailer.bytes());
-        out
+        bytes.extend(trailer.bytes());
+        bytes
     }
 }
 
@@ -320,26 +327,29 @@ mod tests {
             scene.line(line, Stroke::dashed(INK.with_alpha(128), 1.5, &[4.0, 2.0]));
         });
         scene.text(Text::new("Ω (x)", [20.0, 80.0], 12.0).bold());
-        scene.text(Text::new("yaw", [20.0, 80.0], 12.0).upright().anchor(Anchor::Middle));
+        scene.text(Text::new("yaw", [20.0, 80.0], 12.0).rotated().anchor(Anchor::Middle));
         scene
     }
 
     /// Returns the unpacked streams.
     fn streams(document: &[u8]) -> Vec<Vec<u8>> {
-        let at = |from: usize, what: &[u8]| {
-            document[from..].windows(what.len()).position(|w| w == what).map(|at| from + at)
+        let find = |offset: usize, pattern: &[u8]| {
+            document[offset..]
+                .windows(pattern.len())
+                .position(|window| window == pattern)
+                .map(|start| offset + start)
         };
-        let mut found = Vec::new();
-        let mut from = 0;
-        while let Some(start) = at(from, b">>\nstream\n") {
+        let mut contents = Vec::new();
+        let mut offset = 0;
+        while let Some(start) = find(offset, b">>\nstream\n") {
             let start = start + 10;
-            let end = at(start, b"\nendstream").unwrap();
+            let end = find(start, b"\nendstream").unwrap();
             let mut unpacked = Vec::new();
             ZlibDecoder::new(&document[start..end]).read_to_end(&mut unpacked).unwrap();
-            found.push(unpacked);
-            from = end;
+            contents.push(unpacked);
+            offset = end;
         }
-        found
+        contents
     }
 
     #[test]
@@ -350,19 +360,19 @@ mod tests {
         let entries = text[table..].lines().skip(2).filter(|line| line.ends_with(" 00000 n "));
         let mut count = 0;
         for (k, entry) in entries.enumerate() {
-            let place: usize = entry[..10].parse().unwrap();
-            assert!(document[place..].starts_with(format!("{} 0 obj\n", k + 1).as_bytes()));
+            let offset: usize = entry[..10].parse().unwrap();
+            assert!(document[offset..].starts_with(format!("{} 0 obj\n", k + 1).as_bytes()));
             count += 1;
         }
         assert!(count > 10, "{count}");
-        let start = document.windows(10).rposition(|w| w == b"startxref\n").unwrap();
-        let place: usize = String::from_utf8_lossy(&document[start + 10..])
+        let start = document.windows(10).rposition(|window| window == b"startxref\n").unwrap();
+        let offset: usize = String::from_utf8_lossy(&document[start + 10..])
             .lines()
             .next()
             .unwrap()
             .parse()
             .unwrap();
-        assert!(document[place..].starts_with(b"xref\n"));
+        assert!(document[offset..].starts_with(b"xref\n"));
         assert_eq!(document, write(&scene()));
     }
 
@@ -371,24 +381,25 @@ mod tests {
         let document = write(&scene());
         let streams = streams(&document);
         let page = String::from_utf8_lossy(&streams[0]).into_owned();
-        for part in [
+        for operators in [
             "0.75 0 0 -0.75 0 75 cm",
             "10 10 m 60 10 l 60 30 l 10 30 l h B",
             "10 10 m 60 10 l 60 30 l 10 30 l h W n",
-            // A point that is where the one before is leaves no trace.
+            // A point with the same position as the one before is omitted.
             "[4 2] 0 d 1.5 w\n0 0 m 60 40 l S",
             "/A128 gs",
         ] {
-            assert!(page.contains(part), "{part}: {page}");
+            assert!(page.contains(operators), "{operators}: {page}");
         }
-        let matches = |what: &str| page.matches(what).count();
-        assert_eq!((matches("q\n"), matches("Q\n")), (1, 1));
-        // Both weights are embedded, with the letters that they show.
-        assert!(streams.iter().any(|stream| stream == BOLD));
-        assert!(streams.iter().any(|stream| stream == REGULAR));
-        let maps = streams.iter().map(|stream| String::from_utf8_lossy(stream));
-        let maps: Vec<_> = maps.filter(|map| map.contains("begincmap")).collect();
-        assert_eq!(maps.len(), 2);
-        assert!(maps.iter().any(|map| map.contains("<03A9>")), "{maps:?}");
+        let count_matches = |pattern: &str| page.matches(pattern).count();
+        assert_eq!((count_matches("q\n"), count_matches("Q\n")), (1, 1));
+        // Both weights of the typeface are embedded, with the letters that their glyphs show.
+        assert!(streams.iter().any(|stream| stream == BOLD_FONT));
+        assert!(streams.iter().any(|stream| stream == REGULAR_FONT));
+        let character_maps = streams.iter().map(|stream| String::from_utf8_lossy(stream));
+        let character_maps: Vec<_> =
+            character_maps.filter(|map| map.contains("begincmap")).collect();
+        assert_eq!(character_maps.len(), 2);
+        assert!(character_maps.iter().any(|map| map.contains("<03A9>")), "{character_maps:?}");
     }
 }

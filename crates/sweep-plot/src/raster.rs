@@ -9,31 +9,32 @@ use tiny_skia::{
 use ttf_parser::{Face, OutlineBuilder};
 
 use super::error::{PlotError, Result};
-use super::scene::{Anchor, Colour, Item, Outline, PathSegment, Scene, Stroke, Text};
+use super::scene::{Anchor, Colour, Outline, PathSegment, Scene, SceneItem, Stroke, Text};
 use super::svg::halo_width;
 
 /// The typeface of plain text.
-pub(crate) const REGULAR: &[u8] = include_bytes!("fonts/NotoSans-Regular.subset.ttf");
+pub(crate) const REGULAR_FONT: &[u8] = include_bytes!("fonts/NotoSans-Regular.subset.ttf");
 /// The typeface of bold text.
-pub(crate) const BOLD: &[u8] = include_bytes!("fonts/NotoSans-Bold.subset.ttf");
+pub(crate) const BOLD_FONT: &[u8] = include_bytes!("fonts/NotoSans-Bold.subset.ttf");
 
 /// Returns the typeface of bold or plain text.
-pub(crate) fn face(bold: bool) -> &'static Face<'static> {
+pub(crate) fn typeface(bold: bool) -> &'static Face<'static> {
     /// The parsed typefaces, plain and bold.
     static FACES: LazyLock<[Face<'static>; 2]> = LazyLock::new(|| {
-        [REGULAR, BOLD].map(|font| Face::parse(font, 0).expect("the built-in font is valid"))
+        [REGULAR_FONT, BOLD_FONT]
+            .map(|font| Face::parse(font, 0).expect("the built-in font is valid"))
     });
     &FACES[usize::from(bold)]
 }
 
 /// Returns the width of `text` in type `size` px high, px.
 pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
-    let face = face(bold);
-    let advances: u32 = text.chars().map(|letter| u32::from(advance(face, letter))).sum();
+    let face = typeface(bold);
+    let advances: u32 = text.chars().map(|letter| u32::from(glyph_advance(face, letter))).sum();
     f64::from(advances) * size / f64::from(face.units_per_em())
 }
 
-pub(crate) fn advance(face: &Face<'_>, letter: char) -> u16 {
+pub(crate) fn glyph_advance(face: &Face<'_>, letter: char) -> u16 {
     let glyph = face.glyph_index(letter).unwrap_or_default();
     face.glyph_hor_advance(glyph).unwrap_or_default()
 }
@@ -53,14 +54,16 @@ pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
     };
     for item in &scene.items {
         match item {
-            Item::Fill { outline, colour, crisp } => canvas.fill(outline, *colour, !crisp),
-            Item::Line { outline, stroke } => canvas.line(outline, stroke),
-            Item::Text(text) => canvas.text(text),
-            Item::Clip(outline) => {
-                let mask = canvas.clip(outline).ok_or_else(too_large)?;
+            SceneItem::Fill { outline, colour, crisp } => {
+                canvas.fill_outline(outline, *colour, !crisp)
+            }
+            SceneItem::Line { outline, stroke } => canvas.draw_line(outline, stroke),
+            SceneItem::Text(text) => canvas.draw_text(text),
+            SceneItem::Clip(outline) => {
+                let mask = canvas.intersect_clip(outline).ok_or_else(too_large)?;
                 canvas.clips.push(mask);
             }
-            Item::Unclip => {
+            SceneItem::Unclip => {
                 canvas.clips.pop();
             }
         }
@@ -78,45 +81,47 @@ struct Canvas {
 }
 
 impl Canvas {
-    fn fill(&mut self, outline: &Outline, colour: Colour, anti_alias: bool) {
-        if let Some(path) = path(outline) {
-            let paint = paint(colour, anti_alias);
+    fn fill_outline(&mut self, outline: &Outline, colour: Colour, anti_alias: bool) {
+        if let Some(path) = skia_path(outline) {
+            let paint = skia_paint(colour, anti_alias);
             let clip = self.clips.last();
             self.pixmap.fill_path(&path, &paint, FillRule::Winding, self.transform, clip);
         }
     }
 
-    fn line(&mut self, outline: &Outline, stroke: &Stroke) {
-        if let Some(path) = path(outline) {
+    fn draw_line(&mut self, outline: &Outline, stroke: &Stroke) {
+        if let Some(path) = skia_path(outline) {
             let dash = stroke.dash.iter().map(|&length| length as f32).collect();
-            let style =
-                tiny_skia::Stroke { dash: StrokeDash::new(dash, 0.0), ..line(stroke.width) };
-            let paint = paint(stroke.colour, true);
-            self.pixmap.stroke_path(&path, &paint, &style, self.transform, self.clips.last());
+            let skia_stroke = tiny_skia::Stroke {
+                dash: StrokeDash::new(dash, 0.0),
+                ..solid_stroke(stroke.width)
+            };
+            let paint = skia_paint(stroke.colour, true);
+            self.pixmap.stroke_path(&path, &paint, &skia_stroke, self.transform, self.clips.last());
         }
     }
 
-    fn clip(&self, outline: &Outline) -> Option<Mask> {
+    fn intersect_clip(&self, outline: &Outline) -> Option<Mask> {
         let mut mask = match self.clips.last() {
             Some(outer) => outer.clone(),
             None => {
-                let mut all = Mask::new(self.pixmap.width(), self.pixmap.height())?;
-                all.data_mut().fill(255);
-                all
+                let mut whole = Mask::new(self.pixmap.width(), self.pixmap.height())?;
+                whole.data_mut().fill(255);
+                whole
             }
         };
-        match path(outline) {
+        match skia_path(outline) {
             Some(path) => mask.intersect_path(&path, FillRule::Winding, true, self.transform),
             None => mask.data_mut().fill(0),
         }
         Some(mask)
     }
 
-    fn text(&mut self, text: &Text) {
-        let face = face(text.bold);
+    fn draw_text(&mut self, text: &Text) {
+        let face = typeface(text.bold);
         let scale = (text.size / f64::from(face.units_per_em())) as f32;
         let width = text_width(&text.text, text.size, text.bold) as f32;
-        let mut pen = Pen { builder: PathBuilder::new(), x: 0.0, scale };
+        let mut pen = GlyphPen { builder: PathBuilder::new(), x: 0.0, scale };
         pen.x = match text.anchor {
             Anchor::Start => 0.0,
             Anchor::Middle => -width / 2.0,
@@ -124,40 +129,47 @@ impl Canvas {
         };
         for letter in text.text.chars() {
             face.outline_glyph(face.glyph_index(letter).unwrap_or_default(), &mut pen);
-            pen.x += f32::from(advance(face, letter)) * scale;
+            pen.x += f32::from(glyph_advance(face, letter)) * scale;
         }
         let Some(path) = pen.builder.finish() else { return };
-        let place = Transform::from_translate(text.at[0] as f32, text.at[1] as f32);
-        let turn = if text.upright {
+        let translation =
+            Transform::from_translate(text.position[0] as f32, text.position[1] as f32);
+        let rotation = if text.is_rotated {
             Transform::from_row(0.0, -1.0, 1.0, 0.0, 0.0, 0.0)
         } else {
             Transform::identity()
         };
-        let transform = self.transform.pre_concat(place).pre_concat(turn);
+        let transform = self.transform.pre_concat(translation).pre_concat(rotation);
         let clip = self.clips.last();
         if let Some(halo) = text.halo {
-            let style = line(halo_width(text.size));
-            self.pixmap.stroke_path(&path, &paint(halo, true), &style, transform, clip);
+            let style = solid_stroke(halo_width(text.size));
+            self.pixmap.stroke_path(&path, &skia_paint(halo, true), &style, transform, clip);
         }
-        self.pixmap.fill_path(&path, &paint(text.colour, true), FillRule::Winding, transform, clip);
+        self.pixmap.fill_path(
+            &path,
+            &skia_paint(text.colour, true),
+            FillRule::Winding,
+            transform,
+            clip,
+        );
     }
 }
 
 /// Returns a solid line of this width, px.
-fn line(width: f64) -> tiny_skia::Stroke {
+fn solid_stroke(width: f64) -> tiny_skia::Stroke {
     let width = width as f32;
     let line_join = LineJoin::Round;
     tiny_skia::Stroke { width, line_join, ..tiny_skia::Stroke::default() }
 }
 
-fn paint(colour: Colour, anti_alias: bool) -> Paint<'static> {
+fn skia_paint(colour: Colour, anti_alias: bool) -> Paint<'static> {
     let mut paint = Paint { anti_alias, ..Paint::default() };
     let [r, g, b] = colour.rgb;
     paint.set_color_rgba8(r, g, b, colour.alpha);
     paint
 }
 
-fn path(outline: &Outline) -> Option<Path> {
+fn skia_path(outline: &Outline) -> Option<Path> {
     let mut builder = PathBuilder::new();
     for segment in &outline.0 {
         match *segment {
@@ -170,36 +182,37 @@ fn path(outline: &Outline) -> Option<Path> {
 }
 
 /// The collector of a glyph's outline, which comes in font units with y up.
-struct Pen {
+struct GlyphPen {
     builder: PathBuilder,
     x: f32,
     scale: f32,
 }
 
-impl Pen {
-    fn at(&self, x: f32, y: f32) -> (f32, f32) {
+impl GlyphPen {
+    fn to_pixels(&self, x: f32, y: f32) -> (f32, f32) {
         (self.x + x * self.scale, -y * self.scale)
     }
 }
 
-impl OutlineBuilder for Pen {
+impl OutlineBuilder for GlyphPen {
     fn move_to(&mut self, x: f32, y: f32) {
-        let (x, y) = self.at(x, y);
+        let (x, y) = self.to_pixels(x, y);
         self.builder.move_to(x, y);
     }
 
     fn line_to(&mut self, x: f32, y: f32) {
-        let (x, y) = self.at(x, y);
+        let (x, y) = self.to_pixels(x, y);
         self.builder.line_to(x, y);
     }
 
     fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
-        let ((x1, y1), (x, y)) = (self.at(x1, y1), self.at(x, y));
+        let ((x1, y1), (x, y)) = (self.to_pixels(x1, y1), self.to_pixels(x, y));
         self.builder.quad_to(x1, y1, x, y);
     }
 
     fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
-        let ((x1, y1), (x2, y2), (x, y)) = (self.at(x1, y1), self.at(x2, y2), self.at(x, y));
+        let ((x1, y1), (x2, y2), (x, y)) =
+            (self.to_pixels(x1, y1), self.to_pixels(x2, y2), self.to_pixels(x, y));
         self.builder.cubic_to(x1, y1, x2, y2, x, y);
     }
 

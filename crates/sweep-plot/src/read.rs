@@ -27,7 +27,7 @@ pub struct FigureKind {
     pub columns: &'static [&'static str],
     /// Prefixes; a file of the kind also has a column that begins with one of these, if there are
     /// any.
-    pub begins: &'static [&'static str],
+    pub prefixes: &'static [&'static str],
     /// Whether the rows belong to points, which `--at` chooses.
     pub has_points: bool,
 }
@@ -43,14 +43,14 @@ impl FigureKind {
     pub const STUDY: Self = Self::new("study", &["candidate", "on_front"]);
     /// Time histories of both models at one point, or of a measurement and the fitted model.
     pub const TRACE: Self =
-        Self { begins: &["nonlinear_", "measured_"], ..Self::new("trace", &["time_s"]) };
+        Self { prefixes: &["nonlinear_", "measured_"], ..Self::new("trace", &["time_s"]) };
     /// The curve on which a quantity is at its limit. A file of this kind has the two columns of a
     /// bracket.
     pub const BOUNDARY: Self = Self::new("boundary", &[]);
 
     /// Returns a kind that these columns identify.
     pub const fn new(name: &'static str, columns: &'static [&'static str]) -> Self {
-        Self { name, columns, begins: &[], has_points: false }
+        Self { name, columns, prefixes: &[], has_points: false }
     }
 
     /// Returns the kind with rows that belong to points.
@@ -58,11 +58,11 @@ impl FigureKind {
         Self { has_points: true, ..self }
     }
 
-    fn is_shown_by(&self, names: &[&str]) -> bool {
-        let begins = |name: &&str| self.begins.iter().any(|begin| name.starts_with(begin));
+    fn matches_columns(&self, names: &[&str]) -> bool {
+        let has_prefix = |name: &&str| self.prefixes.iter().any(|prefix| name.starts_with(prefix));
         self.columns.iter().all(|name| names.contains(name))
-            && (self.begins.is_empty() || names.iter().any(begins))
-            && (!self.columns.is_empty() || bracket(names).is_some())
+            && (self.prefixes.is_empty() || names.iter().any(has_prefix))
+            && (!self.columns.is_empty() || bracket_columns(names).is_some())
     }
 }
 
@@ -81,10 +81,10 @@ impl ModelKinds {
     /// Returns all kinds. If several fit a file, the first is taken; a design has the columns of a
     /// map.
     pub fn all_kinds(self) -> impl Iterator<Item = FigureKind> {
-        let own = self.kinds.iter().copied();
-        let last =
+        let model_kinds = self.kinds.iter().copied();
+        let common_kinds =
             [FigureKind::MAP, FigureKind::DIFFERENCES, FigureKind::TRACE, FigureKind::BOUNDARY];
-        std::iter::once(FigureKind::STUDY).chain(own).chain(last)
+        std::iter::once(FigureKind::STUDY).chain(model_kinds).chain(common_kinds)
     }
 }
 
@@ -124,9 +124,9 @@ impl FigureFile {
         let provenance: Vec<(String, Value)> = provenance.collect();
         let columns = files::columns(file.schema()).into_iter();
         let columns: Vec<ColumnFacts> =
-            columns.map(|column| completed_by_name(column, file.schema())).collect();
+            columns.map(|column| complete_by_name(column, file.schema())).collect();
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-        let kind = model_kinds.all_kinds().find(|kind| kind.is_shown_by(&names));
+        let kind = model_kinds.all_kinds().find(|kind| kind.matches_columns(&names));
         let kind = kind.ok_or_else(|| PlotError::Undrawable {
             path: path.to_owned(),
             reason: format!(
@@ -148,16 +148,16 @@ impl FigureFile {
         })
     }
 
-    /// Calls `take` for each row with the columns of these names; a missing column is null.
+    /// Calls `visit` for each row with the columns of these names; a missing column is null.
     ///
     /// # Errors
-    /// [`PlotError::File`], and the errors of `take`.
+    /// [`PlotError::File`], and the errors of `visit`.
     pub fn each_row(
         &self,
         names: &[&str],
-        mut take: impl FnMut(FigureRow<'_>) -> Result<()>,
+        mut visit: impl FnMut(FigureRow<'_>) -> Result<()>,
     ) -> Result<()> {
-        self.file.each_row(names, |row| take(FigureRow(row)))
+        self.file.each_row(names, |row| visit(FigureRow(row)))
     }
 
     /// Returns the column of this name.
@@ -182,93 +182,95 @@ impl FigureFile {
         &self,
         option: &str,
         given: impl fmt::Display,
-        what: &str,
-        known: impl fmt::Display,
+        kind_of_name: &str,
+        valid_names: impl fmt::Display,
     ) -> PlotError {
         let path = self.path.display();
         let given = given.to_string();
-        let known = known.to_string();
-        let valid = known.split(", ").map(str::to_owned).collect();
-        let refusal =
-            format!("`{option} {given}`: {path}: there is no such {what}; it has {known}");
+        let valid_names = valid_names.to_string();
+        let valid = valid_names.split(", ").map(str::to_owned).collect();
+        let refusal = format!(
+            "`{option} {given}`: {path}: there is no such {kind_of_name}; it has {valid_names}"
+        );
         PlotError::NotThere { refusal, given, valid }
     }
 
-    fn undrawable(&self, reason: String) -> PlotError {
+    fn undrawable_error(&self, reason: String) -> PlotError {
         PlotError::Undrawable { path: self.path.clone(), reason }
     }
 
     /// Returns the error for a file without anything to draw.
     pub fn nothing_to_draw(&self, reason: &str) -> PlotError {
-        self.undrawable(format!("nothing to draw: {reason}"))
+        self.undrawable_error(format!("nothing to draw: {reason}"))
     }
 
     /// Returns the error for a file with more rows than a figure of its kind can show.
-    pub fn too_many(&self, rows: usize, most: usize) -> PlotError {
+    pub fn too_many_rows(&self, rows: usize, max_rows: usize) -> PlotError {
         let kind = self.kind.name;
-        self.undrawable(format!(
-            "a {kind} file of {rows} rows is more than a figure can show, which is {most} of them"
+        self.undrawable_error(format!(
+            "a {kind} file of {rows} rows is more than a figure can show, which is {max_rows} of \
+             them"
         ))
     }
 
-    /// Rejects an option that was given and has no effect on this file. `fits` says whether it has
-    /// one; `for_what` names the files on which it has one.
+    /// Rejects an option that was given and has no effect on this file. `has_effect` says whether
+    /// it has one; `valid_files` names the files on which it has one.
     ///
     /// # Errors
     /// [`PlotError::Unfit`].
     pub fn reject_option(
         &self,
         option: &str,
-        given: bool,
-        fits: bool,
-        for_what: &str,
+        is_given: bool,
+        has_effect: bool,
+        valid_files: &str,
     ) -> Result<()> {
-        if !given || fits {
+        if !is_given || has_effect {
             return Ok(());
         }
         let kind = self.kind.name;
         let path = self.path.display();
-        Err(PlotError::Unfit(format!("`{option}` is for {for_what}; {path} is a {kind} file")))
+        Err(PlotError::Unfit(format!("`{option}` is for {valid_files}; {path} is a {kind} file")))
     }
 
     /// Rejects a file of another kind than an option takes.
     ///
     /// # Errors
     /// [`PlotError::Unfit`], which says what writes such a file.
-    pub fn expect(&self, kind: FigureKind, option: &str, hint: &str) -> Result<()> {
+    pub fn expect_kind(&self, kind: FigureKind, option: &str, hint: &str) -> Result<()> {
         if self.kind == kind {
             return Ok(());
         }
         let path = self.path.display();
-        let own = self.kind.name;
-        Err(PlotError::Unfit(format!("`{option} {path}`: this is a {own} file; {hint}")))
+        let kind_name = self.kind.name;
+        Err(PlotError::Unfit(format!("`{option} {path}`: this is a {kind_name} file; {hint}")))
     }
 
     /// Returns the error for a missing column that this kind of file needs.
     pub fn missing_column(&self, column: &str, expected: &str) -> PlotError {
         let kind = self.kind.name;
-        self.undrawable(format!("a {kind} file needs the {expected} column `{column}`"))
+        self.undrawable_error(format!("a {kind} file needs the {expected} column `{column}`"))
     }
 
     /// Returns the first value of `key` in the metadata; outer levels are searched before inner
     /// ones.
-    pub fn find(&self, key: &str) -> Option<&Value> {
-        find_in(&self.provenance, key)
+    pub fn find_metadata(&self, key: &str) -> Option<&Value> {
+        find_in_entries(&self.provenance, key)
     }
 
     /// Returns the name of the run, if the file has it, and these notes.
-    pub fn notes(&self, further: impl IntoIterator<Item = String>) -> Vec<String> {
-        self.run_name.iter().cloned().chain(further).collect()
+    pub fn notes(&self, further_notes: impl IntoIterator<Item = String>) -> Vec<String> {
+        self.run_name.iter().cloned().chain(further_notes).collect()
     }
 
-    /// Returns the name of the run, if the file has it, and `rest` as a subtitle.
-    pub fn subtitle(&self, rest: &str) -> String {
-        self.notes([rest.to_owned()]).join(" · ")
+    /// Returns the name of the run, if the file has it, and `text` as a subtitle.
+    pub fn subtitle(&self, text: &str) -> String {
+        self.notes([text.to_owned()]).join(" · ")
     }
 
     /// Returns the quantity whose ratio is taken, by the run's criterion.
-    pub fn compared(&self) -> &'static str {
-        match self.find("criterion").and_then(Value::as_str) {
+    pub fn compared_quantity(&self) -> &'static str {
+        match self.find_metadata("criterion").and_then(Value::as_str) {
             Some("envelope") => "amplitudes by turn",
             Some("rms") => "root mean squares",
             _ => "amplitudes",
@@ -277,29 +279,29 @@ impl FigureFile {
 
     /// Returns the method that placed the points, if the plan is a design.
     pub fn design_method(&self) -> Option<&str> {
-        self.find("design")?.get("method")?.as_str()
+        self.find_metadata("design")?.get("method")?.as_str()
     }
 
     /// Yields the entries of a list that the metadata has under `key`.
-    pub fn list(&self, key: &str) -> impl Iterator<Item = &Value> {
-        self.find(key).and_then(Value::as_array).into_iter().flatten()
+    pub fn metadata_list(&self, key: &str) -> impl Iterator<Item = &Value> {
+        self.find_metadata(key).and_then(Value::as_array).into_iter().flatten()
     }
 
     /// Yields the swept parameters that the plan names.
     pub fn planned_axes(&self) -> impl Iterator<Item = &str> {
-        self.list("axis").filter_map(|axis| axis.get("parameter")?.as_str())
+        self.metadata_list("axis").filter_map(|axis| axis.get("parameter")?.as_str())
     }
 
     /// Returns whether the plan spaces an axis by the logarithm.
-    pub fn is_log(&self, parameter: &str) -> bool {
-        self.list("axis").filter(|axis| axis["parameter"] == parameter).any(|axis| {
+    pub fn is_log_axis(&self, parameter: &str) -> bool {
+        self.metadata_list("axis").filter(|axis| axis["parameter"] == parameter).any(|axis| {
             axis["range"]["spacing"] == "log" || axis["distribution"]["kind"] == "lognormal"
         })
     }
 
     /// Returns the limit of a column in its unit: the column's own, or that of the run for ratios.
     /// The ratios of two files may have two limits, so that they have none here.
-    pub fn limit(&self, column: &ColumnFacts) -> Option<f64> {
+    pub fn column_limit(&self, column: &ColumnFacts) -> Option<f64> {
         let has_run_limit = is_ratio(column) && self.kind != FigureKind::DIFFERENCES;
         column.limit.or_else(|| has_run_limit.then(|| self.ratio_limit()))
     }
@@ -307,7 +309,8 @@ impl FigureFile {
     /// Returns the ratio from which a point is unreliable: the run's limit, or else that of the
     /// paper, 2.
     pub fn ratio_limit(&self) -> f64 {
-        let limit = self.find("ratio_limit").and_then(Value::as_f64).map(drawable);
+        let limit =
+            self.find_metadata("ratio_limit").and_then(Value::as_f64).map(clamp_to_drawable);
         limit.filter(|limit| *limit > 0.0).unwrap_or(2.0)
     }
 }
@@ -335,7 +338,7 @@ impl<'a> FigureRow<'a> {
 
     /// Returns the number in a column as it is drawn, NaN where there is none.
     pub fn number(self, column: usize) -> f64 {
-        drawable(self.0.value(column))
+        clamp_to_drawable(self.0.value(column))
     }
 
     /// Returns the numbers in these columns.
@@ -356,7 +359,7 @@ const GREATEST_DRAWN: f64 = 1e100;
 /// numbers does not underflow.
 const LEAST_DRAWN: f64 = 1e-100;
 
-fn drawable(value: f64) -> f64 {
+fn clamp_to_drawable(value: f64) -> f64 {
     if value.is_infinite() {
         value
     } else if value.abs() < LEAST_DRAWN {
@@ -366,65 +369,65 @@ fn drawable(value: f64) -> f64 {
     }
 }
 
-fn find_in<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&'a Value> {
+fn find_in_entries<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&'a Value> {
     provenance
         .iter()
-        .find_map(|(name, value)| if name == key { Some(value) } else { find(value, key) })
+        .find_map(|(name, value)| if name == key { Some(value) } else { find_in_value(value, key) })
 }
 
 /// Maximum length of a run's name in figures, characters. Basis: room in the subtitle for the
 /// settings that follow.
-const MAX_NAME_CHARACTERS: usize = 40;
+const MAX_RUN_NAME_CHARACTERS: usize = 40;
 
 /// Returns the name of a run with its settings, as in "fig12, mass_kg = 20".
 fn run_name(provenance: &[(String, Value)]) -> Option<String> {
-    let name = find_in(provenance, "name")?.as_str()?;
-    let mut named: String = name.chars().take(MAX_NAME_CHARACTERS).collect();
-    if named.len() < name.len() {
-        named.push('…');
+    let name = find_in_entries(provenance, "name")?.as_str()?;
+    let mut full_name: String = name.chars().take(MAX_RUN_NAME_CHARACTERS).collect();
+    if full_name.len() < name.len() {
+        full_name.push('…');
     }
-    let sets = find_in(provenance, "set").and_then(Value::as_object);
-    for (name, value) in sets.into_iter().flatten() {
+    let settings = find_in_entries(provenance, "set").and_then(Value::as_object);
+    for (name, value) in settings.into_iter().flatten() {
         let value = match value {
             Value::String(text) => text.clone(),
-            Value::Number(number) => {
-                number.as_f64().map_or(number.to_string(), |value| label::significant(value, 6))
-            }
+            Value::Number(number) => number
+                .as_f64()
+                .map_or(number.to_string(), |value| label::format_significant(value, 6)),
             other => other.to_string(),
         };
-        named.push_str(&format!(", {name} = {value}"));
+        full_name.push_str(&format!(", {name} = {value}"));
     }
-    Some(named)
+    Some(full_name)
 }
 
-fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
+fn find_in_value<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
     match value {
         Value::Object(map) => {
-            map.get(key).or_else(|| map.values().find_map(|inner| find(inner, key)))
+            map.get(key).or_else(|| map.values().find_map(|nested| find_in_value(nested, key)))
         }
-        Value::Array(items) => items.iter().find_map(|inner| find(inner, key)),
+        Value::Array(items) => items.iter().find_map(|nested| find_in_value(nested, key)),
         _ => None,
     }
 }
 
 /// Returns the two columns of a boundary's bracket, which follow its two coordinates.
-pub fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
-    let with_word = |words: &[&str]| {
+pub fn bracket_columns<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
+    let find_with_word = |words: &[&str]| {
         names.iter().skip(2).copied().find(|name| name.split('_').any(|part| words.contains(&part)))
     };
-    Some((with_word(&["low", "lower", "min"])?, with_word(&["high", "upper", "max"])?))
+    Some((find_with_word(&["low", "lower", "min"])?, find_with_word(&["high", "upper", "max"])?))
 }
 
 /// Completes unit and direction from the column's name, for files that lost their metadata in
 /// another program.
-fn completed_by_name(column: ColumnFacts, schema: &Schema) -> ColumnFacts {
+fn complete_by_name(column: ColumnFacts, schema: &Schema) -> ColumnFacts {
     let unit = schema.field(column.field).metadata().get("unit");
     let unit = match unit.is_none_or(String::is_empty) {
         true => label::unit_of_name(&column.name),
         false => column.unit,
     };
-    let less = column.name.starts_with("min_").then_some(Worse::Less);
-    ColumnFacts { unit, worse: column.worse.or(less), ..column }
+    let worse = column.name.starts_with("min_").then_some(Worse::Less);
+    ColumnFacts { unit, worse: column.worse.or(worse), ..column }
 }
 
 #[cfg(test)]
@@ -434,11 +437,11 @@ mod tests {
     #[test]
     fn numbers_are_clamped_to_the_drawable_range() {
         for value in [0.0, -350.0, 1e-99, 9e99] {
-            assert_eq!(drawable(value).to_bits(), value.to_bits());
+            assert_eq!(clamp_to_drawable(value).to_bits(), value.to_bits());
         }
-        assert_eq!(drawable(5e-324), 0.0);
-        assert_eq!(drawable(-1e300), -GREATEST_DRAWN);
-        assert_eq!(drawable(f64::INFINITY), f64::INFINITY, "it is left out, as it was");
-        assert!(drawable(f64::NAN).is_nan());
+        assert_eq!(clamp_to_drawable(5e-324), 0.0);
+        assert_eq!(clamp_to_drawable(-1e300), -GREATEST_DRAWN);
+        assert_eq!(clamp_to_drawable(f64::INFINITY), f64::INFINITY, "it is left out, as it was");
+        assert!(clamp_to_drawable(f64::NAN).is_nan());
     }
 }

@@ -2,41 +2,42 @@
 
 /// Number of sample points across and down. Basis: samples closer than a line of text. Doubling
 /// both makes the search sixteen times slower.
-const SAMPLES: [usize; 2] = [44, 33];
+const SAMPLES_PER_SIDE: [usize; 2] = [44, 33];
 
-/// Returns the position that is deepest inside the region `inside` of a panel of `panel` px, for a
-/// text of `size` px; `None` if the text fits nowhere. Coordinates are px from the top left corner
-/// of the panel.
-pub(crate) fn roomiest_place(
+/// Returns the position farthest from the edges of a region for a text of `size` px; `None` if the
+/// text fits nowhere. The region has the points of a panel of `panel` px for which `is_inside` is
+/// true. Coordinates are px from the top left corner of the panel.
+pub(crate) fn roomiest_position(
     panel: [f64; 2],
     size: [f64; 2],
-    inside: impl Fn([f64; 2]) -> bool,
+    is_inside: impl Fn([f64; 2]) -> bool,
 ) -> Option<[f64; 2]> {
-    let at = |i: usize, j: usize| {
+    let sample_point = |i: usize, j: usize| {
         [
-            (i as f64 + 0.5) / SAMPLES[0] as f64 * panel[0],
-            (j as f64 + 0.5) / SAMPLES[1] as f64 * panel[1],
+            (i as f64 + 0.5) / SAMPLES_PER_SIDE[0] as f64 * panel[0],
+            (j as f64 + 0.5) / SAMPLES_PER_SIDE[1] as f64 * panel[1],
         ]
     };
-    let samples = (0..SAMPLES[0]).flat_map(|i| (0..SAMPLES[1]).map(move |j| at(i, j)));
-    let (within, outside): (Vec<_>, Vec<_>) = samples.partition(|&point| inside(point));
+    let samples = (0..SAMPLES_PER_SIDE[0])
+        .flat_map(|i| (0..SAMPLES_PER_SIDE[1]).map(move |j| sample_point(i, j)));
+    let (inside, outside): (Vec<_>, Vec<_>) = samples.partition(|&point| is_inside(point));
     // The distance is in units of the text's half extent, so that a wide text gets a wide place.
     let distance = |a: [f64; 2], b: [f64; 2]| {
         let [dx, dy] = [0, 1].map(|k| 2.0 * (a[k] - b[k]).abs() / size[k]);
         dx.max(dy)
     };
     let mut best: Option<(f64, [f64; 2])> = None;
-    for centre in within {
-        let rim = [0, 1].map(|k| 2.0 * centre[k].min(panel[k] - centre[k]) / size[k]);
-        let mut room = rim[0].min(rim[1]);
-        for &other in &outside {
-            room = room.min(distance(centre, other));
-            if best.is_some_and(|(most, _)| room <= most) {
+    for centre in inside {
+        let edge_distances = [0, 1].map(|k| 2.0 * centre[k].min(panel[k] - centre[k]) / size[k]);
+        let mut clearance = edge_distances[0].min(edge_distances[1]);
+        for &outside_point in &outside {
+            clearance = clearance.min(distance(centre, outside_point));
+            if best.is_some_and(|(greatest, _)| clearance <= greatest) {
                 break;
             }
         }
-        if room >= 1.0 && best.is_none_or(|(most, _)| room > most) {
-            best = Some((room, centre));
+        if clearance >= 1.0 && best.is_none_or(|(greatest, _)| clearance > greatest) {
+            best = Some((clearance, centre));
         }
     }
     best.map(|(_, centre)| centre)
@@ -49,9 +50,9 @@ mod tests {
     #[test]
     fn a_name_is_placed_in_the_wide_part() {
         // The region is a strip 60 px high at the top, and a column 100 px wide below it.
-        let shape = |[x, y]: [f64; 2]| y < 60.0 || x < 100.0;
-        let [x, y] = roomiest_place([600.0, 400.0], [200.0, 20.0], shape).unwrap();
+        let is_inside = |[x, y]: [f64; 2]| y < 60.0 || x < 100.0;
+        let [x, y] = roomiest_position([600.0, 400.0], [200.0, 20.0], is_inside).unwrap();
         assert!((100.0..=500.0).contains(&x) && (10.0..=50.0).contains(&y), "{x} {y}");
-        assert_eq!(roomiest_place([600.0, 400.0], [200.0, 20.0], |[x, _]| x < 150.0), None);
+        assert_eq!(roomiest_position([600.0, 400.0], [200.0, 20.0], |[x, _]| x < 150.0), None);
     }
 }

@@ -52,7 +52,7 @@ impl SampleFile {
     }
 
     /// Adds the bad direction and the limit to the last column.
-    pub(crate) fn bad(mut self, worse: &str, limit: Option<f64>) -> Self {
+    pub(crate) fn worse(mut self, worse: &str, limit: Option<f64>) -> Self {
         let (field, _) = self.columns.last_mut().unwrap();
         let mut metadata = field.metadata().clone();
         metadata.insert("worse".to_owned(), worse.to_owned());
@@ -62,7 +62,7 @@ impl SampleFile {
     }
 
     /// Sets the limit of the column of this name.
-    pub(crate) fn limited(mut self, name: &str, limit: &str) -> Self {
+    pub(crate) fn with_limit(mut self, name: &str, limit: &str) -> Self {
         for (field, _) in self.columns.iter_mut().filter(|(field, _)| field.name() == name) {
             let mut metadata = field.metadata().clone();
             metadata.insert("limit".to_owned(), limit.to_owned());
@@ -88,22 +88,22 @@ impl SampleFile {
         self.column(name, "", Arc::new(values.into_iter().collect::<BooleanArray>()))
     }
 
-    pub(crate) fn metadata(mut self, key: &str, value: &str) -> Self {
+    pub(crate) fn with_metadata(mut self, key: &str, value: &str) -> Self {
         self.metadata.push(KeyValue::new(key.to_owned(), value.to_owned()));
         self
     }
 
-    pub(crate) fn without(mut self, key: &str) -> Self {
+    pub(crate) fn without_metadata(mut self, key: &str) -> Self {
         self.metadata.retain(|pair| pair.key != key);
         self
     }
 
     /// Replaces cells of every column by what other writers or failed runs may leave: null, NaN,
     /// infinite, tiny and huge numbers. Some, all or none of a column's cells are replaced.
-    pub(crate) fn damaged(mut self, numbers: &mut fastrand::Rng) -> Self {
+    pub(crate) fn with_damage(mut self, numbers: &mut fastrand::Rng) -> Self {
         for (_, array) in &mut self.columns {
-            let share = [0.0, 0.0, 0.1, 0.5, 1.0][numbers.usize(..5)];
-            *array = damaged(array, share, numbers);
+            let replaced_share = [0.0, 0.0, 0.1, 0.5, 1.0][numbers.usize(..5)];
+            *array = replace_cells(array, replaced_share, numbers);
         }
         self
     }
@@ -114,9 +114,9 @@ impl SampleFile {
 }
 
 /// Replaces this share of a column's cells, all by the same value or each by another value.
-fn damaged(array: &ArrayRef, share: f64, numbers: &mut fastrand::Rng) -> ArrayRef {
+fn replace_cells(array: &ArrayRef, replaced_share: f64, numbers: &mut fastrand::Rng) -> ArrayRef {
     /// Values that a figure must handle without failing.
-    const BAD: [Option<f64>; 12] = [
+    const DAMAGED_VALUES: [Option<f64>; 12] = [
         None,
         Some(f64::NAN),
         Some(f64::INFINITY),
@@ -130,22 +130,25 @@ fn damaged(array: &ArrayRef, share: f64, numbers: &mut fastrand::Rng) -> ArrayRe
         Some(f64::MAX),
         Some(f64::MIN),
     ];
-    let common = numbers.bool().then(|| numbers.usize(..BAD.len()));
-    let mut damage =
-        || (numbers.f64() < share).then(|| common.unwrap_or(numbers.usize(..BAD.len())));
+    let common_index = numbers.bool().then(|| numbers.usize(..DAMAGED_VALUES.len()));
+    let mut next_index = || {
+        (numbers.f64() < replaced_share)
+            .then(|| common_index.unwrap_or(numbers.usize(..DAMAGED_VALUES.len())))
+    };
     if let Some(values) = array.as_any().downcast_ref::<Float64Array>() {
-        let cells = values.iter().map(|cell| damage().map_or(cell, |bad| BAD[bad]));
+        let cells =
+            values.iter().map(|cell| next_index().map_or(cell, |index| DAMAGED_VALUES[index]));
         return Arc::new(cells.collect::<Float64Array>());
     }
     if let Some(flags) = array.as_any().downcast_ref::<BooleanArray>() {
-        let cells = flags.iter().map(|cell| if damage().is_some() { None } else { cell });
+        let cells = flags.iter().map(|cell| if next_index().is_some() { None } else { cell });
         return Arc::new(cells.collect::<BooleanArray>());
     }
     if let Some(words) = array.as_any().downcast_ref::<DictionaryArray<Int32Type>>() {
         let words = words.downcast_dict::<StringArray>().unwrap();
-        let phrase = ["", "diverged", "no_equilibrium"];
-        let cell = |cell| match damage() {
-            Some(bad) => phrase.get(bad).copied(),
+        let replacement_words = ["", "diverged", "no_equilibrium"];
+        let cell = |cell| match next_index() {
+            Some(index) => replacement_words.get(index).copied(),
             None => cell,
         };
         let cells = words.into_iter().map(cell);
@@ -153,8 +156,9 @@ fn damaged(array: &ArrayRef, share: f64, numbers: &mut fastrand::Rng) -> ArrayRe
     }
     // Other writers may store counts as numbers of any type.
     let Some(counts) = array.as_any().downcast_ref::<UInt64Array>() else { return array.clone() };
-    let cells =
-        counts.iter().map(|cell| damage().map_or(cell.map(|cell| cell as f64), |bad| BAD[bad]));
+    let cells = counts.iter().map(|cell| {
+        next_index().map_or(cell.map(|cell| cell as f64), |index| DAMAGED_VALUES[index])
+    });
     Arc::new(cells.collect::<Float64Array>())
 }
 
@@ -164,11 +168,11 @@ fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample
     let path = folder.join(name);
     let mut writer: Option<Writer<std::fs::File>> = None;
     for sample in samples {
-        let typed = |(field, array): (Field, ArrayRef)| {
+        let with_type_of_array = |(field, array): (Field, ArrayRef)| {
             (field.with_data_type(array.data_type().clone()), array)
         };
         let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) =
-            sample.columns.into_iter().map(typed).unzip();
+            sample.columns.into_iter().map(with_type_of_array).unzip();
         let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
         let writer = writer.get_or_insert_with(|| {
             let properties =
@@ -195,52 +199,56 @@ pub(crate) struct MapSample<'a> {
 
 impl MapSample<'_> {
     pub(crate) fn sample(&self) -> SampleFile {
-        self.rows(0..self.points())
+        self.rows(0..self.point_count())
     }
 
     /// Writes all rows, of which few are in memory at a time.
     pub(crate) fn write_long(&self, folder: &Path, name: &str) -> PathBuf {
         /// Rows in memory at a time.
-        const ROWS: usize = 1 << 14;
-        let all = self.points();
-        let some = |row: usize| self.rows(row..all.min(row + ROWS));
-        write_all(folder, name, (0..all).step_by(ROWS).map(some))
+        const ROWS_AT_A_TIME: usize = 1 << 14;
+        let row_count = self.point_count();
+        let sample_from = |row: usize| self.rows(row..row_count.min(row + ROWS_AT_A_TIME));
+        write_all(folder, name, (0..row_count).step_by(ROWS_AT_A_TIME).map(sample_from))
     }
 
-    fn points(&self) -> usize {
+    fn point_count(&self) -> usize {
         self.axes.iter().map(|(_, values)| values.len()).product()
     }
 
     fn point(&self, index: usize) -> Vec<f64> {
-        let mut rest = index;
-        let mut at: Vec<f64> = Vec::with_capacity(self.axes.len());
+        let mut remaining = index;
+        let mut point: Vec<f64> = Vec::with_capacity(self.axes.len());
         for (_, values) in self.axes.iter().rev() {
-            at.push(values[rest % values.len()]);
-            rest /= values.len();
+            point.push(values[remaining % values.len()]);
+            remaining /= values.len();
         }
-        at.reverse();
-        at
+        point.reverse();
+        point
     }
 
     fn rows(&self, rows: std::ops::Range<usize>) -> SampleFile {
         let points: Vec<Vec<f64>> = rows.clone().map(|index| self.point(index)).collect();
-        let yaws: Vec<Option<[f64; 2]>> = points.iter().map(|at| (self.yaw)(at)).collect();
-        let model = |k: usize| {
-            yaws.iter().map(move |yaw| yaw.map_or(f64::NAN, |yaw| yaw[k])).collect::<Vec<f64>>()
+        let amplitudes: Vec<Option<[f64; 2]>> =
+            points.iter().map(|point| (self.yaw)(point)).collect();
+        let amplitudes_of_model = |k: usize| {
+            amplitudes
+                .iter()
+                .map(move |yaw| yaw.map_or(f64::NAN, |yaw| yaw[k]))
+                .collect::<Vec<f64>>()
         };
-        let ratio: Vec<f64> = model(0)
+        let ratio: Vec<f64> = amplitudes_of_model(0)
             .iter()
-            .zip(model(1))
-            .map(|(n, l)| if l > 0.0 { n / l } else { f64::NAN })
+            .zip(amplitudes_of_model(1))
+            .map(|(nonlinear, linear)| if linear > 0.0 { nonlinear / linear } else { f64::NAN })
             .collect();
         let mut sample = SampleFile::default().counts("point", rows.start as u64..rows.end as u64);
         for (k, (name, _)) in self.axes.iter().enumerate() {
-            sample = sample.numbers(name, "", points.iter().map(|at| at[k]));
+            sample = sample.numbers(name, "", points.iter().map(|point| point[k]));
         }
-        let pitch = |factor: f64| move |value: f64| factor * value;
-        let known = |ratio: &f64| ratio.is_finite();
-        let channel = |ratio: &f64| known(ratio).then_some("body_yaw");
-        let reliable = |ratio: &f64| known(ratio).then_some(*ratio < self.limit);
+        let scaled = |factor: f64| move |value: f64| factor * value;
+        let is_known = |ratio: &f64| ratio.is_finite();
+        let channel = |ratio: &f64| is_known(ratio).then_some("body_yaw");
+        let reliable = |ratio: &f64| is_known(ratio).then_some(*ratio < self.limit);
         let status = |yaw: &Option<_>| Some(if yaw.is_some() { "ok" } else { "diverged" });
         let fail_time = |yaw: &Option<_>| if yaw.is_some() { f64::NAN } else { 41.5 };
         let plan = serde_json::json!({
@@ -248,27 +256,43 @@ impl MapSample<'_> {
             "reliability": { "ratio_limit": self.limit },
         });
         sample
-            .numbers("nonlinear_body_yaw", "rad", model(0))
-            .numbers("nonlinear_body_pitch", "rad", model(0).into_iter().map(pitch(0.4)))
-            .numbers("linear_body_yaw", "rad", model(1))
-            .numbers("linear_body_pitch", "rad", model(1).into_iter().map(pitch(0.5)))
+            .numbers("nonlinear_body_yaw", "rad", amplitudes_of_model(0))
+            .numbers(
+                "nonlinear_body_pitch",
+                "rad",
+                amplitudes_of_model(0).into_iter().map(scaled(0.4)),
+            )
+            .numbers("linear_body_yaw", "rad", amplitudes_of_model(1))
+            .numbers(
+                "linear_body_pitch",
+                "rad",
+                amplitudes_of_model(1).into_iter().map(scaled(0.5)),
+            )
             .numbers("ratio_body_yaw", "1", ratio.iter().copied())
             .numbers("ratio_body_pitch", "1", ratio.iter().map(|ratio| 0.8 * ratio))
             .numbers("ratio_max", "1", ratio.iter().copied())
             .words("ratio_max_channel", ratio.iter().map(channel))
             .flags("reliable", ratio.iter().map(reliable))
-            .flags("sensitive", points.iter().map(|at| Some((self.chaotic)(at))))
-            .numbers("min_gap_nonlinear_m", "m", model(0).into_iter().map(|yaw| 0.01 - 0.1 * yaw))
-            .bad("less", Some(0.0))
-            .numbers("margin_n", "N", model(0).into_iter().map(|yaw| 1.0 - yaw))
-            .bad("less", None)
-            .numbers("min_gap_linear_m", "m", model(1).into_iter().map(|yaw| 0.01 - 0.1 * yaw))
-            .bad("less", Some(0.0))
-            .words("status", yaws.iter().map(status))
-            .numbers("fail_time_s", "s", yaws.iter().map(fail_time))
+            .flags("sensitive", points.iter().map(|point| Some((self.chaotic)(point))))
+            .numbers(
+                "min_gap_nonlinear_m",
+                "m",
+                amplitudes_of_model(0).into_iter().map(|yaw| 0.01 - 0.1 * yaw),
+            )
+            .worse("less", Some(0.0))
+            .numbers("margin_n", "N", amplitudes_of_model(0).into_iter().map(|yaw| 1.0 - yaw))
+            .worse("less", None)
+            .numbers(
+                "min_gap_linear_m",
+                "m",
+                amplitudes_of_model(1).into_iter().map(|yaw| 0.01 - 0.1 * yaw),
+            )
+            .worse("less", Some(0.0))
+            .words("status", amplitudes.iter().map(status))
+            .numbers("fail_time_s", "s", amplitudes.iter().map(fail_time))
             .counts("steps_nonlinear", points.iter().map(|_| 250_000))
-            .metadata("sweep.plan", &plan.to_string())
-            .metadata("sweep.version", "0.1.0")
+            .with_metadata("sweep.plan", &plan.to_string())
+            .with_metadata("sweep.version", "0.1.0")
     }
 }
 
@@ -284,7 +308,7 @@ pub(crate) fn map() -> SampleFile {
             ("damping_n_s_per_m", axis(60.0, 30.0, 9)),
         ],
         limit: 3.0,
-        yaw: &|at| match at {
+        yaw: &|point| match point {
             [mass, damping] if *mass > 0.95 && *damping < 70.0 => None,
             [mass, damping] if *mass < 0.15 && *damping > 290.0 => Some([0.0, 0.0]),
             [mass, damping] => {
@@ -321,9 +345,9 @@ pub(crate) fn has_figure<E: Display>(
     max_bytes: usize,
     draw: impl FnOnce() -> Result<Vec<u8>, E>,
 ) -> bool {
-    let begun = Instant::now();
+    let start = Instant::now();
     let result = draw();
-    let elapsed = begun.elapsed();
+    let elapsed = start.elapsed();
     assert!(elapsed < MAX_TIME, "{name}: {elapsed:?}");
     match result {
         Ok(bytes) => assert!(bytes.len() < max_bytes, "{name}: {} bytes", bytes.len()),

@@ -3,7 +3,7 @@
 use super::error::Result;
 use super::influence::RankInfluence;
 use super::label::{self, Label};
-use super::layer::{self, DividingLimit, Group};
+use super::layer::{self, ColumnGroup, DividingLimit};
 use super::read::FigureFile;
 use super::{PlotOptions, swept};
 use crate::{PlotError, Share};
@@ -11,7 +11,7 @@ use sweep_parameter::Worse;
 
 /// Maximum number of values that are kept; of a longer file some points are picked. Basis: 5 MB of
 /// memory and a page of some megabytes. Doubling it doubles both.
-const MAX_NUMBERS: usize = 600_000;
+const MAX_KEPT_VALUES: usize = 600_000;
 
 /// The side of the limit on which a point lies, or the reason why it lies on none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +37,7 @@ pub(crate) struct DesignParameter {
     pub(crate) name: String,
     pub(crate) label: Label,
     /// Whether the parameter is spread evenly by its logarithm.
-    pub(crate) log: bool,
+    pub(crate) is_log: bool,
     /// The parameter's value at each point that is drawn.
     pub(crate) values: Vec<f64>,
     /// The influence on the quantity; `None` if the quantity is constant.
@@ -52,13 +52,13 @@ pub(crate) struct Scatter {
     /// The label of the quantity's axis.
     pub(crate) label: Label,
     /// A shorter label, for axes with little room.
-    pub(crate) short: Label,
+    pub(crate) short_label: Label,
     /// The channel of the quantity in words; empty without one.
     pub(crate) channel: String,
     /// The limit that divides the points, if there is one.
-    pub(crate) level: Option<DividingLimit>,
+    pub(crate) limit: Option<DividingLimit>,
     /// Whether the quantity is shown on a logarithmic axis.
-    pub(crate) log: bool,
+    pub(crate) is_log: bool,
     /// The varying parameters in file order.
     pub(crate) parameters: Vec<DesignParameter>,
     /// The row numbers of the kept points.
@@ -72,23 +72,23 @@ pub(crate) struct Scatter {
 }
 
 /// Returns the side of a point by its value, or by its verdict if no limit divides the points.
-fn side_of(
-    level: Option<&DividingLimit>,
+fn classify(
+    limit: Option<&DividingLimit>,
     value: f64,
     verdict: Option<&str>,
     status: Option<&str>,
 ) -> Side {
-    let good = match level {
-        Some(level) => {
-            let is_good = match level.worse {
-                Worse::Greater => value < level.value,
-                Worse::Less => value >= level.value,
+    let is_on_good_side = match limit {
+        Some(limit) => {
+            let is_on_good_side = match limit.worse {
+                Worse::Greater => value < limit.value,
+                Worse::Less => value >= limit.value,
             };
-            (value.is_finite() && (value > 0.0 || !level.log)).then_some(is_good)
+            (value.is_finite() && (value > 0.0 || !limit.is_log)).then_some(is_on_good_side)
         }
         None => verdict.map(|verdict| verdict == "true"),
     };
-    match good {
+    match is_on_good_side {
         Some(true) => Side::Good,
         Some(false) => Side::Bad,
         None if status == Some("ok") => Side::Undefined,
@@ -100,40 +100,41 @@ impl Scatter {
     /// Reads the file of a design: every point for the counts, and as many as a figure keeps.
     ///
     /// # Errors
-    /// Returns the errors of [`FigureFile::each_row`] and [`layer::requested_one`];
+    /// Returns the errors of [`FigureFile::each_row`] and [`layer::requested_column`];
     /// [`PlotError::Undrawable`] without points or parameters that vary; [`PlotError::Unfit`] for a
     /// quantity that is no number.
     pub(crate) fn read(source: FigureFile, options: &PlotOptions) -> Result<Self> {
-        let Some(shown) = layer::requested_one(&source, options)? else {
+        let Some(column) = layer::requested_column(&source, options)? else {
             return Err(PlotError::Unfit(
                 "status is no number, and figures of designs mark failed points in any case"
                     .to_owned(),
             ));
         };
-        let facts = source.column(shown.column());
+        let facts = source.column(column.name());
         let (unit, factor) = label::display_unit(facts.map_or("", |facts| &facts.unit));
-        let (title, words) = shown.words(&source);
-        let level = shown.level(&source);
-        let ratio = shown.group == Group::Ratio;
+        let (title, quantity_label) = column.title_and_label(&source);
+        let limit = column.dividing_limit(&source);
+        let is_ratio = column.group == ColumnGroup::Ratio;
         let axes: Vec<&str> =
-            swept::columns(&source).iter().map(|column| column.name.as_str()).collect();
-        let stride = (source.rows * (axes.len() + 3)).div_ceil(MAX_NUMBERS).max(1) as u64;
+            swept::axis_columns(&source).iter().map(|column| column.name.as_str()).collect();
+        let stride = (source.rows * (axes.len() + 3)).div_ceil(MAX_KEPT_VALUES).max(1) as u64;
         // The verdict itself divides the points if it depends on the column alone.
-        let dividing = level.as_ref().filter(|_| !shown.is_verdict(&source));
+        let dividing = limit.as_ref().filter(|_| !column.is_verdict(&source));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); axes.len()];
         let mut points = Vec::new();
         let mut quantity = Vec::new();
         let mut sides = Vec::new();
         let mut counts = [0; 4];
-        let names = [&axes[..], &[shown.column(), "reliable", layer::STATUS]].concat();
+        let names = [&axes[..], &[column.name(), "reliable", layer::STATUS]].concat();
         source.each_row(&names, |row| {
-            let own = axes.len();
-            let value = row.number(own) * factor;
-            let side = side_of(dividing, value, row.word(own + 1), row.word(own + 2));
+            let axis_count = axes.len();
+            let value = row.number(axis_count) * factor;
+            let side =
+                classify(dividing, value, row.word(axis_count + 1), row.word(axis_count + 2));
             counts[side as usize] += 1;
-            if picked(row.index() as u64, stride) {
-                let none = ratio && !(value > 0.0 && value.is_finite());
-                quantity.push(if none { f64::NAN } else { value });
+            if is_picked(row.index() as u64, stride) {
+                let is_missing = is_ratio && !(value > 0.0 && value.is_finite());
+                quantity.push(if is_missing { f64::NAN } else { value });
                 sides.push(side);
                 points.push(row.index());
                 for (column, values) in values.iter_mut().enumerate() {
@@ -145,33 +146,33 @@ impl Scatter {
         if points.is_empty() {
             return Err(source.nothing_to_draw("the design has no points"));
         }
-        let spread = axes.iter().zip(values).filter_map(|(name, values)| {
+        let varying = axes.iter().zip(values).filter_map(|(name, values)| {
             let facts = source.column(name)?;
             let varies = values.iter().any(|value| *value != values[0]);
             varies.then(|| DesignParameter {
                 name: (*name).to_owned(),
-                label: Label::new(&label::words(name), &facts.unit),
-                log: source.is_log(name) && values.iter().all(|value| *value > 0.0),
+                label: Label::new(&label::name_in_words(name), &facts.unit),
+                is_log: source.is_log_axis(name) && values.iter().all(|value| *value > 0.0),
                 influence: RankInfluence::new(&values, &quantity),
                 values,
             })
         });
-        let parameters: Vec<DesignParameter> = spread.collect();
+        let parameters: Vec<DesignParameter> = varying.collect();
         if parameters.is_empty() {
             return Err(source.nothing_to_draw("no parameter varies from point to point"));
         }
-        let spans = || crate::chart::spans_decades(quantity.iter().copied());
-        let log = ratio || (level.is_none() && spans());
-        let label = Label::new(&label::capitalised(&words), unit);
-        let short = Label::new(&shown.short_name(), unit);
+        let spans_decades = || crate::chart::spans_decades(quantity.iter().copied());
+        let is_log = is_ratio || (limit.is_none() && spans_decades());
+        let label = Label::new(&label::capitalise(&quantity_label), unit);
+        let short_label = Label::new(&column.short_name(), unit);
         Ok(Self {
             source,
             title,
             label,
-            short,
-            channel: shown.channel.as_deref().map_or_else(String::new, label::channel),
-            level,
-            log,
+            short_label,
+            channel: column.channel.as_deref().map_or_else(String::new, label::channel_in_words),
+            limit,
+            is_log,
             parameters,
             points,
             quantity,
@@ -187,11 +188,15 @@ impl Scatter {
     }
 
     /// Returns the legend entry of a side.
-    pub(crate) fn words(&self, side: Side) -> String {
-        match (side, &self.level) {
-            (Side::Good | Side::Bad, Some(level)) => {
-                let is_above = (side == Side::Bad) == (level.worse == Worse::Greater);
-                if is_above { level.above[1].clone() } else { level.below[1].clone() }
+    pub(crate) fn side_meaning(&self, side: Side) -> String {
+        match (side, &self.limit) {
+            (Side::Good | Side::Bad, Some(limit)) => {
+                let is_above = (side == Side::Bad) == (limit.worse == Worse::Greater);
+                if is_above {
+                    limit.above_meanings[1].clone()
+                } else {
+                    limit.below_meanings[1].clone()
+                }
             }
             (Side::Good, None) => "reliable".to_owned(),
             (Side::Bad, None) => "unreliable".to_owned(),
@@ -201,18 +206,18 @@ impl Scatter {
     }
 
     /// Returns the subtitle: name of the run, number and placement of the points, and notes.
-    pub(crate) fn subtitle(&self, rest: &[String]) -> String {
-        let all: u64 = self.counts.iter().sum();
+    pub(crate) fn subtitle(&self, further_notes: &[String]) -> String {
+        let point_count: u64 = self.counts.iter().sum();
         let mut parts = self.source.notes([match self.source.design_method() {
-            Some("latin_hypercube") => format!("Latin hypercube of {all} points"),
-            Some("sobol") => format!("Sobol sequence of {all} points"),
-            Some("monte_carlo") => format!("{all} points at random"),
-            _ => format!("list of {all} points"),
+            Some("latin_hypercube") => format!("Latin hypercube of {point_count} points"),
+            Some("sobol") => format!("Sobol sequence of {point_count} points"),
+            Some("monte_carlo") => format!("{point_count} points at random"),
+            _ => format!("list of {point_count} points"),
         }]);
-        if (self.points.len() as u64) < all {
+        if (self.points.len() as u64) < point_count {
             parts.push(format!("{} of them picked at random", self.points.len()));
         }
-        parts.extend(rest.iter().cloned());
+        parts.extend(further_notes.iter().cloned());
         parts.join(" · ")
     }
 
@@ -222,29 +227,31 @@ impl Scatter {
     }
 
     /// Returns the indices of about one in `stride` of the kept points.
-    pub(crate) fn picked(&self, stride: usize) -> Vec<usize> {
-        let is_picked = |&k: &usize| picked(self.points[k] as u64 ^ SECOND_CHOICE, stride as u64);
+    pub(crate) fn pick_points(&self, stride: usize) -> Vec<usize> {
+        let is_picked =
+            |&k: &usize| is_picked(self.points[k] as u64 ^ DRAWN_POINTS_SALT, stride as u64);
         (0..self.points.len()).filter(is_picked).collect()
     }
 
     /// Returns the indices of the parameters, the most influential first.
     pub(crate) fn by_influence(&self) -> Vec<usize> {
-        let size = |k: usize| self.parameters[k].influence.map_or(0.0, RankInfluence::size);
-        let mut places: Vec<usize> = (0..self.parameters.len()).collect();
-        places.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
-        places
+        let influence =
+            |k: usize| self.parameters[k].influence.map_or(0.0, RankInfluence::strength);
+        let mut indices: Vec<usize> = (0..self.parameters.len()).collect();
+        indices.sort_by(|&a, &b| influence(b).total_cmp(&influence(a)));
+        indices
     }
 }
 
 /// Bits that make the choice of drawn points independent of the choice of kept ones.
-const SECOND_CHOICE: u64 = 0x5bf0_3635_0000_0000;
+const DRAWN_POINTS_SALT: u64 = 0x5bf0_3635_0000_0000;
 
 /// Whether a row is picked when one row in `stride` is. Picking every `stride`-th row would leave
 /// out parts of the box if the stride is a power of two and the points are a Sobol sequence.
-fn picked(row: u64, stride: u64) -> bool {
+fn is_picked(row: u64, stride: u64) -> bool {
     // The hash is SplitMix64 of Steele, Lea and Flood.
-    let mixed = row.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (mixed ^ (mixed >> 31)).is_multiple_of(stride)
+    let hash = row.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let hash = (hash ^ (hash >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let hash = (hash ^ (hash >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    (hash ^ (hash >> 31)).is_multiple_of(stride)
 }

@@ -25,9 +25,10 @@ impl Colour {
 
     /// Returns the colour that results from drawing this colour over an opaque one.
     pub fn over(self, under: Self) -> Self {
-        let part = f64::from(self.alpha) / 255.0;
+        let opacity = f64::from(self.alpha) / 255.0;
         let [r, g, b] = [0, 1, 2].map(|k| {
-            (part * f64::from(self.rgb[k]) + (1.0 - part) * f64::from(under.rgb[k])).round() as u8
+            (opacity * f64::from(self.rgb[k]) + (1.0 - opacity) * f64::from(under.rgb[k])).round()
+                as u8
         });
         Self { rgb: [r, g, b], alpha: 255 }
     }
@@ -87,16 +88,16 @@ impl Outline {
 
     /// Adds a line through each run of known points. Returns the isolated points, which no line
     /// shows.
-    pub(crate) fn add_runs(&mut self, places: &[Option<[f64; 2]>]) -> Vec<[f64; 2]> {
-        let mut alone = Vec::new();
-        for run in places.split(Option::is_none) {
+    pub(crate) fn add_runs(&mut self, points: &[Option<[f64; 2]>]) -> Vec<[f64; 2]> {
+        let mut isolated = Vec::new();
+        for run in points.split(Option::is_none) {
             let run: Vec<[f64; 2]> = run.iter().copied().flatten().collect();
             match run[..] {
-                [place] => alone.push(place),
+                [point] => isolated.push(point),
                 _ => self.add_line(&run),
             }
         }
-        alone
+        isolated
     }
 
     /// Returns the outline, shifted.
@@ -123,12 +124,12 @@ impl Outline {
 
     /// Returns a polygon around the centre: corners at equal angles and these distances, clockwise
     /// from the top.
-    fn around<const N: usize>([x, y]: [f64; 2], reaches: [f64; N]) -> Self {
+    fn around<const N: usize>([centre_x, centre_y]: [f64; 2], distances: [f64; N]) -> Self {
         let mut outline = Self::default();
         let half = (N / 2) as f64;
         let corners: [[f64; 2]; N] = std::array::from_fn(|k| {
             let (sin, cos) = (std::f64::consts::PI * k as f64 / half).sin_cos();
-            [x + reaches[k] * sin, y - reaches[k] * cos]
+            [centre_x + distances[k] * sin, centre_y - distances[k] * cos]
         });
         outline.add_polygon(&corners);
         outline
@@ -163,7 +164,7 @@ pub(crate) struct Hatch {
     /// The distance between two lines along x, px.
     pub(crate) spacing: f64,
     /// Whether lines fall to the right; otherwise they rise.
-    pub(crate) falling: bool,
+    pub(crate) is_falling: bool,
 }
 
 impl Hatch {
@@ -171,11 +172,11 @@ impl Hatch {
     /// lines.
     pub(crate) fn within(mut self, [width, height]: [f64; 2]) -> Self {
         // A line crosses an area at least once if the spacing is no larger than both sides.
-        let spacing = ((width + height) / 1.5).clamp(MIN_HATCH_SPACING, self.spacing);
+        let finer_spacing = ((width + height) / 1.5).clamp(MIN_HATCH_SPACING, self.spacing);
         for stroke in &mut self.strokes {
-            stroke.width *= spacing / self.spacing;
+            stroke.width *= finer_spacing / self.spacing;
         }
-        self.spacing = spacing;
+        self.spacing = finer_spacing;
         self
     }
 }
@@ -197,29 +198,29 @@ pub(crate) enum Anchor {
 pub(crate) struct Text {
     pub(crate) text: String,
     /// The position of the anchor on the baseline, px.
-    pub(crate) at: [f64; 2],
+    pub(crate) position: [f64; 2],
     /// The type size, px.
     pub(crate) size: f64,
     pub(crate) bold: bool,
     pub(crate) colour: Colour,
     pub(crate) anchor: Anchor,
     /// Whether the text reads upwards.
-    pub(crate) upright: bool,
+    pub(crate) is_rotated: bool,
     /// The colour of an outline that sets the text off from what is behind it.
     pub(crate) halo: Option<Colour>,
 }
 
 impl Text {
     /// Returns plain text in the ink colour.
-    pub(crate) fn new(text: impl Into<String>, at: [f64; 2], size: f64) -> Self {
+    pub(crate) fn new(text: impl Into<String>, position: [f64; 2], size: f64) -> Self {
         Self {
             text: text.into(),
-            at,
+            position,
             size,
             bold: false,
             colour: INK,
             anchor: Anchor::Start,
-            upright: false,
+            is_rotated: false,
             halo: None,
         }
     }
@@ -237,15 +238,15 @@ impl Text {
     }
 
     /// Returns the text reading upwards.
-    pub(crate) fn upright(mut self) -> Self {
-        self.upright = true;
+    pub(crate) fn rotated(mut self) -> Self {
+        self.is_rotated = true;
         self
     }
 }
 
 /// An item of a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Item {
+pub(crate) enum SceneItem {
     /// An outline filled by the non-zero rule.
     Fill {
         outline: Outline,
@@ -275,7 +276,7 @@ pub(crate) struct Scene {
     /// A sentence that describes the picture to readers who cannot see it.
     pub(crate) description: String,
     /// The items in drawing order.
-    pub(crate) items: Vec<Item>,
+    pub(crate) items: Vec<SceneItem>,
 }
 
 /// The colour of letters and frames.
@@ -296,28 +297,28 @@ impl Scene {
     }
 
     pub(crate) fn fill(&mut self, outline: Outline, colour: Colour) {
-        self.items.push(Item::Fill { outline, colour, crisp: false });
+        self.items.push(SceneItem::Fill { outline, colour, crisp: false });
     }
 
     /// Fills an outline whose edges lie on whole pixels.
     pub(crate) fn fill_crisp(&mut self, outline: Outline, colour: Colour) {
-        self.items.push(Item::Fill { outline, colour, crisp: true });
+        self.items.push(SceneItem::Fill { outline, colour, crisp: true });
     }
 
     /// Draws the line of an outline.
     pub(crate) fn line(&mut self, outline: Outline, stroke: Stroke) {
-        self.items.push(Item::Line { outline, stroke });
+        self.items.push(SceneItem::Line { outline, stroke });
     }
 
     pub(crate) fn text(&mut self, text: Text) {
-        self.items.push(Item::Text(text));
+        self.items.push(SceneItem::Text(text));
     }
 
     /// Draws the items of `draw` within `outline` alone.
     pub(crate) fn clipped(&mut self, outline: Outline, draw: impl FnOnce(&mut Self)) {
-        self.items.push(Item::Clip(outline));
+        self.items.push(SceneItem::Clip(outline));
         draw(self);
-        self.items.push(Item::Unclip);
+        self.items.push(SceneItem::Unclip);
     }
 
     /// Fills `outline` with slanted lines.
@@ -340,11 +341,12 @@ impl Scene {
         let mut lines = Outline::default();
         // Lines lie on multiples of the spacing of x + y, or of x - y, so that hatches of
         // neighbouring shapes match.
-        let (from, to, sign) = if hatch.falling { (bottom, top, -1.0) } else { (top, bottom, 1.0) };
-        let mut along = ((left + sign * from) / spacing).ceil() * spacing - sign * from;
-        while along < right + height {
-            lines.add_line(&[[along, from], [along - height, to]]);
-            along += spacing;
+        let (start_y, end_y, slope) =
+            if hatch.is_falling { (bottom, top, -1.0) } else { (top, bottom, 1.0) };
+        let mut x = ((left + slope * start_y) / spacing).ceil() * spacing - slope * start_y;
+        while x < right + height {
+            lines.add_line(&[[x, start_y], [x - height, end_y]]);
+            x += spacing;
         }
         self.clipped(outline, |scene| {
             for stroke in &hatch.strokes {

@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
     /// The share, from 0 to 1.
-    pub part: f64,
+    pub fraction: f64,
     /// The lower end of the interval.
     pub low: f64,
     /// The upper end of the interval.
@@ -12,23 +12,28 @@ pub struct Share {
 }
 
 impl Share {
-    /// Returns the share `count` of `all` with Wilson's score interval; `None` for no points.
+    /// Returns the share `count` of `total` with Wilson's score interval; `None` for no points.
     ///
     /// E. B. Wilson, Probable inference, the law of succession, and statistical inference, Journal
     /// of the American Statistical Association 22 (1927), 209-212.
-    pub fn wilson(count: u64, all: u64) -> Option<Self> {
+    pub fn wilson(count: u64, total: u64) -> Option<Self> {
         /// The 97.5 % quantile of the standard normal distribution.
         const Z_975: f64 = 1.959_963_984_540_054;
-        if all == 0 {
+        if total == 0 {
             return None;
         }
-        let part = count as f64 / all as f64;
-        let all = all as f64;
-        let square = Z_975 * Z_975 / all;
-        let centre = (part + square / 2.0) / (1.0 + square);
-        let spread = (part * (1.0 - part) / all + square / (4.0 * all)).sqrt();
-        let half = Z_975 / (1.0 + square) * spread;
-        Some(Self { part, low: (centre - half).max(0.0), high: (centre + half).min(1.0) })
+        let fraction = count as f64 / total as f64;
+        let total = total as f64;
+        let squared_quantile = Z_975 * Z_975 / total;
+        let centre = (fraction + squared_quantile / 2.0) / (1.0 + squared_quantile);
+        let deviation =
+            (fraction * (1.0 - fraction) / total + squared_quantile / (4.0 * total)).sqrt();
+        let half_width = Z_975 / (1.0 + squared_quantile) * deviation;
+        Some(Self {
+            fraction,
+            low: (centre - half_width).max(0.0),
+            high: (centre + half_width).min(1.0),
+        })
     }
 }
 
@@ -40,7 +45,8 @@ mod tests {
     fn the_interval_is_wilsons() {
         let percent = |count, all| {
             let share = Share::wilson(count, all).unwrap();
-            [share.part, share.low, share.high].map(|part| format!("{:.1}", 100.0 * part))
+            [share.fraction, share.low, share.high]
+                .map(|fraction| format!("{:.1}", 100.0 * fraction))
         };
         // Expected values by hand: 8 of 10, z = 1.96.
         assert_eq!(percent(8, 10), ["80.0", "49.0", "94.3"]);

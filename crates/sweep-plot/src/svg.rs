@@ -3,40 +3,40 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::scene::{Anchor, Colour, Item, Outline, PathSegment, Scene, Stroke, Text};
+use super::scene::{Anchor, Colour, Outline, PathSegment, Scene, SceneItem, Stroke, Text};
 
 /// The font families in order of preference; PNG output has the first, which is built in.
-const FAMILY: &str = "'Noto Sans', 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
+const FONT_FAMILIES: &str = "'Noto Sans', 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
 
 /// Writes a scene as an SVG document. The same scene gives the same bytes.
 pub(crate) fn write(scene: &Scene) -> String {
     let mut out = String::new();
-    let width = number(scene.width);
-    let height = number(scene.height);
+    let width = format_pixels(scene.width);
+    let height = format_pixels(scene.height);
     let size = format!(r#"width="{width}" height="{height}" viewBox="0 0 {width} {height}""#);
-    let role = format!(r#"role="img" font-family="{FAMILY}""#);
+    let role = format!(r#"role="img" font-family="{FONT_FAMILIES}""#);
     // Writing to a string cannot fail, so that the results below are ignored.
     let _ = writeln!(out, r#"<svg xmlns="http://www.w3.org/2000/svg" {size} {role}>"#);
     let _ = writeln!(out, "<title>{}</title>", escape(&scene.description));
     let clips = write_clips(&mut out, scene);
     for item in &scene.items {
         match item {
-            Item::Fill { outline, colour, crisp } => {
-                let edges = if *crisp { r#" shape-rendering="crispEdges""# } else { "" };
-                let path = path(outline);
-                let fill = paint("fill", *colour);
-                let _ = writeln!(out, r#"<path d="{path}"{fill}{edges}/>"#);
+            SceneItem::Fill { outline, colour, crisp } => {
+                let rendering = if *crisp { r#" shape-rendering="crispEdges""# } else { "" };
+                let data = path_data(outline);
+                let fill = paint_attributes("fill", *colour);
+                let _ = writeln!(out, r#"<path d="{data}"{fill}{rendering}/>"#);
             }
-            Item::Line { outline, stroke } => {
-                let path = path(outline);
+            SceneItem::Line { outline, stroke } => {
+                let data = path_data(outline);
                 let style = stroke_style(stroke);
-                let _ = writeln!(out, r#"<path d="{path}" fill="none"{style}/>"#);
+                let _ = writeln!(out, r#"<path d="{data}" fill="none"{style}/>"#);
             }
-            Item::Text(text) => write_text(&mut out, text),
-            Item::Clip(outline) => {
-                let _ = writeln!(out, r##"<g clip-path="url(#c{})">"##, clips[&path(outline)]);
+            SceneItem::Text(text) => write_text(&mut out, text),
+            SceneItem::Clip(outline) => {
+                let _ = writeln!(out, r##"<g clip-path="url(#c{})">"##, clips[&path_data(outline)]);
             }
-            Item::Unclip => out.push_str("</g>\n"),
+            SceneItem::Unclip => out.push_str("</g>\n"),
         }
     }
     out.push_str("</svg>\n");
@@ -47,21 +47,21 @@ pub(crate) fn write(scene: &Scene) -> String {
 fn write_clips(out: &mut String, scene: &Scene) -> BTreeMap<String, usize> {
     let mut clips = BTreeMap::new();
     for item in &scene.items {
-        let Item::Clip(outline) = item else { continue };
-        let outline = path(outline);
-        if !clips.contains_key(&outline) {
+        let SceneItem::Clip(outline) = item else { continue };
+        let data = path_data(outline);
+        if !clips.contains_key(&data) {
             let id = clips.len();
-            let _ = writeln!(out, r#"<clipPath id="c{id}"><path d="{outline}"/></clipPath>"#);
-            clips.insert(outline, id);
+            let _ = writeln!(out, r#"<clipPath id="c{id}"><path d="{data}"/></clipPath>"#);
+            clips.insert(data, id);
         }
     }
     clips
 }
 
 fn write_text(out: &mut String, text: &Text) {
-    let x = number(text.at[0]);
-    let y = number(text.at[1]);
-    let place = if text.upright {
+    let x = format_pixels(text.position[0]);
+    let y = format_pixels(text.position[1]);
+    let position = if text.is_rotated {
         format!(r#"transform="translate({x} {y}) rotate(-90)""#)
     } else {
         format!(r#"x="{x}" y="{y}""#)
@@ -72,16 +72,16 @@ fn write_text(out: &mut String, text: &Text) {
         Anchor::End => r#" text-anchor="end""#,
     };
     let weight = if text.bold { r#" font-weight="bold""# } else { "" };
-    let size = number(text.size);
+    let size = format_pixels(text.size);
     let halo = text.halo.map_or(String::new(), |colour| {
-        let stroke = paint("stroke", colour);
-        let width = number(halo_width(text.size));
+        let stroke = paint_attributes("stroke", colour);
+        let width = format_pixels(halo_width(text.size));
         format!(r#"{stroke} stroke-width="{width}" stroke-linejoin="round" paint-order="stroke""#)
     });
-    let fill = paint("fill", text.colour);
-    let phrase = escape(&text.text);
+    let fill = paint_attributes("fill", text.colour);
+    let escaped = escape(&text.text);
     let style = format!(r#"font-size="{size}"{weight}{anchor}{fill}{halo}"#);
-    let _ = writeln!(out, "<text {place} {style}>{phrase}</text>");
+    let _ = writeln!(out, "<text {position} {style}>{escaped}</text>");
 }
 
 /// Greatest coordinate that is written, px; positions beyond are moved there. Basis: far outside of
@@ -93,78 +93,83 @@ pub(crate) fn halo_width(size: f64) -> f64 {
     0.3 * size
 }
 
-fn paint(attribute: &str, colour: Colour) -> String {
-    let mut paint = format!(r#" {attribute}="{}""#, colour.css());
+fn paint_attributes(attribute: &str, colour: Colour) -> String {
+    let mut attributes = format!(r#" {attribute}="{}""#, colour.css());
     if colour.alpha < 255 {
-        let opacity = number(f64::from(colour.alpha) / 255.0);
-        let _ = write!(paint, r#" {attribute}-opacity="{opacity}""#);
+        let opacity = format_pixels(f64::from(colour.alpha) / 255.0);
+        let _ = write!(attributes, r#" {attribute}-opacity="{opacity}""#);
     }
-    paint
+    attributes
 }
 
 fn stroke_style(stroke: &Stroke) -> String {
-    let paint = paint("stroke", stroke.colour);
-    let width = number(stroke.width);
+    let paint = paint_attributes("stroke", stroke.colour);
+    let width = format_pixels(stroke.width);
     let mut style = format!(r#"{paint} stroke-width="{width}" stroke-linejoin="round""#);
     if !stroke.dash.is_empty() {
-        let dash: Vec<String> = stroke.dash.iter().map(|&length| number(length)).collect();
+        let dash: Vec<String> = stroke.dash.iter().map(|&length| format_pixels(length)).collect();
         let _ = write!(style, r#" stroke-dasharray="{}""#, dash.join(" "));
     }
     style
 }
 
 /// Returns path data with relative steps, which are shorter: a transient has thousands of them.
-fn path(outline: &Outline) -> String {
-    let mut d = String::new();
+fn path_data(outline: &Outline) -> String {
+    let mut data = String::new();
     // Positions are rounded to hundredths of a pixel before differences are taken, so that rounding
     // does not add up.
-    let mut here = [0_i64; 2];
+    let mut current = [0_i64; 2];
     let mut start = [0_i64; 2];
     for segment in &outline.0 {
         match *segment {
             PathSegment::Move(point) => {
-                here = hundredths(point);
-                start = here;
-                let _ = write!(d, "M{} {}", fixed(here[0]), fixed(here[1]));
+                current = to_hundredths(point);
+                start = current;
+                let _ = write!(
+                    data,
+                    "M{} {}",
+                    format_hundredths(current[0]),
+                    format_hundredths(current[1])
+                );
             }
             PathSegment::Line(point) => {
-                let there = hundredths(point);
-                let [dx, dy] = [there[0] - here[0], there[1] - here[1]];
-                d += &match (fixed(dx), fixed(dy)) {
+                let next = to_hundredths(point);
+                let [dx, dy] = [next[0] - current[0], next[1] - current[1]];
+                data += &match (format_hundredths(dx), format_hundredths(dy)) {
                     (dx, _) if dy == 0 => format!("h{dx}"),
                     (_, dy) if dx == 0 => format!("v{dy}"),
                     (dx, dy) if dy.starts_with('-') => format!("l{dx}{dy}"),
                     (dx, dy) => format!("l{dx} {dy}"),
                 };
-                here = there;
+                current = next;
             }
             PathSegment::Close => {
-                d.push('z');
-                here = start;
+                data.push('z');
+                current = start;
             }
         }
     }
-    d
+    data
 }
 
-pub(crate) fn hundredths(point: [f64; 2]) -> [i64; 2] {
+pub(crate) fn to_hundredths(point: [f64; 2]) -> [i64; 2] {
     // A file's values may lie anywhere; their differences must fit an integer.
     point.map(|value| (value.clamp(-MAX_COORDINATE, MAX_COORDINATE) * 100.0).round() as i64)
 }
 
 /// Writes hundredths as a decimal number without needless characters.
-fn fixed(hundredths: i64) -> String {
+fn format_hundredths(hundredths: i64) -> String {
     let sign = if hundredths < 0 { "-" } else { "" };
     let whole = hundredths.unsigned_abs() / 100;
-    let part = hundredths.unsigned_abs() % 100;
-    let whole = if whole == 0 && part > 0 { String::new() } else { whole.to_string() };
-    let part = format!(".{part:02}");
-    format!("{sign}{whole}{}", part.trim_end_matches(['0', '.']))
+    let fraction = hundredths.unsigned_abs() % 100;
+    let whole = if whole == 0 && fraction > 0 { String::new() } else { whole.to_string() };
+    let fraction = format!(".{fraction:02}");
+    format!("{sign}{whole}{}", fraction.trim_end_matches(['0', '.']))
 }
 
 /// Writes a number of pixels to a hundredth.
-pub(crate) fn number(value: f64) -> String {
-    fixed((value * 100.0).round() as i64)
+pub(crate) fn format_pixels(value: f64) -> String {
+    format_hundredths((value * 100.0).round() as i64)
 }
 
 /// Escapes text for XML character data.
@@ -199,23 +204,25 @@ mod tests {
             (-7.006, "-7.01"),
             (0.05, ".05"),
         ] {
-            assert_eq!(number(value), text);
+            assert_eq!(format_pixels(value), text);
         }
     }
 
     #[test]
     fn rounding_does_not_accumulate_along_a_path() {
         let points: Vec<[f64; 2]> = (0..1000).map(|k| [f64::from(k) * 0.333_33, 1.0]).collect();
-        let d = path(&Outline::line(&points));
-        let sum: f64 =
-            d[d.find('h').unwrap() + 1..].split('h').map(|step| step.parse::<f64>().unwrap()).sum();
+        let data = path_data(&Outline::line(&points));
+        let sum: f64 = data[data.find('h').unwrap() + 1..]
+            .split('h')
+            .map(|step| step.parse::<f64>().unwrap())
+            .sum();
         assert!((sum - 999.0 * 0.333_33).abs() < 0.011, "{sum}");
     }
 
     #[test]
     fn positions_far_outside_are_clamped() {
         let line = Outline::line(&[[f64::MIN, 0.5], [f64::MAX, 1.0], [f64::MIN, f64::MAX]]);
-        assert_eq!(path(&line), "M-10000000 .5l20000000 .5l-20000000 9999999");
+        assert_eq!(path_data(&line), "M-10000000 .5l20000000 .5l-20000000 9999999");
     }
 
     #[test]

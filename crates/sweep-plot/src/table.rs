@@ -10,7 +10,7 @@ use super::read::{ColumnFacts, FigureFile, FigureKind, ModelKinds};
 
 /// Maximum number of values of a file that are kept for a figure. Basis: a page of some megabytes.
 /// Doubling it doubles that page.
-pub const MAX_NUMBERS: usize = 1_400_000;
+pub const MAX_VALUES: usize = 1_400_000;
 
 /// The values of a column.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,40 +26,40 @@ pub enum Values {
 pub struct Words {
     /// The different words.
     pub names: Vec<String>,
-    /// The code of each row: an index into `names`, [`NONE`] or [`SEVERAL`].
+    /// The code of each row: an index into `names`, [`NO_WORD`] or [`SEVERAL_WORDS`].
     pub codes: Vec<u8>,
     /// The code found last, tried first because neighbouring rows mostly share it.
-    last: u8,
+    last_code: u8,
 }
 
 /// The code of a row without a word.
-pub const NONE: u8 = u8::MAX;
+pub const NO_WORD: u8 = u8::MAX;
 /// The code of a cell whose points have different words.
-pub const SEVERAL: u8 = u8::MAX - 1;
+pub const SEVERAL_WORDS: u8 = u8::MAX - 1;
 
 impl Words {
     /// Returns a column of rows without a word.
     pub fn none(rows: usize) -> Self {
-        Self { codes: vec![NONE; rows], ..Self::default() }
+        Self { codes: vec![NO_WORD; rows], ..Self::default() }
     }
 
     /// Returns the code of a word and adds new words to the dictionary. Words beyond the first 254
     /// have no code; the program writes no such file.
     pub fn code(&mut self, word: Option<&str>) -> u8 {
-        let Some(word) = word else { return NONE };
-        if self.names.get(usize::from(self.last)).is_some_and(|name| name == word) {
-            return self.last;
+        let Some(word) = word else { return NO_WORD };
+        if self.names.get(usize::from(self.last_code)).is_some_and(|name| name == word) {
+            return self.last_code;
         }
-        let place = self.names.iter().position(|name| name == word).unwrap_or(self.names.len());
-        match u8::try_from(place) {
-            Ok(place) if place < SEVERAL => {
-                if usize::from(place) == self.names.len() {
+        let index = self.names.iter().position(|name| name == word).unwrap_or(self.names.len());
+        match u8::try_from(index) {
+            Ok(index) if index < SEVERAL_WORDS => {
+                if usize::from(index) == self.names.len() {
                     self.names.push(word.to_owned());
                 }
-                self.last = place;
-                place
+                self.last_code = index;
+                index
             }
-            _ => NONE,
+            _ => NO_WORD,
         }
     }
 
@@ -72,10 +72,11 @@ impl Words {
     pub fn sort(&mut self) {
         let mut sorted = self.names.clone();
         sorted.sort();
-        let place = |name: &String| u8::try_from(sorted.binary_search(name).ok()?).ok();
-        let places: Vec<u8> = self.names.iter().map(|name| place(name).unwrap_or(NONE)).collect();
+        let new_code = |name: &String| u8::try_from(sorted.binary_search(name).ok()?).ok();
+        let new_codes: Vec<u8> =
+            self.names.iter().map(|name| new_code(name).unwrap_or(NO_WORD)).collect();
         for code in &mut self.codes {
-            *code = places.get(usize::from(*code)).copied().unwrap_or(*code);
+            *code = new_codes.get(usize::from(*code)).copied().unwrap_or(*code);
         }
         self.names = sorted;
     }
@@ -93,7 +94,7 @@ pub struct FigureColumn {
 impl FigureColumn {
     /// Returns the label of the column: its name in words and its unit.
     pub fn label(&self) -> Label {
-        Label::new(&label::words(&self.facts.name), &self.facts.unit)
+        Label::new(&label::name_in_words(&self.facts.name), &self.facts.unit)
     }
 
     /// Returns the values if they are numbers.
@@ -128,25 +129,26 @@ impl FigureTable {
     /// Returns the errors of [`FigureFile::each_row`]; [`crate::PlotError::Undrawable`] for other
     /// files with more values than a figure keeps.
     pub fn read(source: FigureFile) -> Result<Self> {
-        let most = MAX_NUMBERS / source.numeric().count().max(1);
-        if source.rows > most {
+        let max_rows = MAX_VALUES / source.numeric().count().max(1);
+        if source.rows > max_rows {
             if source.kind == FigureKind::TRACE {
-                return Self::read_decimated(source, most / 2);
+                return Self::read_decimated(source, max_rows / 2);
             }
-            return Err(source.too_many(source.rows, most));
+            return Err(source.too_many_rows(source.rows, max_rows));
         }
-        let names: Vec<&str> = source.columns.iter().map(|column| column.name.as_str()).collect();
-        let empty = |column: &ColumnFacts| match column.is_number() {
+        let column_names: Vec<&str> =
+            source.columns.iter().map(|column| column.name.as_str()).collect();
+        let empty_values = |column: &ColumnFacts| match column.is_number() {
             true => Values::Numbers(Vec::with_capacity(source.rows)),
             false => Values::Words(Words::default()),
         };
-        let mut values: Vec<Values> = source.columns.iter().map(empty).collect();
+        let mut values: Vec<Values> = source.columns.iter().map(empty_values).collect();
         let mut rows = 0;
-        source.each_row(&names, |row| {
+        source.each_row(&column_names, |row| {
             rows += 1;
             // The metadata may claim fewer rows than the file has.
-            if rows > most {
-                return Err(source.too_many(rows, most));
+            if rows > max_rows {
+                return Err(source.too_many_rows(rows, max_rows));
             }
             for (column, values) in values.iter_mut().enumerate() {
                 match values {
@@ -173,18 +175,19 @@ impl FigureTable {
     /// Returns the errors of [`FigureFile::each_row`].
     pub fn read_decimated(source: FigureFile, count: usize) -> Result<Self> {
         let buckets = Buckets::new(source.rows, count);
-        let names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
-        let keep =
+        let column_names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
+        let rule =
             |name: &str| if name == "time_s" { KeptValues::Instants } else { KeptValues::Extremes };
         let mut decimators: Vec<Decimator> =
-            names.iter().map(|name| Decimator::new(buckets, keep(name))).collect();
-        source.each_row(&names, |row| {
+            column_names.iter().map(|name| Decimator::new(buckets, rule(name))).collect();
+        source.each_row(&column_names, |row| {
             let decimators = decimators.iter_mut().enumerate();
             decimators.for_each(|(column, decimator)| decimator.push(row.number(column)));
             Ok(())
         })?;
-        let kept = decimators.into_iter().map(|decimator| Values::Numbers(decimator.finish()));
-        let columns = source.numeric().cloned().zip(kept);
+        let columns_of_numbers =
+            decimators.into_iter().map(|decimator| Values::Numbers(decimator.finish()));
+        let columns = source.numeric().cloned().zip(columns_of_numbers);
         let columns: Vec<FigureColumn> =
             columns.map(|(facts, values)| FigureColumn { facts, values }).collect();
         let rows = columns.first().and_then(FigureColumn::numbers).map_or(0, <[f64]>::len);

@@ -25,11 +25,11 @@ pub(super) fn draw(
     Ok(std::fs::read(output).unwrap())
 }
 
-pub(super) fn svg(sample: SampleFile, options: &PlotOptions) -> String {
+pub(super) fn draw_svg(sample: SampleFile, options: &PlotOptions) -> String {
     String::from_utf8(draw(sample, options, "figure.svg").unwrap()).unwrap()
 }
 
-pub(super) fn data(sample: SampleFile, options: &PlotOptions) -> Value {
+pub(super) fn draw_page_data(sample: SampleFile, options: &PlotOptions) -> Value {
     page_data(&draw(sample, options, "figure.html").unwrap())
 }
 
@@ -41,18 +41,18 @@ pub(super) fn page_data(page: &[u8]) -> Value {
 }
 
 /// Decodes a curve of a page.
-pub(super) fn curve(series: &Value) -> Vec<f64> {
+pub(super) fn decode_curve(series: &Value) -> Vec<f64> {
     use base64::Engine as _;
     let bytes =
         base64::engine::general_purpose::STANDARD.decode(series["y"].as_str().unwrap()).unwrap();
     bytes.chunks(4).map(|four| f64::from(f32::from_le_bytes(four.try_into().unwrap()))).collect()
 }
 
-pub(super) fn message(result: Result<Vec<u8>, PlotError>) -> String {
+pub(super) fn error_message(result: Result<Vec<u8>, PlotError>) -> String {
     result.unwrap_err().to_string()
 }
 
-fn three_axes() -> SampleFile {
+fn map_of_three_axes() -> SampleFile {
     MapSample {
         axes: vec![
             ("unbalance_mass_kg", vec![0.2, 0.4, 0.6]),
@@ -60,17 +60,17 @@ fn three_axes() -> SampleFile {
             ("peak_hz", vec![300.0, 350.0]),
         ],
         limit: 2.0,
-        yaw: &|at| Some([0.02 * at[0] * at[2] / at[1], 0.01]),
+        yaw: &|point| Some([0.02 * point[0] * point[2] / point[1], 0.01]),
         chaotic: &|_| false,
     }
     .sample()
 }
 
-pub(super) fn one_axis() -> SampleFile {
+pub(super) fn map_of_one_axis() -> SampleFile {
     MapSample {
         axes: vec![("damping_n_s_per_m", vec![60.0, 100.0, 140.0, 180.0])],
         limit: 2.0,
-        yaw: &|at| (at[0] > 70.0).then(|| [2.0 / at[0], 0.01]),
+        yaw: &|point| (point[0] > 70.0).then(|| [2.0 / point[0], 0.01]),
         chaotic: &|_| false,
     }
     .sample()
@@ -93,35 +93,39 @@ fn columns_have_units_words_and_provenance() {
     assert_eq!(column("nonlinear_body_yaw").facts.description, "nonlinear_body_yaw, said");
     assert_eq!(column("ratio_max").facts.unit, "", "1 is no unit to show");
     let words = |name: &str| column(name).words().unwrap();
-    let without = (0..table.rows).filter(|&row| words("reliable").get(row).is_none()).count();
-    assert_eq!((words("reliable").names.join(" "), without), ("false true".to_owned(), 2));
-    let diverged =
+    let rows_without_verdict =
+        (0..table.rows).filter(|&row| words("reliable").get(row).is_none()).count();
+    assert_eq!(
+        (words("reliable").names.join(" "), rows_without_verdict),
+        ("false true".to_owned(), 2)
+    );
+    let diverged_rows =
         (0..table.rows).filter(|&row| words("status").get(row) == Some("diverged")).count();
-    assert_eq!(diverged, 1);
+    assert_eq!(diverged_rows, 1);
     assert_eq!(
         (table.source.ratio_limit(), table.source.run_name.as_deref()),
         (3.0, Some("sample"))
     );
-    let undefined =
+    let rows_without_ratio =
         table.numbers("ratio_max").unwrap().iter().filter(|ratio| ratio.is_nan()).count();
-    assert_eq!(undefined, 2);
+    assert_eq!(rows_without_ratio, 2);
 }
 
 #[test]
 fn the_same_file_gives_the_same_bytes() {
-    for sample in [map, three_axes, one_axis, boundary] {
+    for sample in [map, map_of_three_axes, map_of_one_axis, boundary] {
         for output in ["a.svg", "a.html"] {
-            let twice = [0, 1].map(|_| draw(sample(), &PlotOptions::default(), output).unwrap());
-            assert!(twice[0] == twice[1], "{output}");
+            let figures = [0, 1].map(|_| draw(sample(), &PlotOptions::default(), output).unwrap());
+            assert!(figures[0] == figures[1], "{output}");
         }
     }
-    let twice = [0, 1].map(|_| draw(map(), &PlotOptions::default(), "a.png").unwrap());
-    assert!(twice[0] == twice[1], "a.png");
+    let figures = [0, 1].map(|_| draw(map(), &PlotOptions::default(), "a.png").unwrap());
+    assert!(figures[0] == figures[1], "a.png");
 }
 
 #[test]
 fn a_map_labels_axes_sides_boundary_and_failures() {
-    let figure = svg(map(), &PlotOptions::default());
+    let figure = draw_svg(map(), &PlotOptions::default());
     for phrase in [
         ">Unbalance mass (kg)<",
         ">Damping (N s/m)<",
@@ -138,38 +142,38 @@ fn a_map_labels_axes_sides_boundary_and_failures() {
 
 #[test]
 fn the_boundary_of_a_map_follows_the_limit() {
-    let data = data(map(), &PlotOptions::default());
+    let data = draw_page_data(map(), &PlotOptions::default());
     let line = &data["layers"][0]["lines"][0];
     let points: Vec<f64> = line
         .as_array()
         .unwrap()
         .iter()
         .flat_map(|line| line.as_array().unwrap())
-        .map(|v| v.as_f64().unwrap())
+        .map(|value| value.as_f64().unwrap())
         .collect();
     assert!(points.len() > 20);
-    for at in points.chunks(2) {
+    for point in points.chunks(2) {
         // The logarithm of the sample's ratio is linear in both axes, so that interpolation is
         // exact.
-        assert!((at[1] - (50.0 + 200.0 * at[0])).abs() < 0.01, "{at:?}");
+        assert!((point[1] - (50.0 + 200.0 * point[0])).abs() < 0.01, "{point:?}");
     }
 }
 
 /// Returns the options for a figure of this column.
-pub(crate) fn showing(column: &str) -> PlotOptions {
+pub(crate) fn options_for_column(column: &str) -> PlotOptions {
     PlotOptions { quantity: vec![column.to_owned()], ..PlotOptions::default() }
 }
 
 #[test]
 fn every_column_can_be_drawn() {
-    let shown = |column| svg(map(), &showing(column));
+    let draw_column = |column| draw_svg(map(), &options_for_column(column));
     for (figure, phrase) in [
-        (shown("ratio_body_pitch"), ">Ratio of amplitudes: body pitch<"),
-        (shown("nonlinear_body_yaw"), ">amplitude, nonlinear model (mrad)<"),
-        (shown("linear_body_yaw"), ">amplitude, linear model (mrad)<"),
-        (shown("min_gap_nonlinear_m"), ">least gap (mm)<"),
-        (shown("fail_time_s"), ">fail time (s)<"),
-        (shown("status"), ">diverged (1)<"),
+        (draw_column("ratio_body_pitch"), ">Ratio of amplitudes: body pitch<"),
+        (draw_column("nonlinear_body_yaw"), ">amplitude, nonlinear model (mrad)<"),
+        (draw_column("linear_body_yaw"), ">amplitude, linear model (mrad)<"),
+        (draw_column("min_gap_nonlinear_m"), ">least gap (mm)<"),
+        (draw_column("fail_time_s"), ">fail time (s)<"),
+        (draw_column("status"), ">diverged (1)<"),
     ] {
         assert!(figure.contains(phrase), "{phrase}");
     }
@@ -177,13 +181,13 @@ fn every_column_can_be_drawn() {
 
 #[test]
 fn a_page_contains_its_ticks() {
-    let log = SampleFile::default()
+    let logarithmic_axis = SampleFile::default()
         .counts("point", 0..4)
         .numbers("damping_n_s_per_m", "N s/m", [1.0, 10.0, 100.0, 1000.0])
         .numbers("nonlinear_body_yaw", "rad", [0.1, 0.2, 0.3, 0.4])
         .numbers("ratio_max", "1", [1.0, 1.1, 1.2, 40.0])
         .words("status", [Some("ok"); 4]);
-    let data = data(log, &PlotOptions::default());
+    let data = draw_page_data(logarithmic_axis, &PlotOptions::default());
     let steps = data["ticks"]["steps"].as_array().unwrap();
     assert!(steps.contains(&serde_json::json!([0.05, 2])), "5 hundredths, two decimals");
     assert_eq!(
@@ -196,24 +200,38 @@ fn a_page_contains_its_ticks() {
 
 #[test]
 fn a_third_axis_gives_panels_unless_it_is_fixed() {
-    let figure = svg(three_axes(), &PlotOptions::default());
+    let figure = draw_svg(map_of_three_axes(), &PlotOptions::default());
     assert!(figure.contains(">Peak 300 Hz<") && figure.contains(">Peak 350 Hz<"));
-    let at =
-        |value| PlotOptions { at: vec![("peak_hz".to_owned(), value)], ..PlotOptions::default() };
-    let cut = svg(three_axes(), &at(350.0));
-    assert!(cut.contains(">sample · 18 points · Peak 350 Hz<") && !cut.contains(">Peak 300 Hz<"));
-    assert!(message(draw(three_axes(), &at(351.0), "a.svg")).contains("it has 300, 350"));
-    assert_eq!(data(three_axes(), &at(350.0))["first"]["rest"], serde_json::json!([1]));
+    let options_at = |value| PlotOptions {
+        fixed_values: vec![("peak_hz".to_owned(), value)],
+        ..PlotOptions::default()
+    };
+    let figure_of_cut = draw_svg(map_of_three_axes(), &options_at(350.0));
+    assert!(
+        figure_of_cut.contains(">sample · 18 points · Peak 350 Hz<")
+            && !figure_of_cut.contains(">Peak 300 Hz<")
+    );
+    assert!(
+        error_message(draw(map_of_three_axes(), &options_at(351.0), "a.svg"))
+            .contains("it has 300, 350")
+    );
+    assert_eq!(
+        draw_page_data(map_of_three_axes(), &options_at(350.0))["first"]["rest"],
+        serde_json::json!([1])
+    );
 }
 
 #[test]
 fn a_map_of_one_axis_has_curves_and_marks_failures() {
-    let figure = svg(one_axis(), &PlotOptions::default());
+    let figure = draw_svg(map_of_one_axis(), &PlotOptions::default());
     for phrase in [">Damping (N s/m)<", ">body yaw<", ">unreliable from ratio 2 on<", ">diverged<"]
     {
         assert!(figure.contains(phrase), "{phrase}");
     }
-    assert!(svg(one_axis(), &showing("min_gap_linear_m")).contains(">Least gap (mm)<"));
+    assert!(
+        draw_svg(map_of_one_axis(), &options_for_column("min_gap_linear_m"))
+            .contains(">Least gap (mm)<")
+    );
 }
 
 #[test]
@@ -223,11 +241,14 @@ fn titles_name_the_channel() {
         ("ratio_body_pitch", "Ratio of amplitudes: body pitch"),
         ("ratio_max", "Where the linear model can be trusted"),
     ] {
-        let figure = svg(one_axis(), &showing(column));
+        let figure = draw_svg(map_of_one_axis(), &options_for_column(column));
         assert!(figure.contains(&format!(">{title}<")), "{column}: {figure}");
     }
-    let two = ["nonlinear_body_yaw", "nonlinear_body_pitch"].map(str::to_owned);
-    let figure = svg(one_axis(), &PlotOptions { quantity: two.to_vec(), ..PlotOptions::default() });
+    let two_columns = ["nonlinear_body_yaw", "nonlinear_body_pitch"].map(str::to_owned);
+    let figure = draw_svg(
+        map_of_one_axis(),
+        &PlotOptions { quantity: two_columns.to_vec(), ..PlotOptions::default() },
+    );
     assert!(figure.contains(">Amplitudes of both models<"), "{figure}");
 }
 
@@ -240,21 +261,22 @@ fn a_boundary_that_is_not_drawn_has_no_legend() {
                 ("damping_n_s_per_m", vec![60.0, 100.0, 140.0]),
             ],
             limit,
-            yaw: &|at| Some([0.02 + 0.05 * at[0], 0.01]),
+            yaw: &|point| Some([0.02 + 0.05 * point[0], 0.01]),
             chaotic: &|_| false,
         };
-        svg(sample.sample(), &PlotOptions::default())
+        draw_svg(sample.sample(), &PlotOptions::default())
     };
     assert!(draw_at_limit(4.0).contains(">boundary: ratio 4<"));
-    let reliable = draw_at_limit(40.0);
-    assert!(!reliable.contains(">boundary: ratio 40<"), "{reliable}");
-    assert!(reliable.contains(">reliable: below 40<"), "{reliable}");
+    let figure = draw_at_limit(40.0);
+    assert!(!figure.contains(">boundary: ratio 40<"), "{figure}");
+    assert!(figure.contains(">reliable: below 40<"), "{figure}");
 }
 
 #[test]
 fn a_boundary_is_drawn_with_its_bracket() {
     assert!(
-        svg(boundary(), &PlotOptions::default()).contains(">boundary: ratio 2, bracket shaded<")
+        draw_svg(boundary(), &PlotOptions::default())
+            .contains(">boundary: ratio 2, bracket shaded<")
     );
 }
 
@@ -267,14 +289,15 @@ fn a_png_is_twice_the_size_of_its_figure() {
 
 #[test]
 fn a_page_is_self_contained() {
-    let hostile = || map().metadata("note", "</script><img src=x> {{data}}");
+    let hostile_sample = || map().with_metadata("note", "</script><img src=x> {{data}}");
     let page =
-        String::from_utf8(draw(hostile(), &PlotOptions::default(), "a.html").unwrap()).unwrap();
-    let still = "src=\"data:image/png;base64,iVBOR";
-    assert_eq!(page.matches(still).count(), 1, "a picture where scripts are switched off");
-    let page = page.replace(still, "");
-    for outside in ["http:", "https:", "src=\"", "@import", "url("] {
-        assert!(!page.contains(outside), "{outside}");
+        String::from_utf8(draw(hostile_sample(), &PlotOptions::default(), "a.html").unwrap())
+            .unwrap();
+    let still_picture = "src=\"data:image/png;base64,iVBOR";
+    assert_eq!(page.matches(still_picture).count(), 1, "a picture where scripts are switched off");
+    let page = page.replace(still_picture, "");
+    for external_reference in ["http:", "https:", "src=\"", "@import", "url("] {
+        assert!(!page.contains(external_reference), "{external_reference}");
     }
     assert_eq!(page.matches("</script>").count(), 2, "data cannot end its element");
     assert!(page.contains("&lt;/script&gt;&lt;img src=x&gt; &#123;&#123;data}}"));
@@ -286,8 +309,8 @@ fn a_figure_as_pdf_has_the_pages_size_and_its_title() {
     assert!(document.starts_with(b"%PDF-1.7\n"));
     assert!(document.ends_with(b"%%EOF\n"));
     let text = String::from_utf8_lossy(&document);
-    let drawn = svg(map(), &PlotOptions::default());
-    let width = drawn.split("width=\"").nth(1).unwrap().split('"').next().unwrap();
+    let figure = draw_svg(map(), &PlotOptions::default());
+    let width = figure.split("width=\"").nth(1).unwrap().split('"').next().unwrap();
     let points = 0.75 * width.parse::<f64>().unwrap();
     assert!(text.contains(&format!("/MediaBox [0 0 {points} ")), "{width}");
     assert!(text.contains("/Title <FEFF"));
@@ -296,31 +319,40 @@ fn a_figure_as_pdf_has_the_pages_size_and_its_title() {
 #[test]
 fn errors_name_their_cause_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
-    let none = PlotOptions::default();
-    let at = PlotOptions { at: vec![("body_mass_kg".to_owned(), 20.0)], ..PlotOptions::default() };
+    let default_options = PlotOptions::default();
+    let unknown_axis = PlotOptions {
+        fixed_values: vec![("body_mass_kg".to_owned(), 20.0)],
+        ..PlotOptions::default()
+    };
     let traces = PlotOptions { traces: Some(folder.path().to_owned()), ..PlotOptions::default() };
-    let empty = || SampleFile::default().numbers("ratio_max", "1", []).words("status", []);
-    let doubled = SampleFile::default()
+    let empty_map = || SampleFile::default().numbers("ratio_max", "1", []).words("status", []);
+    let repeated_point = SampleFile::default()
         .numbers("damping_n_s_per_m", "", [60.0, 60.0])
         .numbers("nonlinear_body_yaw", "rad", [1.0, 1.0])
         .numbers("ratio_max", "1", [1.0, 1.0])
         .words("status", [Some("ok"), Some("ok")]);
     for (result, phrase) in [
-        (draw(map(), &none, "a.eps"), ".svg, .pdf, .png or .html"),
-        (draw(map(), &none, "input.parquet/a.svg"), "a part of that path is a file"),
-        (draw(map(), &showing("ratio_yow"), "a.svg"), "it has ratio_max, ratio_body_yaw"),
-        (draw(map(), &showing("ratio_yow"), "a.html"), "it has ratio_max, ratio_body_yaw"),
-        (draw(map(), &at, "a.svg"), "it has none"),
+        (draw(map(), &default_options, "a.eps"), ".svg, .pdf, .png or .html"),
+        (draw(map(), &default_options, "input.parquet/a.svg"), "a part of that path is a file"),
+        (
+            draw(map(), &options_for_column("ratio_yow"), "a.svg"),
+            "it has ratio_max, ratio_body_yaw",
+        ),
+        (
+            draw(map(), &options_for_column("ratio_yow"), "a.html"),
+            "it has ratio_max, ratio_body_yaw",
+        ),
+        (draw(map(), &unknown_axis, "a.svg"), "it has none"),
         (draw(map(), &traces, "a.svg"), "maps drawn as .html"),
         (draw(map(), &traces, "a.html"), "no trace files"),
-        (draw(empty(), &none, "a.svg"), "the map has no rows"),
-        (draw(doubled, &none, "a.svg"), "rows 0 and 1 are the same point"),
+        (draw(empty_map(), &default_options, "a.svg"), "the map has no rows"),
+        (draw(repeated_point, &default_options, "a.svg"), "rows 0 and 1 are the same point"),
         (
-            draw(SampleFile::default().numbers("x", "", [1.0]), &none, "a.svg"),
+            draw(SampleFile::default().numbers("x", "", [1.0]), &default_options, "a.svg"),
             "no file that has a figure: study, map, differences",
         ),
     ] {
-        assert!(message(result).contains(phrase), "{phrase}");
+        assert!(error_message(result).contains(phrase), "{phrase}");
     }
     let text = folder.path().join("text.parquet");
     std::fs::write(&text, "no Parquet").unwrap();
@@ -330,7 +362,10 @@ fn errors_name_their_cause_and_nothing_is_written() {
     ] {
         let output = folder.path().join("a.svg");
         assert!(
-            render(input, &none, &CommonFigures, &output).unwrap_err().to_string().contains(phrase)
+            render(input, &default_options, &CommonFigures, &output)
+                .unwrap_err()
+                .to_string()
+                .contains(phrase)
         );
         assert!(!output.exists());
     }

@@ -32,40 +32,53 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     let unstable = options.stability.as_ref();
     let unstable = unstable.map(|path| stability::read_unstable(table, path)).transpose()?;
     let modes = modes(table)?;
-    let top = modes.iter().flat_map(|mode| &mode.speed).fold(0.0_f64, |top, &speed| top.max(speed));
-    if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
+    let top_speed = modes
+        .iter()
+        .flat_map(|mode| &mode.speed)
+        .fold(0.0_f64, |top_speed, &speed| top_speed.max(speed));
+    if top_speed <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
         return Err(table.source.nothing_to_draw("the modes are given at one speed only"));
     }
-    let is_near =
-        |mode: &FrequencyCurve| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top);
-    let (near, far): (Vec<FrequencyCurve>, Vec<FrequencyCurve>) =
-        modes.into_iter().partition(is_near);
-    let sums = unstable.as_ref().map_or_else(Vec::new, |unstable| frequency_sums(&near, unstable));
-    let drawn = near.iter().chain(&sums).flat_map(|mode| mode.frequency.iter().copied());
-    let (_, highest) = extremes(drawn).unwrap_or((0.0, top));
-    let range = (0.0, (1.06 * top).min(1.25 * highest));
+    let is_in_range = |mode: &FrequencyCurve| {
+        mode.frequency.iter().any(|&frequency| frequency < 1.06 * top_speed)
+    };
+    let (shown_modes, higher_modes): (Vec<FrequencyCurve>, Vec<FrequencyCurve>) =
+        modes.into_iter().partition(is_in_range);
+    let sum_curves_shown =
+        unstable.as_ref().map_or_else(Vec::new, |unstable| frequency_sums(&shown_modes, unstable));
+    let frequencies =
+        shown_modes.iter().chain(&sum_curves_shown).flat_map(|mode| mode.frequency.iter().copied());
+    let (_, highest_frequency) = extremes(frequencies).unwrap_or((0.0, top_speed));
+    let range = (0.0, (1.06 * top_speed).min(1.25 * highest_frequency));
 
     let mut series = Vec::new();
     let mut stars = Vec::new();
-    let mode_curves = near.into_iter().enumerate().map(|(k, mut mode)| {
+    let mode_curves = shown_modes.into_iter().enumerate().map(|(k, mut mode)| {
         let band = mode.band.take();
         let style = band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
         (mode, DISTINCT[k % DISTINCT.len()], style)
     });
-    let sum_curves = sums.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
+    let sum_curves = sum_curves_shown.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
     for (mode, colour, style) in mode_curves.chain(sum_curves) {
-        stars.extend(mode.resonances.iter().map(|&at| (at, at, format!("{at:.1} rpm"))));
+        stars
+            .extend(mode.resonances.iter().map(|&speed| (speed, speed, format!("{speed:.1} rpm"))));
         series.push(Series::new(mode.name, colour, mode.speed, mode.frequency, style));
     }
-    let ends = vec![0.0, top];
-    series.push(Series::new("frequency = spin speed", INK, ends.clone(), ends, Style::Dashed));
+    let diagonal = vec![0.0, top_speed];
+    series.push(Series::new(
+        "frequency = spin speed",
+        INK,
+        diagonal.clone(),
+        diagonal,
+        Style::Dashed,
+    ));
     let mut notes = table.source.notes([]);
     if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
         notes.push("shaded: least to greatest over a turn of the drum".to_owned());
     }
-    if !far.is_empty() {
-        let lie = if far.len() == 1 { "mode lies" } else { "modes lie" };
-        notes.push(format!("{} {lie} above", far.len()));
+    if !higher_modes.is_empty() {
+        let noun_and_verb = if higher_modes.len() == 1 { "mode lies" } else { "modes lie" };
+        notes.push(format!("{} {noun_and_verb} above", higher_modes.len()));
     }
     let label = Label::new("Damped natural frequency", "cycles per minute");
     let panel = ChartPanel::new("frequency", label, series);
@@ -87,7 +100,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
 /// [`PlotError::Unfit`] when the file is not a modes file,
 /// [`PlotError::Undrawable`] when it lacks a column.
 pub(crate) fn resonances(table: &FigureTable) -> Result<Vec<f64>, PlotError> {
-    table.source.expect(MODES, "--modes", "`sweep modes --out FILE` writes a modes file")?;
+    table.source.expect_kind(MODES, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.into_iter().flat_map(|mode| mode.resonances).collect();
     speeds.sort_by(f64::total_cmp);
     Ok(speeds)
@@ -99,35 +112,40 @@ fn frequency_sums(modes: &[FrequencyCurve], unstable: &UnstableSpeeds) -> Vec<Fr
     let mut pairs: Vec<[usize; 2]> = Vec::new();
     for (speed, frequencies) in &unstable.participants {
         let nearest = |frequency: f64| {
-            let apart = |mode: &FrequencyCurve| (at_speed(mode, *speed) - frequency).abs();
-            let places = 0..modes.len();
-            places.min_by(|&a, &b| apart(&modes[a]).total_cmp(&apart(&modes[b])))
+            let distance = |mode: &FrequencyCurve| (at_speed(mode, *speed) - frequency).abs();
+            let indices = 0..modes.len();
+            indices.min_by(|&a, &b| distance(&modes[a]).total_cmp(&distance(&modes[b])))
         };
-        // Among all pairs of participating modes, the one whose sum is nearest to the speed is
-        // taken.
-        let named: Vec<usize> =
-            frequencies.iter().filter(|f| f.is_finite()).filter_map(|f| nearest(*f)).collect();
-        let all = named.iter().flat_map(|&a| named.iter().map(move |&b| [a.min(b), a.max(b)]));
-        let miss = |pair: &[usize; 2]| {
-            let sum: f64 = pair.iter().map(|&mode| at_speed(&modes[mode], *speed)).sum();
-            (sum - speed).abs()
+        // Among all pairs of participating modes, that with the sum nearest to the speed is taken.
+        let participants: Vec<usize> = frequencies
+            .iter()
+            .filter(|frequency| frequency.is_finite())
+            .filter_map(|frequency| nearest(*frequency))
+            .collect();
+        let candidates = participants
+            .iter()
+            .flat_map(|&a| participants.iter().map(move |&b| [a.min(b), a.max(b)]));
+        let distance_from_speed = |pair: &[usize; 2]| {
+            let sum_curve: f64 = pair.iter().map(|&mode| at_speed(&modes[mode], *speed)).sum();
+            (sum_curve - speed).abs()
         };
-        if let Some(pair) = all.min_by(|a, b| miss(a).total_cmp(&miss(b)))
+        if let Some(pair) =
+            candidates.min_by(|a, b| distance_from_speed(a).total_cmp(&distance_from_speed(b)))
             && !pairs.contains(&pair)
         {
             pairs.push(pair);
         }
     }
     pairs.sort_unstable();
-    let sum = |[a, b]: [usize; 2]| {
-        let number = |mode: usize| {
+    let sum_curve = |[a, b]: [usize; 2]| {
+        let mode_number = |mode: usize| {
             let name = modes[mode].name.trim_start_matches("mode ");
             name.split(' ').next().unwrap_or_default()
         };
         let name = if a == b {
-            format!("twice the frequency of mode {}", number(a))
+            format!("twice the frequency of mode {}", mode_number(a))
         } else {
-            format!("sum of the frequencies of modes {} and {}", number(a), number(b))
+            format!("sum of the frequencies of modes {} and {}", mode_number(a), mode_number(b))
         };
         let speed = modes[a].speed.clone();
         let sum_at = |speed: &f64| at_speed(&modes[a], *speed) + at_speed(&modes[b], *speed);
@@ -140,7 +158,7 @@ fn frequency_sums(modes: &[FrequencyCurve], unstable: &UnstableSpeeds) -> Vec<Fr
             band: None,
         }
     };
-    pairs.into_iter().map(sum).collect()
+    pairs.into_iter().map(sum_curve).collect()
 }
 
 /// Returns a mode's frequency at a speed.
@@ -150,22 +168,22 @@ fn at_speed(mode: &FrequencyCurve, speed: f64) -> f64 {
 
 /// Interpolates linearly at `x`; beyond the given values the curve is constant.
 pub(crate) fn interpolate(xs: &[f64], ys: &[f64], x: f64) -> f64 {
-    let above = xs.partition_point(|known| *known < x).min(xs.len() - 1);
-    let below = above.saturating_sub(1);
-    let step = xs[above] - xs[below];
+    let upper = xs.partition_point(|known_x| *known_x < x).min(xs.len() - 1);
+    let lower = upper.saturating_sub(1);
+    let step = xs[upper] - xs[lower];
     if step == 0.0 {
-        return ys[above];
+        return ys[upper];
     }
-    let part = ((x - xs[below]) / step).clamp(0.0, 1.0);
-    ys[below] + part * (ys[above] - ys[below])
+    let share = ((x - xs[lower]) / step).clamp(0.0, 1.0);
+    ys[lower] + share * (ys[upper] - ys[lower])
 }
 
 /// Returns the modes of a file by number.
 pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotError> {
     let speed = table.numbers("speed_rpm")?;
-    let number = table.numbers("mode")?;
+    let mode_numbers = table.numbers("mode")?;
     let frequency = table.numbers("frequency_rpm")?;
-    let over_turn = |word: &str| {
+    let extreme_over_turn = |word: &str| {
         let mut columns = table.columns.iter().filter(|column| {
             column.facts.name.starts_with("frequency")
                 && column.facts.unit == "rpm"
@@ -173,46 +191,51 @@ pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotErro
         });
         columns.next().and_then(|column| column.numbers())
     };
-    let band = over_turn("min").zip(over_turn("max"));
+    let band = extreme_over_turn("min").zip(extreme_over_turn("max"));
     let names =
         table.column("name").or_else(|| table.column("shape")).and_then(|column| column.words());
 
     // A row without a number belongs to no mode.
-    let mut numbers: Vec<f64> = number.iter().copied().filter(|mode| mode.is_finite()).collect();
-    numbers.sort_by(f64::total_cmp);
-    numbers.dedup();
-    let mode = |wanted: f64| {
-        let mut rows: Vec<usize> = (0..table.rows).filter(|&row| number[row] == wanted).collect();
+    let mut distinct_numbers: Vec<f64> =
+        mode_numbers.iter().copied().filter(|number| number.is_finite()).collect();
+    distinct_numbers.sort_by(f64::total_cmp);
+    distinct_numbers.dedup();
+    let mode_curve = |wanted: f64| {
+        let mut rows: Vec<usize> =
+            (0..table.rows).filter(|&row| mode_numbers[row] == wanted).collect();
         rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
-        let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-        let phrase = names.and_then(|names| names.get(*rows.first()?));
-        let known = || -> Option<Vec<f64>> {
-            let mut all = table.source.list(key::MODES);
-            let found = all.find(|mode| mode["mode"] == wanted)?["resonances"].as_array()?;
-            found.iter().map(|resonance| resonance["speed_rpm"].as_f64()).collect()
+        let values_of_rows =
+            |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
+        let shape_name = names.and_then(|names| names.get(*rows.first()?));
+        let resonances_in_file = || -> Option<Vec<f64>> {
+            let mut modes_in_file = table.source.metadata_list(key::MODES);
+            let resonances =
+                modes_in_file.find(|mode| mode["mode"] == wanted)?["resonances"].as_array()?;
+            resonances.iter().map(|resonance| resonance["speed_rpm"].as_f64()).collect()
         };
-        let speed = pick(speed);
-        let frequency = pick(frequency);
+        let speed = values_of_rows(speed);
+        let frequency = values_of_rows(frequency);
         FrequencyCurve {
-            name: phrase.map_or(format!("mode {wanted}"), |phrase| format!("{wanted} {phrase}")),
-            resonances: known().unwrap_or_else(|| crossings(&speed, &frequency)),
+            name: shape_name
+                .map_or(format!("mode {wanted}"), |shape_name| format!("{wanted} {shape_name}")),
+            resonances: resonances_in_file().unwrap_or_else(|| crossings(&speed, &frequency)),
             speed,
             frequency,
-            band: band.map(|(low, high)| (pick(low), pick(high))),
+            band: band.map(|(low, high)| (values_of_rows(low), values_of_rows(high))),
         }
     };
-    Ok(numbers.into_iter().map(mode).collect())
+    Ok(distinct_numbers.into_iter().map(mode_curve).collect())
 }
 
 /// Returns the speeds at which a mode's frequency, linear between the given speeds, is the speed.
 fn crossings(speeds: &[f64], frequencies: &[f64]) -> Vec<f64> {
-    let both = frequencies.iter().zip(speeds);
-    let excess: Vec<f64> = both.map(|(frequency, speed)| frequency - speed).collect();
+    let pairs = frequencies.iter().zip(speeds);
+    let excess: Vec<f64> = pairs.map(|(frequency, speed)| frequency - speed).collect();
     (1..excess.len())
         .filter(|&k| excess[k - 1] > 0.0 && excess[k] <= 0.0)
         .map(|k| {
-            let part = excess[k - 1] / (excess[k - 1] - excess[k]);
-            speeds[k - 1] + part * (speeds[k] - speeds[k - 1])
+            let share = excess[k - 1] / (excess[k - 1] - excess[k]);
+            speeds[k - 1] + share * (speeds[k] - speeds[k - 1])
         })
         .collect()
 }
@@ -225,8 +248,8 @@ mod tests {
     fn a_resonance_is_where_the_frequency_is_the_speed() {
         let speed: Vec<f64> = (0..=10).map(|k| 30.0 * f64::from(k)).collect();
         let frequency: Vec<f64> = speed.iter().map(|speed| 150.0 - 0.02 * speed).collect();
-        let found = crossings(&speed, &frequency);
-        assert_eq!(found.len(), 1);
-        assert!((found[0] - 150.0 / 1.02).abs() < 1e-9);
+        let resonances = crossings(&speed, &frequency);
+        assert_eq!(resonances.len(), 1);
+        assert!((resonances[0] - 150.0 / 1.02).abs() < 1e-9);
     }
 }

@@ -6,7 +6,8 @@ use std::path::Path;
 use crate::WasherFigures;
 use crate::kinds::MACHINE;
 use crate::stability::{
-    HeldPoints, channels_of, columns_of, over_speeds, panel, response, shown_channels,
+    HeldPoints, channel_columns, channel_panel, channels_with_kind, over_speeds, response_series,
+    shown_channels,
 };
 use crate::{passages, trace};
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
@@ -27,18 +28,18 @@ const ATTRACTOR_KINDS: [(&str, &str, Colour); 6] = [
 ];
 
 /// The name of the curve of a trace while the speed rises.
-const RISING: &str = "nonlinear model, speed rising";
+const RISING_SERIES: &str = "nonlinear model, speed rising";
 
 /// Minimum ratio of the largest to the smallest deviation for a logarithmic axis. Basis: on a
 /// linear axis the smaller ones would be flat.
-const LOG_RATIO: f64 = 10.0;
+const MIN_LOG_RATIO: f64 = 10.0;
 
 /// The column of the turn at which a state was recorded.
-const TURN: &str = "turn";
+const TURN_COLUMN: &str = "turn";
 /// The column of the tub's yaw in states once a turn.
-const YAW: &str = "q5_rad";
+const YAW_COLUMN: &str = "q5_rad";
 /// The column of the tub's pitch in states once a turn.
-const PITCH: &str = "q6_rad";
+const PITCH_COLUMN: &str = "q6_rad";
 
 /// An attractor: its speed, the index of its kind, and its deviation by channel.
 type Attractor = (f64, usize, Vec<f64>);
@@ -46,50 +47,54 @@ type Attractor = (f64, usize, Vec<f64>);
 /// Draws the deviations at one point of a dwell file over speed.
 ///
 /// # Errors
-/// The errors of [`HeldPoints::one`] and [`shown_channels`].
+/// The errors of [`HeldPoints::single`] and [`shown_channels`].
 pub(crate) fn chart(
     source: &FigureFile,
-    at: &NamedPoint,
+    fixed_values: &NamedPoint,
     options: &WasherFigures,
 ) -> Result<Chart, PlotError> {
-    let channels = channels_of(source, "periodic");
+    let channels = channels_with_kind(source, "periodic");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown_channels(source, &names, &options.channels)?;
-    let held = HeldPoints::one(source, at, "--at")?;
-    let attractors = attractors(source, &held, &channels)?;
-    let one = held.read(&columns_of(&channels, ["linear", "periodic"]))?.remove(0);
-    let passing =
-        options.against.as_ref().map(|path| passing_run(source, &held, path)).transpose()?;
-    let attractors_of = |kind: usize| attractors.iter().filter(move |(_, own, _)| *own == kind);
-    let first = one.speed.first().copied();
-    let last = one.speed.last().copied();
-    let is_held = |speed: &f64| first <= Some(*speed) && Some(*speed) <= last;
+    let held_points = HeldPoints::single(source, fixed_values, "--at")?;
+    let attractors = attractors(source, &held_points, &channels)?;
+    let curves = held_points.read(&channel_columns(&channels, ["linear", "periodic"]))?.remove(0);
+    let passing_chart =
+        options.against.as_ref().map(|path| passing_run(source, &held_points, path)).transpose()?;
+    let attractors_with_kind = |kind: usize| {
+        attractors.iter().filter(move |(_, kind_of_attractor, _)| *kind_of_attractor == kind)
+    };
+    let first = curves.speed.first().copied();
+    let last = curves.speed.last().copied();
+    let is_in_range = |speed: &f64| first <= Some(*speed) && Some(*speed) <= last;
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
         let (_, factor) = label::display_unit(&facts.unit);
-        let mut series = response("periodic response", &one, k, factor);
+        let mut series = response_series("periodic response", &curves, k, factor);
         for (kind, (_, words, colour)) in ATTRACTOR_KINDS.iter().enumerate() {
-            let ends = attractors_of(kind).map(|(speed, _, values)| (speed, values[k] * factor));
-            let (x, y): (Vec<f64>, Vec<f64>) = ends.unzip();
+            let points =
+                attractors_with_kind(kind).map(|(speed, _, values)| (speed, values[k] * factor));
+            let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
             if !y.is_empty() {
                 let name = format!("ends in: {words}");
                 series.push(Series::new(name, *colour, x, y, Style::Dots));
             }
         }
-        let runs = passing.iter().flat_map(|run| &run.panels).filter(|panel| panel.name == *name);
-        let runs = runs.flat_map(|panel| &panel.series);
-        let rising = runs.filter(|run| run.name == RISING);
+        let curves_of_run =
+            passing_chart.iter().flat_map(|run| &run.panels).filter(|panel| panel.name == *name);
+        let curves_of_run = curves_of_run.flat_map(|panel| &panel.series);
+        let rising = curves_of_run.filter(|run| run.name == RISING_SERIES);
         series.extend(rising.map(|run| {
-            let held = run.x.iter().zip(&run.y).filter(|(speed, _)| is_held(speed));
-            let (x, y): (Vec<f64>, Vec<f64>) = held.unzip();
+            let turns_in_range = run.x.iter().zip(&run.y).filter(|(speed, _)| is_in_range(speed));
+            let (x, y): (Vec<f64>, Vec<f64>) = turns_in_range.unzip();
             Series::new("a run that passes these speeds", INK, x, y, Style::Solid(1.4))
         }));
-        let attractors = series.iter().flat_map(|series| &series.y).copied();
-        let log = extremes(attractors.filter(|y| *y > 0.0))
-            .is_some_and(|(low, high)| high > LOG_RATIO * low);
-        ChartPanel { height: 190.0, log, ..panel((name, facts), is_shown[k], series) }
+        let values = series.iter().flat_map(|series| &series.y).copied();
+        let is_log = extremes(values.filter(|y| *y > 0.0))
+            .is_some_and(|(low, high)| high > MIN_LOG_RATIO * low);
+        ChartPanel { height: 190.0, is_log, ..channel_panel((name, facts), is_shown[k], series) }
     });
     let titles = ["What a held speed ends in", "largest deviation from equilibrium"];
-    Ok(over_speeds(titles, &held, &one, panels.collect()))
+    Ok(over_speeds(titles, &held_points, &curves, panels.collect()))
 }
 
 /// Draws the largest deviation in each turn of a run that passes these speeds.
@@ -98,11 +103,14 @@ pub(crate) fn chart(
 /// [`PlotError::Unfit`] for a file that is no trace or of another machine.
 fn passing_run(
     source: &FigureFile,
-    held: &HeldPoints<'_>,
+    held_points: &HeldPoints<'_>,
     path: &Path,
 ) -> Result<Chart, PlotError> {
-    let trace = trace::other_trace(path)?;
-    let files = [(&trace.source, &together::at(&trace.source)), (source, &held.values())];
+    let trace = trace::read_other_trace(path)?;
+    let files = [
+        (&trace.source, &together::point_of_trace(&trace.source)),
+        (source, &held_points.values()),
+    ];
     together::check_agreement("--against", path, files, MACHINE)?;
     passages::chart(&trace, &WasherFigures::default())
 }
@@ -110,14 +118,14 @@ fn passing_run(
 /// Reads the attractors at every speed.
 fn attractors(
     source: &FigureFile,
-    held: &HeldPoints<'_>,
+    held_points: &HeldPoints<'_>,
     channels: &[(&str, &ColumnFacts)],
 ) -> Result<Vec<Attractor>, PlotError> {
-    let mut columns = columns_of(channels, ["nonlinear"]);
-    columns.push(TURN.to_owned());
-    let has_turns = source.column(TURN).is_some();
+    let mut columns = channel_columns(channels, ["nonlinear"]);
+    columns.push(TURN_COLUMN.to_owned());
+    let has_turns = source.column(TURN_COLUMN).is_some();
     let mut attractors = Vec::new();
-    held.each_row(&columns, |_, mut row| {
+    held_points.each_row(&columns, |_, mut row| {
         // An attractor has a row for each turn; the first one stands for it.
         if row.values.pop().is_some_and(|turn| turn <= 0.0) || !has_turns {
             attractors.push((row.speed, kind_index(row.kind), row.values));
@@ -131,7 +139,7 @@ fn kind_index(kind: Option<&str>) -> usize {
     let kind = kind.unwrap_or_default();
     ATTRACTOR_KINDS
         .iter()
-        .position(|(known, ..)| *known == kind)
+        .position(|(known_kind, ..)| *known_kind == kind)
         .unwrap_or(ATTRACTOR_KINDS.len() - 1)
 }
 
@@ -139,45 +147,45 @@ fn kind_index(kind: Option<&str>) -> usize {
 /// yaw, with a panel for each speed.
 ///
 /// # Errors
-/// The errors of [`HeldPoints::one`]; [`PlotError::Undrawable`] if the file has no states.
-pub(crate) fn sections(source: &FigureFile, at: &NamedPoint) -> Result<Chart, PlotError> {
-    let held = HeldPoints::one(source, at, "--at")?;
-    let columns = ["motion", YAW, PITCH];
+/// The errors of [`HeldPoints::single`]; [`PlotError::Undrawable`] if the file has no states.
+pub(crate) fn sections(source: &FigureFile, fixed_values: &NamedPoint) -> Result<Chart, PlotError> {
+    let held_points = HeldPoints::single(source, fixed_values, "--at")?;
+    let columns = ["motion", YAW_COLUMN, PITCH_COLUMN];
     if columns.into_iter().any(|name| source.column(name).is_none()) {
         return Err(source.nothing_to_draw("it keeps no states: `sweep dwell --sections N` does"));
     }
     // Each entry has the speed, the attractor's number, its kind, and its states.
-    let mut found: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
-    held.each_row(&columns, |_, row| {
+    let mut attractors: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
+    held_points.each_row(&columns, |_, row| {
         let [motion, yaw, pitch] = [0, 1, 2].map(|k| row.values[k]);
         let state = [1e3 * yaw, 1e3 * pitch];
-        match found.last_mut().filter(|last| (last.0, last.1) == (row.speed, motion)) {
+        match attractors.last_mut().filter(|last| (last.0, last.1) == (row.speed, motion)) {
             Some((.., states)) => states.push(state),
-            None => found.push((row.speed, motion, kind_index(row.kind), vec![state])),
+            None => attractors.push((row.speed, motion, kind_index(row.kind), vec![state])),
         }
     })?;
     let mut panels: Vec<ChartPanel> = Vec::new();
-    for (speed, motion, kind, mut states) in found {
+    for (speed, motion, kind, mut states) in attractors {
         states.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let (_, words, colour) = ATTRACTOR_KINDS[kind];
-        let phrase = format!("{} rpm", label::significant(speed, 6));
-        let further = DISTINCT[motion as usize % DISTINCT.len()];
-        let colour = if motion == 0.0 { colour } else { further };
+        let speed_text = format!("{} rpm", label::format_significant(speed, 6));
+        let further_colour = DISTINCT[motion as usize % DISTINCT.len()];
+        let colour = if motion == 0.0 { colour } else { further_colour };
         let name = format!("motion {motion}: {words}");
         let [yaw, pitch]: [Vec<f64>; 2] =
             [0, 1].map(|k| states.iter().map(|state| state[k]).collect());
         let series = Series::new(name, colour, yaw, pitch, Style::Dots);
-        match panels.last_mut().filter(|panel| panel.name == phrase) {
+        match panels.last_mut().filter(|panel| panel.name == speed_text) {
             Some(panel) => panel.series.push(series),
             None => {
-                let label = Label::new(&format!("Pitch at {phrase}"), "mrad");
-                panels.push(ChartPanel::new(&phrase, label, vec![series]));
+                let label = Label::new(&format!("Pitch at {speed_text}"), "mrad");
+                panels.push(ChartPanel::new(&speed_text, label, vec![series]));
             }
         }
     }
     Ok(Chart {
         title: "States once a turn, where the unbalance is up".to_owned(),
-        subtitle: held.notes().join(" · "),
+        subtitle: held_points.notes().join(" · "),
         x_label: Label::new("Yaw of the tub from equilibrium", "mrad"),
         panels,
         ..Chart::default()

@@ -26,6 +26,6 @@ pub(crate) const MODEL_KINDS: ModelKinds = ModelKinds {
 
 /// Returns a mark that is labelled with a speed, rpm.
 pub(crate) fn speed_mark(x: f64, speed_rpm: f64) -> Mark {
-    let speed = format!("{speed_rpm:.1}");
-    Mark { x, label: format!("{} rpm", label::trimmed(&speed)) }
+    let text = format!("{speed_rpm:.1}");
+    Mark { x, label: format!("{} rpm", label::trim_decimals(&text)) }
 }

@@ -80,7 +80,7 @@ impl FigureView {
 
     /// Returns the figure of designs in `sweep-plot`, if it is one.
     #[must_use]
-    pub const fn common(self) -> Option<sweep_plot::DesignView> {
+    pub const fn design_view(self) -> Option<sweep_plot::DesignView> {
         match self {
             Self::Scatter => Some(sweep_plot::DesignView::Scatter),
             Self::Histogram => Some(sweep_plot::DesignView::Histogram),
@@ -117,37 +117,61 @@ impl Figures for WasherFigures {
     }
 
     fn check(&self, source: &FigureFile, is_page: bool) -> Result<(), PlotError> {
-        let is = |kind| source.kind == kind;
-        let trace = is(FigureKind::TRACE);
-        let modes = is(MODES);
-        let dwell = is(DWELL);
-        let over_modes = modes && matches!(self.view, None | Some(FigureView::Frequencies));
-        let over_time = trace && matches!(self.view, None | Some(FigureView::Time));
-        let moving = trace || dwell || is(STABILITY) && self.view == Some(FigureView::Responses);
-        let moving_are = "traces, dwells and responses of stability files (a map shows a channel's \
-                          column: --quantity ratio_tub_yaw)";
-        source.reject_option("--channel", !self.channels.is_empty(), moving, moving_are)?;
-        source.reject_option("--resonances", !self.resonances_rpm.is_empty(), trace, "traces")?;
-        source.reject_option("--modes", self.modes.is_some(), trace, "traces")?;
-        let machines = "traces, and frequencies of modes files";
+        let is_kind = |kind| source.kind == kind;
+        let is_trace = is_kind(FigureKind::TRACE);
+        let is_modes = is_kind(MODES);
+        let is_dwell = is_kind(DWELL);
+        let shows_frequencies =
+            is_modes && matches!(self.view, None | Some(FigureView::Frequencies));
+        let shows_time = is_trace && matches!(self.view, None | Some(FigureView::Time));
+        let shows_channels =
+            is_trace || is_dwell || is_kind(STABILITY) && self.view == Some(FigureView::Responses);
+        let files_with_channels = "traces, dwells and responses of stability files (a map shows a \
+                                   channel's column: --quantity ratio_tub_yaw)";
+        source.reject_option(
+            "--channel",
+            !self.channels.is_empty(),
+            shows_channels,
+            files_with_channels,
+        )?;
+        source.reject_option(
+            "--resonances",
+            !self.resonances_rpm.is_empty(),
+            is_trace,
+            "traces",
+        )?;
+        source.reject_option("--modes", self.modes.is_some(), is_trace, "traces")?;
+        let files_with_stability = "traces, and frequencies of modes files";
         source.reject_option(
             "--stability",
             self.stability.is_some(),
-            trace || over_modes,
-            machines,
+            is_trace || shows_frequencies,
+            files_with_stability,
         )?;
         if let Some(kind) = self.view.map(FigureView::kind) {
             // Options of designs are checked by `sweep-plot`.
             let files = match kind {
                 FigureKind::TRACE => "traces".to_owned(),
-                other => format!("{} files", other.name),
+                kind => format!("{} files", kind.name),
             };
-            source.reject_option("--view", true, is(kind), &files)?;
+            source.reject_option("--view", true, is_kind(kind), &files)?;
         }
-        let over_runs = "traces over time and dwell files";
-        source.reject_option("--against", self.against.is_some(), over_time || dwell, over_runs)?;
-        let map = is(FigureKind::MAP) || is(FigureKind::DIFFERENCES) || is(FigureKind::DESIGN);
-        source.reject_option("--live", self.live.is_some(), map && is_page, "maps drawn as .html")
+        let files_with_runs = "traces over time and dwell files";
+        source.reject_option(
+            "--against",
+            self.against.is_some(),
+            shows_time || is_dwell,
+            files_with_runs,
+        )?;
+        let is_map = is_kind(FigureKind::MAP)
+            || is_kind(FigureKind::DIFFERENCES)
+            || is_kind(FigureKind::DESIGN);
+        source.reject_option(
+            "--live",
+            self.live.is_some(),
+            is_map && is_page,
+            "maps drawn as .html",
+        )
     }
 
     fn chart(
@@ -155,14 +179,14 @@ impl Figures for WasherFigures {
         source: FigureFile,
         options: &PlotOptions,
     ) -> Result<(FigureFile, Chart), PlotError> {
-        let at = &options.at;
+        let fixed_values = &options.fixed_values;
         let speed_chart = match (source.kind, self.view) {
             (STABILITY, Some(FigureView::Responses)) => {
-                Some(stability::responses(&source, at, self)?)
+                Some(stability::responses(&source, fixed_values, self)?)
             }
-            (STABILITY, _) => Some(stability::growth(&source, at)?),
-            (DWELL, Some(FigureView::Sections)) => Some(dwell::sections(&source, at)?),
-            (DWELL, _) => Some(dwell::chart(&source, at, self)?),
+            (STABILITY, _) => Some(stability::growth(&source, fixed_values)?),
+            (DWELL, Some(FigureView::Sections)) => Some(dwell::sections(&source, fixed_values)?),
+            (DWELL, _) => Some(dwell::chart(&source, fixed_values, self)?),
             _ => None,
         };
         if let Some(chart) = speed_chart {

@@ -1,11 +1,11 @@
 //! The live part of a page: the WebAssembly module, its setup and the sliders.
 
 use serde_json::{Value, json};
-use sweep_plot::{LivePart, embed, label, table};
+use sweep_plot::{LivePart, embed, html_table, label};
 
 /// The module of `crates/washer-live`, compressed by gzip; `scripts/release/build_live.sh` makes
 /// it.
-const MODULE: &[u8] = include_bytes!("../assets/live.wasm.gz");
+const COMPRESSED_MODULE: &[u8] = include_bytes!("../assets/live.wasm.gz");
 
 /// The scripts of the live part.
 const SCRIPTS: &[&str] = &[
@@ -17,7 +17,7 @@ const SCRIPTS: &[&str] = &[
 ];
 
 /// The templates of elements, and the script of the page's workers.
-const PARTS: &str = concat!(
+const ELEMENT_TEMPLATES: &str = concat!(
     include_str!("html/parts.html"),
     "<script type=\"text/plain\" id=\"worker\">",
     include_str!("html/worker.js"),
@@ -43,9 +43,11 @@ pub struct Live {
     /// The channels in the order of the module's records.
     pub channels: Vec<String>,
     /// The indices of the channels that the verdict compares.
-    pub compared: Vec<usize>,
+    #[serde(rename = "compared")]
+    pub compared_channels: Vec<usize>,
     /// The words for an amplitude and for a ratio.
-    pub criterion: [String; 2],
+    #[serde(rename = "criterion")]
+    pub criterion_words: [String; 2],
     /// The columns of each model's metrics in the order of the module's records.
     pub metrics: Vec<[String; 2]>,
     /// Whether the map has the static sag.
@@ -57,10 +59,12 @@ pub struct Live {
     /// Whether the growth at a constant speed takes long to compute, as with friction or stops.
     pub has_slow_growth: bool,
     /// The kinds of attractors in the module's order, in words.
-    pub motions: Vec<String>,
+    #[serde(rename = "motions")]
+    pub attractor_kinds: Vec<String>,
     /// The ways in which a response can lose its stability, in the module's order; empty for a
     /// machine whose stability cannot be computed.
-    pub kinds: Vec<String>,
+    #[serde(rename = "kinds")]
+    pub instability_kinds: Vec<String>,
     /// The names of the refinement levels in the module's order.
     pub levels: Vec<String>,
     /// The largest relative error of a checked amplitude.
@@ -70,7 +74,8 @@ pub struct Live {
     /// The lower limit of reliable ratios, if the plan has one.
     pub ratio_min: Option<f64>,
     /// The refinement levels of the nonlinear and of the linear model, in words.
-    pub rungs: [Vec<String>; 2],
+    #[serde(rename = "rungs")]
+    pub level_words: [Vec<String>; 2],
     /// The version of the program that chose the refinement levels.
     pub version: String,
     /// The resonances of the linear model: motion, speed with its unit, damping ratio.
@@ -95,40 +100,41 @@ pub struct Slider {
 pub(crate) fn live_part(live: &Live, axes: &[(&str, bool)]) -> LivePart {
     let channel = |name: &String| {
         let (unit, factor) = label::display_unit(label::unit_of_channel(name));
-        json!({ "name": name, "words": label::channel(name), "unit": unit, "factor": factor })
+        let words = label::channel_in_words(name);
+        json!({ "name": name, "words": words, "unit": unit, "factor": factor })
     };
     let mut data = json!(live);
-    data["module"] = embed::bytes(MODULE.iter().copied()).into();
-    data["setup"] = embed::doubles(&live.setup).into();
-    data["sliders"] = live.sliders.iter().map(|one| slider(one, axes)).collect();
+    data["module"] = embed::encode_bytes(COMPRESSED_MODULE.iter().copied()).into();
+    data["setup"] = embed::encode_doubles(&live.setup).into();
+    data["sliders"] = live.sliders.iter().map(|parameter| slider_json(parameter, axes)).collect();
     data["channels"] = live.channels.iter().map(channel).collect();
-    data["metrics"] = live.metrics.iter().map(metric).collect();
-    for (key, names) in [("kinds", &live.kinds), ("motions", &live.motions)] {
+    data["metrics"] = live.metrics.iter().map(metric_json).collect();
+    for (key, names) in [("kinds", &live.instability_kinds), ("motions", &live.attractor_kinds)] {
         data[key] = names.iter().map(|name| name.replace('_', " ")).collect();
     }
-    LivePart { data, scripts: SCRIPTS, parts: PARTS }
+    LivePart { data, scripts: SCRIPTS, templates: ELEMENT_TEMPLATES }
 }
 
 /// Writes the table of the machine's resonances in HTML.
 pub(crate) fn resonances(live: &Live) -> String {
     let rows: Vec<_> = live.resonances.iter().cloned().map(Vec::from).collect();
     let heads = ["Motion", "Resonance", "Damping ratio"];
-    table("Resonances at the middle of the map", &heads, &rows)
+    html_table("Resonances at the middle of the map", &heads, &rows)
 }
 
-fn metric(columns: &[String; 2]) -> Value {
+fn metric_json(columns: &[String; 2]) -> Value {
     let unit = label::unit_of_name(&columns[0]);
     let (unit, factor) = label::display_unit(&unit);
-    let words = label::quantity(&columns[0]);
+    let words = label::quantity_in_words(&columns[0]);
     json!({ "columns": columns, "words": words, "unit": unit, "factor": factor })
 }
 
-fn slider(slider: &Slider, axes: &[(&str, bool)]) -> Value {
+fn slider_json(slider: &Slider, axes: &[(&str, bool)]) -> Value {
     let mut data = json!(slider);
-    data["words"] = label::words(&slider.name).into();
+    data["words"] = label::name_in_words(&slider.name).into();
     data["unit"] = label::unit_of_name(&slider.name).into();
     data["value"] = slider.value.unwrap_or(slider.from).into();
     data["axis"] = slider.value.is_none().into();
-    data["log"] = axes.iter().any(|(name, log)| *name == slider.name && *log).into();
+    data["log"] = axes.iter().any(|(name, is_log)| *name == slider.name && *is_log).into();
     data
 }

@@ -7,7 +7,7 @@ use sweep_plot::table::FigureTable;
 /// Returns the unbalance and the damping of the machine, if the file has them and all dampers are
 /// equal.
 pub(crate) fn unbalance_and_damping(table: &FigureTable) -> Vec<(&'static str, f64)> {
-    let Some(machine) = table.source.find("machine") else { return Vec::new() };
+    let Some(machine) = table.source.find_metadata("machine") else { return Vec::new() };
     let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
     let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();
     let mut dampings: Vec<f64> = dampers
@@ -15,6 +15,6 @@ pub(crate) fn unbalance_and_damping(table: &FigureTable) -> Vec<(&'static str, f
         .collect();
     dampings.dedup();
     let damping = (dampings.len() == 1).then(|| dampings[0]);
-    let named = [("unbalance_mass_kg", unbalance), ("damping_n_s_per_m", damping)];
-    named.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
+    let values = [("unbalance_mass_kg", unbalance), ("damping_n_s_per_m", damping)];
+    values.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
 }

@@ -14,12 +14,12 @@ use sweep_plot::{DISTINCT, PlotError};
 struct Ramp {
     from: usize,
     to: usize,
-    rises: bool,
+    is_rising: bool,
 }
 
 /// The whole turns of a ramp, each with its mean speed.
 struct RampTurns {
-    rises: bool,
+    is_rising: bool,
     turns: Vec<[usize; 2]>,
     speed: Vec<f64>,
 }
@@ -33,12 +33,16 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     let mut chart = trace::chart(table, options)?;
     let time = table.numbers("time_s")?;
     let speed: Vec<f64> = table.numbers("speed_rpm")?.iter().map(|speed| speed.abs()).collect();
-    let mean = |&[from, to]: &[usize; 2]| 0.5 * (speed[from] + speed[to]);
-    let ramp_turns = |ramp: Ramp| {
+    let mean_speed = |&[from, to]: &[usize; 2]| 0.5 * (speed[from] + speed[to]);
+    let turns_of_ramp = |ramp: Ramp| {
         let turns = turns(time, &speed, ramp);
-        RampTurns { rises: ramp.rises, speed: turns.iter().map(mean).collect::<Vec<_>>(), turns }
+        RampTurns {
+            is_rising: ramp.is_rising,
+            speed: turns.iter().map(mean_speed).collect::<Vec<_>>(),
+            turns,
+        }
     };
-    let mut all_turns: Vec<RampTurns> = ramps(&speed).into_iter().map(ramp_turns).collect();
+    let mut all_turns: Vec<RampTurns> = ramps(&speed).into_iter().map(turns_of_ramp).collect();
     all_turns.retain(|turns| !turns.turns.is_empty());
     if all_turns.is_empty() {
         return Err(table
@@ -47,7 +51,8 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     }
     chart.panels.retain(|panel| panel.name != "gap" && panel.name != "speed");
     for panel in &mut chart.panels {
-        panel.series = panel.series.iter().flat_map(|series| by_turn(series, &all_turns)).collect();
+        panel.series =
+            panel.series.iter().flat_map(|series| series_over_speed(series, &all_turns)).collect();
         panel.height = 190.0;
     }
     chart.title = "Greatest deviation in each turn of the drum, over its speed".to_owned();
@@ -61,57 +66,64 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
 }
 
 /// Returns a curve over time as one over speed for each ramp.
-fn by_turn(series: &Series, all_turns: &[RampTurns]) -> Vec<Series> {
-    let linear = series.name.starts_with("linear") || series.name == "model";
+fn series_over_speed(series: &Series, all_turns: &[RampTurns]) -> Vec<Series> {
+    let is_dashed = series.name.starts_with("linear") || series.name == "model";
     let curve = |turns: &RampTurns| {
-        let name =
-            format!("{}, speed {}", series.name, if turns.rises { "rising" } else { "falling" });
-        let y = turns.turns.iter().map(|&[from, to]| greatest(&series.y[from..=to])).collect();
-        let style = if linear { Style::Dashed } else { Style::Solid(1.8) };
-        Series::new(name, DISTINCT[usize::from(!turns.rises)], turns.speed.clone(), y, style)
+        let name = format!(
+            "{}, speed {}",
+            series.name,
+            if turns.is_rising { "rising" } else { "falling" }
+        );
+        let y = turns
+            .turns
+            .iter()
+            .map(|&[from, to]| greatest_magnitude(&series.y[from..=to]))
+            .collect();
+        let style = if is_dashed { Style::Dashed } else { Style::Solid(1.8) };
+        Series::new(name, DISTINCT[usize::from(!turns.is_rising)], turns.speed.clone(), y, style)
     };
     all_turns.iter().map(curve).collect()
 }
 
 /// Returns the greatest magnitude; NaN if a value is missing.
-fn greatest(values: &[f64]) -> f64 {
+fn greatest_magnitude(values: &[f64]) -> f64 {
     let greatest = values.iter().fold(0.0, |greatest: f64, value| greatest.max(value.abs()));
     if values.iter().any(|value| value.is_nan()) { f64::NAN } else { greatest }
 }
 
 /// Returns the ramps of a trace; instants of constant speed belong to none.
 fn ramps(speed: &[f64]) -> Vec<Ramp> {
-    let mut found: Vec<Ramp> = Vec::new();
+    let mut ramps: Vec<Ramp> = Vec::new();
     for k in 1..speed.len() {
         let change = speed[k] - speed[k - 1];
         if change == 0.0 || change.is_nan() {
             continue;
         }
-        let rises = change > 0.0;
-        match found.last_mut() {
-            Some(last) if last.to == k - 1 && last.rises == rises => last.to = k,
-            _ => found.push(Ramp { from: k - 1, to: k, rises }),
+        let is_rising = change > 0.0;
+        match ramps.last_mut() {
+            Some(last) if last.to == k - 1 && last.is_rising == is_rising => last.to = k,
+            _ => ramps.push(Ramp { from: k - 1, to: k, is_rising }),
         }
     }
-    found
+    ramps
 }
 
 /// Returns the whole turns of a ramp by first and last instant, in order of rising speed.
 fn turns(time: &[f64], speed: &[f64], ramp: Ramp) -> Vec<[usize; 2]> {
-    let mut found = Vec::new();
-    let mut made = 0.0;
-    let mut from = ramp.from;
+    let mut turns = Vec::new();
+    let mut turn_count = 0.0;
+    let mut first = ramp.from;
     for k in ramp.from + 1..=ramp.to {
-        made += 0.5 * (speed[k] + speed[k - 1]) / 60.0 * (time[k] - time[k - 1]);
-        if made >= 1.0 {
-            found.push([from, k]);
-            (made, from) = (made - 1.0, k);
+        turn_count += 0.5 * (speed[k] + speed[k - 1]) / 60.0 * (time[k] - time[k - 1]);
+        if turn_count >= 1.0 {
+            turns.push([first, k]);
+            (turn_count, first) = (turn_count - 1.0, k);
         }
     }
-    if !ramp.rises {
-        found.reverse();
+    if !ramp.is_rising {
+        turns.reverse();
     }
-    found
+    turns
 }
 
 #[cfg(test)]
@@ -124,15 +136,18 @@ mod tests {
         let time: Vec<f64> = (0..=920).map(|k| 0.01 * f64::from(k)).collect();
         let speed: Vec<f64> =
             time.iter().map(|t| (30.0 * t).min(126.0).min(30.0 * (9.2 - t))).collect();
-        let both = ramps(&speed);
-        assert_eq!(both.iter().map(|ramp| ramp.rises).collect::<Vec<_>>(), [true, false]);
-        let [up, down] = [0, 1].map(|k| turns(&time, &speed, both[k]));
+        let ramps = ramps(&speed);
+        assert_eq!(ramps.iter().map(|ramp| ramp.is_rising).collect::<Vec<_>>(), [true, false]);
+        let [up, down] = [0, 1].map(|k| turns(&time, &speed, ramps[k]));
         // On the rising ramp t^2/4 turns are made at t: the second ends at sqrt(8) s.
         assert_eq!((up.len(), down.len()), (4, 4));
         assert!((time[up[1][1]] - 8.0_f64.sqrt()).abs() < 0.02);
-        let middle = |turn: &[usize; 2]| speed[turn[0]] + speed[turn[1]];
-        assert!(down.windows(2).all(|pair| middle(&pair[0]) < middle(&pair[1])));
-        assert_eq!(greatest(&[1.0, -3.0, 2.0]), 3.0);
-        assert!(greatest(&[1.0, f64::NAN, 2.0]).is_nan() && greatest(&[f64::NAN, 2.0]).is_nan());
+        let speed_sum = |turn: &[usize; 2]| speed[turn[0]] + speed[turn[1]];
+        assert!(down.windows(2).all(|pair| speed_sum(&pair[0]) < speed_sum(&pair[1])));
+        assert_eq!(greatest_magnitude(&[1.0, -3.0, 2.0]), 3.0);
+        assert!(
+            greatest_magnitude(&[1.0, f64::NAN, 2.0]).is_nan()
+                && greatest_magnitude(&[f64::NAN, 2.0]).is_nan()
+        );
     }
 }

@@ -1,48 +1,50 @@
 //! The summary of a plan's machine and spin, which a reader of a page needs.
 
 use serde_json::Value;
-use sweep_plot::label::{significant, unit_of_name};
+use sweep_plot::label::{format_significant, unit_of_name};
 
 /// Returns the summary as headings and texts.
 pub(crate) fn plan_summary(plan: &Value) -> Vec<(&'static str, String)> {
-    let phrase = [("Machine", machine(&plan["machine"])), ("Spin", spin(&plan["spin"]))];
-    phrase.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
+    let lines =
+        [("Machine", machine_summary(&plan["machine"])), ("Spin", spin_summary(&plan["spin"]))];
+    lines.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
 }
 
 /// Returns the number under a key, with the unit that ends the key.
-fn quantity(table: &Value, key: &str) -> Option<String> {
-    let value = significant(table.get(key)?.as_f64()?, 4);
+fn format_quantity(table: &Value, key: &str) -> Option<String> {
+    let value = format_significant(table.get(key)?.as_f64()?, 4);
     Some(format!("{value} {}", unit_of_name(key)).trim_end().to_owned())
 }
 
-fn machine(machine: &Value) -> Option<String> {
-    let mass = |body: &str| quantity(&machine[body], "mass_kg");
-    let tub = mass("tub")?;
-    let shaft = mass("shaft")?;
-    let drum = mass("drum")?;
-    let radius = quantity(&machine["unbalance"], "radius_m")?;
-    let unbalance = mass("unbalance")?;
+fn machine_summary(machine: &Value) -> Option<String> {
+    let mass_of = |body: &str| format_quantity(&machine[body], "mass_kg");
+    let tub = mass_of("tub")?;
+    let shaft = mass_of("shaft")?;
+    let drum = mass_of("drum")?;
+    let radius = format_quantity(&machine["unbalance"], "radius_m")?;
+    let unbalance = mass_of("unbalance")?;
     let mut parts = vec![format!(
         "tub {tub}, shaft {shaft}, drum {drum}, unbalance {unbalance} at radius {radius}"
     )];
     // Each number of a list's elements follows its word: the common value, or the least and the
     // greatest.
-    let elements = |(list, numbers): (&str, &[(&str, &str)])| {
-        let all = machine.get(list).and_then(Value::as_array)?;
-        let phrase = numbers.iter().filter_map(|(word, number)| {
+    let list_summary = |(list, numbers): (&str, &[(&str, &str)])| {
+        let elements_of_list = machine.get(list).and_then(Value::as_array)?;
+        let values = numbers.iter().filter_map(|(word, key)| {
             // A number that an element lacks is 0; a number that all lack is left out.
-            let size = |element: &Value| element[*number].as_f64().unwrap_or_default();
-            let most = all.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
-            let least = all.iter().map(size).fold(f64::INFINITY, f64::min);
-            let from = match least == size(most) {
+            let value_of = |element: &Value| element[*key].as_f64().unwrap_or_default();
+            let greatest =
+                elements_of_list.iter().max_by(|a, b| value_of(a).total_cmp(&value_of(b)))?;
+            let least = elements_of_list.iter().map(value_of).fold(f64::INFINITY, f64::min);
+            let least_text = match least == value_of(greatest) {
                 true => String::new(),
-                false => format!("{} to ", significant(least, 4)),
+                false => format!("{} to ", format_significant(least, 4)),
             };
-            Some(format!(" {word} {from}{}", quantity(most, number)?))
+            Some(format!(" {word} {least_text}{}", format_quantity(greatest, key)?))
         });
         let words = list.replace('_', " ");
-        let words = if all.len() == 1 { words.trim_end_matches('s') } else { &words };
-        Some(format!("{} {words}{}", all.len(), phrase.collect::<Vec<_>>().join(",")))
+        let words = if elements_of_list.len() == 1 { words.trim_end_matches('s') } else { &words };
+        Some(format!("{} {words}{}", elements_of_list.len(), values.collect::<Vec<_>>().join(",")))
     };
     let lists: [(&str, &[(&str, &str)]); 6] = [
         ("springs", &[("of", "stiffness_n_per_m")]),
@@ -52,19 +54,21 @@ fn machine(machine: &Value) -> Option<String> {
         ("further_unbalances", &[("of", "mass_kg")]),
         ("feet", &[]),
     ];
-    parts.extend(lists.into_iter().filter_map(elements));
-    if let Some(mass) = machine.get("cabinet").and_then(|cabinet| quantity(cabinet, "mass_kg")) {
-        parts.push(format!("a cabinet of {mass}"));
+    parts.extend(lists.into_iter().filter_map(list_summary));
+    if let Some(mass_of) =
+        machine.get("cabinet").and_then(|cabinet| format_quantity(cabinet, "mass_kg"))
+    {
+        parts.push(format!("a cabinet of {mass_of}"));
     }
-    if let Some(gap) = quantity(machine, "radial_clearance_m") {
+    if let Some(gap) = format_quantity(machine, "radial_clearance_m") {
         parts.push(format!("a gap of {gap} between drum and tub"));
     }
     Some(format!("{}; each point has its own values of the axes' parameters", parts.join("; ")))
 }
 
-fn spin(spin: &Value) -> Option<String> {
+fn spin_summary(spin: &Value) -> Option<String> {
     let profile = spin["profile"].as_str()?;
-    match (quantity(spin, "peak_rpm"), quantity(spin, "ramp_s")) {
+    match (format_quantity(spin, "peak_rpm"), format_quantity(spin, "ramp_s")) {
         (Some(peak), Some(ramp)) => Some(format!("{profile}, up to {peak} in {ramp}")),
         _ => Some(format!("{profile} of {} points", spin["time_s"].as_array()?.len())),
     }

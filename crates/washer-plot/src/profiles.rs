@@ -17,22 +17,24 @@ const CHI2_1_95: f64 = 3.84;
 /// # Errors
 /// [`PlotError::Undrawable`] for a file without profiles.
 pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
-    let empty = || {
+    let no_profiles = || {
         table.source.nothing_to_draw(
             "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
         )
     };
-    let profiles = table.source.find("profiles").and_then(Value::as_array).ok_or_else(empty)?;
-    let grid = profiles.first().map(|profile| numbers(&profile["deviations"]));
-    let grid = grid.filter(|grid| grid.len() > 1).ok_or_else(empty)?;
+    let profiles =
+        table.source.find_metadata("profiles").and_then(Value::as_array).ok_or_else(no_profiles)?;
+    let deviations = profiles.first().map(|profile| numbers(&profile["deviations"]));
+    let deviations =
+        deviations.filter(|deviations| deviations.len() > 1).ok_or_else(no_profiles)?;
     let series = profiles.iter().enumerate().map(|(k, profile)| {
-        let name = label::words(profile["name"].as_str().unwrap_or_default());
+        let name = label::name_in_words(profile["name"].as_str().unwrap_or_default());
         let y = numbers(&profile["cost_above"]);
-        Series::new(name, DISTINCT[k % 6], grid.clone(), y, Style::Solid(1.8))
+        Series::new(name, DISTINCT[k % 6], deviations.clone(), y, Style::Solid(1.8))
     });
-    let parabola = grid.iter().map(|deviation| deviation * deviation).collect();
+    let parabola = deviations.iter().map(|deviation| deviation * deviation).collect();
     let parabola =
-        Series::new("by the standard errors", MUTED, grid.clone(), parabola, Style::Dashed);
+        Series::new("by the standard errors", MUTED, deviations.clone(), parabola, Style::Dashed);
     let series = series.chain([parabola]).collect();
     let panel = ChartPanel {
         levels: vec![(CHI2_1_95, "95 %".to_owned())],

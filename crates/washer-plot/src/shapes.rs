@@ -32,25 +32,29 @@ type AxisShape = [Vec<Phasor>; 2];
 /// # Errors
 /// [`PlotError::Undrawable`] if the file has no machine or no resonances.
 pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
-    let places = places(table).ok_or_else(|| {
+    let positions = axis_positions(table).ok_or_else(|| {
         table.source.nothing_to_draw("the file does not say where the machine's parts are")
     })?;
     let mut panels = Vec::new();
-    for mode in table.source.list(key::MODES) {
+    for mode in table.source.metadata_list(key::MODES) {
         let name = mode["name"].as_str().unwrap_or_default();
         for resonance in mode["resonances"].as_array().into_iter().flatten() {
-            let (Some(speed), Some(q)) =
-                (resonance["speed_rpm"].as_f64(), shape(&resonance["shape"]))
+            let (Some(speed), Some(coordinates)) =
+                (resonance["speed_rpm"].as_f64(), coordinate_phasors(&resonance["shape"]))
             else {
                 continue;
             };
             let number = panels.len() + 1;
-            let words = format!("{}, {speed:.1} rpm", label::capitalised(name));
+            let words = format!("{}, {speed:.1} rpm", label::capitalise(name));
             let label = Label::new(&words, "");
             panels.push(ChartPanel {
                 range: Some((-1.15, 1.15)),
                 height: 200.0,
-                ..ChartPanel::new(&format!("shape {number}"), label, series(&places, &q))
+                ..ChartPanel::new(
+                    &format!("shape {number}"),
+                    label,
+                    shape_series(&positions, &coordinates),
+                )
             });
         }
     }
@@ -70,8 +74,8 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
     })
 }
 
-fn places(table: &FigureTable) -> Option<AxisPositions> {
-    let machine = table.source.find("machine")?;
+fn axis_positions(table: &FigureTable) -> Option<AxisPositions> {
+    let machine = table.source.find_metadata("machine")?;
     let number = |path: &str| machine.pointer(path).and_then(Value::as_f64);
     let rear = number("/bearings/rear_x_m")?;
     let tub = [rear, number("/tub/front_x_m")?];
@@ -83,117 +87,132 @@ fn places(table: &FigureTable) -> Option<AxisPositions> {
 const COORDINATES: usize = 10;
 
 /// Returns the phasor of each coordinate.
-fn shape(coordinates: &Value) -> Option<Vec<Phasor>> {
-    let part = |q: &Value, k: usize| q.get(k).and_then(Value::as_f64);
+fn coordinate_phasors(coordinates: &Value) -> Option<Vec<Phasor>> {
+    let component = |number_pair: &Value, k: usize| number_pair.get(k).and_then(Value::as_f64);
     (1..=COORDINATES)
-        .map(|i| coordinates.get(format!("q{i}")).and_then(|q| Some([part(q, 0)?, part(q, 1)?])))
+        .map(|i| {
+            coordinates.get(format!("q{i}")).and_then(|number_pair| {
+                Some([component(number_pair, 0)?, component(number_pair, 1)?])
+            })
+        })
         .collect()
 }
 
 /// Returns the axes of tub and drum to first order (model page, section 1).
-fn axis_shapes(places: &AxisPositions, q: &[Phasor]) -> [AxisShape; 2] {
-    let plus = |a: Phasor, k: f64, b: Phasor| [a[0] + k * b[0], a[1] + k * b[1]];
-    let straight = |start: Phasor, slope: Phasor, sign: f64, xs: &[f64]| -> Vec<Phasor> {
-        xs.iter().map(|x| plus(start, sign * x, slope)).collect()
+fn axis_shapes(positions: &AxisPositions, phasors: &[Phasor]) -> [AxisShape; 2] {
+    let add_scaled = |a: Phasor, k: f64, b: Phasor| [a[0] + k * b[0], a[1] + k * b[1]];
+    let straight_axis = |start: Phasor, slope: Phasor, sign: f64, xs: &[f64]| -> Vec<Phasor> {
+        xs.iter().map(|x| add_scaled(start, sign * x, slope)).collect()
     };
-    let AxisPositions { tub, drum } = places;
-    let tub = [straight(q[0], q[5], 1.0, tub), straight(q[1], q[4], -1.0, tub)];
-    let mut drum = [straight(q[2], q[7], 1.0, drum), straight(q[3], q[6], -1.0, drum)];
+    let AxisPositions { tub, drum } = positions;
+    let tub = [
+        straight_axis(phasors[0], phasors[5], 1.0, tub),
+        straight_axis(phasors[1], phasors[4], -1.0, tub),
+    ];
+    let mut drum = [
+        straight_axis(phasors[2], phasors[7], 1.0, drum),
+        straight_axis(phasors[3], phasors[6], -1.0, drum),
+    ];
     // Beyond the hinge the drum's axis is bent against the shaft; at theta = 0 its angles are about
     // c2 and c3.
-    let beyond = places.drum[2] - places.drum[1];
-    drum[0][2] = plus(drum[0][2], beyond, q[9]);
-    drum[1][2] = plus(drum[1][2], -beyond, q[8]);
+    let length_beyond_hinge = positions.drum[2] - positions.drum[1];
+    drum[0][2] = add_scaled(drum[0][2], length_beyond_hinge, phasors[9]);
+    drum[1][2] = add_scaled(drum[1][2], -length_beyond_hinge, phasors[8]);
     [tub, drum]
 }
 
-fn series(places: &AxisPositions, q: &[Phasor]) -> Vec<Series> {
-    let [tub, drum] = axis_shapes(places, q);
-    let squared = |[re, im]: Phasor| re * re + im * im;
-    let all = tub.iter().chain(&drum).flatten();
-    let greatest =
-        all.copied().max_by(|a, b| squared(*a).total_cmp(&squared(*b))).unwrap_or([1.0, 0.0]);
+fn shape_series(positions: &AxisPositions, phasors: &[Phasor]) -> Vec<Series> {
+    let [tub, drum] = axis_shapes(positions, phasors);
+    let squared_magnitude = |[real, imaginary]: Phasor| real * real + imaginary * imaginary;
+    let deflections = tub.iter().chain(&drum).flatten();
+    let greatest = deflections
+        .copied()
+        .max_by(|a, b| squared_magnitude(*a).total_cmp(&squared_magnitude(*b)))
+        .unwrap_or([1.0, 0.0]);
     // Division by the greatest deflection makes that 1 at its maximum.
-    let scale = squared(greatest);
-    let turned = |[re, im]: Phasor| {
+    let scale = squared_magnitude(greatest);
+    let normalise = |[real, imaginary]: Phasor| {
         [
-            (re * greatest[0] + im * greatest[1]) / scale,
-            (im * greatest[0] - re * greatest[1]) / scale,
+            (real * greatest[0] + imaginary * greatest[1]) / scale,
+            (imaginary * greatest[0] - real * greatest[1]) / scale,
         ]
     };
     let mut series = Vec::new();
     for (k, direction) in ["vertical", "horizontal"].into_iter().enumerate() {
-        let tub_line: Vec<Phasor> = tub[k].iter().copied().map(turned).collect();
-        let drum_line: Vec<Phasor> = drum[k].iter().copied().map(turned).collect();
-        let mut add = |body: &str, x: &[f64], line: &[Phasor], colour: usize| {
+        let tub_line: Vec<Phasor> = tub[k].iter().copied().map(normalise).collect();
+        let drum_line: Vec<Phasor> = drum[k].iter().copied().map(normalise).collect();
+        let mut add_curves = |body: &str, x: &[f64], line: &[Phasor], colour: usize| {
             // The real part of exp(i w t) comes first; a quarter of a period later it is minus the
             // imaginary part.
-            for (part, sign, style, when) in [
+            for (component, sign, style, suffix) in [
                 (0, 1.0, Style::Solid(2.6), ""),
                 (1, -1.0, Style::Dashed, ", a quarter of a period later"),
             ] {
-                let name = format!("{body}{direction}{when}");
-                let y = line.iter().map(|phasor| sign * phasor[part]).collect();
+                let name = format!("{body}{direction}{suffix}");
+                let y = line.iter().map(|phasor| sign * phasor[component]).collect();
                 series.push(Series::new(name, DISTINCT[colour], x.to_vec(), y, style));
             }
         };
-        add("", &places.tub, &tub_line, k);
-        if max_separation(places, &tub_line, &drum_line) > MIN_SEPARATION {
-            add("drum, ", &places.drum, &drum_line, k + 2);
+        add_curves("", &positions.tub, &tub_line, k);
+        if max_separation(positions, &tub_line, &drum_line) > MIN_SEPARATION {
+            add_curves("drum, ", &positions.drum, &drum_line, k + 2);
         }
     }
     series
 }
 
 /// Returns the greatest distance between the axes of drum and tub.
-fn max_separation(places: &AxisPositions, tub: &[Phasor], drum: &[Phasor]) -> f64 {
-    let on_tub = |x: f64| {
-        let part = (x - places.tub[0]) / (places.tub[1] - places.tub[0]);
-        [0, 1].map(|k| tub[0][k] + part * (tub[1][k] - tub[0][k]))
+fn max_separation(positions: &AxisPositions, tub: &[Phasor], drum: &[Phasor]) -> f64 {
+    let tub_deflection = |x: f64| {
+        let share = (x - positions.tub[0]) / (positions.tub[1] - positions.tub[0]);
+        [0, 1].map(|k| tub[0][k] + share * (tub[1][k] - tub[0][k]))
     };
-    let points = places.drum.into_iter().zip(drum);
-    let max_separation = points.map(|(x, at)| (at[0] - on_tub(x)[0]).hypot(at[1] - on_tub(x)[1]));
-    max_separation.fold(0.0, f64::max)
+    let points = positions.drum.into_iter().zip(drum);
+    let separations = points.map(|(x, deflection)| {
+        (deflection[0] - tub_deflection(x)[0]).hypot(deflection[1] - tub_deflection(x)[1])
+    });
+    separations.fold(0.0, f64::max)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const PLACES: AxisPositions = AxisPositions { tub: [-0.05, 0.45], drum: [-0.05, 0.15, 0.45] };
+    const POSITIONS: AxisPositions =
+        AxisPositions { tub: [-0.05, 0.45], drum: [-0.05, 0.15, 0.45] };
 
     #[test]
     fn pitch_tilts_the_axis_up_and_yaw_tilts_it_against_c3() {
-        let mut q = vec![[0.0, 0.0]; 10];
-        (q[5], q[7]) = ([0.0, 2.0], [0.0, 2.0]);
-        let drawn = series(&PLACES, &q);
-        assert_eq!(drawn.len(), 4, "tub and drum move alike");
-        let curve = |name: &str| &drawn.iter().find(|series| series.name == name).unwrap().y;
-        let near = |found: &[f64], expected: [f64; 2]| {
-            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        let mut phasors = vec![[0.0, 0.0]; 10];
+        (phasors[5], phasors[7]) = ([0.0, 2.0], [0.0, 2.0]);
+        let series = shape_series(&POSITIONS, &phasors);
+        assert_eq!(series.len(), 4, "tub and drum move alike");
+        let curve = |name: &str| &series.iter().find(|series| series.name == name).unwrap().y;
+        let assert_near = |values: &[f64], expected: [f64; 2]| {
+            assert!(values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{values:?}");
         };
-        near(curve("vertical"), [-0.05 / 0.45, 1.0]);
-        near(curve("horizontal"), [0.0, 0.0]);
-        let mut q = vec![[0.0, 0.0]; 10];
-        (q[4], q[6]) = ([1.0, 0.0], [1.0, 0.0]);
-        let drawn = series(&PLACES, &q);
-        near(&drawn[2].y, [-0.05 / 0.45, 1.0]);
+        assert_near(curve("vertical"), [-0.05 / 0.45, 1.0]);
+        assert_near(curve("horizontal"), [0.0, 0.0]);
+        let mut phasors = vec![[0.0, 0.0]; 10];
+        (phasors[4], phasors[6]) = ([1.0, 0.0], [1.0, 0.0]);
+        let series = shape_series(&POSITIONS, &phasors);
+        assert_near(&series[2].y, [-0.05 / 0.45, 1.0]);
     }
 
     #[test]
     fn phase_and_bending_of_the_drum_are_drawn() {
         // The motion along c3 leads that along c2 by a quarter of a period.
-        let mut q = vec![[0.0, 0.0]; 10];
-        (q[0], q[2]) = ([0.0, -1.0], [0.0, -1.0]);
-        (q[1], q[3]) = ([0.5, 0.0], [0.5, 0.0]);
-        q[9] = [0.0, -0.5 / 0.3];
-        let drawn = series(&PLACES, &q);
-        let curve = |name: &str| &drawn.iter().find(|series| series.name == name).unwrap().y;
+        let mut phasors = vec![[0.0, 0.0]; 10];
+        (phasors[0], phasors[2]) = ([0.0, -1.0], [0.0, -1.0]);
+        (phasors[1], phasors[3]) = ([0.5, 0.0], [0.5, 0.0]);
+        phasors[9] = [0.0, -0.5 / 0.3];
+        let series = shape_series(&POSITIONS, &phasors);
+        let curve = |name: &str| &series.iter().find(|series| series.name == name).unwrap().y;
         // The greatest deflection is that of the drum's front, 1.5 along c2.
-        let last = |name: &str| curve(name).last().copied().unwrap();
-        assert!((last("drum, vertical") - 1.0).abs() < 1e-12);
-        assert!((last("vertical") - 1.0 / 1.5).abs() < 1e-12);
-        assert!((last("horizontal, a quarter of a period later") + 0.5 / 1.5).abs() < 1e-12);
-        assert!(last("horizontal").abs() < 1e-12);
+        let last_value = |name: &str| curve(name).last().copied().unwrap();
+        assert!((last_value("drum, vertical") - 1.0).abs() < 1e-12);
+        assert!((last_value("vertical") - 1.0 / 1.5).abs() < 1e-12);
+        assert!((last_value("horizontal, a quarter of a period later") + 0.5 / 1.5).abs() < 1e-12);
+        assert!(last_value("horizontal").abs() < 1e-12);
     }
 }

@@ -13,7 +13,7 @@ use sweep_plot::{INK, MUTED, PlotError};
 /// # Errors
 /// [`PlotError::Undrawable`] for a file without spectra.
 pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
-    let spectra = table.source.find("spectra").ok_or_else(|| {
+    let spectra = table.source.find_metadata("spectra").ok_or_else(|| {
         table.source.nothing_to_draw("it has no spectra: they are in the curves of `sweep fit`")
     })?;
     let panel = |column: &Value| {
@@ -25,8 +25,8 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
             Series::new(key, colour, numbers(&spectra["hz"]), y, Style::Solid(1.3))
         };
         let series = vec![curve("measured", MUTED), curve("residual", INK)];
-        let label = Label::new(&label::words(text("name")), &format!("{unit} per root Hz"));
-        ChartPanel { height: 165.0, log: true, ..ChartPanel::new(text("name"), label, series) }
+        let label = Label::new(&label::name_in_words(text("name")), &format!("{unit} per root Hz"));
+        ChartPanel { height: 165.0, is_log: true, ..ChartPanel::new(text("name"), label, series) }
     };
     Ok(Chart {
         title: "What the fitted model leaves over, by frequency".to_owned(),

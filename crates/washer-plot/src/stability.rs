@@ -14,7 +14,7 @@ use sweep_plot::table::FigureTable;
 use sweep_plot::together::{self, NamedPoint};
 use sweep_plot::{DISTINCT, LINEAR, NONLINEAR, PlotError};
 
-/// Maximum number of points whose growth is drawn: each needs a colour of its own.
+/// Maximum number of points whose growth is drawn: each needs a distinct colour.
 const MAX_CURVES: usize = DISTINCT.len();
 
 /// The channels whose responses are drawn by default, as in charts of traces.
@@ -40,40 +40,42 @@ pub(crate) struct SpeedCurves {
 /// Draws the growth of a stability file over speed.
 ///
 /// # Errors
-/// The errors of [`HeldPoints::at`] and [`HeldPoints::read`].
-pub(crate) fn growth(source: &FigureFile, at: &NamedPoint) -> Result<Chart, PlotError> {
-    let mut held = HeldPoints::at(source, at, "--at")?;
-    let count = held.points.len();
+/// The errors of [`HeldPoints::matching`] and [`HeldPoints::read`].
+pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<Chart, PlotError> {
+    let mut held_points = HeldPoints::matching(source, fixed_values, "--at")?;
+    let count = held_points.points.len();
     if count > MAX_CURVES {
-        let some = (0..MAX_CURVES).map(|k| k * (count - 1) / (MAX_CURVES - 1));
-        held.points = some.map(|place| held.points[place].clone()).collect();
+        let picks = (0..MAX_CURVES).map(|k| k * (count - 1) / (MAX_CURVES - 1));
+        held_points.points = picks.map(|index| held_points.points[index].clone()).collect();
     }
-    let swept = held.read(&[])?;
-    let HeldPoints { axes, points: shown, .. } = &held;
-    let differs = |k: usize| shown.iter().any(|point| point[k] != shown[0][k]);
-    let name = |point: &[f64]| {
-        let named = axes.iter().zip(point).enumerate().filter(|(k, _)| differs(*k));
-        let named: Vec<String> =
-            named.map(|(_, (axis, value))| format_value(axis, *value)).collect();
-        if named.is_empty() { "growth".to_owned() } else { named.join(", ") }
+    let curves = held_points.read(&[])?;
+    let HeldPoints { axes, points: shown_points, .. } = &held_points;
+    let varies = |k: usize| shown_points.iter().any(|curve| curve[k] != shown_points[0][k]);
+    let curve_name = |curve: &[f64]| {
+        let varying_axes = axes.iter().zip(curve).enumerate().filter(|(k, _)| varies(*k));
+        let varying_axes: Vec<String> =
+            varying_axes.map(|(_, (axis, value))| format_value(axis, *value)).collect();
+        if varying_axes.is_empty() { "growth".to_owned() } else { varying_axes.join(", ") }
     };
-    let series = swept.iter().zip(shown).enumerate().map(|(k, (point, values))| {
-        let x = point.speed.clone();
-        let y = point.growth.clone();
-        Series::new(name(values), DISTINCT[k], x, y, Style::Solid(2.2))
+    let series = curves.iter().zip(shown_points).enumerate().map(|(k, (curve, values))| {
+        let x = curve.speed.clone();
+        let y = curve.growth.clone();
+        Series::new(curve_name(values), DISTINCT[k], x, y, Style::Solid(2.2))
     });
-    let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
-    let mut notes = source.notes(common.map(|(_, (axis, value))| format_within(axis, *value)));
-    if shown.len() < count {
-        notes.push(format!("{} of {count} points", shown.len()));
+    let constant_axes = axes.iter().zip(&shown_points[0]).enumerate().filter(|(k, _)| !varies(*k));
+    let mut notes =
+        source.notes(constant_axes.map(|(_, (axis, value))| format_in_lower_case(axis, *value)));
+    if shown_points.len() < count {
+        notes.push(format!("{} of {count} points", shown_points.len()));
     }
     let label = Label::new("Growth of a small disturbance", "1/s");
     let levels = vec![(0.0, "unstable above".to_owned())];
-    let panel = ChartPanel { levels, ..ChartPanel::new("growth", label, series.collect()) };
-    let (alone, edges) = match &swept[..] {
-        [one] => {
-            (unstable_ranges(&one.speed, &one.growth), stability_edges(&one.speed, &one.growth))
-        }
+    let channel_panel = ChartPanel { levels, ..ChartPanel::new("growth", label, series.collect()) };
+    let (shades, edges) = match &curves[..] {
+        [curve] => (
+            unstable_ranges(&curve.speed, &curve.growth),
+            stability_edges(&curve.speed, &curve.growth),
+        ),
         _ => Default::default(),
     };
     let edges = edges.into_iter().take(MAX_EDGES);
@@ -82,10 +84,10 @@ pub(crate) fn growth(source: &FigureFile, at: &NamedPoint) -> Result<Chart, Plot
         title: "Where a dwell at constant speed is unstable".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        panels: vec![panel],
+        panels: vec![channel_panel],
         marks,
         mark_meaning: "edge".to_owned(),
-        shades: alone,
+        shades,
         shade_meaning: UNSTABLE.to_owned(),
         ..Chart::default()
     })
@@ -95,42 +97,48 @@ pub(crate) fn growth(source: &FigureFile, at: &NamedPoint) -> Result<Chart, Plot
 /// over speed.
 ///
 /// # Errors
-/// Returns the errors of [`HeldPoints::one`]; [`PlotError::Unfit`] for an unknown channel.
+/// Returns the errors of [`HeldPoints::single`]; [`PlotError::Unfit`] for an unknown channel.
 pub(crate) fn responses(
     source: &FigureFile,
-    at: &NamedPoint,
+    fixed_values: &NamedPoint,
     options: &WasherFigures,
 ) -> Result<Chart, PlotError> {
-    let channels = channels_of(source, "linear");
+    let channels = channels_with_kind(source, "linear");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown_channels(source, &names, &options.channels)?;
-    let columns = columns_of(&channels, ["linear", "nonlinear"]);
-    let held = HeldPoints::one(source, at, "--at")?;
-    let one = held.read(&columns)?.remove(0);
-    let panels = channels.iter().zip(is_shown).enumerate().map(|(k, (channel, shown))| {
-        let lines = response("nonlinear model", &one, k, label::display_unit(&channel.1.unit).1);
-        ChartPanel { height: 170.0, ..panel(*channel, shown, lines) }
-    });
+    let columns = channel_columns(&channels, ["linear", "nonlinear"]);
+    let held_points = HeldPoints::single(source, fixed_values, "--at")?;
+    let curves = held_points.read(&columns)?.remove(0);
+    let panels =
+        channels.iter().zip(is_shown).enumerate().map(|(k, (channel, is_channel_shown))| {
+            let series = response_series(
+                "nonlinear model",
+                &curves,
+                k,
+                label::display_unit(&channel.1.unit).1,
+            );
+            ChartPanel { height: 170.0, ..channel_panel(*channel, is_channel_shown, series) }
+        });
     let titles =
         ["Periodic responses at constant speed", "largest deviation from equilibrium over a turn"];
-    Ok(over_speeds(titles, &held, &one, panels.collect()))
+    Ok(over_speeds(titles, &held_points, &curves, panels.collect()))
 }
 
 /// Returns a chart of one point over speed with its unstable speeds shaded. `title` is that of the
-/// chart; `shown` names the quantity of its panels.
+/// chart; `quantity` names that of its panels.
 pub(crate) fn over_speeds(
-    [title, shown]: [&str; 2],
-    held: &HeldPoints<'_>,
-    one: &SpeedCurves,
+    [title, quantity]: [&str; 2],
+    held_points: &HeldPoints<'_>,
+    curves: &SpeedCurves,
     panels: Vec<ChartPanel>,
 ) -> Chart {
-    let mut notes = held.notes();
-    notes.push(shown.to_owned());
+    let mut notes = held_points.notes();
+    notes.push(quantity.to_owned());
     Chart {
         title: title.to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        shades: unstable_ranges(&one.speed, &one.growth),
+        shades: unstable_ranges(&curves.speed, &curves.growth),
         shade_meaning: UNSTABLE.to_owned(),
         panels,
         ..Chart::default()
@@ -138,7 +146,7 @@ pub(crate) fn over_speeds(
 }
 
 /// Returns the channels of the nonlinear model that also have a column with the prefix `kind`.
-pub(crate) fn channels_of<'a>(
+pub(crate) fn channels_with_kind<'a>(
     source: &'a FigureFile,
     kind: &str,
 ) -> Vec<(&'a str, &'a ColumnFacts)> {
@@ -148,7 +156,7 @@ pub(crate) fn channels_of<'a>(
 }
 
 /// Returns the columns of each channel with these prefixes.
-pub(crate) fn columns_of<const N: usize>(
+pub(crate) fn channel_columns<const N: usize>(
     channels: &[(&str, &ColumnFacts)],
     kinds: [&str; N],
 ) -> Vec<String> {
@@ -156,36 +164,45 @@ pub(crate) fn columns_of<const N: usize>(
 }
 
 /// Returns the panel of a channel.
-pub(crate) fn panel(
+pub(crate) fn channel_panel(
     (name, facts): (&str, &ColumnFacts),
-    shown: bool,
+    is_shown: bool,
     series: Vec<Series>,
 ) -> ChartPanel {
-    let words = label::capitalised(&label::channel(name));
+    let words = label::capitalise(&label::channel_in_words(name));
     let label = Label::new(&words, label::display_unit(&facts.unit).0);
-    ChartPanel { shown, ..ChartPanel::new(name, label, series) }
+    ChartPanel { is_shown, ..ChartPanel::new(name, label, series) }
 }
 
 /// Returns the curves of the `k`-th channel, times `factor`: the linear model, and the stable and
 /// the unstable part of the nonlinear model's periodic response.
-pub(crate) fn response(name: &str, one: &SpeedCurves, k: usize, factor: f64) -> Vec<Series> {
+pub(crate) fn response_series(
+    name: &str,
+    curves: &SpeedCurves,
+    k: usize,
+    factor: f64,
+) -> Vec<Series> {
     let [linear, periodic]: [Vec<f64>; 2] =
-        [2 * k, 2 * k + 1].map(|k| one.columns[k].iter().map(|value| value * factor).collect());
-    let part_where = |wanted: bool| stability_part(&periodic, &one.growth, wanted);
+        [2 * k, 2 * k + 1].map(|k| curves.columns[k].iter().map(|value| value * factor).collect());
+    let part = |is_unstable: bool| stability_part(&periodic, &curves.growth, is_unstable);
     let [stable, unstable] = ["stable", "unstable"].map(|word| format!("{name}, {word}"));
     vec![
-        Series::new("linear model", LINEAR, one.speed.clone(), linear, Style::Solid(1.6)),
-        Series::new(stable, NONLINEAR, one.speed.clone(), part_where(false), Style::Solid(2.2)),
-        Series::new(unstable, NONLINEAR, one.speed.clone(), part_where(true), Style::Dashed),
+        Series::new("linear model", LINEAR, curves.speed.clone(), linear, Style::Solid(1.6)),
+        Series::new(stable, NONLINEAR, curves.speed.clone(), part(false), Style::Solid(2.2)),
+        Series::new(unstable, NONLINEAR, curves.speed.clone(), part(true), Style::Dashed),
     ]
 }
 
 /// Returns the unstable or the stable part of a curve over speed; other values are NaN. Both parts
 /// share the points at which they meet.
-fn stability_part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
-    let at = |i: usize| growth.get(i).is_some_and(|growth| (*growth > 0.0) == wanted);
-    let near = |i: usize| at(i) || (!wanted && (i > 0 && at(i - 1) || at(i + 1)));
-    (0..line.len()).map(|i| if near(i) { line[i] } else { f64::NAN }).collect()
+fn stability_part(curve: &[f64], growth: &[f64], is_unstable: bool) -> Vec<f64> {
+    let has_stability =
+        |i: usize| growth.get(i).is_some_and(|growth| (*growth > 0.0) == is_unstable);
+    let is_in_part = |i: usize| {
+        has_stability(i)
+            || (!is_unstable && (i > 0 && has_stability(i - 1) || has_stability(i + 1)))
+    };
+    (0..curve.len()).map(|i| if is_in_part(i) { curve[i] } else { f64::NAN }).collect()
 }
 
 /// Returns whether each channel is drawn: the requested ones, or else the default ones, or else
@@ -201,12 +218,12 @@ pub(crate) fn shown_channels(
     if let Some(unknown) = requested.iter().find(|name| !names.contains(&name.as_str())) {
         return Err(source.unknown_name("--channel", unknown, "channel", names.join(", ")));
     }
-    let usual: Vec<&str> =
+    let default_channels: Vec<&str> =
         DEFAULT_CHANNELS.into_iter().filter(|name| names.contains(name)).collect();
-    let is_shown = |name: &&str| match (requested, &usual[..]) {
+    let is_shown = |name: &&str| match (requested, &default_channels[..]) {
         ([], []) => true,
-        ([], usual) => usual.contains(name),
-        (requested, _) => requested.iter().any(|one| one == name),
+        ([], default_channels) => default_channels.contains(name),
+        (requested, _) => requested.iter().any(|name_requested| name_requested == name),
     };
     Ok(names.iter().map(is_shown).collect())
 }
@@ -223,41 +240,42 @@ pub(crate) struct UnstableSpeeds {
 /// Reads the unstable speeds of the machine of a trace or modes file from a stability file.
 ///
 /// # Errors
-/// The errors of [`FigureFile::open`] and [`FigureFile::expect`]; [`PlotError::Unfit`] if the
+/// The errors of [`FigureFile::open`] and [`FigureFile::expect_kind`]; [`PlotError::Unfit`] if the
 /// stability file does not have this machine.
 pub(crate) fn read_unstable(table: &FigureTable, path: &Path) -> Result<UnstableSpeeds, PlotError> {
     let source = FigureFile::open(path, MODEL_KINDS)?;
-    source.expect(STABILITY, "--stability", "`sweep stability` writes a stability file")?;
-    let mut at: NamedPoint = unbalance_and_damping(table)
+    source.expect_kind(STABILITY, "--stability", "`sweep stability` writes a stability file")?;
+    let mut point: NamedPoint = unbalance_and_damping(table)
         .into_iter()
         .map(|(name, value)| (name.to_owned(), value))
         .collect();
-    let named = together::at(&table.source);
-    at.retain(|(known, _)| !named.iter().any(|(name, _)| name == known));
-    at.extend(named.iter().cloned());
-    let axes = swept::columns(&source);
-    at.retain(|(name, _)| axes.iter().any(|axis| axis.name == *name));
-    let held = HeldPoints::one(&source, &at, "--stability")?;
-    let files = [(&table.source, &named), (&source, &held.values())];
+    let point_of_file = together::point_of_trace(&table.source);
+    point.retain(|(known_name, _)| !point_of_file.iter().any(|(name, _)| name == known_name));
+    point.extend(point_of_file.iter().cloned());
+    let axes = swept::axis_columns(&source);
+    point.retain(|(name, _)| axes.iter().any(|axis| axis.name == *name));
+    let held_points = HeldPoints::single(&source, &point, "--stability")?;
+    let files = [(&table.source, &point_of_file), (&source, &held_points.values())];
     together::check_agreement("--stability", path, files, MACHINE)?;
-    let one = held.read(&["mode_1_cpm", "mode_2_cpm"].map(str::to_owned))?.remove(0);
-    let frequency = |place: usize, k: usize| one.columns[place].get(k).copied().unwrap_or(f64::NAN);
+    let curves = held_points.read(&["mode_1_cpm", "mode_2_cpm"].map(str::to_owned))?.remove(0);
+    let frequency =
+        |column: usize, k: usize| curves.columns[column].get(k).copied().unwrap_or(f64::NAN);
     Ok(UnstableSpeeds {
-        speeds: unstable_ranges(&one.speed, &one.growth),
-        participants: (0..one.speed.len())
-            .filter(|&k| one.growth[k] > 0.0)
-            .map(|k| (one.speed[k], [frequency(0, k), frequency(1, k)]))
+        speeds: unstable_ranges(&curves.speed, &curves.growth),
+        participants: (0..curves.speed.len())
+            .filter(|&k| curves.growth[k] > 0.0)
+            .map(|k| (curves.speed[k], [frequency(0, k), frequency(1, k)]))
             .collect(),
     })
 }
 
 fn format_value(axis: &ColumnFacts, value: f64) -> String {
-    label::with_value(&label::words(&axis.name), value, &axis.unit)
+    label::with_value(&label::name_in_words(&axis.name), value, &axis.unit)
 }
 
 /// Returns a value of an axis within a sentence: words in lower case, the unit unchanged.
-fn format_within(axis: &ColumnFacts, value: f64) -> String {
-    label::with_value(&label::words(&axis.name).to_lowercase(), value, &axis.unit)
+fn format_in_lower_case(axis: &ColumnFacts, value: f64) -> String {
+    label::with_value(&label::name_in_words(&axis.name).to_lowercase(), value, &axis.unit)
 }
 
 /// A row of a file over constant speeds. Missing values are NaN.
@@ -285,61 +303,76 @@ impl<'a> HeldPoints<'a> {
     /// # Errors
     /// Returns the errors of [`FigureFile::each_row`]; [`PlotError::Unfit`] for a name that is no
     /// axis or a number that is no value of it; [`PlotError::Undrawable`] without rows.
-    fn at(source: &'a FigureFile, at: &NamedPoint, option: &str) -> Result<Self, PlotError> {
-        let mut held = Self { source, axes: swept::columns(source), points: Vec::new() };
-        let place = |name: &str| {
-            let names = || held.axes.iter().map(|axis| axis.name.as_str());
-            let place = names().position(|axis| axis == name);
-            place.ok_or_else(|| source.unknown_name(option, name, "axis", list_names(names())))
+    fn matching(
+        source: &'a FigureFile,
+        requested_values: &NamedPoint,
+        option: &str,
+    ) -> Result<Self, PlotError> {
+        let mut held_points =
+            Self { source, axes: swept::axis_columns(source), points: Vec::new() };
+        let axis_index = |name: &str| {
+            let names = || held_points.axes.iter().map(|axis| axis.name.as_str());
+            let axis_index = names().position(|axis| axis == name);
+            axis_index.ok_or_else(|| source.unknown_name(option, name, "axis", list_names(names())))
         };
-        let pins = at.iter().map(|(name, value)| Ok((place(name)?, *value)));
-        let pins = pins.collect::<Result<Vec<_>, PlotError>>()?;
+        let requested =
+            requested_values.iter().map(|(name, value)| Ok((axis_index(name)?, *value)));
+        let requested = requested.collect::<Result<Vec<_>, PlotError>>()?;
         let mut points: Vec<Vec<f64>> = Vec::new();
-        let mut seen_rows = false;
-        held.each_row_of_all(&[""; 0], |row| {
-            seen_rows = true;
-            let is_pinned =
-                pins.iter().all(|&(place, value)| SweptAxis::is_near(row.point[place], value));
+        let mut has_rows = false;
+        held_points.each_row_of_file(&[""; 0], |row| {
+            has_rows = true;
+            let is_requested = requested
+                .iter()
+                .all(|&(axis_index, value)| SweptAxis::is_same_value(row.point[axis_index], value));
             // Speed varies fastest, so that the rows of a point follow each other.
-            if is_pinned && points.last() != Some(&row.point) {
+            if is_requested && points.last() != Some(&row.point) {
                 points.push(row.point);
             }
         })?;
-        if !seen_rows {
+        if !has_rows {
             return Err(source.nothing_to_draw("it has no rows"));
         }
         if points.is_empty() {
-            let given = at.iter().map(|(name, value)| format!("{name}={value}"));
-            let given = given.collect::<Vec<_>>().join(", ");
-            return Err(source.unknown_name(option, given, "point", "other values of these axes"));
+            let values_in_words =
+                requested_values.iter().map(|(name, value)| format!("{name}={value}"));
+            let values_in_words = values_in_words.collect::<Vec<_>>().join(", ");
+            return Err(source.unknown_name(
+                option,
+                values_in_words,
+                "point",
+                "other values of these axes",
+            ));
         }
-        held.points = points;
-        Ok(held)
+        held_points.points = points;
+        Ok(held_points)
     }
 
     /// Returns the only point of the file, or the one at the requested values.
     ///
     /// # Errors
-    /// Returns the errors of [`Self::at`]; [`PlotError::Unfit`] where there are several.
-    pub(crate) fn one(
+    /// Returns the errors of [`Self::matching`]; [`PlotError::Unfit`] where there are several.
+    pub(crate) fn single(
         source: &'a FigureFile,
-        at: &NamedPoint,
+        requested_values: &NamedPoint,
         option: &str,
     ) -> Result<Self, PlotError> {
-        let held = Self::at(source, at, option)?;
-        if held.points.len() > 1 {
-            let free = held.axes.iter().map(|axis| axis.name.as_str());
-            let free = list_names(free.filter(|axis| !at.iter().any(|(name, _)| name == axis)));
-            let what = match option {
-                "--at" => format!("one is wanted: give --at NAME=VALUE for {free}"),
-                _ => format!("the file to be drawn does not say which by {free}"),
+        let held_points = Self::matching(source, requested_values, option)?;
+        if held_points.points.len() > 1 {
+            let free_axes = held_points.axes.iter().map(|axis| axis.name.as_str());
+            let free_axes = list_names(
+                free_axes.filter(|axis| !requested_values.iter().any(|(name, _)| name == axis)),
+            );
+            let hint = match option {
+                "--at" => format!("one is wanted: give --at NAME=VALUE for {free_axes}"),
+                _ => format!("the file to be drawn does not say which by {free_axes}"),
             };
             let path = source.path.display();
-            let count = held.points.len();
-            let phrase = format!("{path}: this file has {count} points, and {what}");
+            let count = held_points.points.len();
+            let phrase = format!("{path}: this file has {count} points, and {hint}");
             return Err(PlotError::Unfit(phrase));
         }
-        Ok(held)
+        Ok(held_points)
     }
 
     /// Returns the axes with their values at the first point.
@@ -351,41 +384,41 @@ impl<'a> HeldPoints<'a> {
     /// Returns the notes on the run and on the first point.
     pub(crate) fn notes(&self) -> Vec<String> {
         let values = self.axes.iter().zip(&self.points[0]);
-        self.source.notes(values.map(|(axis, value)| format_within(axis, *value)))
+        self.source.notes(values.map(|(axis, value)| format_in_lower_case(axis, *value)))
     }
 
-    /// Calls `take` for each row of the points, with the index of its point.
+    /// Calls `visit` for each row of the points, with the index of its point.
     ///
     /// # Errors
     /// Returns the errors of [`FigureFile::each_row`].
     pub(crate) fn each_row<S: AsRef<str>>(
         &self,
         columns: &[S],
-        mut take: impl FnMut(usize, SpeedRow<'_>),
+        mut visit: impl FnMut(usize, SpeedRow<'_>),
     ) -> Result<(), PlotError> {
-        self.each_row_of_all(columns, |row| {
-            if let Some(place) = self.points.iter().position(|point| *point == row.point) {
-                take(place, row);
+        self.each_row_of_file(columns, |row| {
+            if let Some(point_index) = self.points.iter().position(|point| *point == row.point) {
+                visit(point_index, row);
             }
         })
     }
 
-    fn each_row_of_all<S: AsRef<str>>(
+    fn each_row_of_file<S: AsRef<str>>(
         &self,
         columns: &[S],
-        mut take: impl FnMut(SpeedRow<'_>),
+        mut visit: impl FnMut(SpeedRow<'_>),
     ) -> Result<(), PlotError> {
         let names = self.axes.iter().map(|axis| axis.name.as_str());
         let names = names.chain(["speed_rpm", "growth_per_s", "kind"]);
         let names: Vec<&str> = names.chain(columns.iter().map(S::as_ref)).collect();
-        let own = self.axes.len();
+        let axis_count = self.axes.len();
         self.source.each_row(&names, |row| {
-            take(SpeedRow {
-                point: row.numbers(0..own),
-                speed: row.number(own),
-                growth: row.number(own + 1),
-                kind: row.word(own + 2),
-                values: row.numbers(own + 3..names.len()),
+            visit(SpeedRow {
+                point: row.numbers(0..axis_count),
+                speed: row.number(axis_count),
+                growth: row.number(axis_count + 1),
+                kind: row.word(axis_count + 2),
+                values: row.numbers(axis_count + 3..names.len()),
             });
             Ok(())
         })
@@ -398,20 +431,20 @@ impl<'a> HeldPoints<'a> {
     pub(crate) fn read(&self, columns: &[String]) -> Result<Vec<SpeedCurves>, PlotError> {
         let empty =
             SpeedCurves { columns: vec![Vec::new(); columns.len()], ..SpeedCurves::default() };
-        let mut swept = vec![empty; self.points.len()];
-        self.each_row(columns, |place, row| {
-            let point = &mut swept[place];
+        let mut curves = vec![empty; self.points.len()];
+        self.each_row(columns, |point_index, row| {
+            let curve = &mut curves[point_index];
             // A speed can have several responses. The first is that of a machine that runs up.
-            if point.speed.last() == Some(&row.speed) {
+            if curve.speed.last() == Some(&row.speed) {
                 return;
             }
-            point.speed.push(row.speed);
-            point.growth.push(row.growth);
-            for (kept, value) in point.columns.iter_mut().zip(row.values) {
-                kept.push(value);
+            curve.speed.push(row.speed);
+            curve.growth.push(row.growth);
+            for (values, value) in curve.columns.iter_mut().zip(row.values) {
+                values.push(value);
             }
         })?;
-        Ok(swept)
+        Ok(curves)
     }
 }
 
@@ -424,35 +457,40 @@ pub(crate) fn unstable_ranges(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
 /// Returns the speeds at which growth passes 0. The end of a range at a missing response is no
 /// edge.
 fn stability_edges(speed: &[f64], growth: &[f64]) -> Vec<f64> {
-    let known = speed.iter().zip(growth);
-    let grows = |edge: f64| known.clone().any(|(&at, &growth)| at == edge && growth > 0.0);
-    unstable_ranges(speed, growth).into_iter().flatten().filter(|&edge| !grows(edge)).collect()
+    let pairs = speed.iter().zip(growth);
+    let is_growing =
+        |edge: f64| pairs.clone().any(|(&speed, &growth)| speed == edge && growth > 0.0);
+    unstable_ranges(speed, growth).into_iter().flatten().filter(|&edge| !is_growing(edge)).collect()
 }
 
 /// Returns the intervals of x in which a curve lies within one of these ranges; it is linear
 /// between its points.
 pub(crate) fn intervals_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let mut found: Vec<[f64; 2]> = Vec::new();
+    let mut intervals: Vec<[f64; 2]> = Vec::new();
     for &[low, high] in ranges {
-        let first_own = found.len();
+        let first_of_range = intervals.len();
         let is_within = |k: usize| low < y[k] && y[k] < high;
         for k in 0..x.len().min(y.len()) {
-            let mut add = |[from, to]: [f64; 2]| match found[first_own..].last_mut() {
+            let mut add = |[from, to]: [f64; 2]| match intervals[first_of_range..].last_mut() {
                 Some(last) if from <= last[1] => last[1] = to,
-                _ => found.push([from, to]),
+                _ => intervals.push([from, to]),
             };
             if k > 0 && y[k - 1] == y[k] && is_within(k) {
                 add([x[k - 1], x[k]]);
             } else if k > 0 && (y[k] - y[k - 1]).is_finite() {
                 // The part of this segment within the range, from 0 to 1 along it.
-                let [a, b] = [low, high].map(|edge| (edge - y[k - 1]) / (y[k] - y[k - 1]));
-                let [first, last] = [a.min(b).max(0.0), a.max(b).min(1.0)];
-                let at = |share: f64| match share {
+                let [share_at_low, share_at_high] =
+                    [low, high].map(|edge| (edge - y[k - 1]) / (y[k] - y[k - 1]));
+                let [first_share, last_share] = [
+                    share_at_low.min(share_at_high).max(0.0),
+                    share_at_low.max(share_at_high).min(1.0),
+                ];
+                let x_at = |share: f64| match share {
                     1.0 => x[k],
                     share => x[k - 1] + share * (x[k] - x[k - 1]),
                 };
-                if last > first {
-                    add([at(first), at(last)]);
+                if last_share > first_share {
+                    add([x_at(first_share), x_at(last_share)]);
                 }
             }
             if is_within(k) {
@@ -460,8 +498,8 @@ pub(crate) fn intervals_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec
             }
         }
     }
-    found.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    found
+    intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    intervals
 }
 
 #[cfg(test)]
@@ -481,8 +519,8 @@ mod tests {
     fn a_ramp_is_within_a_band_on_the_way_up_and_down() {
         let time: Vec<f64> = (0..=10).map(f64::from).collect();
         let speed: Vec<f64> = time.iter().map(|t| 100.0 * (5.0 - (t - 5.0_f64).abs())).collect();
-        let found = intervals_within(&time, &speed, &[[150.0, 250.0], [500.0, 600.0]]);
-        assert_eq!(found, [[1.5, 2.5], [7.5, 8.5]]);
+        let intervals = intervals_within(&time, &speed, &[[150.0, 250.0], [500.0, 600.0]]);
+        assert_eq!(intervals, [[1.5, 2.5], [7.5, 8.5]]);
         // The first curve passes the whole band in one step, the second stays in it.
         assert_eq!(intervals_within(&[0.0, 1.0], &[0.0, 100.0], &[[20.0, 30.0]]), [[0.2, 0.3]]);
         assert_eq!(

@@ -44,11 +44,11 @@ fn draw(
     Ok(std::fs::read(output).unwrap())
 }
 
-fn svg(sample: SampleFile, options: &impl DrawOptions) -> String {
+fn draw_svg(sample: SampleFile, options: &impl DrawOptions) -> String {
     String::from_utf8(draw(sample, options, "figure.svg").unwrap()).unwrap()
 }
 
-fn data(sample: SampleFile, options: &impl DrawOptions) -> Value {
+fn draw_page_data(sample: SampleFile, options: &impl DrawOptions) -> Value {
     page_data(&draw(sample, options, "figure.html").unwrap())
 }
 
@@ -60,12 +60,12 @@ fn page_data(page: &[u8]) -> Value {
 }
 
 /// Decodes a curve of a page.
-fn curve(text: &Value) -> Vec<f64> {
+fn decode_curve(text: &Value) -> Vec<f64> {
     let bytes = STANDARD.decode(text.as_str().unwrap()).unwrap();
     bytes.chunks(4).map(|four| f64::from(f32::from_le_bytes(four.try_into().unwrap()))).collect()
 }
 
-fn message(result: Result<Vec<u8>, PlotError>) -> String {
+fn error_message(result: Result<Vec<u8>, PlotError>) -> String {
     result.unwrap_err().to_string()
 }
 
@@ -77,19 +77,19 @@ fn default_options() -> PlotOptions {
 /// Returns a trace of twelve seconds of both models, to 300 rpm and back.
 pub(crate) fn trace() -> SampleFile {
     let time: Vec<f64> = (0..=6000).map(|k| 0.002 * f64::from(k)).collect();
-    let along = |factor: f64| {
+    let oscillation = |factor: f64| {
         time.iter().map(move |t| factor * (t / 12.0) * (20.0 * t).sin()).collect::<Vec<f64>>()
     };
     SampleFile::default()
         .numbers("time_s", "s", time.iter().copied())
         .numbers("speed_rpm", "rpm", time.iter().map(|t| 50.0 * (6.0 - (t - 6.0).abs())))
-        .numbers("nonlinear_tub_yaw", "rad", along(0.07))
-        .numbers("nonlinear_drum_front_y", "m", along(0.03))
-        .numbers("linear_tub_yaw", "rad", along(0.009))
-        .numbers("linear_drum_front_y", "m", along(0.02))
-        .numbers("gap_nonlinear_m", "m", along(0.002).into_iter().map(|g| 0.01 - g.abs()))
-        .numbers("gap_linear_m", "m", along(0.001).into_iter().map(|g| 0.01 - g.abs()))
-        .metadata("at", r#"{"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 120.0}"#)
+        .numbers("nonlinear_tub_yaw", "rad", oscillation(0.07))
+        .numbers("nonlinear_drum_front_y", "m", oscillation(0.03))
+        .numbers("linear_tub_yaw", "rad", oscillation(0.009))
+        .numbers("linear_drum_front_y", "m", oscillation(0.02))
+        .numbers("gap_nonlinear_m", "m", oscillation(0.002).into_iter().map(|g| 0.01 - g.abs()))
+        .numbers("gap_linear_m", "m", oscillation(0.001).into_iter().map(|g| 0.01 - g.abs()))
+        .with_metadata("at", r#"{"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 120.0}"#)
 }
 
 /// Returns two modes that cross the speed at 100 and 200 rpm, and one far above.
@@ -119,7 +119,7 @@ fn a_trace_shows_requested_channels_and_passed_resonances() {
         modes: Some(modes().write(folder.path(), "modes.parquet")),
         ..WasherFigures::default()
     };
-    let figure = svg(trace(), &options);
+    let figure = draw_svg(trace(), &options);
     for phrase in
         [">Drum front, vertical<", ">Gap, drum to tub<", ">Spin (rpm)<", ">resonance speed passed<"]
     {
@@ -151,38 +151,42 @@ fn a_trace_shows_forces_on_request() {
     };
     let force =
         WasherFigures { channels: vec!["cabinet_force_y".to_owned()], ..WasherFigures::default() };
-    let figure = svg(with_forces(), &force);
+    let figure = draw_svg(with_forces(), &force);
     assert!(figure.contains(">Cabinet force y (N)<") && figure.contains(">linear model<"));
-    assert!(!svg(with_forces(), &default_options()).contains("Cabinet force"));
+    assert!(!draw_svg(with_forces(), &default_options()).contains("Cabinet force"));
 }
 
 #[test]
 fn a_trace_is_compared_with_another() {
     let folder = tempfile::tempdir().unwrap();
-    let other = SampleFile::default()
+    let other_trace = SampleFile::default()
         .numbers("time_s", "s", [0.0, 6.0, 12.0])
         .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.09, 0.0])
-        .metadata("sweep.plan", r#"{"name": "another program"}"#);
+        .with_metadata("sweep.plan", r#"{"name": "another program"}"#);
     let against = |path| WasherFigures { against: Some(path), ..WasherFigures::default() };
-    let data = data(trace(), &against(other.write(folder.path(), "other.parquet")));
+    let data = draw_page_data(trace(), &against(other_trace.write(folder.path(), "other.parquet")));
     let yaw = &data["chart"]["panels"][0]["series"];
-    let named =
+    let name_and_grid =
         |k: usize| (yaw[k]["name"].as_str().unwrap().to_owned(), yaw[k]["grid"].as_u64().unwrap());
-    assert_eq!(named(0), ("input".to_owned(), 0), "by its file where it has no name");
-    assert_eq!((named(1), yaw.as_array().unwrap().len()), (("another program".to_owned(), 1), 2));
+    assert_eq!(name_and_grid(0), ("input".to_owned(), 0), "by its file where it has no name");
+    assert_eq!(
+        (name_and_grid(1), yaw.as_array().unwrap().len()),
+        (("another program".to_owned(), 1), 2)
+    );
     assert!(
-        svg(trace(), &against(trace().write(folder.path(), "same.parquet")))
+        draw_svg(trace(), &against(trace().write(folder.path(), "same.parquet")))
             .contains("difference 0.0e0 of")
     );
     let modes = against(modes().write(folder.path(), "modes.parquet"));
     assert!(
-        message(draw(trace(), &modes, "a.svg")).contains("this is a modes file; `sweep trace`")
+        error_message(draw(trace(), &modes, "a.svg"))
+            .contains("this is a modes file; `sweep trace`")
     );
 }
 
 #[test]
 fn a_campbell_diagram_stars_the_resonances() {
-    let figure = svg(modes(), &default_options());
+    let figure = draw_svg(modes(), &default_options());
     for phrase in [">100.0 rpm<", ">200.0 rpm<", ">frequency = spin speed<", "1 mode lies above"] {
         assert!(figure.contains(phrase), "{phrase}");
     }
@@ -194,16 +198,16 @@ fn with_view(view: FigureView) -> WasherFigures {
 
 #[test]
 fn the_variation_over_a_turn_is_half_the_range() {
-    let figure = svg(modes(), &with_view(FigureView::Variation));
+    let figure = draw_svg(modes(), &with_view(FigureView::Variation));
     for phrase in [">Variation over a turn (± % of the mean)<", ">100.0 rpm<", ">200.0 rpm<"] {
         assert!(figure.contains(phrase), "{phrase}");
     }
-    let data = data(modes(), &with_view(FigureView::Variation));
+    let data = draw_page_data(modes(), &with_view(FigureView::Variation));
     let series = data["chart"]["panels"][0]["series"].as_array().unwrap();
     // The third mode has no resonance.
     assert_eq!(series.len(), 2);
     for series in series {
-        let curve = curve(&series["y"]);
+        let curve = decode_curve(&series["y"]);
         assert!(curve.len() == 31 && curve.iter().all(|y| (y - 1.0).abs() < 1e-6), "{curve:?}");
     }
 }
@@ -213,7 +217,7 @@ fn mode_shapes_are_read_from_the_file() {
     let q = |i: usize, re: f64| if [5, 7].contains(&i) { [re, 0.0] } else { [0.0, 0.0] };
     let shape: serde_json::Map<String, Value> =
         (1..=10).map(|i| (format!("q{i}"), serde_json::json!(q(i, -0.3)))).collect();
-    let facts = serde_json::json!([
+    let modes_in_file = serde_json::json!([
         { "mode": 1, "name": "rocking, horizontal \
                    plane", "resonances": [{ "speed_rpm": 100.06, "shape": shape }] },
         { "name": "drum bending on its shaft", "resonances": [] },
@@ -222,26 +226,26 @@ fn mode_shapes_are_read_from_the_file() {
         "bearings": { "rear_x_m": -0.05 }, "tub": { "front_x_m": 0.45 },
         "drum": { "hinge_x_m": 0.15, "front_x_m": 0.45 },
     } });
-    let file = || modes().metadata("sweep.plan", &machine.to_string());
-    let with_shapes = || file().metadata("sweep.modes", &facts.to_string());
-    let figure = svg(with_shapes(), &with_view(FigureView::Shapes));
+    let file = || modes().with_metadata("sweep.plan", &machine.to_string());
+    let with_shapes = || file().with_metadata("sweep.modes", &modes_in_file.to_string());
+    let figure = draw_svg(with_shapes(), &with_view(FigureView::Shapes));
     for phrase in
         [">Rocking, horizontal plane,<", ">100.1 rpm<", ">horizontal, a quarter of a period later<"]
     {
         assert!(figure.contains(phrase), "{phrase}");
     }
-    let stars = svg(with_shapes(), &default_options());
-    assert!(stars.contains(">100.1 rpm<"), "the same in all figures of a file");
-    let carried = data(with_shapes(), &with_view(FigureView::Shapes));
-    let panels = carried["chart"]["panels"].as_array().unwrap();
+    let figure_of_frequencies = draw_svg(with_shapes(), &default_options());
+    assert!(figure_of_frequencies.contains(">100.1 rpm<"), "the same in all figures of a file");
+    let page_data = draw_page_data(with_shapes(), &with_view(FigureView::Shapes));
+    let panels = page_data["chart"]["panels"].as_array().unwrap();
     assert_eq!(panels.len(), 1);
-    assert_eq!(curve(&panels[0]["series"][2]["y"])[1], 1.0);
+    assert_eq!(decode_curve(&panels[0]["series"][2]["y"])[1], 1.0);
     assert!(
-        message(draw(file(), &with_view(FigureView::Shapes), "a.svg"))
+        error_message(draw(file(), &with_view(FigureView::Shapes), "a.svg"))
             .contains("holds no resonance")
     );
     assert!(
-        message(draw(modes(), &with_view(FigureView::Shapes), "a.svg"))
+        error_message(draw(modes(), &with_view(FigureView::Shapes), "a.svg"))
             .contains("where the machine's parts are")
     );
 }
@@ -253,7 +257,7 @@ fn passages_are_drawn_for_rising_and_falling_speed() {
         resonances_rpm: vec![150.0],
         ..with_view(FigureView::Passages)
     };
-    let figure = svg(trace(), &options);
+    let figure = draw_svg(trace(), &options);
     for phrase in [
         ">Spin speed (rpm)<",
         ">nonlinear model, speed rising<",
@@ -263,20 +267,20 @@ fn passages_are_drawn_for_rising_and_falling_speed() {
         assert!(figure.contains(phrase), "{phrase}");
     }
     assert!(!figure.contains(">Gap, drum to tub<"));
-    let data = data(trace(), &options);
+    let data = draw_page_data(trace(), &options);
     let chart = &data["chart"];
     let panels = chart["panels"].as_array().unwrap();
     let yaw = panels.iter().find(|panel| panel["name"] == "tub_yaw").unwrap();
     // The sample's amplitude grows with time and it oscillates faster than it turns, so that on the
     // way down the deviation is greatest at rest.
-    let [up, down] = [0, 1].map(|series| curve(&yaw["series"][series]["y"]));
+    let [up, down] = [0, 1].map(|series| decode_curve(&yaw["series"][series]["y"]));
     assert!(up.is_sorted() && down.is_sorted_by(|a, b| a >= b) && up.len() > 10, "{up:?} {down:?}");
-    let still = SampleFile::default()
+    let trace_at_constant_speed = SampleFile::default()
         .numbers("time_s", "s", [0.0, 1.0, 2.0])
         .numbers("speed_rpm", "rpm", [60.0, 60.0, 60.0])
         .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.1, 0.0]);
     assert!(
-        message(draw(still, &with_view(FigureView::Passages), "a.svg"))
+        error_message(draw(trace_at_constant_speed, &with_view(FigureView::Passages), "a.svg"))
             .contains("no whole turn while")
     );
 }
@@ -290,15 +294,15 @@ fn a_live_page_contains_the_module_and_its_setup() {
         sliders: vec![slider("unbalance_mass_kg", None), slider("tub_mass_kg", Some(1.5))],
         channels: vec!["tub_yaw".to_owned()],
         metrics: vec![["stop_2_force_nonlinear_n", "stop_2_force_linear_n"].map(str::to_owned)],
-        kinds: vec!["period_doubling".to_owned()],
+        instability_kinds: vec!["period_doubling".to_owned()],
         ..Live::default()
     };
     let options = WasherFigures { live: Some(live), ..WasherFigures::default() };
     let page = draw(map(), &options, "a.html").unwrap();
     let live = &page_data(&page)["live"];
-    let packed = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
+    let compressed = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
     let mut module = Vec::new();
-    flate2::read::GzDecoder::new(&packed[..]).read_to_end(&mut module).unwrap();
+    flate2::read::GzDecoder::new(&compressed[..]).read_to_end(&mut module).unwrap();
     assert_eq!(module[..8], *b"\0asm\x01\0\0\0");
     let setup = STANDARD.decode(live["setup"].as_str().unwrap()).unwrap();
     assert_eq!(setup, [0.1, f64::INFINITY].map(f64::to_le_bytes).concat());
@@ -311,7 +315,8 @@ fn a_live_page_contains_the_module_and_its_setup() {
     assert_eq!(live["kinds"][0], "period doubling");
     assert!(String::from_utf8(page).unwrap().contains("id=\"worker\""));
     assert!(
-        message(draw(map(), &options, "a.svg")).contains("`--live` is for maps drawn as .html")
+        error_message(draw(map(), &options, "a.svg"))
+            .contains("`--live` is for maps drawn as .html")
     );
 }
 
@@ -319,19 +324,19 @@ fn a_live_page_contains_the_module_and_its_setup() {
 fn a_page_contains_the_histories_of_a_folder() {
     let folder = tempfile::tempdir().unwrap();
     trace().write(folder.path(), "by-its-metadata.parquet");
-    let default_options = || {
+    let trace_without_point = || {
         SampleFile::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
             "nonlinear_tub_yaw",
             "rad",
             [0.0, 1.0],
         )
     };
-    default_options().write(folder.path(), "point-7.parquet");
+    trace_without_point().write(folder.path(), "point-7.parquet");
     let options = PlotOptions { traces: Some(folder.path().to_owned()), ..PlotOptions::default() };
-    let carried = data(map(), &options);
+    let page_data = draw_page_data(map(), &options);
     // Mass 0.4 is the fourth of ten values, damping 120 the third of nine.
-    assert_eq!(carried["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29", "7"]);
-    let history = &carried["traces"]["29"];
+    assert_eq!(page_data["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29", "7"]);
+    let history = &page_data["traces"]["29"];
     let panel = |name: &str| {
         let mut panels = history["panels"].as_array().unwrap().iter();
         panels.find(|panel| panel["name"] == name).unwrap()
@@ -340,33 +345,36 @@ fn a_page_contains_the_histories_of_a_folder() {
     assert_eq!(panel("drum_front_y")["words"], "Drum front, vertical");
     assert!(history.to_string().len() < 40_000, "6001 samples of seven columns are thinned");
 
-    let unknown = SampleFile::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
+    let trace_of_unknown_point = SampleFile::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
         "nonlinear_tub_yaw",
         "rad",
         [0.0, 1.0],
     );
-    unknown.write(folder.path(), "point-90.parquet");
-    assert!(message(draw(map(), &options, "a.html")).contains("belongs to no point of this map"));
+    trace_of_unknown_point.write(folder.path(), "point-90.parquet");
+    assert!(
+        error_message(draw(map(), &options, "a.html")).contains("belongs to no point of this map")
+    );
 }
 
 #[test]
 fn a_subtitle_names_each_setting_once() {
     let name = "long ".repeat(40);
     let plan = serde_json::json!({ "name": name, "set": { "damping_n_s_per_m": 120.0 } });
-    let figure = svg(trace().metadata("sweep.plan", &plan.to_string()), &default_options());
+    let figure =
+        draw_svg(trace().with_metadata("sweep.plan", &plan.to_string()), &default_options());
     let phrase = "…, damping_n_s_per_m = 120 · unbalance mass 0.4 kg · least gap";
     assert!(figure.contains(phrase), "{figure}");
 }
 
 #[test]
 fn units_in_subtitles_keep_their_case() {
-    let dwells = SampleFile::default()
+    let stability_file = SampleFile::default()
         .counts("point", [0, 0, 0])
         .numbers("damping_n_s_per_m", "N s/m", [140.0; 3])
         .numbers("speed_rpm", "rpm", [200.0, 210.0, 220.0])
         .numbers("growth_per_s", "1/s", [-0.1, 0.1, 0.2])
         .words("status", [Some("ok"); 3]);
-    let figure = svg(dwells, &default_options());
+    let figure = draw_svg(stability_file, &default_options());
     assert!(figure.contains(">damping 140 N s/m<"), "{figure}");
 }
 #[test]
@@ -382,9 +390,9 @@ fn a_decimated_trace_keeps_its_peaks() {
     assert!(page.len() < 10_000_000, "{}", page.len());
     let data = page_data(&page);
     assert!(data["subtitle"].as_str().unwrap().contains("least and greatest of every 3 instants"));
-    let yaw = curve(&data["chart"]["panels"][0]["series"][0]["y"]);
+    let yaw = decode_curve(&data["chart"]["panels"][0]["series"][0]["y"]);
     assert_eq!(yaw.iter().copied().fold(0.0, f64::max), 9000.0, "mrad");
-    assert_eq!(yaw.len(), curve(&data["chart"]["grids"][0]).len());
+    assert_eq!(yaw.len(), decode_curve(&data["chart"]["grids"][0]).len());
 }
 
 #[test]
@@ -394,7 +402,7 @@ fn modes_files_with_too_many_rows_are_rejected() {
         .numbers("speed_rpm", "rpm", (0..ROWS).map(|k| k as f64))
         .counts("mode", (0..ROWS).map(|_| 1))
         .numbers("frequency_rpm", "rpm", (0..ROWS).map(|_| 100.0));
-    let phrase = message(draw(modes, &default_options(), "a.svg"));
+    let phrase = error_message(draw(modes, &default_options(), "a.svg"));
     assert!(
         phrase.contains("a modes file of 500000 rows is more than a figure can show"),
         "{phrase}"
@@ -420,7 +428,7 @@ fn options_without_effect_are_rejected() {
             "no file that has a figure: study, dwell, stability, modes, map",
         ),
     ] {
-        assert!(message(result).contains(phrase), "{phrase}");
+        assert!(error_message(result).contains(phrase), "{phrase}");
     }
 }
 
@@ -428,8 +436,8 @@ fn options_without_effect_are_rejected() {
 fn the_same_file_gives_the_same_bytes() {
     for sample in [trace, modes] {
         for output in ["a.svg", "a.html"] {
-            let twice = [0, 1].map(|_| draw(sample(), &default_options(), output).unwrap());
-            assert!(twice[0] == twice[1], "{output}");
+            let figures = [0, 1].map(|_| draw(sample(), &default_options(), output).unwrap());
+            assert!(figures[0] == figures[1], "{output}");
         }
     }
 }

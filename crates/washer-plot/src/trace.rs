@@ -31,29 +31,30 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         )));
     }
     let model_prefixes = model_prefixes(table);
-    let found = quantities(table, model_prefixes);
-    let names: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
+    let quantities = quantities(table, model_prefixes);
+    let names: Vec<&str> = quantities.iter().map(|quantity| quantity.name).collect();
     let is_shown = stability::shown_channels(&table.source, &names, &options.channels)?;
     // States and forces are drawn on request only.
-    let any = !options.channels.is_empty();
-    let shown = found
+    let is_any_requested = !options.channels.is_empty();
+    let shown_names = quantities
         .iter()
         .zip(is_shown)
-        .filter(|(quantity, is_shown)| *is_shown && (any || quantity.channel));
-    let shown: Vec<&str> = shown.map(|(quantity, _)| quantity.name).collect();
-    let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
-    let names = match &other {
-        Some(other) => distinct_names(table, other),
-        None => model_prefixes.map(format_side),
+        .filter(|(quantity, is_shown)| *is_shown && (is_any_requested || quantity.is_channel));
+    let shown_names: Vec<&str> = shown_names.map(|(quantity, _)| quantity.name).collect();
+    let compared_trace = options.against.as_ref().map(|path| read_other_trace(path)).transpose()?;
+    let names = match &compared_trace {
+        Some(compared_trace) => distinct_names(table, compared_trace),
+        None => model_prefixes.map(curve_name),
     };
     // The second curve is translucent, so that the first one shows through.
-    let front = other.as_ref().unwrap_or(table);
-    let its_time = Rc::new(front.numbers("time_s")?.to_vec());
-    let drawn = [(table, Rc::clone(&time), NONLINEAR), (front, its_time, LINEAR.with_alpha(165))];
-    let pair = |columns: &[String; 2], factor: f64| -> Vec<Series> {
+    let front = compared_trace.as_ref().unwrap_or(table);
+    let front_time = Rc::new(front.numbers("time_s")?.to_vec());
+    let curve_sources =
+        [(table, Rc::clone(&time), NONLINEAR), (front, front_time, LINEAR.with_alpha(165))];
+    let model_curves = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         let curve = |k: usize| {
-            let ((table, time, colour), name) = (&drawn[k], names[k].clone());
-            let column = table.column(&columns[if other.is_some() { 0 } else { k }])?;
+            let ((table, time, colour), name) = (&curve_sources[k], names[k].clone());
+            let column = table.column(&columns[if compared_trace.is_some() { 0 } else { k }])?;
             let y = column.numbers()?.iter().map(|value| value * factor).collect();
             Some(Series::new(name, *colour, Rc::clone(time), y, Style::Solid(1.3)))
         };
@@ -61,66 +62,68 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     };
     let quantity_panel = |quantity: &TraceQuantity<'_>| {
         let (name, (unit, factor)) = (quantity.name, label::display_unit(quantity.unit));
-        let is_channel = quantity.channel && model_prefixes == MODELS;
-        let words = if is_channel { label::channel(name) } else { label::words(name) };
-        let lines = pair(&quantity.columns, factor);
-        panel(name, Label::new(&words, unit), shown.contains(&name), lines)
+        let is_channel = quantity.is_channel && model_prefixes == MODELS;
+        let words =
+            if is_channel { label::channel_in_words(name) } else { label::name_in_words(name) };
+        let series = model_curves(&quantity.columns, factor);
+        panel(name, Label::new(&words, unit), shown_names.contains(&name), series)
     };
-    let mut panels: Vec<ChartPanel> = found.iter().map(quantity_panel).collect();
+    let mut panels: Vec<ChartPanel> = quantities.iter().map(quantity_panel).collect();
     // Decimated rows of two files do not lie at the same instants.
-    let whole =
-        other.as_ref().is_some_and(|other| table.bucket_rows.or(other.bucket_rows).is_none());
-    let difference_of_runs = if whole { difference(&panels) } else { None };
+    let is_comparable = compared_trace
+        .as_ref()
+        .is_some_and(|compared_trace| table.bucket_rows.or(compared_trace.bucket_rows).is_none());
+    let difference_of_runs = if is_comparable { largest_difference(&panels) } else { None };
     for (name, column) in table.with_prefix("residual_") {
         let (unit, factor) = label::display_unit(&column.facts.unit);
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
         let residual = Series::new("residual", INK, Rc::clone(&time), y, Style::Dots);
-        let words = format!("residual, {}", label::words(name));
-        let shown = shown.contains(&name);
+        let words = format!("residual, {}", label::name_in_words(name));
+        let is_shown = shown_names.contains(&name);
         let label = Label::new(&words, unit);
-        panels.push(panel(&format!("residual_{name}"), label, shown, vec![residual]));
+        panels.push(panel(&format!("residual_{name}"), label, is_shown, vec![residual]));
     }
-    let mut gaps = pair(&["gap_nonlinear_m", "gap_linear_m"].map(str::to_owned), 1e3);
-    if other.is_some() && gaps.len() < 2 {
+    let mut gaps = model_curves(&["gap_nonlinear_m", "gap_linear_m"].map(str::to_owned), 1e3);
+    if compared_trace.is_some() && gaps.len() < 2 {
         gaps.clear();
     }
-    let least = least_gaps(&gaps);
+    let least_gaps = least_gaps(&gaps);
     if !gaps.is_empty() {
         // If the gap stays wide, it would be a flat line at the top of a panel that reaches down to
         // contact.
         let widest = gaps.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
-        let near = least.iter().any(|(_, gap)| *gap < 0.5 * widest);
-        let levels = if near { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
-        let gap = panel("gap", Label::new("gap, drum to tub", "mm"), true, gaps);
-        panels.push(ChartPanel { levels, ..gap });
+        let is_gap_small = least_gaps.iter().any(|(_, gap)| *gap < 0.5 * widest);
+        let levels = if is_gap_small { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
+        let gap_panel = panel("gap", Label::new("gap, drum to tub", "mm"), true, gaps);
+        panels.push(ChartPanel { levels, ..gap_panel });
     }
     let mut marks = Vec::new();
     let mut shades = Vec::new();
     let unstable = unstable_speeds(table, options)?;
-    let (resonances, note) = resonances(table, options)?;
+    let (resonances, other_machine_note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
-        let passed = passages(&time, speed, &resonances).into_iter();
-        marks.extend(passed.map(|(x, resonance)| speed_mark(x, resonance)));
+        let passages = passages(&time, speed, &resonances).into_iter();
+        marks.extend(passages.map(|(x, resonance)| speed_mark(x, resonance)));
         shades = stability::intervals_within(&time, speed, &unstable);
         let x = Rc::clone(&time);
         let series = Series::new("", INK, x, speed.to_vec(), Style::Solid(2.0));
-        let spin = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
-        panels.push(ChartPanel { height: 130.0, ..spin });
+        let speed_panel = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
+        panels.push(ChartPanel { height: 130.0, ..speed_panel });
     }
     Ok(Chart {
-        title: match &other {
+        title: match &compared_trace {
             Some(_) => "Nonlinear motion from static equilibrium".to_owned(),
             None if model_prefixes == FITTED => {
                 "A measurement, and the model fitted to it".to_owned()
             }
             None => "Motion of both models from static equilibrium".to_owned(),
         },
-        subtitle: match &other {
+        subtitle: match &compared_trace {
             // The point of one trace would be wrong for the other, so that the subtitle has
             // neither.
-            Some(_) => common_notes(&least, difference_of_runs).join(" · "),
-            None => subtitle(table, &least, difference_of_runs),
-        } + &note,
+            Some(_) => common_notes(&least_gaps, difference_of_runs).join(" · "),
+            None => subtitle(table, &least_gaps, difference_of_runs),
+        } + &other_machine_note,
         x_label: Label::new("Time", "s"),
         panels,
         marks,
@@ -142,8 +145,8 @@ fn model_prefixes(table: &FigureTable) -> [&'static str; 2] {
 }
 
 /// Returns the legend entry of a prefix.
-fn format_side(side: &str) -> String {
-    if MODELS.contains(&side) { format!("{side} model") } else { side.to_owned() }
+fn curve_name(prefix: &str) -> String {
+    if MODELS.contains(&prefix) { format!("{prefix} model") } else { prefix.to_owned() }
 }
 
 /// A quantity that a trace has of both models over time.
@@ -152,94 +155,94 @@ struct TraceQuantity<'a> {
     /// `spring_1_tension`.
     name: &'a str,
     unit: &'a str,
-    channel: bool,
+    is_channel: bool,
     /// The columns of both models.
     columns: [String; 2],
 }
 
-/// Returns the quantities of a trace: channels first, then states and forces. The gap has a panel
-/// of its own.
+/// Returns the quantities of a trace: channels first, then states and forces. The gap has a
+/// separate panel.
 fn quantities<'a>(table: &'a FigureTable, model_prefixes: [&str; 2]) -> Vec<TraceQuantity<'a>> {
     let channels = table.with_prefix(&format!("{}_", model_prefixes[0])).into_iter();
     let channels = channels.map(|(name, column)| {
-        let own = Some(column.facts.unit.as_str()).filter(|unit| !unit.is_empty());
-        let unit = own.unwrap_or(label::unit_of_channel(name));
+        let file_unit = Some(column.facts.unit.as_str()).filter(|unit| !unit.is_empty());
+        let unit = file_unit.unwrap_or(label::unit_of_channel(name));
         TraceQuantity {
             name,
             unit,
-            channel: true,
-            columns: model_prefixes.map(|side| format!("{side}_{name}")),
+            is_channel: true,
+            columns: model_prefixes.map(|prefix| format!("{prefix}_{name}")),
         }
     });
     let numbers = table.columns.iter().filter(|column| column.numbers().is_some());
-    let further = numbers.filter_map(|column| {
-        let split = column.facts.name.split_once("_nonlinear_");
-        let (name, end) = split.filter(|(name, _)| *name != "gap")?;
-        let columns = model_prefixes.map(|side| format!("{name}_{side}_{end}"));
-        Some(TraceQuantity { name, unit: &column.facts.unit, channel: false, columns })
+    let states_and_forces = numbers.filter_map(|column| {
+        let name_and_suffix = column.facts.name.split_once("_nonlinear_");
+        let (name, unit_suffix) = name_and_suffix.filter(|(name, _)| *name != "gap")?;
+        let columns = model_prefixes.map(|prefix| format!("{name}_{prefix}_{unit_suffix}"));
+        Some(TraceQuantity { name, unit: &column.facts.unit, is_channel: false, columns })
     });
-    channels.chain(further).collect()
+    channels.chain(states_and_forces).collect()
 }
 
 /// Returns the largest difference between the two curves of any panel shown, as a share of the
 /// first curve's peak.
-fn difference(panels: &[ChartPanel]) -> Option<f64> {
-    let shares = panels.iter().filter(|panel| panel.shown).filter_map(|panel| {
+fn largest_difference(panels: &[ChartPanel]) -> Option<f64> {
+    let differences = panels.iter().filter(|panel| panel.is_shown).filter_map(|panel| {
         let [first, second] = &panel.series[..] else { return None };
         let peak = first.y.iter().fold(0.0_f64, |peak, y| peak.max(y.abs()));
-        let difference_of_runs =
+        let difference =
             first.y.iter().zip(&second.y).map(|(a, b)| (a - b).abs()).fold(0.0_f64, f64::max);
-        (first.y.len() == second.y.len() && peak > 0.0).then(|| difference_of_runs / peak)
+        (first.y.len() == second.y.len() && peak > 0.0).then(|| difference / peak)
     });
-    shares.reduce(f64::max)
+    differences.reduce(f64::max)
 }
 
 /// Reads the trace whose nonlinear model is drawn in place of the linear one.
-pub(crate) fn other_trace(path: &Path) -> Result<FigureTable, PlotError> {
+pub(crate) fn read_other_trace(path: &Path) -> Result<FigureTable, PlotError> {
     let table = FigureTable::open(path, MODEL_KINDS)?;
-    table.source.expect(FigureKind::TRACE, "--against", "`sweep trace` writes a trace")?;
+    table.source.expect_kind(FigureKind::TRACE, "--against", "`sweep trace` writes a trace")?;
     Ok(table)
 }
 
 /// Returns the name of a file without its ending.
-fn stem(table: &FigureTable) -> String {
+fn file_stem(table: &FigureTable) -> String {
     table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Returns distinct names of two traces: the names of their runs, or the values in which their
 /// points differ, or else their files' names.
-fn distinct_names(one: &FigureTable, other: &FigureTable) -> [String; 2] {
-    let tables = [one, other];
-    let names = tables.map(|table| table.source.run_name.clone().unwrap_or_else(|| stem(table)));
+fn distinct_names(first: &FigureTable, second: &FigureTable) -> [String; 2] {
+    let tables = [first, second];
+    let names =
+        tables.map(|table| table.source.run_name.clone().unwrap_or_else(|| file_stem(table)));
     if names[0] != names[1] {
         return names;
     }
-    let at = tables.map(|table| together::at(&table.source));
-    let own = |side: usize| -> Vec<String> {
-        let differs = at[side].iter().filter(|own| !at[1 - side].contains(own));
-        differs.map(|(name, value)| parameter(name, *value)).collect()
+    let points = tables.map(|table| together::point_of_trace(&table.source));
+    let differing_values = |index: usize| -> Vec<String> {
+        let differs = points[index].iter().filter(|value| !points[1 - index].contains(value));
+        differs.map(|(name, value)| format_parameter(name, *value)).collect()
     };
-    let named = [own(0), own(1)].map(|words| words.join(", "));
-    if named[0] != named[1] && named.iter().all(|name| !name.is_empty()) {
-        return named;
+    let value_names = [differing_values(0), differing_values(1)].map(|words| words.join(", "));
+    if value_names[0] != value_names[1] && value_names.iter().all(|name| !name.is_empty()) {
+        return value_names;
     }
-    tables.map(stem)
+    tables.map(file_stem)
 }
 
 /// Returns a parameter and its value within a sentence.
-fn parameter(name: &str, value: f64) -> String {
-    label::with_value(&label::words(name).to_lowercase(), value, &label::unit_of_name(name))
+fn format_parameter(name: &str, value: f64) -> String {
+    label::with_value(&label::name_in_words(name).to_lowercase(), value, &label::unit_of_name(name))
 }
 
 /// Returns the notes on the least gaps and on the difference of two runs.
-fn common_notes(least_gaps_mm: &[(String, f64)], difference_of_runs: Option<f64>) -> Vec<String> {
+fn common_notes(least_gaps_mm: &[(String, f64)], difference: Option<f64>) -> Vec<String> {
     let gaps = least_gaps_mm.iter().map(|(name, gap)| format!("{gap:.2} mm {name}"));
     let gaps = gaps.collect::<Vec<_>>().join(", ");
     let gaps = (!gaps.is_empty()).then(|| format!("least gap {gaps}"));
-    let difference_of_runs = difference_of_runs.map(|difference_of_runs| {
-        format!("largest difference {difference_of_runs:.1e} of the peak")
-    });
-    gaps.into_iter().chain(difference_of_runs).collect()
+    let difference =
+        difference.map(|difference| format!("largest difference {difference:.1e} of the peak"));
+    gaps.into_iter().chain(difference).collect()
 }
 
 /// Returns the least gap of each model that has one, in the displayed unit.
@@ -259,16 +262,17 @@ pub(crate) fn subtitle(
     least_gaps_mm: &[(String, f64)],
     difference_of_runs: Option<f64>,
 ) -> String {
-    let machine_sections = unbalance_and_damping(table);
-    let at = together::at(&table.source);
-    let further =
-        at.iter().filter(|(name, _)| machine_sections.iter().all(|(known, _)| known != name));
-    let further = further.map(|(name, value)| (name.as_str(), *value));
+    let machine_values = unbalance_and_damping(table);
+    let point = together::point_of_trace(&table.source);
+    let further_values =
+        point.iter().filter(|(name, _)| machine_values.iter().all(|(known, _)| known != name));
+    let further_values = further_values.map(|(name, value)| (name.as_str(), *value));
     // Settings of the command line are part of the run's name.
-    let set = table.source.find("set");
-    let is_new = |(name, value): &(&str, f64)| set.is_none_or(|set| set[*name] != *value);
-    let phrase = machine_sections.iter().copied().chain(further).filter(is_new);
-    let mut parts = table.source.notes(phrase.map(|(name, value)| parameter(name, value)));
+    let settings = table.source.find_metadata("set");
+    let is_not_in_run_name =
+        |(name, value): &(&str, f64)| settings.is_none_or(|settings| settings[*name] != *value);
+    let values = machine_values.iter().copied().chain(further_values).filter(is_not_in_run_name);
+    let mut parts = table.source.notes(values.map(|(name, value)| format_parameter(name, value)));
     parts.extend(common_notes(least_gaps_mm, difference_of_runs));
     if let Some(rows) = table.bucket_rows {
         parts.push(format!("least and greatest of every {rows} instants"));
@@ -299,13 +303,15 @@ pub(crate) fn resonances(
     if let Some(path) = &options.modes {
         let modes = FigureTable::open(path, MODEL_KINDS)?;
         speeds.extend(campbell::resonances(&modes)?);
-        let files =
-            [(&table.source, &together::at(&table.source)), (&modes.source, &NamedPoint::new())];
-        let split_unit = together::plan_differences(files, MACHINE);
-        if !split_unit.is_empty() {
+        let files = [
+            (&table.source, &together::point_of_trace(&table.source)),
+            (&modes.source, &NamedPoint::new()),
+        ];
+        let differences = together::plan_differences(files, MACHINE);
+        if !differences.is_empty() {
             note = format!(
                 " · resonances of another machine: {}",
-                together::list_first(&split_unit, 1)
+                together::join_first(&differences, 1)
             );
         }
     }
@@ -314,26 +320,26 @@ pub(crate) fn resonances(
 
 /// Returns the instants at which the speed passes each resonance, in order of time.
 fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> {
-    let mut found = Vec::new();
+    let mut passages = Vec::new();
     for k in 1..time.len().min(speed.len()) {
         for &resonance in resonances {
             let before = speed[k - 1] - resonance;
             let after = speed[k] - resonance;
             if (before < 0.0) != (after < 0.0) && before.is_finite() && after.is_finite() {
-                let part = before / (before - after);
-                found.push((time[k - 1] + part * (time[k] - time[k - 1]), resonance));
+                let share = before / (before - after);
+                passages.push((time[k - 1] + share * (time[k] - time[k - 1]), resonance));
             }
         }
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    passages.sort_by(|a, b| a.0.total_cmp(&b.0));
     // A peak that only touches a resonance is one passage, not two.
-    found.dedup();
-    found
+    passages.dedup();
+    passages
 }
 
-fn panel(name: &str, label: Label, shown: bool, series: Vec<Series>) -> ChartPanel {
-    let label = Label { words: label::capitalised(&label.words), ..label };
-    ChartPanel { shown, height: 165.0, ..ChartPanel::new(name, label, series) }
+fn panel(name: &str, label: Label, is_shown: bool, series: Vec<Series>) -> ChartPanel {
+    let label = Label { words: label::capitalise(&label.words), ..label };
+    ChartPanel { is_shown, height: 165.0, ..ChartPanel::new(name, label, series) }
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use crate::store::refuse_unfinished;
 use crate::{Build, Error, Exit, show, tell};
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
-use sweep_plot::capitalised;
+use sweep_plot::capitalise;
 use sweep_results::{
     BoundaryShift, ColumnChange, Comparison, Flip, PlanChange, ResultTable, SharedRow, compare,
 };
@@ -356,7 +356,7 @@ fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
             let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
             format!("| {} |\n", cells.join(" | "))
         };
-        let _ = writeln!(text, "\n#### {}\n", capitalised(&escaped(&title)));
+        let _ = writeln!(text, "\n#### {}\n", capitalise(&escaped(&title)));
         text.push_str(&row(&headings));
         let _ = writeln!(text, "|{}", "---:|".repeat(headings.len()));
         rows.iter().for_each(|cells| text.push_str(&row(cells)));

@@ -62,7 +62,7 @@ pub fn draw<V: ValueEnum + Send + Sync>(
     let output = args.output.clone().unwrap_or_else(|| beside(&args.file, "svg"));
     let options = PlotOptions {
         quantity: args.quantity.clone(),
-        at: args.at.clone(),
+        fixed_values: args.at.clone(),
         boundary: args.boundary.clone(),
         ..further
     };

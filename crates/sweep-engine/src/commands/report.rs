@@ -10,7 +10,10 @@ use crate::store::refuse_unfinished;
 use crate::{Error, Exit, GridInput, Model, Plan, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
 use sweep_parameter::RatioLimits;
-use sweep_plot::{Figures, described, escape, quantity, sheet, significant, table, words};
+use sweep_plot::{
+    Figures, describe_as_html, escape, format_significant, html_table, name_in_words,
+    printable_page, quantity_in_words,
+};
 use sweep_results::{Cell, ResultTable, check, ratio_limits, top};
 
 /// Arguments of `sweep report`.
@@ -61,7 +64,7 @@ pub fn run<M: Model>(
         return Err(Error::option("RESULT", args.result.display(), expected));
     }
     let requirements = conditions::parse("--require", &args.requirements, &file)?;
-    let (picture, about) = described(&args.result, model)?;
+    let (picture, about) = describe_as_html(&args.result, model)?;
     let plan = file.plan.clone().unwrap_or_default();
     let name = plan["name"].as_str().unwrap_or_default();
 
@@ -85,7 +88,7 @@ pub fn run<M: Model>(
          {points} points, {sensitive} are chaotic, and {undefined} have no verdict.{over}</p>\n"
     );
     let heads = ["", "worst", "limit", "at"];
-    body += &table("The worst of it", &heads, &worst(&file)?);
+    body += &html_table("The worst of it", &heads, &worst(&file)?);
     let mut held = true;
     let mut claims = Vec::new();
     for condition in &requirements {
@@ -103,16 +106,16 @@ pub fn run<M: Model>(
         }
         claims.push(vec![checked.expression, found, verdict.to_owned()]);
     }
-    body += &table("What is required", &["", "found", ""], &claims);
+    body += &html_table("What is required", &["", "found", ""], &claims);
     body += &format!("<figure>{picture}</figure>\n");
     for path in &args.further {
         let opened = ParquetFile::open(path)?;
-        let (picture, _) = described(path, model)?;
+        let (picture, _) = describe_as_html(path, model)?;
         let lines = further.listed(&opened)?;
         let lines: Vec<_> =
             lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();
         let shown = path.file_stem().unwrap_or_default().to_string_lossy();
-        body += &table(&shown, &["", ""], &lines);
+        body += &html_table(&shown, &["", ""], &lines);
         body += &format!("<figure>{picture}</figure>\n");
     }
     let run = GridInput::<M>::from_plan(name, &plan).load();
@@ -122,7 +125,7 @@ pub fn run<M: Model>(
         let middle: Vec<_> =
             run.axes.iter().map(|axis| Cell::Number(axis.values.between(0.5))).collect();
         let title = format!("Resonances at {}", place(&file, &middle));
-        body += &table(title.trim_end_matches(" at "), &heads, &found);
+        body += &html_table(title.trim_end_matches(" at "), &heads, &found);
     }
     body += &about;
     // A result does not have the sources of its numbers.
@@ -134,7 +137,7 @@ pub fn run<M: Model>(
     let hashes = escape(&hashes.join(", "));
     body += "<details><summary>File and hashes</summary>";
     body += &format!("<p>{path}</p><p>{hashes}</p></details>\n");
-    page.finish(sheet(&args.question, &body).as_bytes())?;
+    page.finish(printable_page(&args.question, &body).as_bytes())?;
     tell(&format!("wrote {}", output.display()));
     Ok(if held { Exit::Done } else { Exit::NotHeld })
 }
@@ -170,9 +173,9 @@ fn worst(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
         let rows = top(file, &columns, None, Some((name, worse)), 1)?;
         let Some([value, at @ ..]) = rows.first().map(Vec::as_slice) else { continue };
         let Cell::Number(number) = value else { continue };
-        let shown = |value: f64| with_unit(significant(value, 4), &column.unit);
+        let shown = |value: f64| with_unit(format_significant(value, 4), &column.unit);
         found.push(vec![
-            quantity(name),
+            quantity_in_words(name),
             shown(*number),
             column.limit.map_or_else(String::new, shown),
             place(file, at),
@@ -185,8 +188,9 @@ fn worst(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
 fn place(file: &ResultTable, at: &[Cell]) -> String {
     let unit_of = |name: &str| file.column(name).map_or("", |column| column.unit.as_str());
     let axes = file.axes().into_iter().zip(at);
-    let values =
-        axes.map(|(axis, at)| format!("{} {}", words(axis), with_unit(word(at), unit_of(axis))));
+    let values = axes.map(|(axis, at)| {
+        format!("{} {}", name_in_words(axis), with_unit(word(at), unit_of(axis)))
+    });
     values.collect::<Vec<_>>().join(", ")
 }
 

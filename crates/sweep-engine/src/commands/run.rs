@@ -247,10 +247,11 @@ fn place(point: u64, job: &Job<'_>) -> String {
 fn share(tally: &Tally) -> String {
     match Share::wilson(tally.reliable, tally.reliable + tally.unreliable) {
         None => "no point has a verdict".to_owned(),
-        Some(Share { part, low, high }) => {
-            let [part, low, high] = [part, low, high].map(|part| format!("{:.1}", 100.0 * part));
+        Some(Share { fraction, low, high }) => {
+            let [share, low, high] =
+                [fraction, low, high].map(|fraction| format!("{:.1}", 100.0 * fraction));
             format!(
-                "{part} % reliable, with 95 % confidence {low} to {high} % for points at random"
+                "{share} % reliable, with 95 % confidence {low} to {high} % for points at random"
             )
         }
     }

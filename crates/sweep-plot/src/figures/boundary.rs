@@ -8,7 +8,7 @@ use crate::axis::is_log_spaced;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
 use crate::error::Result;
-use crate::read::bracket;
+use crate::read::bracket_columns;
 use crate::table::{FigureColumn, FigureTable};
 use crate::{PlotError, label, together};
 
@@ -21,7 +21,7 @@ struct BoundaryPoint {
     high: f64,
     /// Whether the quantity exceeds its limit above the point, if the file says so. A curve keeps
     /// its sides.
-    rising: Option<bool>,
+    is_rising: Option<bool>,
 }
 
 /// Draws a boundary file: the first column along x, the second along y, the bracket shaded; a curve
@@ -33,101 +33,107 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart> {
     let columns: Vec<&FigureColumn> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();
     let names: Vec<&str> = columns.iter().map(|column| column.facts.name.as_str()).collect();
-    let empty = || table.source.nothing_to_draw("a curve needs at least two points");
-    let (low, high) = bracket(&names).ok_or_else(empty)?;
-    let x = columns[0];
-    let y = columns[1];
-    let xs = table.numbers(&x.facts.name)?;
-    let ys = table.numbers(&y.facts.name)?;
+    let too_few_points = || table.source.nothing_to_draw("a curve needs at least two points");
+    let (low, high) = bracket_columns(&names).ok_or_else(too_few_points)?;
+    let x_column = columns[0];
+    let y_column = columns[1];
+    let xs = table.numbers(&x_column.facts.name)?;
+    let ys = table.numbers(&y_column.facts.name)?;
     let lows = table.numbers(low)?;
     let highs = table.numbers(high)?;
     let mut grid: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
     grid.sort_by(f64::total_cmp);
     grid.dedup();
     if grid.len() < 2 {
-        return Err(empty());
+        return Err(too_few_points());
     }
-    let sides = ["quantity_low", "quantity_high"]
+    let quantities_at_ends = ["quantity_low", "quantity_high"]
         .map(|name| table.column(name).and_then(FigureColumn::numbers));
-    let rising = |row: usize| {
-        let [below, above] = sides.map(|values| values.map_or(f64::NAN, |values| values[row]));
+    let is_rising = |row: usize| {
+        let [below, above] =
+            quantities_at_ends.map(|values| values.map_or(f64::NAN, |values| values[row]));
         below.partial_cmp(&above).map(std::cmp::Ordering::is_lt)
     };
     let mut curves: Vec<(String, Vec<BoundaryPoint>)> = Vec::new();
     for row in 0..table.rows {
-        let place = BoundaryPoint {
+        let point = BoundaryPoint {
             x: xs[row],
             y: ys[row],
             low: lows[row],
             high: highs[row],
-            rising: rising(row),
+            is_rising: is_rising(row),
         };
         let further_axes = further_axes(table, row);
         match curves.iter_mut().find(|(name, _)| *name == further_axes) {
-            Some((_, places)) => places.push(place),
-            None => curves.push((further_axes, vec![place])),
+            Some((_, points)) => points.push(point),
+            None => curves.push((further_axes, vec![point])),
         }
     }
-    let phrase = limit(table);
+    let limit_text = limit_in_words(table);
     let mut series = Vec::new();
-    for (k, (further_axes, places)) in curves.iter().enumerate() {
+    for (k, (further_axes, points)) in curves.iter().enumerate() {
         let name = if further_axes.is_empty() {
-            format!("boundary: {phrase}, bracket shaded")
+            format!("boundary: {limit_text}, bracket shaded")
         } else {
-            format!("{phrase}, {further_axes}")
+            format!("{limit_text}, {further_axes}")
         };
         let colour = DISTINCT[k % DISTINCT.len()];
-        series.extend(join_curves(&grid, places).into_iter().map(|branch| {
+        series.extend(join_curves(&grid, points).into_iter().map(|branch| {
             let pick =
                 |value: fn(&BoundaryPoint) -> f64| branch.iter().map(value).collect::<Vec<f64>>();
-            let style = Style::Band(pick(|place| place.low), pick(|place| place.high));
-            Series::new(name.clone(), colour, grid.clone(), pick(|place| place.y), style)
+            let style = Style::Band(pick(|point| point.low), pick(|point| point.high));
+            Series::new(name.clone(), colour, grid.clone(), pick(|point| point.y), style)
         }));
     }
-    let side = far_side(&curves, side_words(table));
-    let words = x.label().words.to_lowercase();
-    let panel = ChartPanel::new("boundary", y.label(), series);
+    let region_note = upper_region_note(&curves, side_words(table));
+    let x_name = x_column.label().words.to_lowercase();
+    let panel = ChartPanel::new("boundary", y_column.label(), series);
     Ok(Chart {
-        title: match quantity(table) {
+        title: match quantity_name(table) {
             growth if is_growth(growth) => "Where the machine may dwell at any speed".to_owned(),
             ratio if is_ratio(ratio) => "Boundary of the linear model's reliability".to_owned(),
-            other => format!("Limit of the {}", in_words(other)),
+            other => format!("Limit of the {}", quantity_in_words(other)),
         },
-        subtitle: table.source.subtitle(&format!("{} values of {words}{side}", grid.len())),
-        x_label: x.label(),
-        x_log: is_log_spaced(&grid),
+        subtitle: table.source.subtitle(&format!("{} values of {x_name}{region_note}", grid.len())),
+        x_label: x_column.label(),
+        is_x_log: is_log_spaced(&grid),
         panels: vec![ChartPanel { height: 440.0, ..panel }],
         ..Chart::default()
     })
 }
 
 /// Returns the note on the region above the uppermost points, if it is the same for all of them.
-fn far_side(curves: &[(String, Vec<BoundaryPoint>)], [falling, rising]: [&str; 2]) -> String {
-    let all = curves.iter().flat_map(|(_, places)| places);
-    let mut uppermost: Vec<&BoundaryPoint> = all.filter(|place| place.y.is_finite()).collect();
+fn upper_region_note(
+    curves: &[(String, Vec<BoundaryPoint>)],
+    [falling_words, rising_words]: [&str; 2],
+) -> String {
+    let all_points = curves.iter().flat_map(|(_, points)| points);
+    let mut uppermost: Vec<&BoundaryPoint> =
+        all_points.filter(|point| point.y.is_finite()).collect();
     let crossings = uppermost.len();
     uppermost.sort_by(|a, b| a.x.total_cmp(&b.x).then(b.y.total_cmp(&a.y)));
     uppermost.dedup_by(|a, b| a.x == b.x);
-    let side = uppermost.first().and_then(|place| place.rising);
-    let side = match side.filter(|_| uppermost.iter().all(|place| place.rising == side)) {
-        Some(true) => rising,
-        Some(false) => falling,
-        None => return String::new(),
-    };
+    let is_rising = uppermost.first().and_then(|point| point.is_rising);
+    let region_words =
+        match is_rising.filter(|_| uppermost.iter().all(|point| point.is_rising == is_rising)) {
+            Some(true) => rising_words,
+            Some(false) => falling_words,
+            None => return String::new(),
+        };
     let line = if crossings > uppermost.len() { "highest crossing" } else { "line" };
-    format!(" · {side} above the {line}")
+    format!(" · {region_words} above the {line}")
 }
 
 /// Returns the name of the quantity, which is that of its column in a map.
-fn quantity(table: &FigureTable) -> &str {
-    table.source.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
+fn quantity_name(table: &FigureTable) -> &str {
+    table.source.find_metadata("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
 }
 
 /// Returns the words for the side below the limit and for the side above it.
 fn side_words(table: &FigureTable) -> [&'static str; 2] {
-    let about = table.source.find(key::BOUNDARY);
-    let worse = about.and_then(|about| Worse::named(about.get(key::WORSE)?.as_str()?));
-    match (quantity(table), worse) {
+    let settings = table.source.find_metadata(key::BOUNDARY);
+    let worse = settings.and_then(|settings| Worse::named(settings.get(key::WORSE)?.as_str()?));
+    match (quantity_name(table), worse) {
         (growth, _) if is_growth(growth) => ["stable", "unstable"],
         ("ratio_min", _) => ["unreliable", "reliable"],
         (ratio, _) if is_ratio(ratio) => ["reliable", "unreliable"],
@@ -142,7 +148,7 @@ fn is_ratio(quantity: &str) -> bool {
 }
 
 /// Returns the quantity in words, as in "least gap, nonlinear model".
-fn in_words(quantity: &str) -> String {
+fn quantity_in_words(quantity: &str) -> String {
     match label::split_model(quantity) {
         (words, "") => words,
         (words, model) => format!("{words}, {model} model"),
@@ -156,12 +162,12 @@ fn is_growth(quantity: &str) -> bool {
 
 /// Returns the parts of a plan on which the boundary depends, except its limit, which the figure
 /// states.
-pub(crate) fn follows_from(table: &FigureTable) -> Vec<&'static str> {
-    let known = table.source.model_kinds;
-    match quantity(table) {
-        growth if is_growth(growth) => known.machine_sections.to_vec(),
-        "ratio_max" | "ratio_min" => together::ratio_parts(known),
-        _ => together::history_parts(known),
+pub(crate) fn plan_sections(table: &FigureTable) -> Vec<&'static str> {
+    let model_kinds = table.source.model_kinds;
+    match quantity_name(table) {
+        growth if is_growth(growth) => model_kinds.machine_sections.to_vec(),
+        "ratio_max" | "ratio_min" => together::ratio_sections(model_kinds),
+        _ => together::history_sections(model_kinds),
     }
 }
 
@@ -180,84 +186,84 @@ pub(crate) struct Overlay {
 pub(crate) fn overlay(table: &FigureTable, axes: [&str; 2]) -> Result<Overlay> {
     let names: Vec<&str> = table.source.planned_axes().collect();
     if names != axes {
-        let [names, axes] = [&names[..], &axes].map(|all| all.join(", "));
+        let [names, axes] = [&names[..], &axes].map(|names| names.join(", "));
         let phrase = format!("is a boundary over {names}; the map is over {axes}");
         return Err(PlotError::Unfit(format!("{} {phrase}", table.source.path.display())));
     }
     let chart = chart(table)?;
-    let name = format!("traced boundary: {}", limit(table));
+    let name = format!("traced boundary: {}", limit_in_words(table));
     let series = chart.panels.into_iter().flat_map(|panel| panel.series);
     let lines = series.map(|series| series.x.iter().zip(series.y).map(|(&x, y)| [x, y]).collect());
     Ok(Overlay { name, lines: lines.collect() })
 }
 
 /// Returns the limit in words, from the metadata or else that of the ratio.
-fn limit(table: &FigureTable) -> String {
-    let about = table.source.find(key::BOUNDARY);
-    let limit_in_file = about.and_then(|about| about.get(key::LIMIT)?.as_f64());
+fn limit_in_words(table: &FigureTable) -> String {
+    let settings = table.source.find_metadata(key::BOUNDARY);
+    let limit_in_file = settings.and_then(|settings| settings.get(key::LIMIT)?.as_f64());
     let unit = table.column("quantity_low").map_or("", |column| &column.facts.unit);
     let (unit, factor) = label::display_unit(unit);
     let limit = limit_in_file.map_or(table.source.ratio_limit(), |limit| limit * factor);
     let limit = label::with_value("", limit, unit);
-    match quantity(table) {
+    match quantity_name(table) {
         "ratio_max" => format!("ratio {limit}"),
         growth if is_growth(growth) && limit_in_file.is_none_or(|limit| limit == 0.0) => {
             "no growth at any speed".to_owned()
         }
-        other => format!("{} {limit}", in_words(other)),
+        other => format!("{} {limit}", quantity_in_words(other)),
     }
 }
 
 /// Returns the values of the axes beyond the second, which the plan in the file names.
 fn further_axes(table: &FigureTable, row: usize) -> String {
-    let phrase = table.source.planned_axes().skip(2).filter_map(|name| {
+    let values = table.source.planned_axes().skip(2).filter_map(|name| {
         let column = table.column(name)?;
         let value = *column.numbers()?.get(row)?;
-        Some(label::with_value(&label::words(name), value, &column.facts.unit))
+        Some(label::with_value(&label::name_in_words(name), value, &column.facts.unit))
     });
-    phrase.collect::<Vec<_>>().join(", ")
+    values.collect::<Vec<_>>().join(", ")
 }
 
 /// Joins the points of a boundary to curves with at most one point for each x. If there are several
 /// points at an x, each continues the curve that has the same sides and whose last point is
 /// nearest.
-fn join_curves(grid: &[f64], places: &[BoundaryPoint]) -> Vec<Vec<BoundaryPoint>> {
+fn join_curves(grid: &[f64], points: &[BoundaryPoint]) -> Vec<Vec<BoundaryPoint>> {
     /// A gap of a curve.
     const GAP: BoundaryPoint =
-        BoundaryPoint { x: f64::NAN, y: f64::NAN, low: f64::NAN, high: f64::NAN, rising: None };
-    let height = |place: &BoundaryPoint| {
-        if place.y.is_nan() { 0.5 * (place.low + place.high) } else { place.y }
+        BoundaryPoint { x: f64::NAN, y: f64::NAN, low: f64::NAN, high: f64::NAN, is_rising: None };
+    let height = |point: &BoundaryPoint| {
+        if point.y.is_nan() { 0.5 * (point.low + point.high) } else { point.y }
     };
-    let mut lines: Vec<Vec<BoundaryPoint>> = Vec::new();
+    let mut curves: Vec<Vec<BoundaryPoint>> = Vec::new();
     for (k, &x) in grid.iter().enumerate() {
-        let here = places.iter().filter(|place| place.x == x && height(place).is_finite());
-        let here: Vec<BoundaryPoint> = here.copied().collect();
+        let points_at_x = points.iter().filter(|point| point.x == x && height(point).is_finite());
+        let points_at_x: Vec<BoundaryPoint> = points_at_x.copied().collect();
         // Pairs of a curve that had a point at the last x and a point at this one, nearest first.
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
-        for (line, known) in lines.iter().enumerate() {
-            for (place, new) in here.iter().enumerate() {
-                let apart = (height(&known[k - 1]) - height(new)).abs();
-                if apart.is_finite() && known[k - 1].rising == new.rising {
-                    pairs.push((apart, line, place));
+        for (curve, curve_points) in curves.iter().enumerate() {
+            for (point, new_point) in points_at_x.iter().enumerate() {
+                let distance = (height(&curve_points[k - 1]) - height(new_point)).abs();
+                if distance.is_finite() && curve_points[k - 1].is_rising == new_point.is_rising {
+                    pairs.push((distance, curve, point));
                 }
             }
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut taken = vec![None; here.len()];
-        for (_, line, place) in pairs {
-            if taken[place].is_none() && !taken.contains(&Some(line)) {
-                taken[place] = Some(line);
+        let mut curve_of_point = vec![None; points_at_x.len()];
+        for (_, curve, point) in pairs {
+            if curve_of_point[point].is_none() && !curve_of_point.contains(&Some(curve)) {
+                curve_of_point[point] = Some(curve);
             }
         }
-        for (place, line) in here.into_iter().zip(taken) {
-            let line = line.unwrap_or_else(|| {
-                lines.push(vec![GAP; grid.len()]);
-                lines.len() - 1
+        for (point, curve) in points_at_x.into_iter().zip(curve_of_point) {
+            let curve = curve.unwrap_or_else(|| {
+                curves.push(vec![GAP; grid.len()]);
+                curves.len() - 1
             });
-            lines[line][k] = place;
+            curves[curve][k] = point;
         }
     }
-    lines
+    curves
 }
 
 #[cfg(test)]
@@ -266,45 +272,45 @@ mod tests {
 
     #[test]
     fn a_fold_continues_the_nearest_curve() {
-        let place =
-            |x: f64, y: f64| BoundaryPoint { x, y, low: y - 0.1, high: y + 0.1, rising: None };
-        let places = [
-            place(1.0, 250.0),
-            place(2.0, 238.0),
-            place(2.0, 239.0),
-            place(2.0, 259.0),
-            place(3.0, 243.0),
-            place(3.0, 265.0),
+        let point =
+            |x: f64, y: f64| BoundaryPoint { x, y, low: y - 0.1, high: y + 0.1, is_rising: None };
+        let points = [
+            point(1.0, 250.0),
+            point(2.0, 238.0),
+            point(2.0, 239.0),
+            point(2.0, 259.0),
+            point(3.0, 243.0),
+            point(3.0, 265.0),
         ];
-        let lines: Vec<Vec<f64>> = join_curves(&[1.0, 2.0, 3.0], &places)
+        let curves: Vec<Vec<f64>> = join_curves(&[1.0, 2.0, 3.0], &points)
             .iter()
-            .map(|line| line.iter().map(|place| place.y).collect())
+            .map(|curve| curve.iter().map(|point| point.y).collect())
             .collect();
-        assert_eq!(lines[0], [250.0, 259.0, 265.0]);
-        assert_eq!(lines.len(), 3);
-        assert!(lines[1][0].is_nan() && lines[1][1] == 238.0 && lines[1][2].is_nan());
-        assert_eq!(lines[2][1..], [239.0, 243.0]);
+        assert_eq!(curves[0], [250.0, 259.0, 265.0]);
+        assert_eq!(curves.len(), 3);
+        assert!(curves[1][0].is_nan() && curves[1][1] == 238.0 && curves[1][2].is_nan());
+        assert_eq!(curves[2][1..], [239.0, 243.0]);
     }
 
     #[test]
     fn curves_of_opposite_sides_do_not_cross() {
-        let place = |x: f64, y: f64, rising| BoundaryPoint {
+        let point = |x: f64, y: f64, rising| BoundaryPoint {
             x,
             y,
             low: y - 0.1,
             high: y + 0.1,
-            rising: Some(rising),
+            is_rising: Some(rising),
         };
-        let places = [
-            place(1.0, 238.5, false),
-            place(1.0, 239.6, true),
-            place(2.0, 240.0, false),
-            place(2.0, 245.4, true),
+        let points = [
+            point(1.0, 238.5, false),
+            point(1.0, 239.6, true),
+            point(2.0, 240.0, false),
+            point(2.0, 245.4, true),
         ];
-        let lines: Vec<Vec<f64>> = join_curves(&[1.0, 2.0], &places)
+        let curves: Vec<Vec<f64>> = join_curves(&[1.0, 2.0], &points)
             .iter()
-            .map(|line| line.iter().map(|place| place.y).collect())
+            .map(|curve| curve.iter().map(|point| point.y).collect())
             .collect();
-        assert_eq!(lines, [[238.5, 240.0], [239.6, 245.4]]);
+        assert_eq!(curves, [[238.5, 240.0], [239.6, 245.4]]);
     }
 }

@@ -6,7 +6,7 @@ use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::error::{PlotError, Result};
 use crate::gather::CellMap;
 use crate::label::{self, Label};
-use crate::layer::{self, Group, ShownColumn};
+use crate::layer::{self, ColumnGroup, ShownColumn};
 use crate::read::{ColumnFacts, FigureFile};
 use crate::scene::{Colour, INK};
 use crate::table::FigureColumn;
@@ -16,23 +16,23 @@ const MAX_MARKS: usize = 400;
 
 /// Returns the title for the requested columns, with the channel if it is the only one.
 fn title(source: &FigureFile, requested: &[ShownColumn]) -> String {
-    let Some(first) = requested.first() else { return TRUSTED.to_owned() };
+    let Some(first) = requested.first() else { return RATIOS_TITLE.to_owned() };
     let is_alone = requested.iter().all(|shown| shown.channel == first.channel);
     match (first.group, first.channel.as_ref().filter(|_| is_alone)) {
-        (Group::Nonlinear | Group::Linear, Some(channel)) => {
-            format!("{BOTH}: {}", label::channel(channel))
+        (ColumnGroup::Nonlinear | ColumnGroup::Linear, Some(channel)) => {
+            format!("{AMPLITUDES_TITLE}: {}", label::channel_in_words(channel))
         }
-        (Group::Nonlinear | Group::Linear, None) => BOTH.to_owned(),
-        (Group::Other, _) => label::quantity(first.column()),
-        (Group::Ratio, Some(_)) => first.words(source).0,
-        (Group::Ratio, None) => TRUSTED.to_owned(),
+        (ColumnGroup::Nonlinear | ColumnGroup::Linear, None) => AMPLITUDES_TITLE.to_owned(),
+        (ColumnGroup::Other, _) => label::quantity_in_words(first.name()),
+        (ColumnGroup::Ratio, Some(_)) => first.title_and_label(source).0,
+        (ColumnGroup::Ratio, None) => RATIOS_TITLE.to_owned(),
     }
 }
 
 /// The title of charts of amplitudes.
-const BOTH: &str = "Amplitudes of both models";
+const AMPLITUDES_TITLE: &str = "Amplitudes of both models";
 /// The title of charts of ratios.
-const TRUSTED: &str = "Where the linear model can be trusted";
+const RATIOS_TITLE: &str = "Where the linear model can be trusted";
 
 /// Draws the chart of a map file over one axis.
 ///
@@ -43,117 +43,129 @@ pub(crate) fn chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
     let table = &map.table;
     let source = &table.source;
     let requested: Option<Vec<ShownColumn>> =
-        layer::requested(source, options)?.into_iter().collect();
+        layer::requested_columns(source, options)?.into_iter().collect();
     let Some(requested) = requested else {
         return Err(PlotError::Unfit(
             "status is drawn on maps of two or more axes; over one axis, failed points are marked"
                 .to_owned(),
         ));
     };
-    let cells: Vec<usize> = (0..map.counts.len()).filter(|&cell| map.filled(cell)).collect();
+    let cells: Vec<usize> = (0..map.counts.len()).filter(|&cell| map.has_points(cell)).collect();
     let xs: Vec<f64> = cells.iter().map(|&cell| axis.values[cell]).collect();
-    let line = |name: &str, colour: Colour, column: &FigureColumn, factor: f64| {
+    let column_series = |name: &str, colour: Colour, column: &FigureColumn, factor: f64| {
         let values = column.numbers().unwrap_or_default();
         let y = cells.iter().map(|&cell| values[cell] * factor).collect();
         Series::new(name, colour, xs.clone(), y, Style::Solid(2.2))
     };
     let requested_ratios: Vec<&ShownColumn> =
-        requested.iter().filter(|shown| shown.group == Group::Ratio).collect();
-    let wanted = |name: &str| {
+        requested.iter().filter(|shown| shown.group == ColumnGroup::Ratio).collect();
+    let is_channel_requested = |name: &str| {
         let mut channels = requested_ratios.iter().map(|shown| shown.channel.as_deref());
         requested_ratios.is_empty()
             || channels.any(|channel| channel.is_none_or(|channel| channel == name))
     };
-    let mut panels = vec![ratios(map, !requested_ratios.is_empty(), &line, &wanted)];
+    let mut panels =
+        vec![ratio_panel(map, !requested_ratios.is_empty(), &column_series, &is_channel_requested)];
     // Each quantity has a panel with the columns of both models.
-    let panel = |quantity: layer::QuantityColumns<'_>| {
+    let quantity_panel = |quantity: layer::QuantityColumns<'_>| {
         let columns = &quantity.columns;
         let (unit, factor) = label::display_unit(&columns[0].1.unit);
         let lines = columns.iter().filter_map(|(model, facts)| {
-            let phrase = if model.is_empty() { String::new() } else { format!("{model} model") };
+            let name = if model.is_empty() { String::new() } else { format!("{model} model") };
             let colour = if *model == "linear" { LINEAR } else { NONLINEAR };
-            Some(line(&phrase, colour, table.column(&facts.name)?, factor))
+            Some(column_series(&name, colour, table.column(&facts.name)?, factor))
         });
         let limit = columns[0].1.limit.map(|limit| limit * factor);
-        let is_requested = |name: &String| requested.iter().any(|shown| shown.column() == name);
-        let label = Label::new(&label::capitalised(&quantity.words), unit);
+        let is_requested = |name: &String| requested.iter().any(|shown| shown.name() == name);
+        let label = Label::new(&label::capitalise(&quantity.words), unit);
         let panel = ChartPanel::new(&quantity.name, label, lines.collect());
         ChartPanel {
-            shown: columns.iter().any(|(_, facts)| is_requested(&facts.name)),
+            is_shown: columns.iter().any(|(_, facts)| is_requested(&facts.name)),
             levels: limit.map(|limit| (limit, "limit".to_owned())).into_iter().collect(),
             height: if quantity.is_channel { 190.0 } else { panel.height },
             ..panel
         }
     };
-    panels.extend(layer::quantities(source).into_iter().map(panel));
+    panels.extend(layer::quantities(source).into_iter().map(quantity_panel));
     panels.retain(|panel| !panel.series.is_empty());
 
     let failed: Vec<usize> =
         cells.iter().copied().filter(|&cell| map.counts[cell].failed > 0).collect();
-    let each = failed.len().div_ceil(MAX_MARKS).max(1);
+    let mark_stride = failed.len().div_ceil(MAX_MARKS).max(1);
     let mark = |&cell: &usize| Mark {
         x: axis.values[cell],
-        label: map.status(cell).unwrap_or("some failed").replace('_', " "),
+        label: map.common_status(cell).unwrap_or("some failed").replace('_', " "),
     };
-    let mark_meaning = if each == 1 {
+    let mark_meaning = if mark_stride == 1 {
         "failed: no result".to_owned()
     } else {
-        format!("failed: no result; one of {each} places is marked")
+        format!("failed: no result; one of {mark_stride} places is marked")
     };
     Ok(Chart {
         title: title(source, &requested),
         subtitle: super::map::subtitle(map, &[]),
         x_label: Label::new(&axis.swept.words, &axis.swept.unit),
-        x_log: axis.swept.log,
-        marks: failed.iter().step_by(each).map(mark).collect(),
+        is_x_log: axis.swept.is_log,
+        marks: failed.iter().step_by(mark_stride).map(mark).collect(),
         mark_meaning,
         panels,
         ..Chart::default()
     })
 }
 
-fn ratios(
+fn ratio_panel(
     map: &CellMap,
-    shown: bool,
-    line: &impl Fn(&str, Colour, &FigureColumn, f64) -> Series,
-    wanted: &impl Fn(&str) -> bool,
+    is_shown: bool,
+    column_series: &impl Fn(&str, Colour, &FigureColumn, f64) -> Series,
+    is_channel_requested: &impl Fn(&str) -> bool,
 ) -> ChartPanel {
     let limit = map.table.source.ratio_limit();
     let mut channels = map.table.source.with_prefix("ratio_");
     channels.retain(|(name, _)| !["max", "min", "change"].contains(name));
-    let ratio = |(k, (name, facts)): (usize, (&str, &ColumnFacts))| {
-        let column = map.table.column(&facts.name).filter(|_| wanted(name))?;
-        Some(line(&label::channel(name), DISTINCT[k % DISTINCT.len()], column, 1.0))
+    let channel_series = |(k, (name, facts)): (usize, (&str, &ColumnFacts))| {
+        let column = map.table.column(&facts.name).filter(|_| is_channel_requested(name))?;
+        Some(column_series(
+            &label::channel_in_words(name),
+            DISTINCT[k % DISTINCT.len()],
+            column,
+            1.0,
+        ))
     };
-    let mut series: Vec<Series> = channels.into_iter().enumerate().filter_map(ratio).collect();
+    let mut series: Vec<Series> =
+        channels.into_iter().enumerate().filter_map(channel_series).collect();
     if let Some(column) = map.table.column("ratio_max") {
-        series.push(Series { style: Style::Dashed, ..line("largest", INK, column, 1.0) });
+        series.push(Series { style: Style::Dashed, ..column_series("largest", INK, column, 1.0) });
     }
-    let words = format!("Ratio of {}, nonlinear / linear", map.table.source.compared());
+    let words = format!("Ratio of {}, nonlinear / linear", map.table.source.compared_quantity());
     ChartPanel {
-        shown,
-        log: spans_decades(series.iter().flat_map(|series| series.y.iter().copied())),
-        levels: vec![(limit, format!("unreliable from ratio {} on", label::significant(limit, 4)))],
-        mixed: mixed(map),
+        is_shown,
+        is_log: spans_decades(series.iter().flat_map(|series| series.y.iter().copied())),
+        levels: vec![(
+            limit,
+            format!("unreliable from ratio {} on", label::format_significant(limit, 4)),
+        )],
+        mixed: mixed_ranges(map),
         ..ChartPanel::new("ratio", Label::new(&words, ""), series)
     }
 }
 
 /// Returns the ranges of the axis whose cells hold reliable and unreliable points. Ranges that are
 /// too close to be distinguished are merged.
-fn mixed(map: &CellMap) -> Vec<[f64; 2]> {
+fn mixed_ranges(map: &CellMap) -> Vec<[f64; 2]> {
     let axis = &map.grid.axes[0];
     let scale = axis.scale();
     let mut ranges: Vec<[f64; 2]> = Vec::new();
-    for (counts, pair) in map.counts.iter().zip(axis.borders.windows(2)) {
+    for (counts, ends) in map.counts.iter().zip(axis.borders.windows(2)) {
         if counts.reliable == 0 || counts.unreliable == 0 {
             continue;
         }
         match ranges.last_mut() {
-            Some(last) if scale.position(pair[0]) - scale.position(last[1]) < MIN_GAP => {
-                last[1] = pair[1];
+            Some(last_range)
+                if scale.position(ends[0]) - scale.position(last_range[1]) < MIN_RANGE_GAP =>
+            {
+                last_range[1] = ends[1];
             }
-            _ => ranges.push([pair[0], pair[1]]),
+            _ => ranges.push([ends[0], ends[1]]),
         }
     }
     ranges
@@ -161,4 +173,4 @@ fn mixed(map: &CellMap) -> Vec<[f64; 2]> {
 
 /// Minimum gap between two ranges that are drawn apart, as a share of the axis. Basis: half a pixel
 /// of a picture.
-const MIN_GAP: f64 = 5e-4;
+const MIN_RANGE_GAP: f64 = 5e-4;

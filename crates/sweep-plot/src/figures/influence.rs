@@ -4,7 +4,7 @@ use crate::axis::AxisScale;
 use crate::colour::{FAILED, GOOD_SIDE};
 use crate::frame::{
     BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE,
-    heading, legend, legend_height,
+    draw_heading, draw_legend, legend_height,
 };
 use crate::influence::chance_correlation;
 use crate::label;
@@ -21,7 +21,7 @@ const ROW_HEIGHT: f64 = 40.0;
 const BAR_HEIGHT: f64 = 20.0;
 
 /// Maximum number of parameters shown, the most influential ones. Basis: a figure of one page.
-const MAX_PARAMETERS: usize = 24;
+const MAX_BARS: usize = 24;
 
 /// The legend entry of a bar's outline.
 const OUTLINE_MEANING: &str = "rising and falling alike (root of the correlation ratio)";
@@ -34,86 +34,97 @@ const CHANCE_COLOUR: Colour = FAILED.with_alpha(110);
 
 /// Draws a bar for each parameter, the most influential on top.
 pub(crate) fn draw(scatter: &Scatter) -> Scene {
-    let mut places = scatter.by_influence();
-    places.truncate(MAX_PARAMETERS);
-    let words = |k: usize| scatter.parameters[k].label.words.clone();
-    let widest = places.iter().map(|&k| text_width(&words(k), LABEL_SIZE, false));
-    let left = widest.fold(80.0, f64::max).min(320.0) + 40.0;
+    let mut indices = scatter.by_influence();
+    indices.truncate(MAX_BARS);
+    let name = |k: usize| scatter.parameters[k].label.words.clone();
+    let name_widths = indices.iter().map(|&k| text_width(&name(k), LABEL_SIZE, false));
+    let left = name_widths.fold(80.0, f64::max).min(320.0) + 40.0;
     let entries = [
         (LegendSymbol::Area(GOOD_SIDE), "rank correlation".to_owned()),
         (LegendSymbol::Line(Stroke::solid(INK, 1.6)), OUTLINE_MEANING.to_owned()),
         (LegendSymbol::Area(CHANCE_COLOUR), "may be chance (95 %)".to_owned()),
     ];
-    let room = FIGURE_WIDTH - left - RIGHT_MARGIN;
+    let panel_width = FIGURE_WIDTH - left - RIGHT_MARGIN;
     let legend_height = legend_height(&entries, FIGURE_WIDTH - 60.0);
-    let height = ROW_HEIGHT * places.len() as f64 + 12.0;
-    let total = HEADING_HEIGHT + height + BOTTOM_MARGIN + legend_height + 8.0;
+    let height = ROW_HEIGHT * indices.len() as f64 + 12.0;
+    let total_height = HEADING_HEIGHT + height + BOTTOM_MARGIN + legend_height + 8.0;
     let channel = match scatter.channel.as_str() {
         "" => String::new(),
         channel => format!(": {channel}"),
     };
     let title = format!("What it depends on: {}{channel}", scatter.label.words.to_lowercase());
-    let with_value = scatter.count_with_value();
-    let all = scatter.parameters.len();
+    let value_count = scatter.count_with_value();
+    let parameter_count = scatter.parameters.len();
     let mut notes = Vec::new();
-    if with_value < scatter.points.len() {
-        notes.push(format!("{with_value} with a value"));
+    if value_count < scatter.points.len() {
+        notes.push(format!("{value_count} with a value"));
     }
-    if all > MAX_PARAMETERS {
-        notes.push(format!("the {MAX_PARAMETERS} most influential of {all} parameters"));
+    if parameter_count > MAX_BARS {
+        notes.push(format!("the {MAX_BARS} most influential of {parameter_count} parameters"));
     }
     let subtitle = scatter.subtitle(&notes);
-    let mut scene = Scene::new(FIGURE_WIDTH, total, format!("{title}. {subtitle}"));
-    heading(&mut scene, &title, &subtitle);
+    let mut scene = Scene::new(FIGURE_WIDTH, total_height, format!("{title}. {subtitle}"));
+    draw_heading(&mut scene, &title, &subtitle);
     let panel = Panel {
         x: left,
         y: HEADING_HEIGHT,
-        width: room,
+        width: panel_width,
         height,
-        xs: AxisScale::linear(-1.0, 1.0),
+        x_scale: AxisScale::linear(-1.0, 1.0),
         // Bars have names instead of numbers.
-        ys: AxisScale::linear(0.0, 0.0),
+        y_scale: AxisScale::linear(0.0, 0.0),
     };
     panel.draw_grid_lines(&mut scene);
-    let span = |scene: &mut Scene, from: f64, to: f64, y: f64, height: f64, colour: Colour| {
-        let [from, to] = [from.min(to), from.max(to)].map(|x| panel.at_x(x));
-        scene.fill(Outline::rectangle(from, y, to - from, height), colour);
-    };
-    let noise = chance_correlation(with_value);
-    span(&mut scene, -noise, noise, panel.y, height, CHANCE_COLOUR);
-    let middle = panel.at_x(0.0);
-    let axis = Outline::line(&[[middle, panel.y], [middle, panel.y + height]]);
+    let fill_range =
+        |scene: &mut Scene, from: f64, to: f64, y: f64, height: f64, colour: Colour| {
+            let [from, to] = [from.min(to), from.max(to)].map(|x| panel.x_pixel(x));
+            scene.fill(Outline::rectangle(from, y, to - from, height), colour);
+        };
+    let chance_limit = chance_correlation(value_count);
+    fill_range(&mut scene, -chance_limit, chance_limit, panel.y, height, CHANCE_COLOUR);
+    let zero_x = panel.x_pixel(0.0);
+    let axis = Outline::line(&[[zero_x, panel.y], [zero_x, panel.y + height]]);
     scene.line(axis, Stroke::solid(INK, 1.2));
-    for (row, &k) in places.iter().enumerate() {
+    for (row, &k) in indices.iter().enumerate() {
         let centre = panel.y + 6.0 + ROW_HEIGHT * (row as f64 + 0.5);
-        let text = Text::new(words(k), [left - 12.0, centre + 0.35 * LABEL_SIZE], LABEL_SIZE);
+        let text = Text::new(name(k), [left - 12.0, centre + 0.35 * LABEL_SIZE], LABEL_SIZE);
         scene.text(text.anchor(Anchor::End));
-        let Some(found) = scatter.parameters[k].influence else { continue };
-        span(&mut scene, 0.0, found.rank, centre - BAR_HEIGHT / 2.0, BAR_HEIGHT, GOOD_SIDE);
-        if let Some(any) = found.any.filter(|any| *any > found.rank.abs()) {
-            let end = panel.at_x(any.copysign(found.rank));
-            let from = middle.min(end);
-            let to = middle.max(end);
+        let Some(influence) = scatter.parameters[k].influence else { continue };
+        fill_range(
+            &mut scene,
+            0.0,
+            influence.rank_correlation,
+            centre - BAR_HEIGHT / 2.0,
+            BAR_HEIGHT,
+            GOOD_SIDE,
+        );
+        if let Some(ratio) = influence
+            .root_correlation_ratio
+            .filter(|ratio| *ratio > influence.rank_correlation.abs())
+        {
+            let end_x = panel.x_pixel(ratio.copysign(influence.rank_correlation));
+            let from = zero_x.min(end_x);
+            let to = zero_x.max(end_x);
             let outline =
                 Outline::rectangle(from, centre - BAR_HEIGHT / 2.0, to - from, BAR_HEIGHT);
             scene.line(outline, Stroke::solid(INK, 1.6));
         }
-        let phrase = signed(found.rank);
-        let at = [panel.x + room + 10.0, centre + 0.35 * TICK_SIZE];
-        scene.text(Text::new(phrase, at, TICK_SIZE));
+        let number = format_signed(influence.rank_correlation);
+        let position = [panel.x + panel_width + 10.0, centre + 0.35 * TICK_SIZE];
+        scene.text(Text::new(number, position, TICK_SIZE));
     }
-    if places.iter().all(|&k| scatter.parameters[k].influence.is_none()) {
+    if indices.iter().all(|&k| scatter.parameters[k].influence.is_none()) {
         panel.write_centred(&mut scene, NO_INFLUENCE);
     }
     panel.draw_frame(&mut scene, true, false);
-    panel.x_label(&mut scene, "Rank correlation (Spearman)");
+    panel.draw_x_label(&mut scene, "Rank correlation (Spearman)");
     let y = panel.y + height + BOTTOM_MARGIN;
-    legend(&mut scene, &entries, 40.0, y, FIGURE_WIDTH - 60.0);
+    draw_legend(&mut scene, &entries, 40.0, y, FIGURE_WIDTH - 60.0);
     scene
 }
 
 /// Returns a correlation with its sign.
-fn signed(rank: f64) -> String {
-    let sign = if rank < 0.0 { "-" } else { "+" };
-    format!("{sign}{}", label::significant(rank.abs(), 2))
+fn format_signed(rank_correlation: f64) -> String {
+    let sign = if rank_correlation < 0.0 { "-" } else { "+" };
+    format!("{sign}{}", label::format_significant(rank_correlation.abs(), 2))
 }

@@ -3,20 +3,21 @@
 use std::collections::BTreeMap;
 
 use crate::axis::AxisScale;
-use crate::colour::{BOTH, COLOUR_STEPS, DISTINCT};
-use crate::contour::{MAX_POINTS, leave_out_shortest, zero_lines};
+use crate::colour::{BOTH_SIDES, COLOUR_STEPS, DISTINCT};
+use crate::contour::{MAX_POINTS, remove_shortest, zero_lines};
 use crate::cuts::Cuts;
 use crate::error::Result;
 use crate::figures::boundary::Overlay;
 use crate::frame::{
     self, BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE,
-    failed, failed_hatch, heading, legend_height, sensitive_hatch, undefined,
+    draw_failed_area, draw_heading, draw_undefined_cells, failed_hatch, legend_height,
+    sensitive_hatch,
 };
-use crate::gather::{CellMap, OK};
+use crate::gather::{CellMap, OK_STATUS};
 use crate::grid::GridAxis;
 use crate::layer::{DividingLimit, Layer, ShownColumn};
 use crate::raster::text_width;
-use crate::region::roomiest_place;
+use crate::region::roomiest_position;
 use crate::scene::{Anchor, Colour, Hatch, INK, Outline, PAPER, Scene, Stroke, Text};
 
 /// The colour of a boundary file's curve, which no colour scale has.
@@ -36,11 +37,11 @@ const RIGHT_MARGIN: f64 = 128.0;
 pub(crate) fn draw(
     map: &CellMap,
     cuts: &Cuts,
-    shown: Option<&ShownColumn>,
+    shown_column: Option<&ShownColumn>,
     overlay: Option<&Overlay>,
 ) -> Result<Scene> {
-    let mut cells = match shown {
-        Some(shown) => CellPainter::by_value(map, shown.layer(map)?),
+    let mut painter = match shown_column {
+        Some(shown_column) => CellPainter::by_value(map, shown_column.layer(map)?),
         None => CellPainter::by_status(map),
     };
     let grid = &map.grid;
@@ -51,75 +52,91 @@ pub(crate) fn draw(
         _ => 3,
     };
     let rows = cuts.cuts.len().div_ceil(columns);
-    let single = cuts.cuts.len() == 1;
-    let bar = if cells.layer.is_some() { RIGHT_MARGIN } else { 24.0 };
-    let (gap, head) = if single { (0.0, 0.0) } else { (22.0, 26.0) };
-    let width = (FIGURE_WIDTH - LEFT_MARGIN - bar - gap * (columns - 1) as f64) / columns as f64;
-    let height = if single { 440.0 } else { 0.78 * width };
-    cells.refine_hatches([width, height]);
-    let [xs, ys] = [0, 1].map(|k| grid.axes[k].values.len());
-    let all = || (0..xs).flat_map(|x| (0..ys).map(move |y| (x, y)));
-    let drawn = cuts.cuts.iter().flat_map(|cut| all().map(|(x, y)| grid.cell(x, y, &cut.rest)));
-    let mut entries = cells.legend(&drawn.collect::<Vec<_>>());
+    let is_single = cuts.cuts.len() == 1;
+    let right_margin = if painter.layer.is_some() { RIGHT_MARGIN } else { 24.0 };
+    let (gap, name_height) = if is_single { (0.0, 0.0) } else { (22.0, 26.0) };
+    let width =
+        (FIGURE_WIDTH - LEFT_MARGIN - right_margin - gap * (columns - 1) as f64) / columns as f64;
+    let height = if is_single { 440.0 } else { 0.78 * width };
+    painter.refine_hatches([width, height]);
+    let [column_count, row_count] = [0, 1].map(|k| grid.axes[k].values.len());
+    let positions_in_cut = || {
+        (0..column_count).flat_map(|x_index| (0..row_count).map(move |y_index| (x_index, y_index)))
+    };
+    let drawn_cells = cuts.cuts.iter().flat_map(|cut| {
+        positions_in_cut().map(|(x_index, y_index)| grid.cell(x_index, y_index, &cut.other_picks))
+    });
+    let mut legend_entries = painter.legend_entries(&drawn_cells.collect::<Vec<_>>());
     let scales = [0, 1].map(|k| grid.axes[k].scale());
     if let Some(overlay) = overlay.filter(|overlay| is_within(overlay, scales)) {
-        entries.push((LegendSymbol::Line(overlay_stroke()), overlay.name.clone()));
+        legend_entries.push((LegendSymbol::Line(overlay_stroke()), overlay.name.clone()));
     }
-    let legend_height = legend_height(&entries, FIGURE_WIDTH - LEFT_MARGIN - 20.0);
-    let panels_height = rows as f64 * (height + head) + gap * (rows - 1) as f64;
-    let total = HEADING_HEIGHT + panels_height + BOTTOM_MARGIN + legend_height + 14.0;
+    let legend_height = legend_height(&legend_entries, FIGURE_WIDTH - LEFT_MARGIN - 20.0);
+    let panels_height = rows as f64 * (height + name_height) + gap * (rows - 1) as f64;
+    let total_height = HEADING_HEIGHT + panels_height + BOTTOM_MARGIN + legend_height + 14.0;
 
     let [x_axis, y_axis] = [&grid.axes[0], &grid.axes[1]];
-    let described = format!("{}: {} over {}", cells.title, y_axis.label(), x_axis.label());
-    let mut scene = Scene::new(FIGURE_WIDTH, total, described);
-    heading(&mut scene, &cells.title, &subtitle(map, &cuts.notes));
+    let description = format!("{}: {} over {}", painter.title, y_axis.label(), x_axis.label());
+    let mut scene = Scene::new(FIGURE_WIDTH, total_height, description);
+    draw_heading(&mut scene, &painter.title, &subtitle(map, &cuts.notes));
     for (index, cut) in cuts.cuts.iter().enumerate() {
         let column = index % columns;
         let row = index / columns;
         let panel = Panel {
             x: LEFT_MARGIN + column as f64 * (width + gap),
-            y: HEADING_HEIGHT + head + row as f64 * (height + head + gap),
+            y: HEADING_HEIGHT + name_height + row as f64 * (height + name_height + gap),
             width,
             height,
-            xs: x_axis.scale(),
-            ys: y_axis.scale(),
+            x_scale: x_axis.scale(),
+            y_scale: y_axis.scale(),
         };
-        cells.draw(&mut scene, &panel, &cut.rest);
-        let divided = cells.layer.as_ref().and_then(|layer| Some((layer, layer.level.as_ref()?)));
-        let room = MAX_POINTS / cuts.cuts.len();
-        let mut lines = divided.map_or_else(Vec::new, |divided| {
-            cells.draw_line(&mut scene, &panel, divided, &cut.rest, room)
+        painter.draw(&mut scene, &panel, &cut.other_picks);
+        let layer_and_limit =
+            painter.layer.as_ref().and_then(|layer| Some((layer, layer.limit.as_ref()?)));
+        let max_points = MAX_POINTS / cuts.cuts.len();
+        let mut lines = layer_and_limit.map_or_else(Vec::new, |layer_and_limit| {
+            painter.draw_line(&mut scene, &panel, layer_and_limit, &cut.other_picks, max_points)
         });
         if let Some(overlay) = overlay {
             draw_overlay(&mut scene, &panel, overlay);
         }
         // The names of the sides are drawn over the lines, which they interrupt if there is no room
         // beside them.
-        if let Some(divided) = divided {
-            let overlaid = overlay.iter().flat_map(|overlay| &overlay.lines);
-            lines.extend(overlaid.map(|line| curve_pixels(&panel, line)));
-            cells.name_regions(&mut scene, &panel, divided, (&cut.rest, &lines));
+        if let Some(layer_and_limit) = layer_and_limit {
+            let overlay_lines = overlay.iter().flat_map(|overlay| &overlay.lines);
+            lines.extend(overlay_lines.map(|line| curve_pixels(&panel, line)));
+            painter.name_regions(&mut scene, &panel, layer_and_limit, (&cut.other_picks, &lines));
         }
-        let lowest = index + columns >= cuts.cuts.len();
-        panel.draw_frame(&mut scene, lowest, column == 0);
+        let is_lowest = index + columns >= cuts.cuts.len();
+        panel.draw_frame(&mut scene, is_lowest, column == 0);
         if let Some(name) = &cut.name {
-            let at = [panel.x + width / 2.0, panel.y - 8.0];
-            scene.text(Text::new(name.clone(), at, TICK_SIZE).bold().anchor(Anchor::Middle));
+            let position = [panel.x + width / 2.0, panel.y - 8.0];
+            scene.text(Text::new(name.clone(), position, TICK_SIZE).bold().anchor(Anchor::Middle));
         }
-        if lowest {
-            panel.x_label(&mut scene, &x_axis.label());
+        if is_lowest {
+            panel.draw_x_label(&mut scene, &x_axis.label());
         }
         if column == 0 {
-            panel.y_label(&mut scene, &y_axis.label(), 60.0);
+            panel.draw_y_label(&mut scene, &y_axis.label(), 60.0);
         }
     }
-    if let Some(layer) = &cells.layer {
-        let area =
-            [FIGURE_WIDTH - RIGHT_MARGIN + 20.0, HEADING_HEIGHT + head, 22.0, panels_height - head];
+    if let Some(layer) = &painter.layer {
+        let area = [
+            FIGURE_WIDTH - RIGHT_MARGIN + 20.0,
+            HEADING_HEIGHT + name_height,
+            22.0,
+            panels_height - name_height,
+        ];
         colour_bar(&mut scene, layer, area);
     }
-    let y = HEADING_HEIGHT + panels_height + BOTTOM_MARGIN;
-    frame::legend(&mut scene, &entries, LEFT_MARGIN, y, FIGURE_WIDTH - LEFT_MARGIN - 20.0);
+    let legend_y = HEADING_HEIGHT + panels_height + BOTTOM_MARGIN;
+    frame::draw_legend(
+        &mut scene,
+        &legend_entries,
+        LEFT_MARGIN,
+        legend_y,
+        FIGURE_WIDTH - LEFT_MARGIN - 20.0,
+    );
     Ok(scene)
 }
 
@@ -131,32 +148,36 @@ fn overlay_stroke() -> Stroke {
 /// Draws the curve of a boundary file as far as it lies within the panel.
 fn draw_overlay(scene: &mut Scene, panel: &Panel, overlay: &Overlay) {
     let mut outline = Outline::default();
-    let mut alone = Vec::new();
+    let mut isolated = Vec::new();
     for line in &overlay.lines {
-        alone.extend(outline.add_runs(&curve_pixels(panel, line)));
+        isolated.extend(outline.add_runs(&curve_pixels(panel, line)));
     }
     scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
     scene.line(outline, overlay_stroke());
-    for place in alone {
-        scene.fill(Outline::circle(place, 4.5), PAPER);
-        scene.fill(Outline::circle(place, 3.5), OVERLAY_COLOUR);
+    for point in isolated {
+        scene.fill(Outline::circle(point, 4.5), PAPER);
+        scene.fill(Outline::circle(point, 3.5), OVERLAY_COLOUR);
     }
 }
 
 /// Returns whether a point of a boundary file's curve lies within these scales.
-fn is_within(overlay: &Overlay, [xs, ys]: [AxisScale; 2]) -> bool {
+fn is_within(overlay: &Overlay, [x_scale, y_scale]: [AxisScale; 2]) -> bool {
     let is_inside = |&[x, y]: &[f64; 2]| {
-        [xs.position(x), ys.position(y)].iter().all(|part| (0.0..=1.0).contains(part))
+        [x_scale.position(x), y_scale.position(y)]
+            .iter()
+            .all(|position| (0.0..=1.0).contains(position))
     };
     overlay.lines.iter().flatten().any(is_inside)
 }
 
 /// Returns the pixels of a curve's points; `None` for points outside the panel and for gaps.
 fn curve_pixels(panel: &Panel, line: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
-    let inside = |x: f64, y: f64| {
-        [panel.xs.position(x), panel.ys.position(y)].iter().all(|part| (0.0..=1.0).contains(part))
+    let is_inside = |x: f64, y: f64| {
+        [panel.x_scale.position(x), panel.y_scale.position(y)]
+            .iter()
+            .all(|position| (0.0..=1.0).contains(position))
     };
-    line.iter().map(|&[x, y]| inside(x, y).then(|| panel.at(x, y))).collect()
+    line.iter().map(|&[x, y]| is_inside(x, y).then(|| panel.pixel(x, y))).collect()
 }
 
 /// Returns the subtitle: the name of the run, the number of points and of failed ones, and notes on
@@ -164,7 +185,7 @@ fn curve_pixels(panel: &Panel, line: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
 pub(crate) fn subtitle(map: &CellMap, notes: &[String]) -> String {
     let source = &map.table.source;
     let mut parts = source.notes([format!("{} points", source.rows)]);
-    let failed = map.failed();
+    let failed = map.count_failed();
     if failed > 0 {
         parts.push(format!("{failed} failed"));
     }
@@ -174,47 +195,51 @@ pub(crate) fn subtitle(map: &CellMap, notes: &[String]) -> String {
 }
 
 /// Returns the legend of all cells by a layer, or by status without one.
-pub(crate) fn legend(map: &CellMap, layer: Option<Layer>) -> Vec<(LegendSymbol, String)> {
-    let cells = layer
+pub(crate) fn map_legend_entries(
+    map: &CellMap,
+    layer: Option<Layer>,
+) -> Vec<(LegendSymbol, String)> {
+    let painter = layer
         .map_or_else(|| CellPainter::by_status(map), |layer| CellPainter::by_value(map, layer));
-    cells.legend(&(0..map.counts.len()).collect::<Vec<_>>())
+    painter.legend_entries(&(0..map.counts.len()).collect::<Vec<_>>())
 }
 
 /// Returns the colour of each status.
-pub(crate) fn kinds(map: &CellMap) -> BTreeMap<String, String> {
-    let cells = CellPainter::by_status(map);
-    let colour = |kind: usize| (cells.kinds[kind].0.clone(), cells.status_colour(kind).css());
-    (0..cells.kinds.len()).map(colour).collect()
+pub(crate) fn status_colours(map: &CellMap) -> BTreeMap<String, String> {
+    let painter = CellPainter::by_status(map);
+    let name_and_colour =
+        |index: usize| (painter.statuses[index].0.clone(), painter.status_colour(index).css());
+    (0..painter.statuses.len()).map(name_and_colour).collect()
 }
 
 /// Returns the lines of a limit in several cuts of a map, in values of its axes, with at most
-/// `room` points. If a ragged boundary has more, its shortest lines are left out: the cells on
-/// either side show them. `cell` maps a cut and its indices along both axes to a cell.
-pub(crate) fn level_lines(
+/// `max_points` points. If a ragged boundary has more, its shortest lines are left out: the cells
+/// on either side show them. `cell` maps a cut and its indices along both axes to a cell.
+pub(crate) fn limit_lines(
     map: &CellMap,
-    (layer, level): (&Layer, &DividingLimit),
+    (layer, limit): (&Layer, &DividingLimit),
     cuts: usize,
     cell: impl Fn(usize, usize, usize) -> usize,
-    room: usize,
+    max_points: usize,
 ) -> Vec<Vec<Vec<[f64; 2]>>> {
-    let [xs, ys] = [&map.grid.axes[0], &map.grid.axes[1]];
+    let [x_axis, y_axis] = [&map.grid.axes[0], &map.grid.axes[1]];
     let lines_of_cut = |cut: usize| {
-        zero_lines(&xs.coordinates(), &ys.coordinates(), |x, y| {
+        zero_lines(&x_axis.coordinates(), &y_axis.coordinates(), |x, y| {
             let cell = cell(cut, x, y);
-            level.offset(if map.filled(cell) { layer.typical(cell) } else { f64::NAN })
+            limit.offset(if map.has_points(cell) { layer.mean_value(cell) } else { f64::NAN })
         })
     };
     let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts).map(lines_of_cut).collect();
-    leave_out_shortest(&mut lines, room);
+    remove_shortest(&mut lines, max_points);
     for [x, y] in lines.iter_mut().flatten().flatten() {
-        (*x, *y) = (xs.swept.from_coordinate(*x), ys.swept.from_coordinate(*y));
+        (*x, *y) = (x_axis.swept.from_coordinate(*x), y_axis.swept.from_coordinate(*y));
     }
     lines
 }
 
 /// The filling of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Fill {
+enum CellFill {
     Step(usize),
     Status(usize),
     /// Points on both sides of the limit, or of several kinds.
@@ -228,102 +253,117 @@ struct CellPainter<'a> {
     map: &'a CellMap,
     title: String,
     /// The filling of each cell; `None` if the file has no point in it.
-    fills: Vec<Option<Fill>>,
+    fills: Vec<Option<CellFill>>,
     layer: Option<Layer>,
-    /// The statuses that [`Fill::Status`] refers to, with the number of points of each.
-    kinds: Vec<(String, usize)>,
+    /// The statuses that [`CellFill::Status`] refers to, with the number of points of each.
+    statuses: Vec<(String, usize)>,
     /// The hatch of cells in which some points have no value, and that of cells with sensitive
     /// points.
     hatches: [Hatch; 2],
 }
 
 impl<'a> CellPainter<'a> {
-    fn new(map: &'a CellMap, title: String, fill: impl Fn(usize) -> Fill) -> Self {
-        let fill = |cell: usize| map.filled(cell).then(|| fill(cell));
+    fn new(map: &'a CellMap, title: String, fill: impl Fn(usize) -> CellFill) -> Self {
+        let fill = |cell: usize| map.has_points(cell).then(|| fill(cell));
         let fills = (0..map.counts.len()).map(fill).collect();
         let hatches = [failed_hatch(), sensitive_hatch()];
-        Self { map, title, fills, layer: None, kinds: Vec::new(), hatches }
+        Self { map, title, fills, layer: None, statuses: Vec::new(), hatches }
     }
 
     fn by_value(map: &'a CellMap, layer: Layer) -> Self {
         let fill = |cell: usize| match (layer.values[cell].is_finite(), map.counts[cell].failed) {
-            (true, _) if layer.both(cell) => Fill::Both,
-            (true, _) => Fill::Step(layer.scale.step(layer.values[cell])),
-            (false, 0) => Fill::Undefined,
-            (false, _) => Fill::Failed,
+            (true, _) if layer.is_divided(cell) => CellFill::Both,
+            (true, _) => CellFill::Step(layer.scale.step(layer.values[cell])),
+            (false, 0) => CellFill::Undefined,
+            (false, _) => CellFill::Failed,
         };
-        let cells = Self::new(map, layer.title.clone(), fill);
-        Self { layer: Some(layer), ..cells }
+        let painter = Self::new(map, layer.title.clone(), fill);
+        Self { layer: Some(layer), ..painter }
     }
 
     fn by_status(map: &'a CellMap) -> Self {
-        let mut kinds: Vec<(String, usize)> =
-            map.statuses.iter().map(|(kind, points)| (kind.clone(), *points)).collect();
-        kinds.sort_by_key(|(kind, _)| (kind != OK, kind.clone()));
+        let mut statuses: Vec<(String, usize)> =
+            map.statuses.iter().map(|(name, points)| (name.clone(), *points)).collect();
+        statuses.sort_by_key(|(name, _)| (name != OK_STATUS, name.clone()));
         let fill = |cell: usize| {
-            map.status(cell).map_or(Fill::Both, |status| {
-                Fill::Status(kinds.iter().position(|(kind, _)| kind == status).unwrap_or_default())
+            map.common_status(cell).map_or(CellFill::Both, |status| {
+                CellFill::Status(
+                    statuses.iter().position(|(name, _)| name == status).unwrap_or_default(),
+                )
             })
         };
-        let cells = Self::new(map, "How each point ended".to_owned(), fill);
-        Self { kinds, ..cells }
+        let painter = Self::new(map, "How each point ended".to_owned(), fill);
+        Self { statuses, ..painter }
     }
 
     /// Makes hatches fine enough to be visible on the smallest cell of a panel of this size, px.
     fn refine_hatches(&mut self, size: [f64; 2]) {
-        let smallest = [0, 1].map(|k| {
+        let smallest_cell = [0, 1].map(|k| {
             let axis = &self.map.grid.axes[k];
             let scale = axis.scale();
-            let part = |pair: &[f64]| scale.position(pair[1]) - scale.position(pair[0]);
-            axis.borders.windows(2).map(part).fold(1.0, f64::min) * size[k]
+            let share = |pair: &[f64]| scale.position(pair[1]) - scale.position(pair[0]);
+            axis.borders.windows(2).map(share).fold(1.0, f64::min) * size[k]
         });
-        self.hatches = self.hatches.clone().map(|hatch| hatch.within(smallest));
+        self.hatches = self.hatches.clone().map(|hatch| hatch.within(smallest_cell));
     }
 
-    fn status_colour(&self, kind: usize) -> Colour {
-        if self.kinds[kind].0 == OK {
+    fn status_colour(&self, index: usize) -> Colour {
+        if self.statuses[index].0 == OK_STATUS {
             Colour::hex(0xe8ebee)
         } else {
-            DISTINCT[kind % DISTINCT.len()]
+            DISTINCT[index % DISTINCT.len()]
         }
     }
 
-    fn draw(&self, scene: &mut Scene, panel: &Panel, rest: &[usize]) {
+    fn draw(&self, scene: &mut Scene, panel: &Panel, cut_indices: &[usize]) {
         // Cells of one colour are one shape, and runs of them along y one rectangle: the file is
         // small and has no seams.
-        let mut shapes: BTreeMap<Fill, Outline> = BTreeMap::new();
-        let mut lone: Vec<[f64; 4]> = Vec::new();
+        let mut shapes: BTreeMap<CellFill, Outline> = BTreeMap::new();
+        let mut undefined_areas: Vec<[f64; 4]> = Vec::new();
         let fill = |cell: usize| self.fills[cell];
-        let is_lone = |fill| fill == Some(Fill::Undefined);
-        for ([x, y, width, height], fill) in self.strips(panel, rest, fill, is_lone) {
+        let is_undefined = |fill| fill == Some(CellFill::Undefined);
+        for ([x, y, width, height], fill) in self.strips(panel, cut_indices, fill, is_undefined) {
             match fill {
-                Some(Fill::Undefined) => lone.push([x, y, width, height]),
+                Some(CellFill::Undefined) => undefined_areas.push([x, y, width, height]),
                 Some(fill) => shapes.entry(fill).or_default().add_rectangle(x, y, width, height),
                 None => {}
             }
         }
         for (fill, shape) in shapes {
             match (fill, &self.layer) {
-                (Fill::Step(level), Some(layer)) => {
-                    scene.fill_crisp(shape, layer.scale.colour(level))
+                (CellFill::Step(step), Some(layer)) => {
+                    scene.fill_crisp(shape, layer.scale.colour(step))
                 }
-                (Fill::Status(kind), _) => scene.fill_crisp(shape, self.status_colour(kind)),
-                (Fill::Both, _) => scene.fill_crisp(shape, BOTH),
-                _ => failed(scene, shape),
+                (CellFill::Status(status), _) => {
+                    scene.fill_crisp(shape, self.status_colour(status))
+                }
+                (CellFill::Both, _) => scene.fill_crisp(shape, BOTH_SIDES),
+                _ => draw_failed_area(scene, shape),
             }
         }
-        if !lone.is_empty() {
-            undefined(scene, &lone);
+        if !undefined_areas.is_empty() {
+            draw_undefined_cells(scene, &undefined_areas);
         }
-        scene.hatch(self.area(panel, rest, |cell| self.partly_lost(cell)), &self.hatches[0]);
-        scene.hatch(self.area(panel, rest, |cell| self.sensitive(cell)), &self.hatches[1]);
+        scene.hatch(
+            self.area(panel, cut_indices, |cell| self.has_missing_values(cell)),
+            &self.hatches[0],
+        );
+        scene
+            .hatch(self.area(panel, cut_indices, |cell| self.is_sensitive(cell)), &self.hatches[1]);
     }
 
-    /// Returns the outline of the cells for which `holds` is true.
-    fn area(&self, panel: &Panel, rest: &[usize], holds: impl Fn(usize) -> bool) -> Outline {
+    /// Returns the outline of the cells for which `is_included` is true.
+    fn area(
+        &self,
+        panel: &Panel,
+        cut_indices: &[usize],
+        is_included: impl Fn(usize) -> bool,
+    ) -> Outline {
         let mut area = Outline::default();
-        for ([x, y, width, height], holds) in self.strips(panel, rest, holds, |_| false) {
-            if holds {
+        for ([x, y, width, height], is_included) in
+            self.strips(panel, cut_indices, is_included, |_| false)
+        {
+            if is_included {
                 area.add_rectangle(x, y, width, height);
             }
         }
@@ -331,29 +371,32 @@ impl<'a> CellPainter<'a> {
     }
 
     /// Returns rectangles `[x, y, width, height]` (px) of runs of cells along y with the same
-    /// content. Cells whose content is `lone` have a rectangle each.
+    /// content. A cell for whose content `is_separate` is true has its own rectangle.
     fn strips<T: Copy + PartialEq>(
         &self,
         panel: &Panel,
-        rest: &[usize],
+        cut_indices: &[usize],
         content: impl Fn(usize) -> T,
-        lone: impl Fn(T) -> bool,
+        is_separate: impl Fn(T) -> bool,
     ) -> Vec<([f64; 4], T)> {
         let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
-        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
+        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.y_pixel(border)).collect();
         let mut strips = Vec::new();
-        for (x, pair) in x_axis.borders.windows(2).enumerate() {
-            let left = panel.at_x(pair[0]);
-            let right = panel.at_x(pair[1]);
-            let content_at = |y: usize| content(self.map.grid.cell(x, y, rest));
+        for (x, borders) in x_axis.borders.windows(2).enumerate() {
+            let left = panel.x_pixel(borders[0]);
+            let right = panel.x_pixel(borders[1]);
+            let content_at = |y: usize| content(self.map.grid.cell(x, y, cut_indices));
             let mut start = 0;
             while start + 1 < ys.len() {
-                let here = content_at(start);
+                let first_content = content_at(start);
                 let mut end = start + 1;
-                while !lone(here) && end + 1 < ys.len() && content_at(end) == here {
+                while !is_separate(first_content)
+                    && end + 1 < ys.len()
+                    && content_at(end) == first_content
+                {
                     end += 1;
                 }
-                strips.push(([left, ys[end], right - left, ys[start] - ys[end]], here));
+                strips.push(([left, ys[end], right - left, ys[start] - ys[end]], first_content));
                 start = end;
             }
         }
@@ -361,38 +404,39 @@ impl<'a> CellPainter<'a> {
     }
 
     /// Returns whether a cell has points that failed or have no value beside others with a value.
-    fn partly_lost(&self, cell: usize) -> bool {
-        matches!(self.fills[cell], Some(Fill::Step(_) | Fill::Both))
+    fn has_missing_values(&self, cell: usize) -> bool {
+        matches!(self.fills[cell], Some(CellFill::Step(_) | CellFill::Both))
             && self
                 .layer
                 .as_ref()
-                .is_some_and(|layer| self.some_failed(cell) || layer.undefined(cell))
+                .is_some_and(|layer| self.has_failed(cell) || layer.has_undefined(cell))
     }
 
-    fn some_failed(&self, cell: usize) -> bool {
+    fn has_failed(&self, cell: usize) -> bool {
         self.map.counts[cell].failed > 0
     }
 
     /// Returns whether a cell's colour depends on a chaotic motion.
-    fn sensitive(&self, cell: usize) -> bool {
-        self.layer.as_ref().is_some_and(|layer| layer.nonlinear)
+    fn is_sensitive(&self, cell: usize) -> bool {
+        self.layer.as_ref().is_some_and(|layer| layer.is_nonlinear)
             && self.map.counts[cell].sensitive > 0
     }
 
-    /// Draws the lines of the limit with at most `room` points. Returns their points, px.
+    /// Draws the lines of the limit with at most `max_points` points. Returns their points, px.
     fn draw_line(
         &self,
         scene: &mut Scene,
         panel: &Panel,
-        divided: (&Layer, &DividingLimit),
-        rest: &[usize],
-        room: usize,
+        layer_and_limit: (&Layer, &DividingLimit),
+        cut_indices: &[usize],
+        max_points: usize,
     ) -> Vec<Vec<Option<[f64; 2]>>> {
-        let cell = |_, x, y| self.map.grid.cell(x, y, rest);
-        let lines = level_lines(self.map, divided, 1, cell, room).into_iter().flatten();
+        let cell = |_, x, y| self.map.grid.cell(x, y, cut_indices);
+        let lines =
+            limit_lines(self.map, layer_and_limit, 1, cell, max_points).into_iter().flatten();
         let mut outline = Outline::default();
         let lines = lines.map(|line| {
-            let points: Vec<[f64; 2]> = line.iter().map(|&[x, y]| panel.at(x, y)).collect();
+            let points: Vec<[f64; 2]> = line.iter().map(|&[x, y]| panel.pixel(x, y)).collect();
             outline.add_line(&points);
             points.into_iter().map(Some).collect()
         });
@@ -406,94 +450,106 @@ impl<'a> CellPainter<'a> {
         &self,
         scene: &mut Scene,
         panel: &Panel,
-        (layer, level): (&Layer, &DividingLimit),
-        (rest, lines): (&[usize], &[Vec<Option<[f64; 2]>>]),
+        (layer, limit): (&Layer, &DividingLimit),
+        (cut_indices, lines): (&[usize], &[Vec<Option<[f64; 2]>>]),
     ) {
-        let place = |axis: &GridAxis, scale: AxisScale, part: f64| {
-            let found = axis.borders.partition_point(|&border| scale.position(border) <= part);
-            found.clamp(1, axis.borders.len() - 1) - 1
+        let cell_index_at = |axis: &GridAxis, scale: AxisScale, share: f64| {
+            let index = axis.borders.partition_point(|&border| scale.position(border) <= share);
+            index.clamp(1, axis.borders.len() - 1) - 1
         };
         let axes = &self.map.grid.axes;
         let offset = |[x, y]: [f64; 2]| {
-            let x = place(&axes[0], panel.xs, x / panel.width);
-            let y = place(&axes[1], panel.ys, 1.0 - y / panel.height);
-            let cell = self.map.cell(x, y, rest).filter(|&cell| !layer.both(cell));
-            level.offset(cell.map_or(f64::NAN, |cell| layer.values[cell]))
+            let x = cell_index_at(&axes[0], panel.x_scale, x / panel.width);
+            let y = cell_index_at(&axes[1], panel.y_scale, 1.0 - y / panel.height);
+            let cell = self.map.cell(x, y, cut_indices).filter(|&cell| !layer.is_divided(cell));
+            limit.offset(cell.map_or(f64::NAN, |cell| layer.values[cell]))
         };
-        for (name, wanted_above) in [(&level.above[0], true), (&level.below[0], false)] {
+        for (name, wanted_above) in
+            [(&limit.above_meanings[0], true), (&limit.below_meanings[0], false)]
+        {
             // A cell without a value lies on neither side.
-            let inside = |point: [f64; 2]| {
+            let is_inside = |point: [f64; 2]| {
                 let offset = offset(point);
                 offset.is_finite() && (offset >= 0.0) == wanted_above
             };
             let size = [text_width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
             let area = [panel.width, panel.height];
             // A name is kept away from the lines if there is room.
-            let clear = |point: [f64; 2]| inside(point) && !is_near(panel, lines, point);
-            let found =
-                roomiest_place(area, size, clear).or_else(|| roomiest_place(area, size, inside));
-            if let Some([x, y]) = found {
-                let at = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
-                let text = Text::new(name, at, LABEL_SIZE).bold().anchor(Anchor::Middle);
+            let is_clear = |point: [f64; 2]| is_inside(point) && !is_near_line(panel, lines, point);
+            let name_position = roomiest_position(area, size, is_clear)
+                .or_else(|| roomiest_position(area, size, is_inside));
+            if let Some([x, y]) = name_position {
+                let position = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
+                let text = Text::new(name, position, LABEL_SIZE).bold().anchor(Anchor::Middle);
                 scene.text(Text { halo: Some(PAPER), ..text });
             }
         }
     }
 
     /// Returns the legend of the cells that are drawn.
-    fn legend(&self, drawn: &[usize]) -> Vec<(LegendSymbol, String)> {
+    fn legend_entries(&self, drawn_cells: &[usize]) -> Vec<(LegendSymbol, String)> {
         let mut entries = Vec::new();
-        let shown = |wanted: &dyn Fn(usize) -> bool| drawn.iter().any(|&cell| wanted(cell));
-        let filled = |fill: Fill| shown(&|cell| self.fills[cell] == Some(fill));
-        if let Some(Layer { level: Some(level), scale, .. }) = &self.layer {
-            let quarter = |part: usize| scale.colour(part * COLOUR_STEPS / 4);
+        let is_any_drawn =
+            |condition: &dyn Fn(usize) -> bool| drawn_cells.iter().any(|&cell| condition(cell));
+        let is_fill_drawn = |fill: CellFill| is_any_drawn(&|cell| self.fills[cell] == Some(fill));
+        if let Some(Layer { limit: Some(limit), scale, .. }) = &self.layer {
+            let colour_at_quarter = |quarters: usize| scale.colour(quarters * COLOUR_STEPS / 4);
             // Cells whose points are all on one side have no line between them.
             let offset = |cell: usize| {
-                self.layer.as_ref().map_or(f64::NAN, |layer| level.offset(layer.typical(cell)))
+                self.layer.as_ref().map_or(f64::NAN, |layer| limit.offset(layer.mean_value(cell)))
             };
-            if shown(&|cell| offset(cell) >= 0.0) && shown(&|cell| offset(cell) < 0.0) {
-                entries.push((LegendSymbol::Line(Stroke::solid(INK, 2.6)), level.line.clone()));
+            if is_any_drawn(&|cell| offset(cell) >= 0.0) && is_any_drawn(&|cell| offset(cell) < 0.0)
+            {
+                entries
+                    .push((LegendSymbol::Line(Stroke::solid(INK, 2.6)), limit.line_name.clone()));
             }
-            entries.push((LegendSymbol::Area(quarter(3)), level.above[1].clone()));
-            entries.push((LegendSymbol::Area(quarter(1)), level.below[1].clone()));
-            if filled(Fill::Both) {
-                entries.push((LegendSymbol::Area(BOTH), level.both.clone()));
+            entries
+                .push((LegendSymbol::Area(colour_at_quarter(3)), limit.above_meanings[1].clone()));
+            entries
+                .push((LegendSymbol::Area(colour_at_quarter(1)), limit.below_meanings[1].clone()));
+            if is_fill_drawn(CellFill::Both) {
+                entries.push((LegendSymbol::Area(BOTH_SIDES), limit.both_meaning.clone()));
             }
         }
-        for (kind, (name, points)) in self.kinds.iter().enumerate() {
+        for (index, (name, points)) in self.statuses.iter().enumerate() {
             let text = format!("{} ({points})", name.replace('_', " "));
-            entries.push((LegendSymbol::Area(self.status_colour(kind)), text));
+            entries.push((LegendSymbol::Area(self.status_colour(index)), text));
         }
-        if self.layer.is_none() && filled(Fill::Both) {
-            entries.push((LegendSymbol::Area(BOTH), "points of several kinds".to_owned()));
+        if self.layer.is_none() && is_fill_drawn(CellFill::Both) {
+            entries.push((LegendSymbol::Area(BOTH_SIDES), "points of several kinds".to_owned()));
         }
-        let only_failed =
+        let has_only_failed =
             |cell: usize| self.map.counts[cell].failed == self.map.counts[cell].points;
-        if shown(&|cell| self.fills[cell] == Some(Fill::Failed) && !only_failed(cell)) {
+        if is_any_drawn(&|cell| {
+            self.fills[cell] == Some(CellFill::Failed) && !has_only_failed(cell)
+        }) {
             entries.push((LegendSymbol::Failed, "no result: failed or undefined".to_owned()));
-        } else if filled(Fill::Failed) {
+        } else if is_fill_drawn(CellFill::Failed) {
             entries.push((LegendSymbol::Failed, "failed: no result".to_owned()));
         }
-        if shown(&|cell| self.partly_lost(cell)) {
-            let some_failed = shown(&|cell| self.partly_lost(cell) && self.some_failed(cell));
-            let undefined = |cell| self.layer.as_ref().is_some_and(|layer| layer.undefined(cell));
-            let some_undefined = shown(&|cell| self.partly_lost(cell) && undefined(cell));
-            let phrase = match (some_failed, some_undefined) {
+        if is_any_drawn(&|cell| self.has_missing_values(cell)) {
+            let is_any_failed =
+                is_any_drawn(&|cell| self.has_missing_values(cell) && self.has_failed(cell));
+            let is_undefined =
+                |cell| self.layer.as_ref().is_some_and(|layer| layer.has_undefined(cell));
+            let is_any_undefined =
+                is_any_drawn(&|cell| self.has_missing_values(cell) && is_undefined(cell));
+            let phrase = match (is_any_failed, is_any_undefined) {
                 (true, false) => "some points failed",
                 (true, true) => "some points failed or undefined",
                 (false, _) => "some points undefined",
             };
             entries.push((LegendSymbol::Hatched(self.hatches[0].clone()), phrase.to_owned()));
         }
-        if shown(&|cell| self.sensitive(cell)) {
-            let phrase = if self.map.grid.merged() {
+        if is_any_drawn(&|cell| self.is_sensitive(cell)) {
+            let phrase = if self.map.grid.merges_points() {
                 "some points sensitive: chaotic"
             } else {
                 "sensitive: motion is chaotic"
             };
             entries.push((LegendSymbol::Hatched(self.hatches[1].clone()), phrase.to_owned()));
         }
-        if filled(Fill::Undefined) {
+        if is_fill_drawn(CellFill::Undefined) {
             entries.push((LegendSymbol::Undefined, "undefined: no excitation".to_owned()));
         }
         entries
@@ -502,39 +558,41 @@ impl<'a> CellPainter<'a> {
 
 /// Returns whether a point of a panel, px from its corner, is as close to a line as neighbouring
 /// samples of the search for a name's place are.
-fn is_near(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]) -> bool {
+fn is_near_line(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]) -> bool {
     let point = [panel.x + x, panel.y + y];
-    let reach = (panel.width / 44.0).max(panel.height / 33.0);
-    let near = |from: [f64; 2], to: [f64; 2]| {
+    let max_distance = (panel.width / 44.0).max(panel.height / 33.0);
+    let is_close = |from: [f64; 2], to: [f64; 2]| {
         let [[dx, px], [dy, py]] = [0, 1].map(|k| [to[k] - from[k], point[k] - from[k]]);
-        let square = (dx * dx + dy * dy).max(f64::MIN_POSITIVE);
-        let part = ((px * dx + py * dy) / square).clamp(0.0, 1.0);
-        (px - part * dx).hypot(py - part * dy) < reach
+        let squared_length = (dx * dx + dy * dy).max(f64::MIN_POSITIVE);
+        let share = ((px * dx + py * dy) / squared_length).clamp(0.0, 1.0);
+        (px - share * dx).hypot(py - share * dy) < max_distance
     };
     let pairs = lines.iter().flat_map(|line| line.windows(2));
-    let mut known = pairs.filter_map(|pair| pair[0].zip(pair[1]));
-    known.any(|(from, to)| near(from, to))
+    let mut segments = pairs.filter_map(|pair| pair[0].zip(pair[1]));
+    segments.any(|(from, to)| is_close(from, to))
 }
 
 fn colour_bar(scene: &mut Scene, layer: &Layer, [x, y, width, height]: [f64; 4]) {
-    let step = height / COLOUR_STEPS as f64;
-    for level in 0..COLOUR_STEPS {
-        let top = y + height - (level + 1) as f64 * step;
-        scene.fill_crisp(Outline::rectangle(x, top, width, step), layer.scale.colour(level));
+    let step_height = height / COLOUR_STEPS as f64;
+    for step in 0..COLOUR_STEPS {
+        let top = y + height - (step + 1) as f64 * step_height;
+        scene.fill_crisp(Outline::rectangle(x, top, width, step_height), layer.scale.colour(step));
     }
     scene.line(Outline::rectangle(x, y, width, height), Stroke::solid(INK, 1.2));
     let mut marks = Outline::default();
     for tick in layer.scale.ticks() {
-        let at = y + (1.0 - layer.scale.position(tick.value)) * height;
-        marks.add_line(&[[x + width, at], [x + width + 5.0, at]]);
-        let centre = layer.scale.centre == Some(tick.value);
-        let text = Text::new(tick.label, [x + width + 8.0, at + 0.35 * TICK_SIZE], TICK_SIZE);
-        scene.text(if centre { text.bold() } else { text });
-        if centre {
-            marks.add_line(&[[x, at], [x + width, at]]);
+        let tick_y = y + (1.0 - layer.scale.position(tick.value)) * height;
+        marks.add_line(&[[x + width, tick_y], [x + width + 5.0, tick_y]]);
+        let is_centre = layer.scale.centre == Some(tick.value);
+        let text = Text::new(tick.label, [x + width + 8.0, tick_y + 0.35 * TICK_SIZE], TICK_SIZE);
+        scene.text(if is_centre { text.bold() } else { text });
+        if is_centre {
+            marks.add_line(&[[x, tick_y], [x + width, tick_y]]);
         }
     }
     scene.line(marks, Stroke::solid(INK, 1.4));
-    let at = [x + width + 72.0, y + height / 2.0];
-    scene.text(Text::new(layer.label.clone(), at, TICK_SIZE).anchor(Anchor::Middle).upright());
+    let label_position = [x + width + 72.0, y + height / 2.0];
+    scene.text(
+        Text::new(layer.label.clone(), label_position, TICK_SIZE).anchor(Anchor::Middle).rotated(),
+    );
 }

@@ -5,8 +5,8 @@ use crate::axis::{AxisScale, extremes};
 use crate::chart::level_stroke;
 use crate::colour::{BAD_SIDE, GOOD_SIDE};
 use crate::frame::{
-    BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, heading, legend,
-    legend_height,
+    BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, draw_heading,
+    draw_legend, legend_height,
 };
 use crate::label::Label;
 use crate::layer::DividingLimit;
@@ -15,10 +15,10 @@ use crate::scatter::{Scatter, Side};
 use crate::scene::{Colour, INK, MUTED, Outline, Scene, Stroke};
 
 /// Maximum number of parameters shown. Basis: with more, panels are too small to read.
-pub(crate) const MAX_PARAMETERS: usize = 5;
+pub(crate) const MAX_MATRIX_PARAMETERS: usize = 5;
 /// Approximate maximum number of points that are drawn. Basis: more points overlap. Doubling it
 /// doubles the size of the figure.
-pub(crate) const MAX_POINTS: usize = 4000;
+pub(crate) const MAX_DRAWN_POINTS: usize = 4000;
 
 /// Left margin for the numbers and labels of the y axes, px.
 const LEFT_MARGIN: f64 = 100.0;
@@ -39,128 +39,134 @@ pub(crate) struct MatrixAxis<'a> {
 }
 
 /// Returns the indices of the parameters shown in file order: all, or the most influential.
-pub(crate) fn shown(scatter: &Scatter) -> Vec<usize> {
-    let mut places = scatter.by_influence();
-    places.truncate(MAX_PARAMETERS);
-    places.sort_unstable();
-    places
+pub(crate) fn shown_parameters(scatter: &Scatter) -> Vec<usize> {
+    let mut indices = scatter.by_influence();
+    indices.truncate(MAX_MATRIX_PARAMETERS);
+    indices.sort_unstable();
+    indices
 }
 
 /// Returns the notes on parameters and points that are left out.
 pub(crate) fn notes(scatter: &Scatter) -> Vec<String> {
-    let all = scatter.parameters.len();
-    let shown = shown(scatter).len();
+    let parameter_count = scatter.parameters.len();
+    let shown_count = shown_parameters(scatter).len();
     let mut notes = Vec::new();
-    if shown < all {
-        notes.push(format!("the {shown} most influential of {all} parameters"));
+    if shown_count < parameter_count {
+        notes.push(format!("the {shown_count} most influential of {parameter_count} parameters"));
     }
-    let drawn = drawn(scatter).len();
-    if drawn < scatter.points.len() {
-        notes.push(format!("{drawn} drawn"));
+    let drawn_count = drawn_points(scatter).len();
+    if drawn_count < scatter.points.len() {
+        notes.push(format!("{drawn_count} drawn"));
     }
     notes
 }
 
 /// Returns the indices of the points drawn.
-pub(crate) fn drawn(scatter: &Scatter) -> Vec<usize> {
-    let stride = scatter.points.len().div_ceil(MAX_POINTS).max(1);
-    scatter.picked(stride)
+pub(crate) fn drawn_points(scatter: &Scatter) -> Vec<usize> {
+    let stride = scatter.points.len().div_ceil(MAX_DRAWN_POINTS).max(1);
+    scatter.pick_points(stride)
 }
 
 /// Returns the scale of some values, with a margin for the dots at its ends.
-pub(crate) fn scale(values: &[f64], log: bool) -> AxisScale {
-    if !log {
+pub(crate) fn scale_with_margin(values: &[f64], is_log: bool) -> AxisScale {
+    if !is_log {
         return AxisScale::around(values.iter().copied());
     }
     let positive = values.iter().copied().filter(|value| *value > 0.0);
     let (low, high) = extremes(positive).unwrap_or((1.0, 10.0));
-    let room = (high / low).powf(0.05).max(1.02);
-    AxisScale::log(low / room, high * room)
+    let margin_factor = (high / low).powf(0.05).max(1.02);
+    AxisScale::logarithmic(low / margin_factor, high * margin_factor)
 }
 
 /// Returns the axes of the matrix: the parameters, and last the quantity.
-pub(crate) fn directions(scatter: &Scatter) -> Vec<MatrixAxis<'_>> {
-    let parameters = shown(scatter).into_iter().map(|k| &scatter.parameters[k]);
-    let parameters = parameters.map(|one| (&one.name[..], &one.label, &one.values[..], one.log));
-    let all = parameters.chain([("", &scatter.short, &scatter.quantity[..], scatter.log)]);
-    let direction = |(name, label, values, log)| {
-        let scale = scale(values, log);
+pub(crate) fn matrix_axes(scatter: &Scatter) -> Vec<MatrixAxis<'_>> {
+    let parameters = shown_parameters(scatter).into_iter().map(|k| &scatter.parameters[k]);
+    let parameters = parameters.map(|parameter| {
+        (&parameter.name[..], &parameter.label, &parameter.values[..], parameter.is_log)
+    });
+    let parameters_and_quantity =
+        parameters.chain([("", &scatter.short_label, &scatter.quantity[..], scatter.is_log)]);
+    let matrix_axis = |(name, label, values, is_log)| {
+        let scale = scale_with_margin(values, is_log);
         MatrixAxis { name, label, values, scale }
     };
-    all.map(direction).collect()
+    parameters_and_quantity.map(matrix_axis).collect()
 }
 
 /// The panels of the matrix, each by the indices of its x and y axis, and its left and top edge,
 /// width and height, px.
-pub(crate) type PanelPlaces = Vec<(usize, usize, f64, f64, f64, f64)>;
+pub(crate) type PanelPositions = Vec<(usize, usize, f64, f64, f64, f64)>;
 
 /// Draws the matrix: every pair of parameters below its diagonal, and the quantity in its last row.
-pub(crate) fn draw(scatter: &Scatter) -> (Scene, PanelPlaces) {
-    let directions = directions(scatter);
-    let parameters = &directions[..directions.len() - 1];
+pub(crate) fn draw(scatter: &Scatter) -> (Scene, PanelPositions) {
+    let axes = matrix_axes(scatter);
+    let parameters = &axes[..axes.len() - 1];
     let count = parameters.len();
     let width =
         (FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN - PANEL_GAP * (count - 1) as f64) / count as f64;
     let height = (0.8 * width).clamp(130.0, MAX_PANEL_HEIGHT);
-    let entries = entries(scatter);
-    let room = FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
-    let legend_height = legend_height(&entries, room);
-    let lines = parameters.iter().map(|one| x_lines(one.label, width).len()).max();
-    let below = BOTTOM_MARGIN + 1.2 * LABEL_SIZE * lines.unwrap_or(1).saturating_sub(1) as f64;
+    let legend_entries = legend_entries(scatter);
+    let legend_width = FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
+    let legend_height = legend_height(&legend_entries, legend_width);
+    let label_lines = parameters.iter().map(|axis| wrap_label(axis.label, width).len()).max();
+    let space_below =
+        BOTTOM_MARGIN + 1.2 * LABEL_SIZE * label_lines.unwrap_or(1).saturating_sub(1) as f64;
     let panels_height = count as f64 * (height + PANEL_GAP) - PANEL_GAP;
-    let total = HEADING_HEIGHT + panels_height + below + legend_height + 8.0;
+    let total_height = HEADING_HEIGHT + panels_height + space_below + legend_height + 8.0;
     let title = &scatter.title;
     let subtitle = scatter.subtitle(&notes(scatter));
-    let mut scene = Scene::new(FIGURE_WIDTH, total, format!("{title}. {subtitle}"));
-    heading(&mut scene, title, &subtitle);
+    let mut scene = Scene::new(FIGURE_WIDTH, total_height, format!("{title}. {subtitle}"));
+    draw_heading(&mut scene, title, &subtitle);
     let dots = Dots::new(scatter, width);
-    let mut places = PanelPlaces::new();
+    let mut positions = PanelPositions::new();
     for row in 0..count {
-        let last = row + 1 == count;
-        let y = &directions[row + 1];
-        for (column, x) in parameters.iter().enumerate().take(if last { count } else { row + 1 }) {
+        let is_last_row = row + 1 == count;
+        let y = &axes[row + 1];
+        for (column, x) in
+            parameters.iter().enumerate().take(if is_last_row { count } else { row + 1 })
+        {
             let panel = Panel {
                 x: LEFT_MARGIN + column as f64 * (width + PANEL_GAP),
                 y: HEADING_HEIGHT + row as f64 * (height + PANEL_GAP),
                 width,
                 height,
-                xs: x.scale,
-                ys: y.scale,
+                x_scale: x.scale,
+                y_scale: y.scale,
             };
-            places.push((column, row + 1, panel.x, panel.y, width, height));
+            positions.push((column, row + 1, panel.x, panel.y, width, height));
             panel.draw_grid_lines(&mut scene);
             scene.clipped(panel.outline(), |scene| {
-                if let (true, Some(level)) = (last, &scatter.level) {
-                    let at = panel.at_y(level.value);
-                    let line = Outline::line(&[[panel.x, at], [panel.x + width, at]]);
+                if let (true, Some(limit)) = (is_last_row, &scatter.limit) {
+                    let limit_y = panel.y_pixel(limit.value);
+                    let line = Outline::line(&[[panel.x, limit_y], [panel.x + width, limit_y]]);
                     scene.line(line, level_stroke());
                 }
                 dots.draw(scene, &panel, x.values, y.values);
             });
-            panel.draw_frame_beside(&mut scene, last, column == 0);
-            if last {
-                x_label(&mut scene, &panel, x.label);
+            panel.draw_frame_beside_neighbours(&mut scene, is_last_row, column == 0);
+            if is_last_row {
+                draw_x_label(&mut scene, &panel, x.label);
             }
             if column == 0 {
-                panel.y_label(&mut scene, &y.label.to_string(), 66.0);
+                panel.draw_y_label(&mut scene, &y.label.to_string(), 66.0);
             }
         }
     }
-    let y = HEADING_HEIGHT + panels_height + below;
-    legend(&mut scene, &entries, LEFT_MARGIN, y, room);
-    (scene, places)
+    let y = HEADING_HEIGHT + panels_height + space_below;
+    draw_legend(&mut scene, &legend_entries, LEFT_MARGIN, y, legend_width);
+    (scene, positions)
 }
 
 /// Breaks a label into lines that fit below a panel; its unit stays on one line.
-fn x_lines(label: &Label, width: f64) -> Vec<String> {
+fn wrap_label(label: &Label, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let unit = (!label.unit.is_empty()).then(|| format!("({})", label.unit));
     for word in label.words.split(' ').chain(unit.as_deref()) {
-        let longer = lines.last().map(|line| format!("{line} {word}"));
-        match longer {
-            Some(longer) if text_width(&longer, LABEL_SIZE, false) <= width => {
+        let longer_line = lines.last().map(|line| format!("{line} {word}"));
+        match longer_line {
+            Some(longer_line) if text_width(&longer_line, LABEL_SIZE, false) <= width => {
                 lines.pop();
-                lines.push(longer);
+                lines.push(longer_line);
             }
             _ => lines.push(word.to_owned()),
         }
@@ -168,15 +174,15 @@ fn x_lines(label: &Label, width: f64) -> Vec<String> {
     lines
 }
 
-fn x_label(scene: &mut Scene, panel: &Panel, label: &Label) {
-    for (k, line) in x_lines(label, panel.width).iter().enumerate() {
+fn draw_x_label(scene: &mut Scene, panel: &Panel, label: &Label) {
+    for (k, line) in wrap_label(label, panel.width).iter().enumerate() {
         let below = Panel { y: panel.y + 1.2 * LABEL_SIZE * k as f64, ..panel.clone() };
-        below.x_label(scene, line);
+        below.draw_x_label(scene, line);
     }
 }
 
 /// Returns the colour of a side.
-pub(crate) const fn colour(side: Side) -> Colour {
+pub(crate) const fn side_colour(side: Side) -> Colour {
     match side {
         Side::Good => GOOD_SIDE,
         Side::Bad => BAD_SIDE,
@@ -188,45 +194,45 @@ pub(crate) const fn colour(side: Side) -> Colour {
 /// The dots of a design's points: shapes differ as well as colours.
 struct Dots {
     /// The indices of the points drawn, by side.
-    places: Vec<(Side, Vec<usize>)>,
+    indices_by_side: Vec<(Side, Vec<usize>)>,
     /// Half the size of a dot, px.
     radius: f64,
 }
 
 impl Dots {
     fn new(scatter: &Scatter, width: f64) -> Self {
-        let all = drawn(scatter);
+        let indices = drawn_points(scatter);
         let points_on =
-            |side: Side| all.iter().copied().filter(|&k| scatter.sides[k] == side).collect();
-        let places = Side::ALL.into_iter().map(|side| (side, points_on(side))).collect();
+            |side: Side| indices.iter().copied().filter(|&k| scatter.sides[k] == side).collect();
+        let indices_by_side = Side::ALL.into_iter().map(|side| (side, points_on(side))).collect();
         // Dots cover a quarter of the panel's area at most.
-        let radius = (0.25 * width / (all.len().max(1) as f64).sqrt()).clamp(1.1, 3.4);
-        Self { places, radius }
+        let radius = (0.25 * width / (indices.len().max(1) as f64).sqrt()).clamp(1.1, 3.4);
+        Self { indices_by_side, radius }
     }
 
     /// Draws the dots of a panel. Points without a value lie at its lower edge, so that failures
     /// are visible over their parameter.
     fn draw(&self, scene: &mut Scene, panel: &Panel, xs: &[f64], ys: &[f64]) {
-        for (side, places) in &self.places {
+        for (side, indices) in &self.indices_by_side {
             let mut outline = Outline::default();
-            let failed = matches!(side, Side::Failed | Side::Undefined);
-            for &k in places {
+            let has_no_value = matches!(side, Side::Failed | Side::Undefined);
+            for &k in indices {
                 let y = if ys[k].is_finite() {
-                    panel.at_y(ys[k])
+                    panel.y_pixel(ys[k])
                 } else {
                     panel.y + panel.height - 5.0
                 };
-                if xs[k].is_finite() && (failed || ys[k].is_finite()) {
-                    add(&mut outline, *side, [panel.at_x(xs[k]), y], self.radius);
+                if xs[k].is_finite() && (has_no_value || ys[k].is_finite()) {
+                    add_dot(&mut outline, *side, [panel.x_pixel(xs[k]), y], self.radius);
                 }
             }
             if outline.0.is_empty() {
                 continue;
             }
             match side {
-                Side::Good | Side::Bad => scene.fill(outline, colour(*side).with_alpha(210)),
+                Side::Good | Side::Bad => scene.fill(outline, side_colour(*side).with_alpha(210)),
                 Side::Undefined | Side::Failed => {
-                    scene.line(outline, Stroke::solid(colour(*side), 1.2));
+                    scene.line(outline, Stroke::solid(side_colour(*side), 1.2));
                 }
             }
         }
@@ -234,45 +240,65 @@ impl Dots {
 }
 
 /// Adds a dot of a side: a round dot, a diamond, a ring or a cross.
-fn add(outline: &mut Outline, side: Side, [x, y]: [f64; 2], radius: f64) {
+fn add_dot(outline: &mut Outline, side: Side, [x, y]: [f64; 2], radius: f64) {
     match side {
         Side::Good | Side::Undefined => {
-            let n = 0.414 * radius;
-            let f = radius;
-            let corners = [[n, f], [f, n], [f, -n], [n, -f], [-n, -f], [-f, -n], [-f, n], [-n, f]];
+            let near = 0.414 * radius;
+            let far = radius;
+            let corners = [
+                [near, far],
+                [far, near],
+                [far, -near],
+                [near, -far],
+                [-near, -far],
+                [-far, -near],
+                [-far, near],
+                [-near, far],
+            ];
             outline.add_polygon(&corners.map(|[dx, dy]| [x + dx, y + dy]));
         }
         Side::Bad => {
-            let reach = 1.25 * radius;
-            outline.add_polygon(&[[x + reach, y], [x, y + reach], [x - reach, y], [x, y - reach]]);
+            let half_diagonal = 1.25 * radius;
+            outline.add_polygon(&[
+                [x + half_diagonal, y],
+                [x, y + half_diagonal],
+                [x - half_diagonal, y],
+                [x, y - half_diagonal],
+            ]);
         }
         Side::Failed => {
-            let reach = radius.max(2.5);
-            outline.add_line(&[[x - reach, y - reach], [x + reach, y + reach]]);
-            outline.add_line(&[[x - reach, y + reach], [x + reach, y - reach]]);
+            let half_diagonal = radius.max(2.5);
+            outline.add_line(&[
+                [x - half_diagonal, y - half_diagonal],
+                [x + half_diagonal, y + half_diagonal],
+            ]);
+            outline.add_line(&[
+                [x - half_diagonal, y + half_diagonal],
+                [x + half_diagonal, y - half_diagonal],
+            ]);
         }
     }
 }
 
-fn entries(scatter: &Scatter) -> Vec<(LegendSymbol, String)> {
+fn legend_entries(scatter: &Scatter) -> Vec<(LegendSymbol, String)> {
     let mut entries = Vec::new();
     for (side, count) in Side::ALL.into_iter().zip(scatter.counts) {
         if count > 0 {
-            let words = format!("{} ({count})", scatter.words(side));
-            entries.push((sign(side), words));
+            let words = format!("{} ({count})", scatter.side_meaning(side));
+            entries.push((side_symbol(side), words));
         }
     }
-    let quantity = scale(&scatter.quantity, scatter.log);
-    let is_drawn = |level: &&DividingLimit| (0.0..=1.0).contains(&quantity.position(level.value));
-    if let Some(level) = scatter.level.as_ref().filter(is_drawn) {
-        entries.push((LegendSymbol::Line(level_stroke()), level.line.clone()));
+    let quantity = scale_with_margin(&scatter.quantity, scatter.is_log);
+    let is_drawn = |limit: &&DividingLimit| (0.0..=1.0).contains(&quantity.position(limit.value));
+    if let Some(limit) = scatter.limit.as_ref().filter(is_drawn) {
+        entries.push((LegendSymbol::Line(level_stroke()), limit.line_name.clone()));
     }
     entries
 }
 
 /// Returns the legend symbol of a side.
-fn sign(side: Side) -> LegendSymbol {
+fn side_symbol(side: Side) -> LegendSymbol {
     let mut outline = Outline::default();
-    add(&mut outline, side, [0.0, 0.0], 5.0);
-    LegendSymbol::Shape(outline, matches!(side, Side::Good | Side::Bad), colour(side))
+    add_dot(&mut outline, side, [0.0, 0.0], 5.0);
+    LegendSymbol::Shape(outline, matches!(side, Side::Good | Side::Bad), side_colour(side))
 }

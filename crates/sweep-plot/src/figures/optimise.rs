@@ -11,8 +11,8 @@ use crate::read::{ColumnFacts, FigureFile};
 const CANDIDATE_KINDS: [&str; 3] = ["breaks a condition", "tried", "on the front"];
 
 /// Returns a column with its name in words.
-fn in_words(column: &ColumnFacts) -> (&ColumnFacts, String) {
-    (column, label::words(&column.name))
+fn with_name_in_words(column: &ColumnFacts) -> (&ColumnFacts, String) {
+    (column, label::name_in_words(&column.name))
 }
 
 /// Draws the chart of a study's file.
@@ -22,44 +22,49 @@ fn in_words(column: &ColumnFacts) -> (&ColumnFacts, String) {
 pub(crate) fn chart(source: &FigureFile) -> Result<Chart> {
     // The study's expressions are clearer than column names, which lack quantiles.
     let objectives: Vec<(&ColumnFacts, String)> = source
-        .list("objective")
-        .filter_map(|one| {
-            let text = one.get("minimise").or_else(|| one.get("maximise"))?.as_str()?;
-            Some((source.column(one["name"].as_str()?)?, text.to_owned()))
+        .metadata_list("objective")
+        .filter_map(|objective| {
+            let text = objective.get("minimise").or_else(|| objective.get("maximise"))?.as_str()?;
+            Some((source.column(objective["name"].as_str()?)?, text.to_owned()))
         })
         .collect();
-    let [first, further @ ..] = objectives.as_slice() else {
+    let [first_objective, further_objectives @ ..] = objectives.as_slice() else {
         return Err(source.missing_column("an objective", "written by `sweep optimise`"));
     };
-    let number = source
+    let candidate_column = source
         .column("candidate")
         .ok_or_else(|| source.missing_column("candidate", "its index"))?;
-    let (x, ys) = match further {
-        [] => (in_words(number), &objectives[..]),
-        _ => (first.clone(), further),
+    let (x_column, y_objectives) = match further_objectives {
+        [] => (with_name_in_words(candidate_column), &objectives[..]),
+        _ => (first_objective.clone(), further_objectives),
     };
     // Parameters stand between the generation and the first objective.
-    let own = source.numeric().skip_while(|column| column.name != "generation").skip(1);
-    let own = own.take_while(|column| column.name != first.0.name).map(in_words);
-    let shown: Vec<(&ColumnFacts, String)> = ys.iter().cloned().chain(own).collect();
-    let mut names = vec!["feasible", "on_front", x.0.name.as_str()];
-    names.extend(shown.iter().map(|(column, _)| column.name.as_str()));
-    let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
-    source.each_row(&names, |row| {
-        let is = |column| usize::from(row.word(column) == Some("true"));
-        rows.push((is(0) + is(1), row.numbers(2..names.len())));
+    let parameters = source.numeric().skip_while(|column| column.name != "generation").skip(1);
+    let parameters = parameters
+        .take_while(|column| column.name != first_objective.0.name)
+        .map(with_name_in_words);
+    let y_columns: Vec<(&ColumnFacts, String)> =
+        y_objectives.iter().cloned().chain(parameters).collect();
+    let mut column_names = vec!["feasible", "on_front", x_column.0.name.as_str()];
+    column_names.extend(y_columns.iter().map(|(column, _)| column.name.as_str()));
+    let mut candidates: Vec<(usize, Vec<f64>)> = Vec::new();
+    source.each_row(&column_names, |row| {
+        let is_true = |column| usize::from(row.word(column) == Some("true"));
+        candidates.push((is_true(0) + is_true(1), row.numbers(2..column_names.len())));
         Ok(())
     })?;
-    rows.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
-    let units: Vec<(&str, f64)> = std::iter::once(&x)
-        .chain(&shown)
+    candidates.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
+    let units: Vec<(&str, f64)> = std::iter::once(&x_column)
+        .chain(&y_columns)
         .map(|(column, _)| label::display_unit(&column.unit))
         .collect();
     let values = |kind: usize, k: usize| -> Vec<f64> {
-        let own = rows.iter().filter(|(own, values)| *own == kind && values[0].is_finite());
-        own.map(|(_, values)| values[k] * units[k].1).collect()
+        let candidates_of_kind = candidates.iter().filter(|(kind_of_candidate, values)| {
+            *kind_of_candidate == kind && values[0].is_finite()
+        });
+        candidates_of_kind.map(|(_, values)| values[k] * units[k].1).collect()
     };
-    let panels = shown.iter().enumerate().map(|(k, (column, words))| {
+    let panels = y_columns.iter().enumerate().map(|(k, (column, words))| {
         let colours = [FAILED, DISTINCT[5], NONLINEAR];
         let dots = |kind: usize| {
             Series::new(
@@ -73,16 +78,20 @@ pub(crate) fn chart(source: &FigureFile) -> Result<Chart> {
         let dots = (0..CANDIDATE_KINDS.len()).map(dots).filter(|series| !series.x.is_empty());
         let label = Label::new(words, units[k + 1].0);
         ChartPanel {
-            shown: k < ys.len(),
+            is_shown: k < y_objectives.len(),
             height: 300.0,
             ..ChartPanel::new(&column.name, label, dots.collect())
         }
     });
     Ok(Chart {
-        title: if further.is_empty() { "What was tried" } else { "What no other choice beats" }
-            .to_owned(),
+        title: if further_objectives.is_empty() {
+            "What was tried"
+        } else {
+            "What no other choice beats"
+        }
+        .to_owned(),
         subtitle: source.subtitle(&format!("{} candidates", source.rows)),
-        x_label: Label::new(&x.1, units[0].0),
+        x_label: Label::new(&x_column.1, units[0].0),
         panels: panels.collect(),
         ..Chart::default()
     })

@@ -2,7 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::{CHART, CORE, DESIGN, START, chart_json, computed, curve, embed, page};
+use super::{
+    CHART_SCRIPT, CORE_SCRIPT, DESIGN_SCRIPT, START_SCRIPT, chart_json, embed, encode_curve,
+    live_part_and_summary, write_page,
+};
 use crate::figures::{histogram, influence, matrix};
 use crate::frame::HEADING_HEIGHT;
 use crate::model::Figures;
@@ -12,22 +15,23 @@ use crate::{DesignView, PlotOptions, svg};
 /// Writes the page, which opens with the figure that the options name.
 pub(crate) fn design_page(scatter: &Scatter, options: &PlotOptions, model: &dyn Figures) -> String {
     let title = &scatter.title;
-    let drawn = matrix::drawn(scatter);
+    let drawn_points = matrix::drawn_points(scatter);
     let chart = histogram::chart(scatter);
-    let pick = |values: &[f64]| embed::floats(drawn.iter().map(|&k| values[k]));
-    let direction = |one: &matrix::MatrixAxis<'_>| {
+    let encode_drawn =
+        |values: &[f64]| embed::encode_floats(drawn_points.iter().map(|&k| values[k]));
+    let axis_json = |axis: &matrix::MatrixAxis<'_>| {
         json!({
-            "name": one.name,
-            "words": one.label.words,
-            "unit": one.label.unit,
-            "values": pick(one.values),
-            "log": one.scale.log,
-            "range": [one.scale.from, one.scale.to],
+            "name": axis.name,
+            "words": axis.label.words,
+            "unit": axis.label.unit,
+            "values": encode_drawn(axis.values),
+            "log": axis.scale.is_log,
+            "range": [axis.scale.from, axis.scale.to],
         })
     };
     let (picture, panels) = matrix::draw(scatter);
     let [top, width, height] = [HEADING_HEIGHT, picture.width, picture.height - HEADING_HEIGHT];
-    let sides = Side::ALL.map(|side| scatter.words(side));
+    let sides = Side::ALL.map(|side| scatter.side_meaning(side));
     let data = json!({
         "kind": "design",
         "title": title,
@@ -41,19 +45,31 @@ pub(crate) fn design_page(scatter: &Scatter, options: &PlotOptions, model: &dyn 
             "picture": svg::write(&picture),
             "view": [0.0, top, width, height],
             "panels": panels,
-            "directions": matrix::directions(scatter).iter().map(direction).collect::<Value>(),
-            "points": drawn.iter().map(|&k| scatter.points[k]).collect::<Value>(),
-            "of": drawn.iter().map(|&k| scatter.sides[k] as usize).collect::<Value>(),
+            "directions": matrix::matrix_axes(scatter).iter().map(axis_json).collect::<Value>(),
+            "points": drawn_points.iter().map(|&k| scatter.points[k]).collect::<Value>(),
+            "of": drawn_points.iter().map(|&k| scatter.sides[k] as usize).collect::<Value>(),
             "sides": sides,
             "note": matrix::notes(scatter).join("; "),
         },
         "histogram": {
-            "title": chart.title, "subtitle": chart.subtitle, "chart": chart_json(&chart, curve),
+            "title": chart.title,
+            "subtitle": chart.subtitle,
+            "chart": chart_json(&chart, encode_curve),
         },
         "influence": svg::write(&influence::draw(scatter)),
     });
-    let axes: Vec<(&str, bool)> =
-        scatter.parameters.iter().map(|one| (one.name.as_str(), one.log)).collect();
-    let (live_part, summary) = computed(&scatter.source, &axes, model);
-    page(title, data, [&[CORE, CHART, DESIGN], &[START]], live_part, &scatter.source, &summary)
+    let axes: Vec<(&str, bool)> = scatter
+        .parameters
+        .iter()
+        .map(|parameter| (parameter.name.as_str(), parameter.is_log))
+        .collect();
+    let (live_part, summary) = live_part_and_summary(&scatter.source, &axes, model);
+    write_page(
+        title,
+        data,
+        [&[CORE_SCRIPT, CHART_SCRIPT, DESIGN_SCRIPT], &[START_SCRIPT]],
+        live_part,
+        &scatter.source,
+        &summary,
+    )
 }

@@ -4,22 +4,22 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
 /// Encodes values as little-endian 32-bit floats (7 digits) in base64.
-pub fn floats(values: impl Iterator<Item = f64>) -> String {
+pub fn encode_floats(values: impl Iterator<Item = f64>) -> String {
     STANDARD.encode(values.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>())
 }
 
 /// Encodes values as little-endian 64-bit floats in base64.
-pub fn doubles(values: &[f64]) -> String {
+pub fn encode_doubles(values: &[f64]) -> String {
     STANDARD.encode(values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
 }
 
 /// Encodes bytes in base64.
-pub fn bytes(values: impl Iterator<Item = u8>) -> String {
+pub fn encode_bytes(values: impl Iterator<Item = u8>) -> String {
     STANDARD.encode(values.collect::<Vec<u8>>())
 }
 
 /// Encodes flags as bits, the least significant bit of a byte first, in base64.
-pub fn bits(values: &[bool]) -> String {
+pub fn encode_bits(values: &[bool]) -> String {
     let byte = |values: &[bool]| {
         values.iter().rev().fold(0, |byte: u8, value| byte << 1 | u8::from(*value))
     };
@@ -28,10 +28,11 @@ pub fn bits(values: &[bool]) -> String {
 
 /// Encodes values as little-endian 16-bit integers in base64, and returns the value of one unit:
 /// 1/32767 of the peak. A value that is not finite becomes the least integer.
-pub fn quantised(values: &[f64]) -> (String, f64) {
-    let known = values.iter().filter(|value| value.is_finite());
-    let peak = known.fold(0.0_f64, |peak, value| peak.max(value.abs()));
-    let unit = rounded(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
+pub fn quantise(values: &[f64]) -> (String, f64) {
+    let finite = values.iter().filter(|value| value.is_finite());
+    let peak = finite.fold(0.0_f64, |peak, value| peak.max(value.abs()));
+    let unit =
+        round_to_six_digits(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
     let integer =
         |value: &f64| if value.is_finite() { (value / unit).round() as i16 } else { i16::MIN };
     let data = values.iter().flat_map(|value| integer(value).to_le_bytes()).collect::<Vec<u8>>();
@@ -39,7 +40,7 @@ pub fn quantised(values: &[f64]) -> (String, f64) {
 }
 
 /// Rounds a number to six digits, so that it is written short.
-pub fn rounded(value: f64) -> f64 {
+pub fn round_to_six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
@@ -50,7 +51,7 @@ mod tests {
     #[test]
     fn floats_are_little_endian() {
         assert_eq!(
-            STANDARD.decode(floats([1.0, f64::NAN].into_iter())).unwrap()[..4],
+            STANDARD.decode(encode_floats([1.0, f64::NAN].into_iter())).unwrap()[..4],
             [0, 0, 0x80, 0x3f]
         );
     }
@@ -58,28 +59,28 @@ mod tests {
     #[test]
     fn the_least_significant_bit_comes_first() {
         let values: Vec<bool> = (0..10).map(|k| k == 1 || k == 9).collect();
-        assert_eq!(STANDARD.decode(bits(&values)).unwrap(), [0b10, 0b10]);
+        assert_eq!(STANDARD.decode(encode_bits(&values)).unwrap(), [0b10, 0b10]);
     }
 
     #[test]
     fn a_quantised_curve_is_decoded_within_half_a_unit() {
         let curve = [0.0, 0.07, -0.035, 1.0e-5, f64::NAN];
-        let (data, unit) = quantised(&curve);
-        let back: Vec<i16> = STANDARD
+        let (data, unit) = quantise(&curve);
+        let decoded: Vec<i16> = STANDARD
             .decode(data)
             .unwrap()
             .chunks(2)
             .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
             .collect();
-        assert_eq!(back[4], i16::MIN);
-        for (value, integer) in curve.iter().zip(back).take(4) {
+        assert_eq!(decoded[4], i16::MIN);
+        for (value, integer) in curve.iter().zip(decoded).take(4) {
             assert!((f64::from(integer) * unit - value).abs() <= 0.07 / 32_000.0);
         }
     }
 
     #[test]
     fn numbers_are_rounded_to_six_digits() {
-        assert_eq!(rounded(0.1 + 0.2).to_string(), "0.3");
-        assert!(rounded(f64::NAN).is_nan());
+        assert_eq!(round_to_six_digits(0.1 + 0.2).to_string(), "0.3");
+        assert!(round_to_six_digits(f64::NAN).is_nan());
     }
 }

@@ -16,7 +16,7 @@ use sweep_files::{FileError, regular};
 
 /// Number of time buckets of a history, each of which keeps its least and greatest value. Basis: a
 /// page draws a history about 500 px wide. Doubling it doubles the size of histories in a page.
-const BUCKETS: usize = 500;
+const TIME_BUCKETS: usize = 500;
 
 /// Returns the charts of a folder's trace files by the cell of their point, their curves quantised.
 ///
@@ -29,8 +29,8 @@ const BUCKETS: usize = 500;
 /// [`PlotError::File`] for the folder; the errors of [`FigureTable::open`] for its files;
 /// [`PlotError::Unfit`] for a file that is not a trace or belongs to no point of the grid, and for
 /// a folder without traces.
-pub(crate) fn read(folder: &Path, map: &CellMap, model: &dyn Figures) -> Result<Value> {
-    let known = map.table.source.model_kinds;
+pub(crate) fn read_histories(folder: &Path, map: &CellMap, model: &dyn Figures) -> Result<Value> {
+    let model_kinds = map.table.source.model_kinds;
     let names = regular::names(folder).map_err(FileError::io("list", folder))?;
     let mut files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "parquet"));
@@ -42,56 +42,68 @@ pub(crate) fn read(folder: &Path, map: &CellMap, model: &dyn Figures) -> Result<
     }
     let mut histories = Object::new();
     for file in files {
-        let source = FigureFile::open(&file, known)?;
-        let unfit =
+        let source = FigureFile::open(&file, model_kinds)?;
+        let unfit_error =
             |what: &str| PlotError::Unfit(format!("`--traces`: {}: {what}", file.display()));
         if source.kind != FigureKind::TRACE {
-            return Err(unfit("not a trace file"));
+            return Err(unfit_error("not a trace file"));
         }
-        let at = together::at(&source);
-        let cell = cell(&source, &at, map).ok_or_else(|| {
-            unfit(
+        let point_of_file = together::point_of_trace(&source);
+        let cell = find_cell(&source, &point_of_file, map).ok_or_else(|| {
+            unfit_error(
                 "it belongs to no point of this map: neither its metadata (`at`) nor its name \
                    (point-<index>) says one",
             )
         })?;
-        let point = point(&at, cell, map);
+        let point_in_map = map_point(&point_of_file, cell, map);
         // In a map whose cells have several points, an index alone does not identify a point.
-        let own = if at.is_empty() && map.grid.merged() { &point } else { &at };
-        let files = [(&map.table.source, &point), (&source, own)];
-        together::check_agreement("--traces", &file, files, &together::history_parts(known))?;
-        let chart = model.history(&FigureTable::read_decimated(source, BUCKETS)?)?;
-        let chart = chart_json(&chart, |values| json!(embed::quantised(values)));
+        let point_of_trace = if point_of_file.is_empty() && map.grid.merges_points() {
+            &point_in_map
+        } else {
+            &point_of_file
+        };
+        let files = [(&map.table.source, &point_in_map), (&source, point_of_trace)];
+        together::check_agreement(
+            "--traces",
+            &file,
+            files,
+            &together::history_sections(model_kinds),
+        )?;
+        let chart = model.history(&FigureTable::read_decimated(source, TIME_BUCKETS)?)?;
+        let chart = chart_json(&chart, |values| json!(embed::quantise(values)));
         histories.insert(cell.to_string(), chart);
     }
     Ok(Value::Object(histories))
 }
 
 /// Returns the cell of a trace's point in the map's grid.
-fn cell(trace: &FigureFile, at: &NamedPoint, map: &CellMap) -> Option<usize> {
+fn find_cell(trace: &FigureFile, point_of_trace: &NamedPoint, map: &CellMap) -> Option<usize> {
     // A file whose metadata give its point belongs to that point only, whatever its name.
-    if !at.is_empty() {
-        let value =
-            |name: &str| at.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
-        let places = map.grid.axes.iter().map(|axis| axis.place_near(value(&axis.swept.name)?));
-        let places: Vec<usize> = places.collect::<Option<_>>()?;
-        return Some(map.grid.index(places)).filter(|&cell| map.filled(cell));
+    if !point_of_trace.is_empty() {
+        let value_of_axis = |name: &str| {
+            point_of_trace.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
+        };
+        let cells_of_axes =
+            map.grid.axes.iter().map(|axis| axis.cell_index_near(value_of_axis(&axis.swept.name)?));
+        let cells_of_axes: Vec<usize> = cells_of_axes.collect::<Option<_>>()?;
+        return Some(map.grid.index(cells_of_axes)).filter(|&cell| map.has_points(cell));
     }
     let stem = trace.path.file_stem()?.to_str()?;
     let digits = stem.rsplit(|letter: char| !letter.is_ascii_digit()).next()?;
-    let wanted: u32 = digits.parse().ok()?;
-    map.table.numbers("point").ok()?.iter().position(|point| *point == f64::from(wanted))
+    let point_index: u32 = digits.parse().ok()?;
+    map.table.numbers("point").ok()?.iter().position(|point| *point == f64::from(point_index))
 }
 
 /// Returns the values of the map's axes at a trace's point.
-fn point(at: &NamedPoint, cell: usize, map: &CellMap) -> NamedPoint {
-    let mut rest = cell;
+fn map_point(point_of_trace: &NamedPoint, cell: usize, map: &CellMap) -> NamedPoint {
+    let mut remaining = cell;
     let mut point = NamedPoint::new();
     for axis in map.grid.axes.iter().rev() {
-        let named = at.iter().find(|(name, _)| *name == axis.swept.name);
-        let value = named.map_or(axis.values[rest % axis.values.len()], |(_, value)| *value);
+        let axis_value = point_of_trace.iter().find(|(name, _)| *name == axis.swept.name);
+        let value =
+            axis_value.map_or(axis.values[remaining % axis.values.len()], |(_, value)| *value);
         point.push((axis.swept.name.clone(), value));
-        rest /= axis.values.len();
+        remaining /= axis.values.len();
     }
     point
 }

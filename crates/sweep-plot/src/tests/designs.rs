@@ -2,7 +2,7 @@
 
 use super::super::sample::SampleFile;
 use super::super::*;
-use super::{draw, message, page_data, showing, svg};
+use super::{draw, draw_svg, error_message, options_for_column, page_data};
 
 /// Returns points whose ratio is 4 where the mass exceeds a half, for any damping; the last row
 /// failed and the one before it is undefined.
@@ -11,12 +11,13 @@ pub(super) fn points(count: u32) -> SampleFile {
 }
 
 /// Returns the points of [`points`] with further parameters.
-fn points_with(count: u32, further: impl Fn(SampleFile) -> SampleFile) -> SampleFile {
-    let part = |k: u32, step: f64| (f64::from(k) * step).fract();
-    let mass: Vec<f64> = (0..count).map(|k| part(k, 0.618_033_988_749_895)).collect();
-    let damping = (0..count).map(|k| 60.0 + 240.0 * part(k, 0.414_213_562_373_095));
-    let lost = |k: usize| k + 2 >= count as usize;
-    let ratio = |k: usize| (!lost(k)).then(|| if mass[k] > 0.5 { 4.0 } else { 1.0 + mass[k] });
+fn points_with(count: u32, add_parameters: impl Fn(SampleFile) -> SampleFile) -> SampleFile {
+    let fraction = |k: u32, step: f64| (f64::from(k) * step).fract();
+    let mass: Vec<f64> = (0..count).map(|k| fraction(k, 0.618_033_988_749_895)).collect();
+    let damping = (0..count).map(|k| 60.0 + 240.0 * fraction(k, 0.414_213_562_373_095));
+    let has_no_result = |k: usize| k + 2 >= count as usize;
+    let ratio =
+        |k: usize| (!has_no_result(k)).then(|| if mass[k] > 0.5 { 4.0 } else { 1.0 + mass[k] });
     let column = |value: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
         (0..count as usize).map(|k| value(k).unwrap_or(f64::NAN)).collect()
     };
@@ -29,7 +30,7 @@ fn points_with(count: u32, further: impl Fn(SampleFile) -> SampleFile) -> Sample
         .numbers("unbalance_mass_kg", "kg", mass.iter().copied())
         .numbers("damping_n_s_per_m", "N s/m", damping)
         .numbers("gravity_m_per_s2", "m/s^2", mass.iter().map(|_| 9.81));
-    further(parameters)
+    add_parameters(parameters)
         .numbers("nonlinear_body_yaw", "rad", column(&|k| Some(0.01 * ratio(k)?)))
         .numbers("linear_body_yaw", "rad", column(&|k| ratio(k).map(|_| 0.01)))
         .numbers("ratio_body_yaw", "1", column(&ratio))
@@ -40,35 +41,35 @@ fn points_with(count: u32, further: impl Fn(SampleFile) -> SampleFile) -> Sample
             "m",
             column(&|k| ratio(k).map(|ratio| 0.003 - 0.001 * ratio)),
         )
-        .bad("less", Some(0.0))
+        .worse("less", Some(0.0))
         .words("status", (0..count).map(|k| Some(if k + 1 == count { "diverged" } else { "ok" })))
-        .metadata("sweep.plan", plan)
+        .with_metadata("sweep.plan", plan)
 }
 
 /// Returns random points, none of which has a result.
 pub(super) fn failed(count: u32) -> SampleFile {
-    let none = || (0..count).map(|_| f64::NAN);
+    let missing_values = || (0..count).map(|_| f64::NAN);
     let plan = r#"{
         "name": "sample", "reliability": { "ratio_limit": 2.0 },
         "design": { "method": "monte_carlo", "points": 0, "seed": 0 }
     }"#;
-    let part = |step: f64| (0..count).map(move |k| (f64::from(k) * step).fract());
+    let fractions = |step: f64| (0..count).map(move |k| (f64::from(k) * step).fract());
     SampleFile::default()
         .counts("point", 0..u64::from(count))
-        .numbers("unbalance_mass_kg", "kg", part(0.618_033_988_749_895))
-        .numbers("damping_n_s_per_m", "N s/m", part(0.414_213_562_373_095))
-        .numbers("nonlinear_body_yaw", "rad", none())
-        .numbers("linear_body_yaw", "rad", none())
-        .numbers("ratio_body_yaw", "1", none())
-        .numbers("ratio_max", "1", none())
+        .numbers("unbalance_mass_kg", "kg", fractions(0.618_033_988_749_895))
+        .numbers("damping_n_s_per_m", "N s/m", fractions(0.414_213_562_373_095))
+        .numbers("nonlinear_body_yaw", "rad", missing_values())
+        .numbers("linear_body_yaw", "rad", missing_values())
+        .numbers("ratio_body_yaw", "1", missing_values())
+        .numbers("ratio_max", "1", missing_values())
         .flags("reliable", (0..count).map(|_| None))
-        .numbers("min_gap_nonlinear_m", "m", none())
-        .bad("less", Some(0.0))
+        .numbers("min_gap_nonlinear_m", "m", missing_values())
+        .worse("less", Some(0.0))
         .words("status", (0..count).map(|_| Some("diverged")))
-        .metadata("sweep.plan", plan)
+        .with_metadata("sweep.plan", plan)
 }
 
-fn view(view: DesignView) -> PlotOptions {
+fn options_for_view(view: DesignView) -> PlotOptions {
     PlotOptions { view: Some(view), ..PlotOptions::default() }
 }
 
@@ -79,7 +80,7 @@ fn count_texts(figure: &str, text: &str) -> usize {
 
 #[test]
 fn a_design_has_a_panel_for_each_pair_and_a_legend() {
-    let figure = svg(points(202), &PlotOptions::default());
+    let figure = draw_svg(points(202), &PlotOptions::default());
     for phrase in [
         "Where the linear model can be trusted",
         "sample · 202 points at random",
@@ -93,12 +94,12 @@ fn a_design_has_a_panel_for_each_pair_and_a_legend() {
     }
     assert_eq!(count_texts(&figure, "Unbalance mass (kg)"), 1);
     assert!(!figure.contains("Gravity"), "what is the same at every point is no axis");
-    let count_of_side = |side: &str| {
+    let count_on_side = |side: &str| {
         let start = figure.find(side).unwrap() + side.len();
         figure[start..start + 5].split(['(', ')']).nth(1).unwrap().parse::<u32>().unwrap()
     };
     assert_eq!(
-        count_of_side(">reliable: below 2 ") + count_of_side(">unreliable: ratio 2 or more "),
+        count_on_side(">reliable: below 2 ") + count_on_side(">unreliable: ratio 2 or more "),
         200
     );
 }
@@ -117,7 +118,7 @@ fn long_numbers() -> SampleFile {
 }
 
 /// Returns the horizontal centred texts of a picture: position, size and text.
-fn middles(figure: &str) -> Vec<([f64; 2], f64, String)> {
+fn centred_texts(figure: &str) -> Vec<([f64; 2], f64, String)> {
     let number = |text: &str, name: &str| {
         let (_, rest) = text.split_once(&format!(" {name}=\""))?;
         rest.split('"').next()?.parse::<f64>().ok()
@@ -125,23 +126,27 @@ fn middles(figure: &str) -> Vec<([f64; 2], f64, String)> {
     let texts = figure.split("<text").skip(1).filter_map(|text| {
         let (tag, rest) = text.split_once('>')?;
         let is_plain = tag.contains("middle") && !tag.contains("rotate");
-        let at = [number(tag, "x")?, number(tag, "y")?];
-        is_plain.then_some((at, number(tag, "font-size")?, rest.split('<').next()?.to_owned()))
+        let position = [number(tag, "x")?, number(tag, "y")?];
+        is_plain.then_some((
+            position,
+            number(tag, "font-size")?,
+            rest.split('<').next()?.to_owned(),
+        ))
     });
     texts.collect()
 }
 
 #[test]
 fn numbers_below_neighbouring_panels_do_not_touch() {
-    let figure = svg(long_numbers(), &PlotOptions::default());
-    let texts = middles(&figure);
+    let figure = draw_svg(long_numbers(), &PlotOptions::default());
+    let texts = centred_texts(&figure);
     let numbers: Vec<_> = texts.iter().filter(|(_, _, text)| text.parse::<f64>().is_ok()).collect();
     assert!(numbers.len() >= 10, "two below each panel: {numbers:?}");
     let mut ends: Vec<_> = numbers
         .iter()
         .map(|([x, _], size, text)| {
-            let half = raster::text_width(text, *size, false) / 2.0;
-            (x - half, x + half, text)
+            let half_width = raster::text_width(text, *size, false) / 2.0;
+            (x - half_width, x + half_width, text)
         })
         .collect();
     ends.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -152,73 +157,84 @@ fn numbers_below_neighbouring_panels_do_not_touch() {
 
 #[test]
 fn units_are_not_broken_across_lines() {
-    let figure = svg(long_numbers(), &PlotOptions::default());
+    let figure = draw_svg(long_numbers(), &PlotOptions::default());
     for unit in ["(kg m^2)", "(N m/rad)", "(N/m)", "(kg)"] {
         assert!(figure.contains(&format!("{unit}<")), "{unit}");
     }
-    let broken = figure.split("<text").skip(1).filter_map(|text| {
+    let broken_texts = figure.split("<text").skip(1).filter_map(|text| {
         let text = text.split_once('>')?.1.split('<').next()?;
         (text.contains('(') != text.contains(')')).then(|| text.to_owned())
     });
-    assert_eq!(broken.collect::<Vec<_>>(), [""; 0]);
+    assert_eq!(broken_texts.collect::<Vec<_>>(), [""; 0]);
 }
 
 #[test]
 fn a_histogram_states_the_share_and_its_interval() {
-    let figure = svg(points(102), &view(DesignView::Histogram));
+    let figure = draw_svg(points(102), &options_for_view(DesignView::Histogram));
     // The values 0.618 k modulo 1 with k below 100 exceed a half 49 times. The interval (Wilson) is
     // calculated by hand.
     assert!(figure.contains("51.0 % of the points reliable"), "{figure}");
     assert!(figure.contains("41.3 to 60.6 % (Wilson)"), "{figure}");
     assert!(figure.contains("1 undefined · 1 failed"), "{figure}");
-    let histogram = |column| {
-        let options = PlotOptions { view: Some(DesignView::Histogram), ..showing(column) };
-        svg(points(102), &options)
+    let draw_histogram = |column| {
+        let options =
+            PlotOptions { view: Some(DesignView::Histogram), ..options_for_column(column) };
+        draw_svg(points(102), &options)
     };
-    let gap = histogram("min_gap_nonlinear_m");
-    assert!(gap.contains("51.0 % of the points with least gap 0 mm or more"), "{gap}");
-    assert!(histogram("nonlinear_body_yaw").contains("51.0 % of the points reliable"));
+    let figure_of_gap = draw_histogram("min_gap_nonlinear_m");
+    assert!(
+        figure_of_gap.contains("51.0 % of the points with least gap 0 mm or more"),
+        "{figure_of_gap}"
+    );
+    assert!(draw_histogram("nonlinear_body_yaw").contains("51.0 % of the points reliable"));
 }
 
 #[test]
 fn bins_count_every_point_once() {
-    let page = page_data(&draw(points(102), &view(DesignView::Histogram), "a.html").unwrap());
+    let page =
+        page_data(&draw(points(102), &options_for_view(DesignView::Histogram), "a.html").unwrap());
     let series = page["histogram"]["chart"]["panels"][0]["series"].as_array().unwrap();
     let shares = series.iter().map(|series| {
         // Each bin gives two points of the curve.
-        let ends = super::curve(series);
+        let ends = super::decode_curve(series);
         ends.iter().filter(|share| share.is_finite()).sum::<f64>() / 2.0
     });
     let shares: Vec<f64> = shares.collect();
-    let near = |share: f64, expected: f64| (share - expected).abs() < 1e-3;
-    assert!(near(shares[0], 51.0) && near(shares[1], 49.0), "{shares:?}");
+    let is_near = |share: f64, expected: f64| (share - expected).abs() < 1e-3;
+    assert!(is_near(shares[0], 51.0) && is_near(shares[1], 49.0), "{shares:?}");
 }
 
 #[test]
 fn the_most_influential_parameter_comes_first() {
-    let page = page_data(&draw(points(402), &view(DesignView::Influence), "a.html").unwrap());
+    let page =
+        page_data(&draw(points(402), &options_for_view(DesignView::Influence), "a.html").unwrap());
     assert_eq!(
         (page["kind"].as_str(), page["first"].as_str()),
         (Some("design"), Some("influence"))
     );
-    let figure = svg(points(402), &view(DesignView::Influence));
+    let figure = draw_svg(points(402), &options_for_view(DesignView::Influence));
     assert_eq!(page["influence"], figure);
     // The number follows the parameter's name.
-    let rank = |name: &str| -> f64 {
+    let rank_correlation = |name: &str| -> f64 {
         let (_, after) = figure.split_once(&format!(">{name}<")).unwrap();
         after.split('>').find_map(|text| text.split_once('<')?.0.parse().ok()).unwrap()
     };
     // Half of the ratios share the greatest rank.
-    assert!(rank("Unbalance mass") > 0.9 && rank("Damping").abs() < 0.1, "{figure}");
+    assert!(
+        rank_correlation("Unbalance mass") > 0.9 && rank_correlation("Damping").abs() < 0.1,
+        "{figure}"
+    );
     let [mass, damping] = [">Unbalance mass<", ">Damping<"].map(|name| figure.find(name).unwrap());
     assert!(mass < damping);
 }
 
 #[test]
 fn a_figure_of_influence_names_its_channel() {
-    let options =
-        PlotOptions { view: Some(DesignView::Influence), ..showing("nonlinear_body_yaw") };
-    let figure = svg(points(102), &options);
+    let options = PlotOptions {
+        view: Some(DesignView::Influence),
+        ..options_for_column("nonlinear_body_yaw")
+    };
+    let figure = draw_svg(points(102), &options);
     let title = ">What it depends on: amplitude, nonlinear model: body yaw<";
     assert!(figure.contains(title), "{figure}");
 }
@@ -228,14 +244,14 @@ fn many_points_are_all_counted_and_some_are_drawn() {
     let page = page_data(&draw(points(250_002), &PlotOptions::default(), "a.html").unwrap());
     let scatter = &page["scatter"];
     let picture = scatter["picture"].as_str().unwrap();
-    let counted = ["reliable: below 2 (", "ratio 2 or more (", "excitation (", "no result ("];
+    let legend_texts = ["reliable: below 2 (", "ratio 2 or more (", "excitation (", "no result ("];
     let count = |words: &str| -> u64 {
         let (_, rest) = picture.split_once(words).unwrap();
         rest.split(')').next().unwrap().parse().unwrap()
     };
-    assert_eq!(counted.map(count).iter().sum::<u64>(), 250_002);
-    let drawn = scatter["of"].as_array().unwrap().len();
-    assert!((3000..5000).contains(&drawn), "{drawn}");
+    assert_eq!(legend_texts.map(count).iter().sum::<u64>(), 250_002);
+    let drawn_count = scatter["of"].as_array().unwrap().len();
+    assert!((3000..5000).contains(&drawn_count), "{drawn_count}");
     assert!(page["subtitle"].as_str().unwrap().contains("picked at random"));
     let size = draw(points(250_002), &PlotOptions::default(), "a.svg").unwrap().len();
     assert!(size < 2_000_000, "{size}");
@@ -243,15 +259,25 @@ fn many_points_are_all_counted_and_some_are_drawn() {
 
 #[test]
 fn a_list_of_a_whole_grid_is_drawn_as_a_map() {
-    let refused = message(draw(super::super::sample::map(), &view(DesignView::Scatter), "a.svg"));
-    assert!(refused.contains("`--view` is for designs"), "{refused}");
-    assert!(message(draw(points(50), &showing("status"), "a.svg")).contains("no number"));
-    let at = PlotOptions { at: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
-    assert!(message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
-    let listed = || {
+    let error = error_message(draw(
+        super::super::sample::map(),
+        &options_for_view(DesignView::Scatter),
+        "a.svg",
+    ));
+    assert!(error.contains("`--view` is for designs"), "{error}");
+    assert!(
+        error_message(draw(points(50), &options_for_column("status"), "a.svg"))
+            .contains("no number")
+    );
+    let at = PlotOptions { fixed_values: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
+    assert!(error_message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
+    let listed_map = || {
         let plan = r#"{ "design": { "method": "list" } }"#;
-        super::super::sample::map().metadata("sweep.listed", plan)
+        super::super::sample::map().with_metadata("sweep.listed", plan)
     };
-    assert!(svg(listed(), &PlotOptions::default()).contains("linear model unreliable"));
-    assert!(svg(listed(), &view(DesignView::Histogram)).contains("Share of the points (%)"));
+    assert!(draw_svg(listed_map(), &PlotOptions::default()).contains("linear model unreliable"));
+    assert!(
+        draw_svg(listed_map(), &options_for_view(DesignView::Histogram))
+            .contains("Share of the points (%)")
+    );
 }

@@ -6,10 +6,10 @@ use serde_json::Value;
 
 use super::super::sample::{MapSample, SampleFile};
 use super::super::*;
-use super::{draw, page_data, svg};
+use super::{draw, draw_svg, page_data};
 
 /// Returns the values from 0 in steps of 1.
-fn counted(count: usize) -> Vec<f64> {
+fn integers_below(count: usize) -> Vec<f64> {
     (0..count).map(|k| k as f64).collect()
 }
 
@@ -18,20 +18,20 @@ fn counted(count: usize) -> Vec<f64> {
 fn map(counts: [usize; 2]) -> MapSample<'static> {
     MapSample {
         axes: vec![
-            ("unbalance_mass_kg", counted(counts[0])), // the first varies slowest
-            ("damping_n_s_per_m", counted(counts[1])),
+            ("unbalance_mass_kg", integers_below(counts[0])), // the first varies slowest
+            ("damping_n_s_per_m", integers_below(counts[1])),
         ],
         limit: 2.0,
-        yaw: &|at| Some([0.01 * ratio(at), 0.01]),
+        yaw: &|point| Some([0.01 * ratio(point), 0.01]),
         chaotic: &|_| false,
     }
 }
 
 /// Returns the ratio at a point of the map.
-fn ratio(at: &[f64]) -> f64 {
-    // Some points lie far off their neighbours, as they do in chaotic motion.
-    let off = if (at[0] * 31.0 + at[1] * 17.0) % 101.0 == 0.0 { 3.0 } else { 1.0 };
-    off * 4.0 / (1.0 + 3.0 * ((at[1] * 7.0 + at[0]) % 1000.0) / 1000.0)
+fn ratio(point: &[f64]) -> f64 {
+    // The ratios of some points differ much from those of their neighbours, as in chaotic motion.
+    let outlier_factor = if (point[0] * 31.0 + point[1] * 17.0) % 101.0 == 0.0 { 3.0 } else { 1.0 };
+    outlier_factor * 4.0 / (1.0 + 3.0 * ((point[1] * 7.0 + point[0]) % 1000.0) / 1000.0)
 }
 
 fn render_to(input: &Path, name: &str) -> Vec<u8> {
@@ -40,12 +40,12 @@ fn render_to(input: &Path, name: &str) -> Vec<u8> {
     std::fs::read(output).unwrap()
 }
 
-fn bits(text: &Value) -> Vec<bool> {
+fn decode_bits(text: &Value) -> Vec<bool> {
     let bytes = base64::engine::general_purpose::STANDARD.decode(text.as_str().unwrap()).unwrap();
     bytes.iter().flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1 == 1)).collect()
 }
 
-fn floats(text: &Value) -> Vec<f64> {
+fn decode_floats(text: &Value) -> Vec<f64> {
     let bytes = base64::engine::general_purpose::STANDARD.decode(text.as_str().unwrap()).unwrap();
     bytes.chunks(4).map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect()
 }
@@ -58,17 +58,22 @@ fn memory_and_page_size_do_not_grow_with_the_rows() {
     for counts in [[724, 724], [1448, 1448]] {
         let input = map(counts).write_long(folder.path(), &format!("{}.parquet", counts[0]));
         peaks.push(["a.svg", "a.png", "a.html"].map(|name| {
-            let mut written = 0;
-            let heap = allocation_counter::measure(|| written = render_to(&input, name).len());
+            let mut written_bytes = 0;
+            let heap =
+                allocation_counter::measure(|| written_bytes = render_to(&input, name).len());
             let peak = heap.bytes_max;
-            let phrase = format!("{counts:?} {name}: {peak} bytes at most, {written} written");
+            let phrase =
+                format!("{counts:?} {name}: {peak} bytes at most, {written_bytes} written");
             println!("{phrase}");
-            assert!(peak < MAX_BYTES_ALLOCATED && written < 10_000_000, "{phrase}");
+            assert!(peak < MAX_BYTES_ALLOCATED && written_bytes < 10_000_000, "{phrase}");
             peak
         }));
     }
-    for (few, many) in peaks[0].iter().zip(peaks[1]) {
-        assert!(many < few + few / 2, "four times the rows: {few} bytes at most, then {many}");
+    for (peak_of_few, peak_of_many) in peaks[0].iter().zip(peaks[1]) {
+        assert!(
+            peak_of_many < peak_of_few + peak_of_few / 2,
+            "four times the rows: {peak_of_few} bytes at most, then {peak_of_many}"
+        );
     }
 }
 
@@ -85,38 +90,39 @@ fn a_cell_of_several_points_shows_the_worst_and_counts_them() {
     let [xs, ys] = [spans(0), spans(1)];
     assert!(xs.len() < counts[0] && ys.len() < counts[1] && xs.len() * ys.len() > 20_000);
     let [count, reliable, unreliable] =
-        ["points", "reliable", "unreliable"].map(|name| floats(&data["counts"][name]));
-    let worst = floats(&data["columns"]["ratio_max"]["data"]);
-    let index = floats(&data["columns"]["point"]["data"]);
-    let [gap, margin] =
-        ["min_gap_nonlinear_m", "margin_n"].map(|name| floats(&data["columns"][name]["data"]));
-    let says_both = bits(&data["layers"][0]["both"]);
-    let within = |span: &[f64; 2]| (span[0] as usize..=span[1] as usize).map(|k| k as f64);
-    let mut both = 0;
+        ["points", "reliable", "unreliable"].map(|name| decode_floats(&data["counts"][name]));
+    let worst = decode_floats(&data["columns"]["ratio_max"]["data"]);
+    let index = decode_floats(&data["columns"]["point"]["data"]);
+    let [gap, margin] = ["min_gap_nonlinear_m", "margin_n"]
+        .map(|name| decode_floats(&data["columns"][name]["data"]));
+    let is_divided = decode_bits(&data["layers"][0]["both"]);
+    let values_in_span = |span: &[f64; 2]| (span[0] as usize..=span[1] as usize).map(|k| k as f64);
+    let mut divided_cells = 0;
     for (i, x) in xs.iter().enumerate() {
         for (j, y) in ys.iter().enumerate() {
             let cell = i * ys.len() + j;
-            let points = within(x).flat_map(|x| within(y).map(move |y| [x, y]));
-            let ratios: Vec<f64> = points.map(|at| ratio(&at)).collect();
-            let above = ratios.iter().filter(|ratio| **ratio >= 2.0).count();
+            let points = values_in_span(x).flat_map(|x| values_in_span(y).map(move |y| [x, y]));
+            let ratios: Vec<f64> = points.map(|point| ratio(&point)).collect();
+            let unreliable_count = ratios.iter().filter(|ratio| **ratio >= 2.0).count();
             let greatest = ratios.iter().copied().fold(0.0, f64::max);
-            let counted = [count[cell], reliable[cell], unreliable[cell]];
-            let expected = [ratios.len(), ratios.len() - above, above];
-            assert_eq!(counted, expected.map(|count| count as f64));
+            let counts_of_cell = [count[cell], reliable[cell], unreliable[cell]];
+            let expected = [ratios.len(), ratios.len() - unreliable_count, unreliable_count];
+            assert_eq!(counts_of_cell, expected.map(|count| count as f64));
             assert!((worst[cell] - greatest).abs() < 1e-6 * greatest);
             let least_gap = 0.01 - 0.1 * 0.01 * greatest;
             assert!((gap[cell] - least_gap).abs() < 1e-8, "the least gap of the cell");
             assert!((margin[cell] - 1.0 + 0.01 * greatest).abs() < 1e-6, "and its least margin");
             let index = index[cell] as usize;
-            let at = [index / counts[1], index % counts[1]].map(|place| place as f64);
-            assert_eq!(ratio(&at), greatest, "the point named is the worst one");
-            assert_eq!(says_both[cell], above > 0 && above < ratios.len());
-            both += usize::from(says_both[cell]);
+            let worst_point =
+                [index / counts[1], index % counts[1]].map(|index_on_axis| index_on_axis as f64);
+            assert_eq!(ratio(&worst_point), greatest, "the point named is the worst one");
+            assert_eq!(is_divided[cell], unreliable_count > 0 && unreliable_count < ratios.len());
+            divided_cells += usize::from(is_divided[cell]);
         }
     }
-    assert!(both > 100, "{both} cells hold both");
-    let all: f64 = count.iter().sum();
-    assert_eq!(all, 300_000.0);
+    assert!(divided_cells > 100, "{divided_cells} cells hold both");
+    let point_count: f64 = count.iter().sum();
+    assert_eq!(point_count, 300_000.0);
     let figure = String::from_utf8(render_to(&folder.path().join("map.parquet"), "a.svg")).unwrap();
     assert!(figure.contains(">both: reliable and unreliable points<"));
     assert!(figure.contains("300000 points · a cell holds 2 by 2 points"));
@@ -127,31 +133,31 @@ fn a_small_map_has_a_cell_for_every_point() {
     let data = page_data(&draw(map([30, 40]).sample(), &PlotOptions::default(), "a.html").unwrap());
     assert!(data["counts"].is_null() && data["axes"][0]["spans"].is_null());
     assert!(data["layers"][0]["both"].is_null() && data["layers"][0]["undefined"].is_null());
-    assert!(!svg(map([30, 40]).sample(), &PlotOptions::default()).contains("both:"));
+    assert!(!draw_svg(map([30, 40]).sample(), &PlotOptions::default()).contains("both:"));
 }
 
 #[test]
 fn failed_points_are_hatched_in_cells_with_others() {
-    let yaw = |at: &[f64]| (at[1] % 50.0 != 0.0).then_some([0.01, 0.01]);
-    let failing = MapSample { yaw: &yaw, ..map([500, 600]) };
+    let yaw = |point: &[f64]| (point[1] % 50.0 != 0.0).then_some([0.01, 0.01]);
+    let map_with_failures = MapSample { yaw: &yaw, ..map([500, 600]) };
     let folder = tempfile::tempdir().unwrap();
-    let input = failing.write_long(folder.path(), "map.parquet");
+    let input = map_with_failures.write_long(folder.path(), "map.parquet");
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
     assert!(figure.contains(">some points failed<") && !figure.contains(">failed: no result<"));
     assert!(figure.contains("300000 points · 6000 failed"));
     let data = page_data(&render_to(&input, "a.html"));
-    assert_eq!(floats(&data["counts"]["failed"]).iter().sum::<f64>(), 6000.0);
-    let ended: Vec<&Value> =
+    assert_eq!(decode_floats(&data["counts"]["failed"]).iter().sum::<f64>(), 6000.0);
+    let legend_texts: Vec<&Value> =
         data["legend"].as_array().unwrap().iter().map(|entry| &entry[1]).collect();
-    assert_eq!(ended[..2], ["ok (294000)", "diverged (6000)"]);
+    assert_eq!(legend_texts[..2], ["ok (294000)", "diverged (6000)"]);
 }
 
 #[test]
 fn undefined_and_sensitive_points_are_marked_in_cells_with_others() {
-    let still = |at: &[f64]| at[1] % 50.0 == 7.0;
-    let chaotic = |at: &[f64]| (at[0] + at[1]) % 40.0 == 0.0;
-    let yaw = |at: &[f64]| Some(if still(at) { [0.0, 0.0] } else { [0.01, 0.01] });
-    let sample = MapSample { yaw: &yaw, chaotic: &chaotic, ..map([500, 600]) };
+    let is_at_rest = |point: &[f64]| point[1] % 50.0 == 7.0;
+    let is_chaotic = |point: &[f64]| (point[0] + point[1]) % 40.0 == 0.0;
+    let yaw = |point: &[f64]| Some(if is_at_rest(point) { [0.0, 0.0] } else { [0.01, 0.01] });
+    let sample = MapSample { yaw: &yaw, chaotic: &is_chaotic, ..map([500, 600]) };
     let folder = tempfile::tempdir().unwrap();
     let input = sample.write_long(folder.path(), "map.parquet");
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
@@ -160,29 +166,30 @@ fn undefined_and_sensitive_points_are_marked_in_cells_with_others() {
     }
     assert!(!figure.contains("both:") && !figure.contains("failed"));
     let data = page_data(&render_to(&input, "a.html"));
-    let all = (0..500).flat_map(|x| (0..600).map(move |y| [f64::from(x), f64::from(y)]));
-    let sensitive = all.filter(|at| chaotic(at)).count();
-    assert_eq!(floats(&data["counts"]["sensitive"]).iter().sum::<f64>(), sensitive as f64);
-    let [points, reliable] = ["points", "reliable"].map(|name| floats(&data["counts"][name]));
-    let undefined = bits(&data["layers"][0]["undefined"]);
+    let all_points = (0..500).flat_map(|x| (0..600).map(move |y| [f64::from(x), f64::from(y)]));
+    let sensitive = all_points.filter(|point| is_chaotic(point)).count();
+    assert_eq!(decode_floats(&data["counts"]["sensitive"]).iter().sum::<f64>(), sensitive as f64);
+    let [points, reliable] =
+        ["points", "reliable"].map(|name| decode_floats(&data["counts"][name]));
+    let undefined = decode_bits(&data["layers"][0]["undefined"]);
     for cell in 0..points.len() {
         assert_eq!(undefined[cell], reliable[cell] < points[cell], "cell {cell}");
     }
     // The linear model is never chaotic.
     let output = folder.path().join("linear.svg");
-    render(&input, &super::showing("linear_body_yaw"), &CommonFigures, &output).unwrap();
+    render(&input, &super::options_for_column("linear_body_yaw"), &CommonFigures, &output).unwrap();
     assert!(!std::fs::read_to_string(output).unwrap().contains("sensitive"));
 }
 
 #[test]
 fn sensitive_points_are_hatched_in_small_maps_too() {
-    let chaotic = |at: &[f64]| at == [3.0, 4.0];
-    let sample = MapSample { chaotic: &chaotic, ..map([30, 40]) };
-    let drawn = svg(sample.sample(), &PlotOptions::default());
-    assert!(drawn.contains(">sensitive: motion is chaotic<"));
+    let is_chaotic = |point: &[f64]| point == [3.0, 4.0];
+    let sample = MapSample { chaotic: &is_chaotic, ..map([30, 40]) };
+    let figure = draw_svg(sample.sample(), &PlotOptions::default());
+    assert!(figure.contains(">sensitive: motion is chaotic<"));
     // Without sensitive points the picture lacks the hatch and its legend entry.
-    let none = svg(map([30, 40]).sample(), &PlotOptions::default());
-    assert!(!none.contains("sensitive") && drawn.len() > none.len());
+    let figure_without = draw_svg(map([30, 40]).sample(), &PlotOptions::default());
+    assert!(!figure_without.contains("sensitive") && figure.len() > figure_without.len());
     let data = page_data(&draw(sample.sample(), &PlotOptions::default(), "a.html").unwrap());
     let words = &data["codes"]["sensitive"]["words"];
     assert_eq!(*words, serde_json::json!(["false", "true"]));
@@ -190,10 +197,11 @@ fn sensitive_points_are_hatched_in_small_maps_too() {
 
 #[test]
 fn an_axis_of_too_many_values_is_drawn_by_its_range() {
-    let one = MapSample { axes: vec![("damping_n_s_per_m", counted(300_000))], ..map([1, 1]) };
-    let one = MapSample { yaw: &|at| Some([0.02 - 1e-8 * at[0], 0.01]), ..one };
+    let one_axis =
+        MapSample { axes: vec![("damping_n_s_per_m", integers_below(300_000))], ..map([1, 1]) };
+    let one_axis = MapSample { yaw: &|point| Some([0.02 - 1e-8 * point[0], 0.01]), ..one_axis };
     let folder = tempfile::tempdir().unwrap();
-    let input = one.write_long(folder.path(), "map.parquet");
+    let input = one_axis.write_long(folder.path(), "map.parquet");
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
     assert!(figure.contains("300000 points · a cell holds many points and shows the worst"));
     assert!(render_to(&input, "a.html").len() < 10_000_000);
@@ -202,34 +210,35 @@ fn an_axis_of_too_many_values_is_drawn_by_its_range() {
 #[test]
 fn a_curve_marks_the_cells_that_hold_both_verdicts() {
     // The ratio falls through the limit of 2, and exceeds it once more at one point.
-    let yaw = |at: &[f64]| {
-        let again = if at[0] == 200_000.0 { 0.01 } else { 0.0 };
-        Some([0.03 - 1e-7 * (at[0] - 2.5) + again, 0.01])
+    let yaw = |point: &[f64]| {
+        let outlier = if point[0] == 200_000.0 { 0.01 } else { 0.0 };
+        Some([0.03 - 1e-7 * (point[0] - 2.5) + outlier, 0.01])
     };
-    let one = MapSample { axes: vec![("damping_n_s_per_m", counted(240_000))], ..map([1, 1]) };
+    let one_axis =
+        MapSample { axes: vec![("damping_n_s_per_m", integers_below(240_000))], ..map([1, 1]) };
     let folder = tempfile::tempdir().unwrap();
-    let input = MapSample { yaw: &yaw, ..one }.write_long(folder.path(), "map.parquet");
+    let input = MapSample { yaw: &yaw, ..one_axis }.write_long(folder.path(), "map.parquet");
     let phrase = ">both: reliable and unreliable points<";
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
     assert!(figure.contains(phrase));
     let data = page_data(&render_to(&input, "a.html"));
-    let mixed = data["chart"]["panels"][0]["mixed"].as_array().unwrap();
+    let mixed_ranges = data["chart"]["panels"][0]["mixed"].as_array().unwrap();
     let ranges: Vec<[f64; 2]> =
-        mixed.iter().map(|range| [0, 1].map(|end| range[end].as_f64().unwrap())).collect();
+        mixed_ranges.iter().map(|range| [0, 1].map(|end| range[end].as_f64().unwrap())).collect();
     for point in [100_002.5, 200_000.0] {
         assert!(ranges.iter().any(|[from, to]| *from <= point && point <= *to), "{ranges:?}");
     }
     assert!(ranges.len() == 2 && ranges.iter().all(|[from, to]| to - from < 50.0), "{ranges:?}");
 
     // Cells of one point cannot hold both verdicts.
-    let few = vec![("damping_n_s_per_m", counted(240))];
-    let few = MapSample { axes: few, yaw: &yaw, ..map([1, 1]) };
-    assert!(!svg(few.sample(), &PlotOptions::default()).contains(phrase));
+    let few_points = vec![("damping_n_s_per_m", integers_below(240))];
+    let few_points = MapSample { axes: few_points, yaw: &yaw, ..map([1, 1]) };
+    assert!(!draw_svg(few_points.sample(), &PlotOptions::default()).contains(phrase));
 }
 
 #[test]
 fn a_page_of_too_many_cuts_keeps_the_requested_one() {
-    let values = || [40, 40, 60, 3].map(counted);
+    let values = || [40, 40, 60, 3].map(integers_below);
     let names = ["unbalance_mass_kg", "damping_n_s_per_m", "peak_hz", "body_mass_kg"];
     let sample = || MapSample { axes: names.into_iter().zip(values()).collect(), ..map([1, 1]) };
     let folder = tempfile::tempdir().unwrap();
@@ -238,14 +247,14 @@ fn a_page_of_too_many_cuts_keeps_the_requested_one() {
     assert!(page.len() < 10_000_000, "{}", page.len());
     let data = page_data(&page);
     assert!(data["counts"].is_null(), "what is shown is shown point by point");
-    let picked = |data: &Value, k: usize| data["axes"][k]["values"].as_array().unwrap().len();
-    let [spins, masses] = [2, 3].map(|k| picked(&data, k));
-    let phrase = format!("{spins} of 60 values of peak");
-    assert!(spins < 60 && data["subtitle"].as_str().unwrap().contains(&phrase));
-    assert_eq!(masses, 3);
+    let count_values = |data: &Value, k: usize| data["axes"][k]["values"].as_array().unwrap().len();
+    let [speed_count, mass_count] = [2, 3].map(|k| count_values(&data, k));
+    let phrase = format!("{speed_count} of 60 values of peak");
+    assert!(speed_count < 60 && data["subtitle"].as_str().unwrap().contains(&phrase));
+    assert_eq!(mass_count, 3);
 
-    let at = vec![("peak_hz".to_owned(), 17.0)];
-    let options = PlotOptions { at, ..PlotOptions::default() };
+    let fixed_values = vec![("peak_hz".to_owned(), 17.0)];
+    let options = PlotOptions { fixed_values, ..PlotOptions::default() };
     let output = folder.path().join("b.html");
     render(&input, &options, &CommonFigures, &output).unwrap();
     let data = page_data(&std::fs::read(output).unwrap());
@@ -259,9 +268,9 @@ fn repeated_points_are_found_in_cells_of_several_points() {
     let mut sample = map([500, 600]);
     sample.axes[0].1[499] = 498.0;
     let input = sample.write_long(folder.path(), "map.parquet");
-    let drawn =
+    let result =
         render(&input, &PlotOptions::default(), &CommonFigures, &folder.path().join("a.svg"));
-    let phrase = drawn.unwrap_err().to_string();
+    let phrase = result.unwrap_err().to_string();
     assert!(phrase.contains("are the same point"), "{phrase}");
 }
 
@@ -282,9 +291,9 @@ fn scattered_rows_are_rejected_before_they_fill_the_memory() {
     let input = sample.write(folder.path(), "map.parquet");
     let mut phrase = String::new();
     let peak = allocation_counter::measure(|| {
-        let drawn =
+        let result =
             render(&input, &PlotOptions::default(), &CommonFigures, &folder.path().join("a.svg"));
-        phrase = drawn.unwrap_err().to_string();
+        phrase = result.unwrap_err().to_string();
     });
     assert!(phrase.contains("scattered"), "{phrase}");
     assert!(peak.bytes_max < 60 << 20, "{} bytes", peak.bytes_max);
@@ -292,19 +301,20 @@ fn scattered_rows_are_rejected_before_they_fill_the_memory() {
 
 #[test]
 fn columns_with_the_same_name_are_drawn() {
-    let twice = map([30, 40]).sample().numbers("ratio_max", "1", (0..1200).map(|_| 1.0));
-    let twice = twice.numbers("later", "1", (0..1200).map(|_| 1.0));
+    let with_repeated_name =
+        map([30, 40]).sample().numbers("ratio_max", "1", (0..1200).map(|_| 1.0));
+    let with_repeated_name = with_repeated_name.numbers("later", "1", (0..1200).map(|_| 1.0));
     for name in ["a.svg", "a.html"] {
-        assert!(draw(twice.clone(), &PlotOptions::default(), name).is_ok(), "{name}");
+        assert!(draw(with_repeated_name.clone(), &PlotOptions::default(), name).is_ok(), "{name}");
     }
 }
 
 #[test]
 fn long_metadata_is_truncated_in_a_page() {
-    let long = serde_json::to_string(&counted(100_000)).unwrap();
-    let sample = map([3, 4]).sample().metadata("note", &long);
+    let long_list = serde_json::to_string(&integers_below(100_000)).unwrap();
+    let sample = map([3, 4]).sample().with_metadata("note", &long_list);
     let page = String::from_utf8(draw(sample, &PlotOptions::default(), "a.html").unwrap()).unwrap();
-    let from = page.find("<dt>note</dt>").unwrap();
-    let note = &page[from..from + page[from..].find("</dd>").unwrap()];
+    let start = page.find("<dt>note</dt>").unwrap();
+    let note = &page[start..start + page[start..].find("</dd>").unwrap()];
     assert!(note.len() < 20_000 && note.contains("characters in all; the file has them)"));
 }

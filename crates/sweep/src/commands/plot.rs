@@ -69,7 +69,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         live,
     };
     let options = PlotOptions {
-        view: args.plot.view.and_then(FigureView::common),
+        view: args.plot.view.and_then(FigureView::design_view),
         traces: args.traces.clone(),
         ..PlotOptions::default()
     };

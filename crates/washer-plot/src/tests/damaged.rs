@@ -39,37 +39,41 @@ fn dwells() -> SampleFile {
 fn damaged_files_have_a_figure_or_an_error() {
     let seed = number_from_environment("SEED", 61);
     let rounds = number_from_environment("ROUNDS", 2);
-    let mut numbers = fastrand::Rng::with_seed(seed);
-    let case = |sample: fn() -> SampleFile, views: &'static [FigureView]| (sample, views);
+    let mut random = fastrand::Rng::with_seed(seed);
+    let sample_with_views =
+        |sample: fn() -> SampleFile, views: &'static [FigureView]| (sample, views);
     let one_point: fn() -> SampleFile = || stability(&[0.4]);
     let files = [
-        case(
+        sample_with_views(
             trace,
             &[FigureView::Time, FigureView::Passages, FigureView::Profiles, FigureView::Spectrum],
         ),
-        case(modes, &[FigureView::Frequencies, FigureView::Variation, FigureView::Shapes]),
-        case(one_point, &[FigureView::Growth, FigureView::Responses]),
-        case(dwells, &[FigureView::Growth, FigureView::Sections]),
+        sample_with_views(
+            modes,
+            &[FigureView::Frequencies, FigureView::Variation, FigureView::Shapes],
+        ),
+        sample_with_views(one_point, &[FigureView::Growth, FigureView::Responses]),
+        sample_with_views(dwells, &[FigureView::Growth, FigureView::Sections]),
     ];
     let folder = tempfile::tempdir().unwrap();
-    let unstable = stability(&[0.4]).write(folder.path(), "stability.parquet");
-    let with_unstable =
-        WasherFigures { stability: Some(unstable.clone()), ..WasherFigures::default() };
-    let mut drawn = 0_u64;
+    let stability_path = stability(&[0.4]).write(folder.path(), "stability.parquet");
+    let with_stability =
+        WasherFigures { stability: Some(stability_path.clone()), ..WasherFigures::default() };
+    let mut figure_count = 0_u64;
     for round in 0..rounds {
         for (k, (sample, views)) in files.iter().enumerate() {
-            let sample = sample().damaged(&mut numbers);
+            let sample = sample().with_damage(&mut random);
             let views = views.iter().map(|view| with_view(*view));
-            for options in views.chain([WasherFigures::default(), with_unstable.clone()]) {
+            for options in views.chain([WasherFigures::default(), with_stability.clone()]) {
                 for output in ["a.svg", "a.html"] {
                     let name = format!("SEED={seed}, round {round}, file {k}, {output}");
                     let name = format!("{name}, {:?}", options.view);
                     let draw = || draw(sample.clone(), &options, output);
-                    drawn += u64::from(has_figure(&name, MAX_BYTES, draw));
+                    figure_count += u64::from(has_figure(&name, MAX_BYTES, draw));
                 }
             }
         }
     }
     // Errors alone would not show that figures are drawn.
-    assert!(drawn > 4 * rounds, "{drawn}");
+    assert!(figure_count > 4 * rounds, "{figure_count}");
 }

@@ -13,24 +13,25 @@ pub(super) fn stability(masses: &[f64]) -> SampleFile {
         .flat_map(|&mass| (0..=20).map(move |k| (mass, 200.0 + 5.0 * f64::from(k))))
         .collect();
     let growth = |&(mass, speed): &(f64, f64)| mass * (10.0 - (speed - 240.0).abs()) / 10.0;
-    let is_in = |row: &(f64, f64)| growth(row) > 0.0;
-    let mode = |value: f64| move |row: &(f64, f64)| if is_in(row) { value } else { f64::NAN };
-    let words = |row: &(f64, f64)| Some(if is_in(row) { "quasi_periodic" } else { "stable" });
+    let is_unstable = |row: &(f64, f64)| growth(row) > 0.0;
+    let frequency_while_unstable =
+        |value: f64| move |row: &(f64, f64)| if is_unstable(row) { value } else { f64::NAN };
+    let kind = |row: &(f64, f64)| Some(if is_unstable(row) { "quasi_periodic" } else { "stable" });
     SampleFile::default()
         .counts("point", rows.iter().map(|row| (row.0 * 10.0) as u64))
         .numbers("unbalance_mass_kg", "kg", rows.iter().map(|row| row.0))
         .numbers("speed_rpm", "rpm", rows.iter().map(|row| row.1))
         .numbers("growth_per_s", "1/s", rows.iter().map(growth))
-        .words("kind", rows.iter().map(words))
-        .numbers("mode_1_cpm", "1/min", rows.iter().map(mode(86.0)))
-        .numbers("mode_2_cpm", "1/min", rows.iter().map(mode(202.0)))
+        .words("kind", rows.iter().map(kind))
+        .numbers("mode_1_cpm", "1/min", rows.iter().map(frequency_while_unstable(86.0)))
+        .numbers("mode_2_cpm", "1/min", rows.iter().map(frequency_while_unstable(202.0)))
         .numbers("nonlinear_tub_yaw", "rad", rows.iter().map(|row| 0.002 * row.0))
         .numbers("linear_tub_yaw", "rad", rows.iter().map(|row| 0.001 * row.0))
         .words("status", rows.iter().map(|_| Some("ok")))
-        .metadata("sweep.plan", r#"{"name": "dwell"}"#)
+        .with_metadata("sweep.plan", r#"{"name": "dwell"}"#)
 }
 
-fn page(sample: SampleFile, options: &impl DrawOptions) -> Value {
+fn draw_chart(sample: SampleFile, options: &impl DrawOptions) -> Value {
     page_data(&draw(sample, options, "figure.html").unwrap())["chart"].clone()
 }
 
@@ -41,12 +42,12 @@ fn ranges(shades: &Value) -> Vec<[f64; 2]> {
 
 #[test]
 fn growth_of_one_point_is_shaded_between_its_marked_edges() {
-    let chart = page(stability(&[0.4]), &default_options());
+    let chart = draw_chart(stability(&[0.4]), &default_options());
     assert_eq!(ranges(&chart["shades"]), [[230.0, 250.0]]);
     let marks: Vec<&str> =
         chart["marks"].as_array().unwrap().iter().map(|mark| mark[1].as_str().unwrap()).collect();
     assert_eq!(marks, ["230 rpm", "250 rpm"]);
-    let figure = svg(stability(&[0.4]), &default_options());
+    let figure = draw_svg(stability(&[0.4]), &default_options());
     for text in ["dwell · unbalance mass 0.4 kg", "a dwell at this speed is unstable", "230 rpm"] {
         assert!(figure.contains(text), "{text}");
     }
@@ -54,26 +55,29 @@ fn growth_of_one_point_is_shaded_between_its_marked_edges() {
 
 #[test]
 fn each_point_has_a_curve_up_to_a_maximum() {
-    let names = |masses: &[f64], at: Vec<(String, f64)>| -> Vec<String> {
-        let options = PlotOptions { at, ..PlotOptions::default() };
-        let chart = page(stability(masses), &options);
+    let curve_names = |masses: &[f64], fixed_values: Vec<(String, f64)>| -> Vec<String> {
+        let options = PlotOptions { fixed_values, ..PlotOptions::default() };
+        let chart = draw_chart(stability(masses), &options);
         let series = chart["panels"][0]["series"].as_array().unwrap().clone();
-        series.iter().map(|one| one["name"].as_str().unwrap().to_owned()).collect()
+        series.iter().map(|curve| curve["name"].as_str().unwrap().to_owned()).collect()
     };
-    assert_eq!(names(&[0.2, 0.4], Vec::new()), ["Unbalance mass 0.2 kg", "Unbalance mass 0.4 kg"]);
-    let many: Vec<f64> = (1..=20).map(|k| 0.05 * f64::from(k)).collect();
-    let shown = names(&many, Vec::new());
+    assert_eq!(
+        curve_names(&[0.2, 0.4], Vec::new()),
+        ["Unbalance mass 0.2 kg", "Unbalance mass 0.4 kg"]
+    );
+    let many_masses: Vec<f64> = (1..=20).map(|k| 0.05 * f64::from(k)).collect();
+    let shown = curve_names(&many_masses, Vec::new());
     assert_eq!((shown.len(), shown[5].as_str()), (6, "Unbalance mass 1 kg"));
-    assert_eq!(names(&[0.2, 0.4], vec![("unbalance_mass_kg".to_owned(), 0.4)]), ["growth"]);
+    assert_eq!(curve_names(&[0.2, 0.4], vec![("unbalance_mass_kg".to_owned(), 0.4)]), ["growth"]);
 }
 
 #[test]
 fn unstable_responses_are_dashed() {
-    let chart = page(stability(&[0.4]), &with_view(FigureView::Responses));
+    let chart = draw_chart(stability(&[0.4]), &with_view(FigureView::Responses));
     let series = chart["panels"][0]["series"].as_array().unwrap().clone();
     let names: Vec<(&str, bool)> = series
         .iter()
-        .map(|one| (one["name"].as_str().unwrap(), one["dashed"].as_bool().unwrap()))
+        .map(|curve| (curve["name"].as_str().unwrap(), curve["dashed"].as_bool().unwrap()))
         .collect();
     assert_eq!(
         names,
@@ -84,8 +88,12 @@ fn unstable_responses_are_dashed() {
         ]
     );
     assert_eq!(ranges(&chart["shades"]), [[230.0, 250.0]]);
-    let two = message(draw(stability(&[0.2, 0.4]), &with_view(FigureView::Responses), "a.svg"));
-    assert!(two.contains("has 2 points") && two.contains("--at NAME=VALUE for unbalance"), "{two}");
+    let error =
+        error_message(draw(stability(&[0.2, 0.4]), &with_view(FigureView::Responses), "a.svg"));
+    assert!(
+        error.contains("has 2 points") && error.contains("--at NAME=VALUE for unbalance"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -93,7 +101,7 @@ fn other_figures_shade_unstable_speeds() {
     let folder = tempfile::tempdir().unwrap();
     let path = stability(&[0.4]).write(folder.path(), "stability.parquet");
     let options = WasherFigures { stability: Some(path.clone()), ..WasherFigures::default() };
-    let chart = page(trace(), &options);
+    let chart = draw_chart(trace(), &options);
     let file = trace().write(folder.path(), "trace.parquet");
     let table = FigureTable::open(&file, MODEL_KINDS).unwrap();
     let time = table.numbers("time_s").unwrap();
@@ -106,13 +114,13 @@ fn other_figures_shade_unstable_speeds() {
         let is_at_an_edge = (speed - 230.0).abs() < 1e-6 || (speed - 250.0).abs() < 1e-6;
         assert!(is_shaded == is_inside || is_at_an_edge, "{time} s, {speed} rpm");
     }
-    let chart = page(modes(), &options);
+    let chart = draw_chart(modes(), &options);
     assert_eq!(ranges(&chart["shades"]), [[230.0, 250.0]]);
     let names: Vec<String> = chart["panels"][0]["series"]
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| one["name"].as_str().unwrap().to_owned())
+        .map(|curve| curve["name"].as_str().unwrap().to_owned())
         .collect();
     let sum = "sum of the frequencies of modes 1 and 2";
     assert!(names.iter().any(|name| name == sum), "{names:?}");
@@ -120,36 +128,40 @@ fn other_figures_shade_unstable_speeds() {
 
 #[test]
 fn a_map_shows_the_curve_of_a_boundary_over_its_axes() {
-    let over = |axes: [&str; 2]| {
+    let boundary_over = |axes: [&str; 2]| {
         let [x, y] = axes.map(|name| format!(r#"{{"parameter": "{name}", "values": [1, 2]}}"#));
         let plan =
             format!(r#"{{"name": "dwell", "quantity": "growth_per_s", "axis": [{x}, {y}]}}"#);
-        boundary().metadata("sweep.plan", &plan)
+        boundary().with_metadata("sweep.plan", &plan)
     };
     let folder = tempfile::tempdir().unwrap();
-    let same = over(["unbalance_mass_kg", "damping_n_s_per_m"]).write(folder.path(), "a.parquet");
-    let other = over(["unbalance_mass_kg", "tub_mass_kg"]).write(folder.path(), "b.parquet");
+    let same_axes =
+        boundary_over(["unbalance_mass_kg", "damping_n_s_per_m"]).write(folder.path(), "a.parquet");
+    let other_axes =
+        boundary_over(["unbalance_mass_kg", "tub_mass_kg"]).write(folder.path(), "b.parquet");
     let no_boundary = trace().write(folder.path(), "trace.parquet");
-    let with = |path: &Path| PlotOptions { boundary: Some(path.to_owned()), ..Default::default() };
-    let without = svg(map(), &default_options());
-    let figure = svg(map(), &with(&same));
+    let with_boundary =
+        |path: &Path| PlotOptions { boundary: Some(path.to_owned()), ..Default::default() };
+    let figure_without = draw_svg(map(), &default_options());
+    let figure = draw_svg(map(), &with_boundary(&same_axes));
     assert!(
         figure.contains(">traced boundary: no growth at any speed<"),
         "the legend names the line"
     );
-    let dashed = |figure: &str| figure.matches("stroke-dasharray").count();
+    let count_dashed = |figure: &str| figure.matches("stroke-dasharray").count();
     // The legend has a symbol of the line.
-    assert_eq!(dashed(&figure), dashed(&without) + 2);
+    assert_eq!(count_dashed(&figure), count_dashed(&figure_without) + 2);
     for (path, format, phrase) in [
-        (&other, "a.svg", "is a boundary over unbalance_mass_kg, tub_mass_kg"),
+        (&other_axes, "a.svg", "is a boundary over unbalance_mass_kg, tub_mass_kg"),
         (&no_boundary, "a.svg", "`sweep boundary` writes a boundary file"),
-        (&same, "a.html", "`--boundary` is for maps drawn as .svg, .pdf or .png"),
+        (&same_axes, "a.html", "`--boundary` is for maps drawn as .svg, .pdf or .png"),
     ] {
-        let refused = message(draw(map(), &with(path), format));
-        assert!(refused.contains(phrase), "{refused}");
+        let error = error_message(draw(map(), &with_boundary(path), format));
+        assert!(error.contains(phrase), "{error}");
     }
-    let own = svg(over(["unbalance_mass_kg", "damping_n_s_per_m"]), &default_options());
-    assert!(own.contains(">Where the machine may dwell at any speed<"), "the title");
+    let figure_of_boundary =
+        draw_svg(boundary_over(["unbalance_mass_kg", "damping_n_s_per_m"]), &default_options());
+    assert!(figure_of_boundary.contains(">Where the machine may dwell at any speed<"), "the title");
 }
 
 /// Returns a plan of the samples' machine with this mass of the tub.
@@ -166,90 +178,109 @@ fn files_of_different_plans_are_not_drawn_together() {
     let folder = tempfile::tempdir().unwrap();
     let axes =
         r#""axis": [{"parameter": "unbalance_mass_kg"}, {"parameter": "damping_n_s_per_m"}],"#;
-    let named = |file: SampleFile, tub: f64, name: &str| {
+    let write_with_plan = |file: SampleFile, tub: f64, name: &str| {
         let plan = plan(tub, axes);
-        file.without("sweep.plan").metadata("sweep.plan", &plan).write(folder.path(), name)
+        file.without_metadata("sweep.plan")
+            .with_metadata("sweep.plan", &plan)
+            .write(folder.path(), name)
     };
-    let own = 24.0;
-    let other = 20.0;
-    let map_of = || map().without("sweep.plan").metadata("sweep.plan", &plan(own, axes));
-    let trace_of = || trace().metadata("sweep.plan", &plan(own, ""));
-    let boundary = |tub, name| PlotOptions {
-        boundary: Some(named(boundary(), tub, name)),
+    let own_mass = 24.0;
+    let other_mass = 20.0;
+    let map_with_plan =
+        || map().without_metadata("sweep.plan").with_metadata("sweep.plan", &plan(own_mass, axes));
+    let trace_with_plan = || trace().with_metadata("sweep.plan", &plan(own_mass, ""));
+    let options_with_boundary = |tub, name| PlotOptions {
+        boundary: Some(write_with_plan(boundary(), tub, name)),
         ..Default::default()
     };
-    svg(map_of(), &boundary(own, "b.parquet"));
-    let phrase = message(draw(map_of(), &boundary(other, "c.parquet"), "a.svg"));
+    draw_svg(map_with_plan(), &options_with_boundary(own_mass, "b.parquet"));
+    let phrase = error_message(draw(
+        map_with_plan(),
+        &options_with_boundary(other_mass, "c.parquet"),
+        "a.svg",
+    ));
     assert!(phrase.contains("machine.tub.mass_kg 24.0 and 20.0"), "{phrase}");
 
-    let stability_of = |tub, name| WasherFigures {
-        stability: Some(named(stability(&[0.4]), tub, name)),
+    let options_with_stability = |tub, name| WasherFigures {
+        stability: Some(write_with_plan(stability(&[0.4]), tub, name)),
         ..Default::default()
     };
-    svg(trace_of(), &stability_of(own, "s.parquet"));
-    for file in [trace_of(), modes().metadata("sweep.plan", &plan(own, ""))] {
-        let phrase = message(draw(file, &stability_of(other, "t.parquet"), "a.svg"));
+    draw_svg(trace_with_plan(), &options_with_stability(own_mass, "s.parquet"));
+    for file in [trace_with_plan(), modes().with_metadata("sweep.plan", &plan(own_mass, ""))] {
+        let phrase =
+            error_message(draw(file, &options_with_stability(other_mass, "t.parquet"), "a.svg"));
         assert!(phrase.contains("`--stability`") && phrase.contains("24.0 and 20.0"), "{phrase}");
     }
 
-    let modes_of = |tub, name, view| WasherFigures {
-        modes: Some(named(modes(), tub, name)),
+    let options_with_modes = |tub, name, view| WasherFigures {
+        modes: Some(write_with_plan(modes(), tub, name)),
         view,
         ..Default::default()
     };
     for view in [None, Some(FigureView::Passages)] {
-        let same = svg(trace_of(), &modes_of(own, "m.parquet", view));
-        assert!(!same.contains("another machine"));
-        let warned = svg(trace_of(), &modes_of(other, "n.parquet", view));
+        let figure = draw_svg(trace_with_plan(), &options_with_modes(own_mass, "m.parquet", view));
+        assert!(!figure.contains("another machine"));
+        let figure_with_note =
+            draw_svg(trace_with_plan(), &options_with_modes(other_mass, "n.parquet", view));
         let phrase = "resonances of another machine: machine.tub.mass_kg 24.0 and 20.0";
-        assert!(warned.contains(phrase), "the figure says so");
+        assert!(figure_with_note.contains(phrase), "the figure says so");
     }
 
     let traces = folder.path().join("traces");
     std::fs::create_dir(&traces).unwrap();
-    let with = PlotOptions { traces: Some(traces.clone()), ..Default::default() };
-    trace_of().write(&traces, "point-3.parquet");
-    let carried = data(map_of(), &with);
-    assert_eq!(carried["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29"]);
-    let other_trace = trace().metadata("sweep.plan", &plan(other, axes));
+    let with_traces = PlotOptions { traces: Some(traces.clone()), ..Default::default() };
+    trace_with_plan().write(&traces, "point-3.parquet");
+    let page_data = draw_page_data(map_with_plan(), &with_traces);
+    assert_eq!(page_data["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29"]);
+    let other_trace = trace().with_metadata("sweep.plan", &plan(other_mass, axes));
     other_trace.write(&traces, "point-29.parquet");
-    let phrase = message(draw(map_of(), &with, "a.html"));
+    let phrase = error_message(draw(map_with_plan(), &with_traces, "a.html"));
     assert!(phrase.contains("point-29.parquet is of another plan than"), "{phrase}");
     // A file whose metadata give its point belongs to that point only, in spite of the number in
     // its name.
-    let astray = trace().without("at").metadata("at", r#"{"unbalance_mass_kg": 7.0}"#);
-    astray.write(&traces, "point-29.parquet");
-    let phrase = message(draw(map_of(), &with, "a.html"));
+    let trace_elsewhere =
+        trace().without_metadata("at").with_metadata("at", r#"{"unbalance_mass_kg": 7.0}"#);
+    trace_elsewhere.write(&traces, "point-29.parquet");
+    let phrase = error_message(draw(map_with_plan(), &with_traces, "a.html"));
     assert!(phrase.contains("belongs to no point of this map"), "{phrase}");
     // A file with its number alone has the point's unbalance and damping in its plan.
-    trace_of().without("at").write(&traces, "point-29.parquet");
-    data(map_of(), &with);
-    trace_of().without("at").write(&traces, "point-30.parquet");
-    let phrase = message(draw(map_of(), &with, "a.html"));
+    trace_with_plan().without_metadata("at").write(&traces, "point-29.parquet");
+    draw_page_data(map_with_plan(), &with_traces);
+    trace_with_plan().without_metadata("at").write(&traces, "point-30.parquet");
+    let phrase = error_message(draw(map_with_plan(), &with_traces, "a.html"));
     assert!(phrase.contains("damping_n_s_per_m 150.0 and 120.0"), "{phrase}");
 }
 
 #[test]
 fn files_that_do_not_fit_an_option_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
-    let one = stability(&[0.4]).write(folder.path(), "one.parquet");
-    let two = stability(&[0.2, 0.7]).write(folder.path(), "two.parquet");
+    let one_point = stability(&[0.4]).write(folder.path(), "one.parquet");
+    let two_points = stability(&[0.2, 0.7]).write(folder.path(), "two.parquet");
     let no_trace = trace().write(folder.path(), "trace.parquet");
-    let with =
+    let with_stability =
         |path: &Path| WasherFigures { stability: Some(path.to_owned()), ..Default::default() };
-    let at = PlotOptions { at: vec![("tub_mass_kg".to_owned(), 1.0)], ..Default::default() };
-    let value =
-        PlotOptions { at: vec![("unbalance_mass_kg".to_owned(), 9.0)], ..Default::default() };
+    let unknown_axis =
+        PlotOptions { fixed_values: vec![("tub_mass_kg".to_owned(), 1.0)], ..Default::default() };
+    let unknown_value = PlotOptions {
+        fixed_values: vec![("unbalance_mass_kg".to_owned(), 9.0)],
+        ..Default::default()
+    };
     for (result, phrase) in [
-        (draw(trace(), &with(&no_trace), "a.svg"), "`sweep stability` writes a stability file"),
-        (draw(stability(&[0.4]), &with(&one), "a.svg"), "`--stability` is for traces"),
+        (
+            draw(trace(), &with_stability(&no_trace), "a.svg"),
+            "`sweep stability` writes a stability file",
+        ),
+        (
+            draw(stability(&[0.4]), &with_stability(&one_point), "a.svg"),
+            "`--stability` is for traces",
+        ),
         (draw(stability(&[0.4]), &with_view(FigureView::Time), "a.svg"), "`--view` is for traces"),
         (draw(trace(), &with_view(FigureView::Growth), "a.svg"), "`--view` is for stability files"),
-        (draw(stability(&[0.4]), &at, "a.svg"), "it has unbalance_mass_kg"),
-        (draw(stability(&[0.4]), &value, "a.svg"), "no such point"),
-        (draw(modes(), &with(&two), "a.svg"), "two.parquet"),
+        (draw(stability(&[0.4]), &unknown_axis, "a.svg"), "it has unbalance_mass_kg"),
+        (draw(stability(&[0.4]), &unknown_value, "a.svg"), "no such point"),
+        (draw(modes(), &with_stability(&two_points), "a.svg"), "two.parquet"),
     ] {
-        let message = message(result);
+        let message = error_message(result);
         assert!(message.contains(phrase), "{phrase}: {message}");
     }
 }
