@@ -3,11 +3,11 @@
 use lane_ode::{Cancel, Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, Disturbance, Dwell, Machine, Method, ModelKind, Point, Response, Spin, Start, Starts,
-    Target, Timing, find_endings, history, prepare, respond,
+    Channel, Disturbance, HeldSpeed, InitialDeviation, Machine, Method, ModelKind, Point, Response,
+    Spin, StartRule, Target, Timing, find_attractors, find_responses, history, prepare,
 };
 use washer_row::{
-    Demand, Deviations, DwellPeaks, Level, LevelRun, Next, Outcome, RefinementLevels,
+    Deviations, DwellPeaks, Level, LevelRun, NextStep, Outcome, OutcomePurpose, RefinementLevels,
     RefinementRule, RowRefinement, RowRule, Status, Trajectory, Verdict, integrate_points,
 };
 
@@ -171,24 +171,24 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
     let point = ready_point(setup, values)?;
     let levels = refinement_levels(setup, values);
     let rule = &setup.rule;
-    let with = RefinementRule { levels, demand: Demand::Row, rule };
+    let with = RefinementRule { levels, purpose: OutcomePurpose::Row, row_rule: rule };
     let mut refinement = RowRefinement::default();
     let outcome = loop {
-        match refinement.next(0, &point, with) {
-            Next::Done(outcome) => break *outcome,
-            Next::Runs(wanted) => {
+        match refinement.next_step(0, &point, with) {
+            NextStep::Done(outcome) => break *outcome,
+            NextStep::Runs(wanted) => {
                 for (model, place) in wanted {
                     let model_levels = &levels[model];
                     let perturbed = model_levels.is_perturbed(place).then(|| point.perturbed());
                     let started = perturbed.as_ref().unwrap_or(&point);
                     for run in run_method(model, model_levels.method(place), &[started], rule) {
-                        refinement.take((model, place), run, &point, with);
+                        refinement.add_run((model, place), run, &point, with);
                     }
                 }
             }
         }
     };
-    let finest = [0, 1].map(|model| refinement.finest(model, &point, with));
+    let finest = [0, 1].map(|model| refinement.finest_run(model, &point, with));
     let [Some(nonlinear), Some(linear)] = finest else { return Err(NoPoint::NoEquilibrium) };
     let finest = [nonlinear, linear];
     let amplitudes = finest.map(|(run, ..)| run.amplitudes);
@@ -225,7 +225,7 @@ pub fn motion(
     let levels = &refinement_levels(setup, values)[model as usize];
     let level = place.and_then(|place| levels.levels.get(place));
     let level = level.unwrap_or(&levels.levels[quick_level_index(levels)]);
-    let history = history(model, &level.method, &point, &Start::default(), every_s);
+    let history = history(model, &level.method, &point, &InitialDeviation::default(), every_s);
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();
     Ok(PointHistory { failure: history.failure, channels, gaps_m })
@@ -243,10 +243,10 @@ pub fn growth(
     speeds_rpm: &[f64],
 ) -> Result<Vec<Option<(Disturbance, bool)>>, NoPoint> {
     let point = ready_point(setup, values)?;
-    let dwells: Vec<Dwell<'_>> =
-        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+    let dwells: Vec<HeldSpeed<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let disturbance = |first: &Response| (first.disturbance(), first.is_on_curve);
-    let answers = respond(&dwells, Cancel::Never).into_iter();
+    let answers = find_responses(&dwells, Cancel::Never).into_iter();
     Ok(answers.map(|answer| answer.ok()?.first().map(disturbance)).collect())
 }
 
@@ -261,9 +261,10 @@ pub fn dwell(
     speeds_rpm: &[f64],
 ) -> Result<Option<DwellPeaks>, NoPoint> {
     let point = ready_point(setup, values)?;
-    let dwells: Vec<Dwell<'_>> =
-        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+    let dwells: Vec<HeldSpeed<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let carried = vec![None; dwells.len()];
-    let found = find_endings(Simd::best(), &dwells, &carried, &Starts::default(), Cancel::Never);
-    Ok(DwellPeaks::from_endings(speeds_rpm, &found))
+    let found =
+        find_attractors(Simd::best(), &dwells, &carried, &StartRule::default(), Cancel::Never);
+    Ok(DwellPeaks::from_attractors(speeds_rpm, &found))
 }

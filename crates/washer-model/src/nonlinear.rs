@@ -5,7 +5,6 @@
 //! A turned by the spin theta, frame E (the hinge's) is S turned by q9, and frame D (the drum's) is
 //! E turned by q10. Names end in `_a`, `_s` or `_e` where the frame is not clear.
 
-pub(crate) mod ahead;
 pub(crate) mod coefficients;
 pub(crate) mod coupling;
 pub(crate) mod elements;
@@ -13,6 +12,7 @@ pub(crate) mod equilibrium;
 pub(crate) mod floating;
 pub(crate) mod forces;
 pub(crate) mod frame;
+pub(crate) mod implicit_stage;
 pub(crate) mod outputs;
 
 use crate::COORDINATES;
@@ -23,14 +23,14 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
-use crate::nonlinear::floating::{Factors, Floating};
+use crate::nonlinear::floating::{FloatingChain, LdltFactors};
 use crate::nonlinear::forces::{Deflection, flexure};
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
-use lane_ode::{Aside, Lane, N, Real};
+use lane_ode::{Lane, N, OutOfLine, Real};
 
 /// The tub or the rotor: equations of motion, lower triangle of the inertia, and orientation.
 pub(crate) struct Half<T, const R: usize> {
-    pub(crate) floating: Floating<T, R>,
+    pub(crate) floating: FloatingChain<T, R>,
     pub(crate) inertia: [[N<T>; R]; R],
     pub(crate) tilt: Tilt<T>,
 }
@@ -71,8 +71,8 @@ pub(crate) fn accelerations<T: Lane>(
 ) -> [N<T>; COORDINATES] {
     let (tub, rotor) = uncoupled_halves(machine, coupling, sag, spin, q, u);
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let tub_factors = Factors::new(tub.inertia);
-    let rotor_factors = Factors::new(rotor.inertia);
+    let tub_factors = LdltFactors::new(tub.inertia);
+    let rotor_factors = LdltFactors::new(rotor.inertia);
     let tub = (&tub.floating, &tub_factors);
     let rotor = (&rotor.floating, &rotor_factors);
     coupling.accelerations(&machine.bodies, spin.speed, &deflection, &sag.bearings, tub, rotor)
@@ -90,26 +90,27 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     u: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; TUB.len()] {
     let (tub, rotor) = uncoupled_halves(machine, coupling, sag, spin, q, u);
-    let tub_factors = Factors::new(tub.inertia);
-    let rotor_factors = Factors::new(rotor.inertia);
+    let tub_factors = LdltFactors::new(tub.inertia);
+    let rotor_factors = LdltFactors::new(rotor.inertia);
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let b = &machine.bodies;
+    let bodies = &machine.bodies;
     let speed = spin.speed;
-    let mut free = [speed; COORDINATES];
+    let mut unloaded_accelerations = [speed; COORDINATES];
     let mut per_load = [[speed; COORDINATES]; 4];
     // The first pass of the loop has no load, so that the code for both cases is compiled once.
-    for loaded in 0..=TUB.len() {
+    for load_number in 0..=TUB.len() {
         let mut floating = tub.floating;
-        if loaded > 0 {
-            floating.add_unit_force(loaded - 1);
+        if load_number > 0 {
+            floating.add_unit_force(load_number - 1);
         }
         let tub = (&floating, &tub_factors);
         let rotor = (&rotor.floating, &rotor_factors);
-        let found = coupling.accelerations(b, speed, &deflection, &sag.bearings, tub, rotor);
-        if loaded == 0 {
-            free = found;
+        let accelerations =
+            coupling.accelerations(bodies, speed, &deflection, &sag.bearings, tub, rotor);
+        if load_number == 0 {
+            unloaded_accelerations = accelerations;
         } else {
-            per_load[loaded - 1] = difference(found, &free);
+            per_load[load_number - 1] = difference(accelerations, &unloaded_accelerations);
         }
     }
     per_load
@@ -128,13 +129,14 @@ fn uncoupled_halves<T: Lane>(
 ) -> (Half<T, 2>, Half<T, 4>) {
     let tub = tub(machine, q, u);
     let mut rotor = rotor(&machine.bodies, spin, q, u);
-    if let Some(mass) = coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge) {
-        for (place, r) in [2, 3].into_iter().enumerate() {
-            rotor.inertia[r][r] += mass.inertia;
-            rotor.floating.torque[r] += mass.torque[place];
+    if let Some(hinge_mass) = coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge)
+    {
+        for (index, r) in [2, 3].into_iter().enumerate() {
+            rotor.inertia[r][r] += hinge_mass.inertia;
+            rotor.floating.torque[r] += hinge_mass.torque[index];
         }
-        rotor.floating.torque[2] += mass.torque_per_speed * u[HINGE_PITCH];
-        rotor.floating.torque[3] -= mass.torque_per_speed * u[HINGE_YAW];
+        rotor.floating.torque[2] += hinge_mass.torque_per_speed * u[HINGE_PITCH];
+        rotor.floating.torque[3] -= hinge_mass.torque_per_speed * u[HINGE_YAW];
     }
     (tub, rotor)
 }
@@ -188,7 +190,7 @@ pub(crate) fn tub<T: Lane>(
     let c = tilt.cos_pitch;
     let zero = s.lit(0.0);
     Half {
-        floating: Floating {
+        floating: FloatingChain {
             per_mass: b.tub_per_mass,
             force: [force[0] - b.gravity * b.tub_mass, force[1]],
             drift: [drift[1], drift[2]],
@@ -222,7 +224,7 @@ pub(crate) fn rotor<T: Lane>(
 ) -> Half<T, 4> {
     if b.is_skewed.holds() {
         let zero = q[0].lit(0.0);
-        return zero.0.aside(SkewedRotor { b, spin, q, u });
+        return zero.0.run_out_of_line(SkewedRotor { b, spin, q, u });
     }
     assemble_rotor::<T, false>(b, spin, q, u)
 }
@@ -237,7 +239,7 @@ struct SkewedRotor<'a, T> {
     u: &'a [N<T>; COORDINATES],
 }
 
-impl<T: Lane> Aside for SkewedRotor<'_, T> {
+impl<T: Lane> OutOfLine for SkewedRotor<'_, T> {
     type Output = Half<T, 4>;
 
     #[inline(always)]
@@ -379,7 +381,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         }
     }
     Half {
-        floating: Floating {
+        floating: FloatingChain {
             per_mass: b.rotor_per_mass,
             force: [-(b.gravity * b.rotor_mass).v(), zero],
             drift: [drift[1], drift[2]],

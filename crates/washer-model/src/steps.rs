@@ -8,7 +8,7 @@
 pub(crate) mod formula;
 
 use crate::highest_frequency_rad_per_s;
-use crate::modes::{highest_with_caps, motions};
+use crate::modes::{highest_with_caps, mode_roots};
 use crate::{Caps, Formula, Method, ModelKind, NoModes, Point, Spin};
 use lane_ode::Cancel;
 
@@ -60,7 +60,7 @@ struct Frequencies<'a> {
 impl<'a> Frequencies<'a> {
     fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, NoModes> {
         let top_rad_per_s = spin.greatest_speed_rad_per_s(end_s);
-        let at_rest = motions(point, 0.0, None)?;
+        let at_rest = mode_roots(point, 0.0, None)?;
         let fastest_at_rest = highest_frequency_rad_per_s(point, 0.0)?;
         let fastest_at_top = highest_frequency_rad_per_s(point, top_rad_per_s)?;
         Ok(Self {

@@ -4,15 +4,15 @@ use crate::channel::CHANNELS;
 use crate::coordinates::{FIRST_ANGLE, STATES, TUB};
 use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
-use crate::linear::rotor_terms::Terms;
-use crate::linear::step::{self, RotorAt, StepConstants};
+use crate::linear::rotor_terms::RotorCoefficients;
+use crate::linear::step::{self, RotorArrays, StepConstants};
 use crate::machine::parameters::MAX_COORDINATE_M;
 use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
-use crate::nonlinear::ahead::derivative_ahead;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::elements::corners::CornerForce;
+use crate::nonlinear::implicit_stage::solve_implicit_stage;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
@@ -117,7 +117,7 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
 /// Requires that bearings and hinge are not capped.
 impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
     #[inline(always)]
-    fn derivative_ahead(
+    fn solve_implicit_stage(
         &self,
         spin: &SpinState<T>,
         x: &[N<T>; STATES],
@@ -125,7 +125,7 @@ impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
         g_s: N<T>,
     ) -> [N<T>; STATES] {
         let (q, u) = split(x);
-        derivative_ahead(&self.machine, spin, &q, &u, r, g_s)
+        solve_implicit_stage(&self.machine, spin, &q, &u, r, g_s)
     }
 }
 
@@ -157,14 +157,14 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
             coupling,
             machine: Coefficients::splat(zero, &point.machine),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
-            rest: InLanes::splat(zero, &point.rest.map(N)),
+            rest: InLanes::splat(zero, &point.channels_at_rest.map(N)),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)),
         }
     }
 
     fn set_point(&mut self, lane: usize, point: &Point) {
         self.machine.set_lane(lane, &point.machine);
-        self.rest.set_lane(lane, &point.rest.map(N));
+        self.rest.set_lane(lane, &point.channels_at_rest.map(N));
         self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
     }
 
@@ -214,7 +214,7 @@ pub(crate) struct Linear<T> {
     coupling: Coupling<T>,
     flexure_stiffness: N<T>,
     constants: StepConstants<T>,
-    terms: Terms<T>,
+    terms: RotorCoefficients<T>,
     /// The hinge's coordinates q9 and q10 at equilibrium (rad).
     sag: [N<T>; 2],
     outputs: LinearOutputs<T>,
@@ -225,7 +225,7 @@ pub(crate) struct Linear<T> {
 #[derive(Clone, Copy)]
 pub(crate) struct LinearForcing<T> {
     spin: SpinState<T>,
-    rotor: RotorAt<T>,
+    rotor: RotorArrays<T>,
 }
 
 impl<T: Lane> System<T, STATES> for Linear<T> {
@@ -235,16 +235,17 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     fn forcing(&self, t_s: N<T>) -> LinearForcing<T> {
         let spin = self.spin.at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &spin, self.sag);
-        let rotor = RotorAt::new(&self.constants, &self.coupling, &self.terms, &spin, hinge_mass);
+        let rotor =
+            RotorArrays::new(&self.constants, &self.coupling, &self.terms, &spin, hinge_mass);
         LinearForcing { spin, rotor }
     }
 
     #[inline(always)]
-    fn renew(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
+    fn update_forcing(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
         forcing.spin = self.spin.at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &forcing.spin, self.sag);
         let Self { constants, coupling, terms, .. } = self;
-        forcing.rotor.renew(constants, coupling, terms, &forcing.spin, hinge_mass);
+        forcing.rotor.update(constants, coupling, terms, &forcing.spin, hinge_mass);
     }
 
     #[inline(always)]
@@ -262,7 +263,7 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
 /// Requires that bearings and hinge are not capped.
 impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
     #[inline(always)]
-    fn derivative_ahead(
+    fn solve_implicit_stage(
         &self,
         forcing: &LinearForcing<T>,
         x: &[N<T>; STATES],
@@ -271,7 +272,7 @@ impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
     ) -> [N<T>; STATES] {
         let (q, u) = split(x);
         let Self { constants, terms, flexure_stiffness, .. } = self;
-        step::derivative_ahead(
+        step::solve_implicit_stage(
             constants,
             terms,
             *flexure_stiffness,
@@ -294,7 +295,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
             coupling,
             flexure_stiffness: zero.lit(point.machine.bodies.flexure_stiffness.0),
             constants: StepConstants::splat(zero, &step_constants(point)),
-            terms: Terms::splat(zero, &point.linear.terms),
+            terms: RotorCoefficients::splat(zero, &point.linear.terms),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)).hinge,
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinLanes::splat(zero, &point.stretches[0]),

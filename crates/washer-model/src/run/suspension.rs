@@ -211,10 +211,10 @@ impl TubState {
 
     /// Computes the motion of a tub point.
     fn point(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
-        let at_first = Ends { cabinet: *tub, tub: *tub };
+        let both_ends = Ends { cabinet: *tub, tub: *tub };
         PointMotion {
-            displacement: tub_from_cabinet(&self.displaced, &at_first),
-            velocity: tub_from_cabinet(&self.moving, &at_first).map(|place| self.velocity(place)),
+            displacement: tub_from_cabinet(&self.displaced, &both_ends),
+            velocity: tub_from_cabinet(&self.moving, &both_ends).map(|place| self.velocity(place)),
         }
     }
 

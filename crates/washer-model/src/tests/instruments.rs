@@ -4,7 +4,7 @@ use crate::coordinates::COORDINATES;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
-use crate::nonlinear::floating::Floating;
+use crate::nonlinear::floating::FloatingChain;
 use crate::nonlinear::{Half, Halves, halves};
 use crate::point::Point;
 use crate::{
@@ -95,7 +95,7 @@ fn inertia_forces<T: Real, const R: usize>(
     midpoint: [N<T>; 2],
     rotation: [N<T>; R],
 ) -> ([N<T>; 2], [N<T>; R]) {
-    let Floating { per_mass, arm, .. } = &half.floating;
+    let FloatingChain { per_mass, arm, .. } = &half.floating;
     let mut centre = midpoint;
     for i in 0..2 {
         for r in 0..R {
