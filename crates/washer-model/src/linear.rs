@@ -14,7 +14,9 @@ pub(crate) mod step;
 pub(crate) mod symmetric;
 
 use crate::COORDINATES;
-use crate::coordinates::{ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, seeded};
+use crate::coordinates::{
+    ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, with_unit_derivative,
+};
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLES};
 use crate::linear::rotor_terms::{
@@ -24,7 +26,7 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
 use crate::nonlinear::frame::Tilt;
-use crate::nonlinear::{Half, rotor, tub};
+use crate::nonlinear::{Half, assemble_rotor_in_lanes, assemble_tub};
 use lane_ode::{Dual, Lane, N, OutOfLine, Real};
 
 /// The number of entries of all arrays of the rotor. Those of the inertia come last.
@@ -69,11 +71,11 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
         let zero = q[0].lit(0.0);
         let zeros = [zero; COORDINATES];
         let bodies = &machine.bodies;
-        let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load(bodies);
+        let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load_on_shaft(bodies);
         let dual_machine = machine.constant();
 
         // The tub does not depend on the spin.
-        let at_rest = tub(machine, q, &zeros);
+        let at_rest = assemble_tub(machine, q, &zeros);
         let [tub_stiffness, tub_damping] = tub_tangents(machine, q);
 
         let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
@@ -83,7 +85,8 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
             {
                 let angle = (zero.lit(sin), zero.lit(cos));
                 let spin = SpinState::new(angle, zero.lit(speed), zero.lit(acceleration));
-                let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &zeros);
+                let Half { mut floating, inertia, .. } =
+                    assemble_rotor_in_lanes(bodies, &spin, q, &zeros);
                 floating.apply(&on_shaft);
                 let (force, torque) = floating.generalised_forces();
                 let arm = floating.arm;
@@ -95,9 +98,10 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
                     let column = direction % 4;
                     let entry = if direction < 4 { entry::stiffness } else { entry::damping };
                     let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
-                    let q = seeded(q, ROTOR_TURNS[column], dq);
-                    let u = seeded(&zeros, ROTOR_TURNS[column], du);
-                    let Half { mut floating, .. } = rotor(&dual_machine.bodies, &dual_spin, &q, &u);
+                    let q = with_unit_derivative(q, ROTOR_TURNS[column], dq);
+                    let u = with_unit_derivative(&zeros, ROTOR_TURNS[column], du);
+                    let Half { mut floating, .. } =
+                        assemble_rotor_in_lanes(&dual_machine.bodies, &dual_spin, &q, &u);
                     floating.apply(&on_shaft.constant());
                     let rows: [_; ROWS] =
                         transform_to_mass_centre(floating.generalised_forces(), &arm);
@@ -147,15 +151,19 @@ pub(crate) fn tub_tangents<T: Lane>(
 ) -> [[[N<T>; 4]; 4]; 2] {
     let zero = q[0].lit(0.0);
     let zeros = [zero; COORDINATES];
-    let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load(&machine.bodies);
+    let on_shaft =
+        Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load_on_shaft(&machine.bodies);
     let on_tub = on_shaft.reaction().constant();
-    let arm = tub(machine, q, &zeros).floating.arm;
+    let arm = assemble_tub(machine, q, &zeros).floating.arm;
     let dual_machine = machine.constant();
     let mut tangents = [[[zero; 4]; 4]; 2];
     for (column, &j) in TUB.iter().enumerate() {
         for (tangent, (dq, du)) in tangents.iter_mut().zip([(1.0, 0.0), (0.0, 1.0)]) {
-            let Half { mut floating, .. } =
-                tub(&dual_machine, &seeded(q, j, dq), &seeded(&zeros, j, du));
+            let Half { mut floating, .. } = assemble_tub(
+                &dual_machine,
+                &with_unit_derivative(q, j, dq),
+                &with_unit_derivative(&zeros, j, du),
+            );
             floating.apply(&on_tub);
             let rows: [_; 4] = transform_to_mass_centre(floating.generalised_forces(), &arm);
             for (row, slope) in rows.iter().enumerate() {
@@ -167,7 +175,7 @@ pub(crate) fn tub_tangents<T: Lane>(
 }
 
 /// Transforms the slopes of generalised forces from the bearing midpoint to the mass centre, with
-/// the equilibrium's arms: the inverse of `Floating::generalised_forces`.
+/// the equilibrium's arms: the inverse of `FloatingChain::generalised_forces`.
 #[inline(always)]
 fn transform_to_mass_centre<T: Real, const R: usize, const ROWS: usize>(
     (midpoint, rotation): ([N<Dual<T>>; 2], [N<Dual<T>>; R]),
@@ -190,8 +198,9 @@ fn rotor_coefficients_of_lane<T: Lane>(
 ) -> RotorCoefficients<f64> {
     let coefficients = |entry: usize| {
         let mut functions = [0.0; FUNCTIONS];
-        let harmonics_at =
-            |kind: usize| harmonics::coefficients(samples[kind][entry].map(|v| v.0.get(lane)));
+        let harmonics_at = |kind: usize| {
+            harmonics::harmonic_coefficients(samples[kind][entry].map(|v| v.0.get(lane)))
+        };
         let at_rest = harmonics_at(0);
         let at_speed = harmonics_at(1);
         let accelerated = harmonics_at(2);
@@ -251,7 +260,7 @@ impl LinearPoint {
         };
         let mut stiffness = [[0.0; COORDINATES]; COORDINATES];
         for j in 0..COORDINATES {
-            let load = unit_deflection(j).load(bodies);
+            let load = unit_deflection(j).load_on_shaft(bodies);
             for (i, row) in stiffness.iter_mut().enumerate() {
                 row[j] = work(i, &load);
             }
@@ -262,7 +271,7 @@ impl LinearPoint {
     /// Computes the matrices at an instant. `bodies` are those of the same machine.
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let c = &self.constants;
-        let (inertia, e) = self.terms.at(&harmonics::functions(spin));
+        let (inertia, e) = self.terms.at(&harmonics::spin_functions(spin));
         let tub = MassCentreMap { midpoint: [TUB_Y, TUB_Z], rotations: TUB_TURNS, arm: c.tub_arm };
         let rotor = MassCentreMap {
             midpoint: [SHAFT_Y, SHAFT_Z],

@@ -11,7 +11,7 @@
 
 use crate::modes::fastest_rigid_rad_per_s;
 use crate::point::{self, segments};
-use crate::steps::to_bits;
+use crate::steps::round_down_to_bits;
 use crate::{
     Caps, FrictionSpeed, Gauge, Machine, Method, ModelKind, NoEquilibrium, Point, Recorders, Spin,
     Timing, simulate_with,
@@ -225,7 +225,7 @@ pub fn prepare(
         let segments = segments(&point.stretches, &timing_to_window).into();
         let point = Point { segments, ..point.with_own_friction_speeds(&search.speeds_m_per_s()) };
         let fastest_rad_per_s = fastest_rigid_rad_per_s(&point, &point.linear).ok()?;
-        let step_s = to_bits(
+        let step_s = round_down_to_bits(
             FIRST_STEP_PHASE_RAD / fastest_rad_per_s.max(point.segments.last()?.fastest_rad_per_s),
             STEP_BITS,
         );
@@ -276,7 +276,7 @@ impl OpenPoint {
     fn update(&mut self, speeds_m_per_s: &[f64]) {
         if speeds_m_per_s.is_empty() {
             // A hinge below its cap, or friction at a low speed, is too stiff for the step.
-            self.step_s = to_bits(STEP_REDUCTION * self.step_s, STEP_BITS);
+            self.step_s = round_down_to_bits(STEP_REDUCTION * self.step_s, STEP_BITS);
             self.is_finished = self.step_s < self.min_step_s;
             return;
         }

@@ -19,7 +19,7 @@ pub use snapshots::Snapshot;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::nonlinear::outputs::{RADIAL, squared};
+use crate::nonlinear::outputs::{RADIAL, squared_distance};
 use crate::run::method::{
     LinearFamily, ModelFamily, NonlinearFamily, Stepper, StepperVisitor, coupling_for_method,
     start_segment,
@@ -239,7 +239,11 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
             let times = Some((step.end_s, step.length_s));
             self.record(times, (step.after, step.slope_after), &radial, &channels, lanes_in_window);
         }
-        self.radial_peaks.advance(step.length_s, &[squared(&radial)], all_lanes(self.in_window));
+        self.radial_peaks.advance(
+            step.length_s,
+            &[squared_distance(&radial)],
+            all_lanes(self.in_window),
+        );
     }
 
     fn cancel(&self) -> Cancel<'_> {
@@ -268,7 +272,7 @@ impl<T: Lane, M: LaneModel<T>> OutOfLine for RecordStart<'_, '_, T, M> {
             task.channel_peaks.begin(&channels, lanes_in_window);
             task.record(None, (x, dx), &radial, &channels, lanes_in_window);
         }
-        task.radial_peaks.begin(&[squared(&radial)], all_lanes(task.in_window));
+        task.radial_peaks.begin(&[squared_distance(&radial)], all_lanes(task.in_window));
     }
 }
 

@@ -7,7 +7,7 @@
 use crate::channel::{CHANNELS, Channel, channels};
 use crate::coordinates::{
     COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH,
-    TUB_Y, TUB_YAW, TUB_Z, seeded,
+    TUB_Y, TUB_YAW, TUB_Z, with_unit_derivative,
 };
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::sparse::{FurtherTerms, sparse_sums};
@@ -249,7 +249,8 @@ impl<T: Lane> OutOfLine for LineariseOutputs<'_, T> {
         for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
             let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero, zero).constant();
             for j in 0..COORDINATES {
-                let motion = MovingCoordinates { q: seeded(q, j, 1.0), u: zeros, a: zeros };
+                let motion =
+                    MovingCoordinates { q: with_unit_derivative(q, j, 1.0), u: zeros, a: zeros };
                 let axes = Axes::new(&spin, &motion);
                 let channels = axes.channels(&dual_bodies, &motion);
                 let radial = axes.radial(&dual_bodies, &motion);

@@ -184,7 +184,7 @@ impl<T: Lane> RotorArrays<T> {
         spin: &SpinState<T>,
         hinge_mass: Option<HingeMass<T>>,
     ) {
-        let functions = harmonics::functions(spin);
+        let functions = harmonics::spin_functions(spin);
         let zero = spin.sin.lit(0.0);
         terms.sum_others(&functions, &mut self.entries);
         // The inverse is a long chain of dependent operations. It comes last, because a stage

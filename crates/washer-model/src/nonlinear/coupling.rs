@@ -176,7 +176,7 @@ impl<T: Lane> Coupling<T> {
         (rotor, rotor_inertia): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
     ) -> [N<T>; COORDINATES] {
         let on_shaft = match self {
-            Self::Springs => deflection.load(bodies),
+            Self::Springs => deflection.load_on_shaft(bodies),
             Self::MassScaled(scaling) => {
                 let tub_response = tub.response(tub_inertia);
                 let rotor_response = rotor.response(rotor_inertia);

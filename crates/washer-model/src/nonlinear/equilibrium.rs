@@ -8,13 +8,14 @@
 //! 4. Stop when an unshifted step is below the tolerance, or when the shift exceeds its limit.
 
 use crate::coordinates::{
-    COORDINATES, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z, seeded,
+    COORDINATES, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
+    with_unit_derivative,
 };
 use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::floating::LdltFactors;
-use crate::nonlinear::{Halves, halves};
+use crate::nonlinear::{Halves, coupled_halves};
 use lane_ode::{Lane, N, OutOfLine};
 
 /// The greatest number of Newton steps. Basis: twice the number of undamped ones. Doubling it costs
@@ -76,7 +77,7 @@ pub(crate) fn solve_equilibrium<T: Lane>(
         let mut stiffness = [[zero; COORDINATES]; COORDINATES];
         let mut force = [zero; COORDINATES];
         for j in 0..COORDINATES {
-            let forces = static_forces(&machine, &seeded(&q, j, 1.0));
+            let forces = static_forces(&machine, &with_unit_derivative(&q, j, 1.0));
             for i in 0..COORDINATES {
                 stiffness[i][j] = N(forces[i].0.slope.neg());
                 force[i] = N(forces[i].0.value);
@@ -136,7 +137,7 @@ pub(crate) fn unstable_motion(
     let q = q.map(N);
     let stiffness = RIGID_MOTIONS.map(|(_, coordinates, _)| {
         let stiffness_along = |along: usize| {
-            let forces = static_forces(&machine, &seeded(&q, along, 1.0));
+            let forces = static_forces(&machine, &with_unit_derivative(&q, along, 1.0));
             coordinates.iter().map(|&i| -forces[i].0.slope).sum::<f64>()
         };
         coordinates.into_iter().map(stiffness_along).sum::<f64>()
@@ -158,7 +159,7 @@ fn static_forces<T: Lane>(
 ) -> [N<T>; COORDINATES] {
     let zero = q[0].lit(0.0);
     let spin = SpinState::new((zero, zero.lit(1.0)), zero, zero);
-    let Halves { tub, rotor } = halves(machine, &spin, q, &[zero; COORDINATES]);
+    let Halves { tub, rotor } = coupled_halves(machine, &spin, q, &[zero; COORDINATES]);
     let ([f1, f2], [f5, f6]) = tub.floating.generalised_forces();
     let ([f3, f4], [f7, f8, f9, f10]) = rotor.floating.generalised_forces();
     [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]
@@ -181,7 +182,7 @@ mod tests {
         let weight_n = (23.87 + 4.34 + 4.04) * 9.81;
         let sag_m = -(q[0].0 + 0.2068 * q[5].0);
         assert!((sag_m - weight_n / 32_000.0).abs() < 1e-5, "{sag_m} m in the springs' mid-plane");
-        for force in static_forces(&coefficients.constant(), &seeded(&q, 0, 0.0)) {
+        for force in static_forces(&coefficients.constant(), &with_unit_derivative(&q, 0, 0.0)) {
             assert!(force.0.value.abs() < 1e-5, "{} N or N m left", force.0.value);
         }
     }

@@ -13,7 +13,7 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{accelerations_under_load, mass_scaled_load};
 use crate::nonlinear::floating::LdltFactors;
 use crate::nonlinear::forces::Deflection;
-use crate::nonlinear::{rotor, tub};
+use crate::nonlinear::{assemble_rotor_in_lanes, assemble_tub};
 use lane_ode::{Lane, N};
 
 /// Computes the stage's derivative k. The springs are evaluated at r + g k with `g` in s, all other
@@ -28,8 +28,8 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     g: N<T>,
 ) -> [N<T>; STATES] {
     let b = &machine.bodies;
-    let mut tub = tub(machine, q, u);
-    let mut rotor = rotor(b, spin, q, u);
+    let mut tub = assemble_tub(machine, q, u);
+    let mut rotor = assemble_rotor_in_lanes(b, spin, q, u);
     // The change of the coordinates from `q` to the end of the stage, without the term g^2 a.
     let mut coordinate_change = *q;
     for i in 0..COORDINATES {

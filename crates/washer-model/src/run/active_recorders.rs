@@ -9,7 +9,7 @@ use super::snapshots::Snapshots;
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::whole_turn_cuts_s;
-use crate::nonlinear::outputs::{RADIAL, squared};
+use crate::nonlinear::outputs::{RADIAL, squared_distance};
 use crate::{ModelKind, Point, Reading, Recorders};
 use lane_ode::{IntervalPeaks, Lane, N, OutOfLine, Sample, SquareIntegrals, TimeAbove};
 
@@ -186,7 +186,7 @@ impl<T: Lane> OutOfLine for ObservedState<'_, T> {
         if recorders.has_gauge(Gauge::ClashTime) {
             // The gap is negative where the square of the radial distance exceeds that of the
             // clearance.
-            let mut overlap = squared(radial);
+            let mut overlap = squared_distance(radial);
             overlap.value -= active.clearance_squared;
             match step {
                 Some((_, length_s)) => {

@@ -10,7 +10,7 @@ use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
-use crate::nonlinear::outputs::squared;
+use crate::nonlinear::outputs::squared_distance;
 use crate::run::method::{
     LinearFamily, ModelFamily, NonlinearFamily, Rk4Stepper, Stepper, StepperVisitor,
     coupling_for_method, start_segment,
@@ -223,7 +223,7 @@ fn outputs<M: LaneModel<f64>>(
     let state = state.map(N);
     let derivative = model.derivative(&forcing, &state);
     let (radial, channels) = model.observe(&forcing, &state, &derivative, true);
-    let gap_m = point.machine.bodies.clearance.0 - squared(&radial).value.0.sqrt();
+    let gap_m = point.machine.bodies.clearance.0 - squared_distance(&radial).value.0.sqrt();
     let channels = channels.unwrap_or([Sample::still(N(f64::NAN), N(f64::NAN)); CHANNELS]);
     let values = channels.map(|sample| sample.value.0);
     let rates = channels.map(|sample| sample.slope.0);

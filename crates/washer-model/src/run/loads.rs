@@ -3,7 +3,7 @@
 //! The force laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers
 //! for their rates. The linear model's loads are first order in its deviations from equilibrium.
 
-use super::suspension::{deviating, dual, forces, on_cabinet};
+use super::suspension::{dual, forces, load_on_cabinet_axes, tub_with_deviation};
 use crate::coordinates::{STATES, TUB};
 use crate::lanes::{InLanes as _, ToDual as _};
 use crate::machine::feet::{FEET, LOAD, LoadDistribution, turning_force_n};
@@ -129,7 +129,7 @@ impl LoadSelection {
             on_tub = elements.load_on_tub(tub);
         }
         if self.feet {
-            components[..LOAD].copy_from_slice(&on_cabinet(tub, &on_tub));
+            components[..LOAD].copy_from_slice(&load_on_cabinet_axes(tub, &on_tub));
         }
         for k in 0..self.stops {
             [components[LOAD + 2 * k], components[LOAD + 2 * k + 1]] = elements.stop(k, tub);
@@ -160,7 +160,11 @@ impl<T: Lane> LoadLaws<T> {
         let unit = |state: usize| core::array::from_fn(|i| f64::from(u8::from(i == state)));
         let components_by = |state: usize| {
             let mut components = vec![dual(0.0, 0.0); selection.component_count()];
-            selection.evaluate(&elements, &deviating(point, &unit(state)), &mut components);
+            selection.evaluate(
+                &elements,
+                &tub_with_deviation(point, &unit(state)),
+                &mut components,
+            );
             components
         };
         let force_at = |state: &[f64; STATES]| forces(point, ModelKind::Linear, state).cabinet_n;

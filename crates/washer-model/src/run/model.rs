@@ -47,13 +47,15 @@ pub(crate) trait LaneModel<T: Lane>: SemiImplicit<T, STATES> {
 /// Returns the coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
 fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> MovingCoordinates<T> {
-    let (q, u) = split(x);
-    MovingCoordinates { q, u, a: split(dx).1 }
+    let (q, u) = split_state(x);
+    MovingCoordinates { q, u, a: split_state(dx).1 }
 }
 
 /// Splits a state, or its derivative, into the parts of coordinates and of speeds.
 #[inline(always)]
-pub(crate) fn split<T: Copy>(x: &[N<T>; STATES]) -> ([N<T>; COORDINATES], [N<T>; COORDINATES]) {
+pub(crate) fn split_state<T: Copy>(
+    x: &[N<T>; STATES],
+) -> ([N<T>; COORDINATES], [N<T>; COORDINATES]) {
     (core::array::from_fn(|i| x[i]), core::array::from_fn(|i| x[COORDINATES + i]))
 }
 
@@ -65,7 +67,7 @@ pub(super) fn tub_samples<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> [
 
 /// Joins speeds and accelerations to the derivative of a state.
 #[inline(always)]
-fn joined<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; STATES] {
+fn join_derivative<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; STATES] {
     core::array::from_fn(|i| if i < COORDINATES { u[i] } else { a[i - COORDINATES] })
 }
 
@@ -103,9 +105,9 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
 
     #[inline(always)]
     fn derivative(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
-        let (q, u) = split(x);
+        let (q, u) = split_state(x);
         let Self { machine, coupling, sag, .. } = self;
-        joined(&u, &nonlinear::accelerations(machine, coupling, sag, spin, &q, &u))
+        join_derivative(&u, &nonlinear::accelerations(machine, coupling, sag, spin, &q, &u))
     }
 
     #[inline(always)]
@@ -124,7 +126,7 @@ impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
         r: &[N<T>; STATES],
         g_s: N<T>,
     ) -> [N<T>; STATES] {
-        let (q, u) = split(x);
+        let (q, u) = split_state(x);
         solve_implicit_stage(&self.machine, spin, &q, &u, r, g_s)
     }
 }
@@ -145,7 +147,7 @@ impl<T: Lane> Nonlinear<T> {
         spin: &SpinState<T>,
         x: &[N<T>; STATES],
     ) -> [[N<T>; COORDINATES]; TUB.len()] {
-        let (q, u) = split(x);
+        let (q, u) = split_state(x);
         nonlinear::accelerations_per_load(&self.machine, &self.coupling, &self.sag, spin, &q, &u)
     }
 }
@@ -250,8 +252,11 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
 
     #[inline(always)]
     fn derivative(&self, forcing: &LinearForcing<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
-        let (q, u) = split(x);
-        joined(&u, &step::accelerations(&self.constants, &self.coupling, &forcing.rotor, &q, &u))
+        let (q, u) = split_state(x);
+        join_derivative(
+            &u,
+            &step::accelerations(&self.constants, &self.coupling, &forcing.rotor, &q, &u),
+        )
     }
 
     #[inline(always)]
@@ -270,7 +275,7 @@ impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
         r: &[N<T>; STATES],
         g_s: N<T>,
     ) -> [N<T>; STATES] {
-        let (q, u) = split(x);
+        let (q, u) = split_state(x);
         let Self { constants, terms, flexure_stiffness, .. } = self;
         step::solve_implicit_stage(
             constants,

@@ -4,7 +4,7 @@
 use super::Response;
 use super::turn::integrate_step;
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, STATES, mirrored};
+use crate::coordinates::{COORDINATES, STATES, mirror_state};
 use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
@@ -311,7 +311,7 @@ fn response_at(
 ) -> [f64; STATES] {
     let speed_rad_per_s = response.speed_rpm * TAU / 60.0;
     let (start, direction) = match is_backward {
-        true => (mirrored(&response.start), -1.0),
+        true => (mirror_state(&response.start), -1.0),
         false => (response.start, 1.0),
     };
     let angle = (direction * theta_rad(point, time_s)).rem_euclid(TAU);

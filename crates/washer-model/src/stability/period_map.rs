@@ -12,7 +12,7 @@ use crate::coordinates::STATES;
 use crate::machine::spin::SpinStretch;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::elements::corners::CornerForce;
-use crate::nonlinear::outputs::squared;
+use crate::nonlinear::outputs::squared_distance;
 use crate::point::Point;
 use crate::preparation::{MAX_RUNS, SpeedAmplitudeSearch, own_speeds};
 use crate::run::active_recorders::{ActiveRecorders, ObservedState};
@@ -556,7 +556,7 @@ impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M>
                 });
             }
             let greatest = self.max_radial_squared.0;
-            let radial_squared = squared(&radial).value.0;
+            let radial_squared = squared_distance(&radial).value.0;
             self.max_radial_squared =
                 N(T::select(greatest.less(radial_squared), radial_squared, greatest));
         }

@@ -357,8 +357,8 @@ fn continue_between<'a>(
 
 /// Searches again for missing responses. Guesses on a curve are tried with damped steps. If a
 /// request has no response then, the machine is integrated from the linear model's response until
-/// its transient has decayed, which may lead to a stable response. Returns false once `is_stopped`
-/// returns true.
+/// its transient has decayed, which may lead to a stable response. Returns false once `cancel`
+/// is requested.
 fn retry_missing(
     sought: &[SoughtResponse<'_>],
     found: &mut [Result<Response, ResponseError>],

@@ -156,8 +156,8 @@ fn same_bits_beside_any_points_random_machines() {
     same_beside_any_points(&random_machines());
 }
 
-/// Integrates a segment with more steps than the integrator makes between two calls of
-/// `is_stopped`, while segments in other lanes end before.
+/// Integrates a segment with more steps than the integrator makes between two polls of
+/// its cancellation, while segments in other lanes end before.
 #[test]
 fn blocks_of_steps_do_not_change_bits() {
     let timing = Timing { end_s: 1.0, window_s: [0.9, 1.0], checkpoints: 0 };

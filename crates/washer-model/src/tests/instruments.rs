@@ -5,7 +5,7 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::floating::FloatingChain;
-use crate::nonlinear::{Half, Halves, halves};
+use crate::nonlinear::{Half, Halves, coupled_halves};
 use crate::point::Point;
 use crate::{
     Gauge, Machine, Parameter, Profile, Recorders, Spin, Target, Timing, Unbalance, prepare,
@@ -134,7 +134,7 @@ pub(super) fn equations<T: Lane>(
     u: &[N<T>; COORDINATES],
     a: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; 2] {
-    loaded_equations(&halves(machine, spin, q, u), a)
+    loaded_equations(&coupled_halves(machine, spin, q, u), a)
 }
 
 /// Computes the mass matrix of the nonlinear model by columns from unit accelerations.

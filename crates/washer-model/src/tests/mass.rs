@@ -7,7 +7,7 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::forces::Deflection;
 use crate::nonlinear::frame::Tilt;
-use crate::nonlinear::{accelerations, halves};
+use crate::nonlinear::{accelerations, coupled_halves};
 use crate::tests::reference::{machine, numbers, reference, spin};
 use lane_ode::{Dual, N};
 
@@ -101,8 +101,8 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
             let Deflection { offset, tilt } = sag.bearings;
             let deflection =
                 Deflection { offset: added(d.offset, offset), tilt: added(d.tilt, tilt) };
-            let load = deflection.load(&machine.bodies);
-            let mut both = halves(machine, spin, q, u);
+            let load = deflection.load_on_shaft(&machine.bodies);
+            let mut both = coupled_halves(machine, spin, q, u);
             both.tub.floating.apply(&load.reaction());
             both.rotor.floating.apply(&load);
             if let Some(cap) = hinge_rad_per_s {

@@ -5,7 +5,7 @@ use crate::coordinates::{COORDINATES, TUB};
 use crate::nonlinear::elements::{
     DamperCoefficients, Elements, SpringCoefficients, StopCoefficients, TubMotion,
 };
-use crate::nonlinear::frame::{difference, dot};
+use crate::nonlinear::frame::{dot, subtract};
 use lane_ode::N;
 
 /// The greatest travel of a tub point from its place at rest (m). Basis: no machine has room for
@@ -29,7 +29,7 @@ impl Elements<f64> {
         for spring in &mut linearised.springs {
             let ends = &spring.ends;
             let displacement = tub.point(&ends.tub).displacement;
-            let span = difference(displacement, &difference(ends.cabinet, &ends.tub));
+            let span = subtract(displacement, &subtract(ends.cabinet, &ends.tub));
             let length = dot(&span, &span).sqrt();
             let elongation = length - spring.free_length;
             let cubic = spring.cubic;

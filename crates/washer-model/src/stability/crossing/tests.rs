@@ -136,7 +136,7 @@ fn backwards_the_response_is_the_mirrored_machines() {
         find_responses(&[HeldSpeed { point: &mirrored_point, speed_rpm: 225.0 }], Cancel::Never);
     let response = response.into_iter().next().unwrap().unwrap().remove(0);
     for time_s in [1e-12, 0.1, 0.2, 1.0] {
-        let start = mirrored(&response.start);
+        let start = mirror_state(&response.start);
         let followed = integrate(&point, STEP_S, [0.0, time_s], &start).end;
         let expected = response_at(&point, STEP_S, &response, true, time_s);
         let deviation = core::array::from_fn(|i| {
@@ -149,6 +149,10 @@ fn backwards_the_response_is_the_mirrored_machines() {
         };
         assert!(share(&expected) < 1e-6, "{time_s}: {}", share(&expected));
         // Nothing else is it: not the response as it is.
-        assert!(share(&mirrored(&expected)) > 1e-2, "{time_s}: {}", share(&mirrored(&expected)));
+        assert!(
+            share(&mirror_state(&expected)) > 1e-2,
+            "{time_s}: {}",
+            share(&mirror_state(&expected))
+        );
     }
 }
