@@ -78,8 +78,8 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
                     corners[m].by_coordinate[direction] = N(motions[m][1].0.slope);
                 }
             }
-            // By virtual power, a force loads a coordinate by the derivative of the motion's speed
-            // by that coordinate's speed. The motion's speed is linear in the tub's speeds.
+            // A force loads a coordinate by the derivative of the motion's speed by that
+            // coordinate's speed (virtual power). The motion's speed is linear in the tub's speeds.
             for k in 0..TUB.len() {
                 let mut unit = state;
                 for tub_coordinate in TUB {

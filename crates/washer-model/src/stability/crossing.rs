@@ -143,14 +143,14 @@ pub fn peaks_without_departures(
 }
 
 /// Equal steps within one stretch of the spin.
-struct Segment {
+struct SpinSegment {
     stretch: SpinStretch,
     start_s: f64,
     step_s: f64,
     steps: usize,
 }
 
-impl Segment {
+impl SpinSegment {
     /// Returns the time (s) after a number of steps.
     fn time_s(&self, steps: f64) -> f64 {
         self.start_s + self.step_s * steps
@@ -175,14 +175,14 @@ impl Segment {
 }
 
 /// Divides the time from `from_s` to `to_s` at the kinks of the spin.
-fn segments(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<Segment> {
+fn segments(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<SpinSegment> {
     let kinks = point.stretches.iter().map(|stretch| stretch.start_s.0);
     let inner_kinks = kinks.filter(|&kink_s| kink_s > from_s && kink_s < to_s);
     let mut start_s = from_s;
     let mut segments = Vec::new();
     for end_s in inner_kinks.chain([to_s]) {
         let steps = ((end_s - start_s) / step_s).ceil().max(1.0);
-        segments.push(Segment {
+        segments.push(SpinSegment {
             stretch: point.stretches[stretch_at(&point.stretches, start_s)],
             start_s,
             step_s: (end_s - start_s) / steps,
@@ -208,7 +208,7 @@ fn integrate(point: &Point, step_s: f64, from_to_s: [f64; 2], start: &[f64; STAT
 
 struct SegmentRun<'a> {
     point: &'a Point,
-    segments: &'a [Segment],
+    segments: &'a [SpinSegment],
     start: &'a [f64; STATES],
 }
 
@@ -320,7 +320,7 @@ fn response_at(
         return start;
     }
     let steps = (end_s / step_s).ceil().max(1.0);
-    let segment = Segment {
+    let segment = SpinSegment {
         stretch: SpinStretch::steady(direction * response.speed_rpm),
         start_s: 0.0,
         step_s: end_s / steps,
