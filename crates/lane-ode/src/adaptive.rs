@@ -1,34 +1,34 @@
 //! Times, steps and segments of the lanes in adaptive methods. Each lane has its own.
 
 use crate::control::StepControl;
-use crate::{Count, Failure, Lane, MAX_LANES, N, SegmentEnd, Task, Tolerance};
+use crate::{Failure, Lane, MAX_LANES, N, SegmentEnd, StepCount, Task, Tolerance};
 
 /// The segment of one lane.
 #[derive(Clone, Copy, Default)]
-struct AdaptiveProgress {
+struct AdaptiveSegment {
     is_active: bool,
     end_s: f64,
-    count: Count,
+    count: StepCount,
 }
 
 /// The times and steps of the lanes.
-pub(crate) struct Lanes<T> {
+pub(crate) struct AdaptiveLanes<T> {
     pub(crate) time: N<T>,
     control: StepControl<T>,
-    segments: [AdaptiveProgress; MAX_LANES],
+    segments: [AdaptiveSegment; MAX_LANES],
     /// The end of a lane's segment, until the next one is requested.
-    ended: [Option<SegmentEnd>; MAX_LANES],
+    segment_ends: [Option<SegmentEnd>; MAX_LANES],
 }
 
-impl<T: Lane> Lanes<T> {
+impl<T: Lane> AdaptiveLanes<T> {
     /// Creates lanes without a segment.
     #[inline(always)]
     pub(crate) fn new(zero: N<T>) -> Self {
         Self {
             time: zero,
             control: StepControl::new(zero),
-            segments: [AdaptiveProgress::default(); MAX_LANES],
-            ended: [Some(SegmentEnd::Idle); MAX_LANES],
+            segments: [AdaptiveSegment::default(); MAX_LANES],
+            segment_ends: [Some(SegmentEnd::Idle); MAX_LANES],
         }
     }
 
@@ -42,13 +42,13 @@ impl<T: Lane> Lanes<T> {
     ) -> bool {
         let mut has_begun = false;
         for lane in 0..T::LANES {
-            let Some(end) = self.ended[lane].take() else { continue };
+            let Some(end) = self.segment_ends[lane].take() else { continue };
             has_begun = true;
             let segment = task.next_segment(lane, end, x);
-            self.segments[lane] = AdaptiveProgress {
+            self.segments[lane] = AdaptiveSegment {
                 is_active: segment.is_some(),
                 end_s: segment.map_or(0.0, |segment| segment.end_s),
-                ..AdaptiveProgress::default()
+                ..AdaptiveSegment::default()
             };
             self.time.0.set(lane, segment.map_or(0.0, |segment| segment.start_s));
             self.control.start(lane, segment.map_or(0.0, |segment| segment.step_s));
@@ -58,7 +58,7 @@ impl<T: Lane> Lanes<T> {
 
     /// Whether any lane has a segment.
     #[inline(always)]
-    pub(crate) fn are_active(&self) -> bool {
+    pub(crate) fn has_active_lane(&self) -> bool {
         self.segments[..T::LANES].iter().any(|segment| segment.is_active)
     }
 
@@ -80,7 +80,7 @@ impl<T: Lane> Lanes<T> {
 
     /// Returns the time at the end of a lane's step.
     #[inline(always)]
-    pub(crate) fn end_of_step(&self, lane: usize, h: N<T>) -> f64 {
+    pub(crate) fn step_end_s(&self, lane: usize, h: N<T>) -> f64 {
         let step = h.0.get(lane);
         let time = self.time.0.get(lane);
         let end_s = self.segments[lane].end_s;
@@ -107,7 +107,7 @@ impl<T: Lane> Lanes<T> {
                 continue;
             }
             let [is_accepted, is_in_range] = lanes.map(|bits| bits >> lane & 1 == 1);
-            let reached = self.end_of_step(lane, h);
+            let reached = self.step_end_s(lane, h);
             self.control.update(lane, is_accepted, &next);
             let segment = &mut self.segments[lane];
             let count = &mut segment.count;
@@ -123,7 +123,7 @@ impl<T: Lane> Lanes<T> {
             let least = 16.0 * f64::EPSILON * time.abs().max(segment.end_s);
             let is_stuck = !is_accepted && self.control.step.0.get(lane) <= least;
             let fail = |reason, time_s| Some(SegmentEnd::Failed { reason, time_s, count: *count });
-            self.ended[lane] = if !is_in_range && (is_accepted || is_stuck) {
+            self.segment_ends[lane] = if !is_in_range && (is_accepted || is_stuck) {
                 fail(Failure::Diverged, time)
             } else if is_stuck {
                 fail(Failure::StepTooSmall, time)

@@ -13,9 +13,9 @@
 //! schemes for time dependent partial differential equations, Journal of Scientific Computing 68
 //! (2016) 975. The tests measure the resulting order.
 
-use crate::adaptive::Lanes;
-use crate::control::padded;
-use crate::{Lane, N, SemiImplicit, Step, System as _, Task, Tolerance};
+use crate::adaptive::AdaptiveLanes;
+use crate::control::pad_rows;
+use crate::{Lane, N, ObservedStep, SemiImplicit, System as _, Task, Tolerance};
 
 /// Number of stages.
 const STAGES: usize = 8;
@@ -36,7 +36,7 @@ const C: [f64; STAGES] = [
 ];
 
 /// Matrix of the explicit part.
-const A_EXPLICIT: [[f64; STAGES]; STAGES] = padded([
+const A_EXPLICIT: [[f64; STAGES]; STAGES] = pad_rows([
     &[],
     &[41.0 / 100.0],
     &[367_902_744_464.0 / 2_072_280_473_677.0, 677_623_207_551.0 / 8_224_143_866_563.0],
@@ -86,7 +86,7 @@ const B: [f64; STAGES] = [
 ];
 
 /// Matrix of the implicit part below its diagonal. Its last row equals the weights.
-const A_IMPLICIT: [[f64; STAGES]; STAGES] = padded([
+const A_IMPLICIT: [[f64; STAGES]; STAGES] = pad_rows([
     &[],
     &[41.0 / 200.0],
     &[41.0 / 400.0, -567_603_406_766.0 / 11_931_857_230_679.0],
@@ -138,21 +138,21 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut lanes = Lanes::new(zero);
+    let mut lanes = AdaptiveLanes::new(zero);
     let mut k = [[zero; D]; STAGES];
     let mut before = x;
     let mut slope_before = x;
     let mut length = zero;
     let mut is_fresh = lanes.start_pending_lanes(task, &mut x);
-    while lanes.are_active() && !task.cancel().is_requested() {
-        let forcing = task.system().forcing_aside(lanes.time);
+    while lanes.has_active_lane() && !task.cancel().is_requested() {
+        let forcing = task.system().forcing_out_of_line(lanes.time);
         k[0] = task.system().derivative(&forcing, &x);
         if is_fresh {
             task.begin(&forcing, &x, &k[0]);
         } else {
             task.observe(
                 &forcing,
-                &Step {
+                &ObservedStep {
                     end_s: lanes.time,
                     length_s: length,
                     before: &before,
@@ -186,7 +186,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
                 r[i] = x[i] + h * implicit;
             }
             let forcing = task.system().forcing(h * C[stage] + lanes.time);
-            k[stage] = task.system().derivative_ahead(&forcing, &y, &r, g);
+            k[stage] = task.system().solve_implicit_stage(&forcing, &y, &r, g);
         }
         let mut error = [zero; D];
         for i in 0..D {
@@ -201,7 +201,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         }
 
         let in_range = task.system().in_range(&y);
-        let error = tolerance.norm(&x, &y, &error);
+        let error = tolerance.error_norm(&x, &y, &error);
         before = x;
         slope_before = k[0];
         let accepted = error.0.less(zero.lit(1.0).0);

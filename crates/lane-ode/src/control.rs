@@ -17,7 +17,7 @@ impl Tolerance {
     /// Returns the largest ratio of a component's error to its tolerance. A step is accepted if it
     /// is below 1. The result is NaN if any component is not finite.
     #[inline(always)]
-    pub(crate) fn norm<T: Lane, const D: usize>(
+    pub(crate) fn error_norm<T: Lane, const D: usize>(
         &self,
         before: &[N<T>; D],
         after: &[N<T>; D],
@@ -38,7 +38,7 @@ impl Tolerance {
 }
 
 /// Returns a formula's matrix from its rows, which may omit zeros at their ends.
-pub(crate) const fn padded<const ROWS: usize, const COLUMNS: usize>(
+pub(crate) const fn pad_rows<const ROWS: usize, const COLUMNS: usize>(
     rows: [&[f64]; ROWS],
 ) -> [[f64; COLUMNS]; ROWS] {
     let mut matrix = [[0.0; COLUMNS]; ROWS];
@@ -74,7 +74,7 @@ pub(crate) struct Proposals<T> {
 
 /// Returns a step's factor within the shrink limit and `greatest`.
 #[inline(always)]
-fn clamped<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
+fn clamp_factor<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
     let least = factor.lit(SHRINK_LIMIT);
     let greatest = factor.lit(greatest);
     let factor = factor.where_less(greatest, factor, greatest);
@@ -83,7 +83,7 @@ fn clamped<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
 
 /// The safety factor of the step size. Basis: `dopri5.f` (0.9). Doubling it would have nearly every
 /// step rejected.
-const SAFETY: f64 = 0.9;
+const SAFETY_FACTOR: f64 = 0.9;
 /// The least factor from one step to the next. Basis: `dopri5.f` (0.2). Doubling it takes more
 /// rejected steps where the motion suddenly becomes faster.
 const SHRINK_LIMIT: f64 = 0.2;
@@ -124,8 +124,8 @@ impl<T: Lane> StepControl<T> {
         let alpha = (root_8 * (root_32 * root_64)).v();
         let beta = (root_32 * root_128).v();
         Proposals {
-            accepted: (h * clamped(SAFETY * self.memory / alpha, GROWTH_LIMIT)).v(),
-            rejected: (h * clamped(SAFETY / alpha, 1.0)).v(),
+            accepted: (h * clamp_factor(SAFETY_FACTOR * self.memory / alpha, GROWTH_LIMIT)).v(),
+            rejected: (h * clamp_factor(SAFETY_FACTOR / alpha, 1.0)).v(),
             memory: beta,
         }
     }

@@ -9,7 +9,7 @@
 //! where accuracy, not stability, limits the steps of the latter.
 
 use crate::fixed::FixedSegments;
-use crate::{Lane, N, Step, System as _, Task};
+use crate::{Lane, N, ObservedStep, System as _, Task};
 use core::hint::black_box;
 
 /// The limit of stability on the imaginary axis: the method is stable up to this |h w|.
@@ -130,7 +130,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let h = clock.h;
         let mut time = clock.at(index);
         // The compiler must not see through this call, or it copies the forcing repeatedly.
-        let mut forcing = task.system().forcing_aside(time);
+        let mut forcing = task.system().forcing_out_of_line(time);
         let forcing = black_box(&mut forcing);
         // The states at the start of this step and of the last one, which swap places, and the
         // stage's state; then the slopes, with the first slope of the last step, which observers
@@ -140,9 +140,9 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         // Index of a stage's state among the states.
         const STAGE: usize = 2;
         // Index of the last step's first slope among the slopes.
-        const BEFORE: usize = DOP853_STAGES;
-        let mut now = 0;
-        let mut last = 1;
+        const PREVIOUS: usize = DOP853_STAGES;
+        let mut current = 0;
+        let mut previous = 1;
         let mut is_fresh = true;
         let mut done = 0;
         loop {
@@ -152,19 +152,19 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             let next_time = clock.at(index + 1.0);
             for stage in 0..DOP853_STAGES {
                 if stage == 0 {
-                    slopes[0] = task.system().derivative(forcing, &states[now]);
+                    slopes[0] = task.system().derivative(forcing, &states[current]);
                     if is_fresh {
-                        task.begin(forcing, &states[now], &slopes[0]);
+                        task.begin(forcing, &states[current], &slopes[0]);
                         is_fresh = false;
                     } else {
                         task.observe(
                             forcing,
-                            &Step {
+                            &ObservedStep {
                                 end_s: time,
                                 length_s: h,
-                                before: &states[last],
-                                slope_before: &slopes[BEFORE],
-                                after: &states[now],
+                                before: &states[previous],
+                                slope_before: &slopes[PREVIOUS],
+                                after: &states[current],
                                 slope_after: &slopes[0],
                                 dense: None,
                             },
@@ -173,31 +173,31 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     if is_last {
                         break;
                     }
-                    slopes[BEFORE] = slopes[0];
+                    slopes[PREVIOUS] = slopes[0];
                     continue;
                 }
                 let stage_time = clock.at(index + C[stage]);
-                task.system().renew(
+                task.system().update_forcing(
                     if stage == DOP853_STAGES - 1 { next_time } else { stage_time },
                     forcing,
                 );
-                add_slopes(h, A[stage - 1], &slopes, &mut states, now, STAGE);
+                add_slopes(h, A[stage - 1], &slopes, &mut states, current, STAGE);
                 slopes[stage] = task.system().derivative(forcing, &states[STAGE]);
             }
             if is_last {
                 break;
             }
-            add_slopes(h, B, &slopes, &mut states, now, last);
-            (now, last) = (last, now);
+            add_slopes(h, B, &slopes, &mut states, current, previous);
+            (current, previous) = (previous, current);
             index = index + 1.0;
             time = next_time;
             done += 1;
-            let in_range = task.system().in_range(&states[now]);
+            let in_range = task.system().in_range(&states[current]);
             if !T::all(in_range) && segments.fail(in_range, time, done) {
                 run = done;
             }
         }
-        x = states[now];
+        x = states[current];
         segments.index = index;
         segments.count_steps(done);
     }
@@ -226,9 +226,9 @@ fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
             x[i] = states[from][first + i];
         }
         for (stage, weight) in row {
-            let reach = (h * *weight).v();
+            let weighted_step = (h * *weight).v();
             for i in 0..SUMS_IN_REGISTERS.min(D - first) {
-                x[i] += reach * slopes[*stage][first + i];
+                x[i] += weighted_step * slopes[*stage][first + i];
             }
         }
         for i in 0..SUMS_IN_REGISTERS.min(D - first) {
@@ -240,7 +240,7 @@ fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
 /// Returns the factor by which a step of z' = i y z, of length 1, changes the magnitude of z.
 #[cfg(test)]
 pub(crate) fn amplification(y: f64) -> f64 {
-    let along = |row: SparseRow, slopes: &[[f64; 2]]| {
+    let combine = |row: SparseRow, slopes: &[[f64; 2]]| {
         row.iter().fold([1.0, 0.0], |[re, im], (stage, weight)| {
             [re + weight * slopes[*stage][0], im + weight * slopes[*stage][1]]
         })
@@ -248,8 +248,8 @@ pub(crate) fn amplification(y: f64) -> f64 {
     let slope = |[re, im]: [f64; 2]| [-y * im, y * re];
     let mut slopes = vec![slope([1.0, 0.0])];
     for row in A {
-        slopes.push(slope(along(row, &slopes)));
+        slopes.push(slope(combine(row, &slopes)));
     }
-    let [re, im] = along(B, &slopes);
+    let [re, im] = combine(B, &slopes);
     re.hypot(im)
 }

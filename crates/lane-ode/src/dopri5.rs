@@ -4,9 +4,9 @@
 //! output and step control: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I,
 //! sections II.4 to II.6.
 
-use crate::adaptive::Lanes;
-use crate::control::padded;
-use crate::{Lane, N, Step, System as _, Task, Tolerance};
+use crate::adaptive::AdaptiveLanes;
+use crate::control::pad_rows;
+use crate::{Lane, N, ObservedStep, System as _, Task, Tolerance};
 
 /// Number of stages.
 const STAGES: usize = 7;
@@ -15,7 +15,7 @@ const STAGES: usize = 7;
 const C: [f64; STAGES] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 
 /// Matrix. Its last row equals the weights of order 5.
-const A: [[f64; 6]; STAGES] = padded([
+const A: [[f64; 6]; STAGES] = pad_rows([
     &[],
     &[1.0 / 5.0],
     &[3.0 / 40.0, 9.0 / 40.0],
@@ -49,7 +49,7 @@ const DENSE: [f64; STAGES] = [
 
 /// Computes h times a weighted sum of the stages' slopes.
 #[inline(always)]
-fn combined<T: Lane, const D: usize>(
+fn combine_stages<T: Lane, const D: usize>(
     h: N<T>,
     k: &[[N<T>; D]; STAGES],
     weights: &[f64; STAGES],
@@ -73,13 +73,13 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 ) {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut lanes = Lanes::new(zero);
+    let mut lanes = AdaptiveLanes::new(zero);
     let mut k = [[zero; D]; STAGES];
     let mut is_fresh = true;
 
     loop {
         is_fresh |= lanes.start_pending_lanes(task, &mut x);
-        if task.cancel().is_requested() || !lanes.are_active() {
+        if task.cancel().is_requested() || !lanes.has_active_lane() {
             return;
         }
         let h = lanes.steps();
@@ -103,20 +103,20 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         is_fresh = false;
 
         let in_range = task.system().in_range(&y);
-        let error = tolerance.norm(&x, &y, &combined(h, &k, &E));
+        let error = tolerance.error_norm(&x, &y, &combine_stages(h, &k, &E));
         let accepted = error.0.less(zero.lit(1.0).0);
         let before = x;
         let slope_before = k[0];
-        let dense = combined(h, &k, &DENSE);
+        let dense = combine_stages(h, &k, &DENSE);
         for i in 0..D {
             x[i] = N(T::select(accepted, y[i].0, x[i].0));
             k[0][i] = N(T::select(accepted, k[STAGES - 1][i].0, k[0][i].0));
         }
         let length = lanes.accept_or_reject(h, error, [accepted, in_range], tolerance);
-        let forcing = task.system().forcing_aside(lanes.time);
+        let forcing = task.system().forcing_out_of_line(lanes.time);
         task.observe(
             &forcing,
-            &Step {
+            &ObservedStep {
                 end_s: lanes.time,
                 length_s: length,
                 before: &before,

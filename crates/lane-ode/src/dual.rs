@@ -1,7 +1,7 @@
 //! Forward automatic differentiation: numbers that carry one derivative along.
 
 use crate::real::operations;
-use crate::{Aside, Lane, N, Real};
+use crate::{Lane, N, OutOfLine, Real};
 
 /// A value and its derivative along one direction. Nested dual numbers have second derivatives.
 #[derive(Clone, Copy, Debug)]
@@ -110,7 +110,7 @@ impl<T: Lane> Lane for Dual<T> {
         T::bits(mask)
     }
     #[inline(always)]
-    fn aside<W: Aside>(self, work: W) -> W::Output {
-        self.value.aside(work)
+    fn run_out_of_line<W: OutOfLine>(self, work: W) -> W::Output {
+        self.value.run_out_of_line(work)
     }
 }

@@ -1,8 +1,8 @@
 //! The common part of methods with a fixed step: times of the lanes, and ends of their segments.
 
-use crate::{Count, Failure, Lane, MAX_LANES, N, Segment, SegmentEnd, Task};
+use crate::{Failure, Lane, MAX_LANES, N, Segment, SegmentEnd, StepCount, Task};
 
-/// Greatest number of steps between two calls of [`Task::is_stopped`]. Basis: they take some
+/// Greatest number of steps between two polls of [`Task::cancel`]. Basis: they take some
 /// hundredths of a second. Doubling it doubles the time until an interrupt takes effect.
 pub const STEPS_AT_ONCE: u64 = 1 << 14;
 
@@ -38,8 +38,8 @@ impl<T: Lane> SegmentClock<T> {
 #[derive(Clone, Copy, Default)]
 struct FixedProgress {
     is_active: bool,
-    total: u64,
-    left: u64,
+    total_steps: u64,
+    remaining_steps: u64,
 }
 
 /// The current segments of the lanes.
@@ -48,7 +48,7 @@ pub(crate) struct FixedSegments<T> {
     /// The number of steps made in the segment.
     pub(crate) index: N<T>,
     lanes: [FixedProgress; MAX_LANES],
-    ended: [Option<SegmentEnd>; MAX_LANES],
+    segment_ends: [Option<SegmentEnd>; MAX_LANES],
 }
 
 impl<T: Lane> FixedSegments<T> {
@@ -59,13 +59,13 @@ impl<T: Lane> FixedSegments<T> {
             clock: SegmentClock { start: zero, end: zero, h: zero, total: zero },
             index: zero,
             lanes: [FixedProgress::default(); MAX_LANES],
-            ended: [Some(SegmentEnd::Idle); MAX_LANES],
+            segment_ends: [Some(SegmentEnd::Idle); MAX_LANES],
         }
     }
 
     /// Requests the next segment for every lane whose segment has ended. Returns the number of
     /// steps that all lanes can make before one of them is at its end, or before
-    /// [`Task::is_stopped`] is called next; `None` if the task is stopped or no lane has a segment.
+    /// [`Task::cancel`] is polled next; `None` if the task is stopped or no lane has a segment.
     #[inline(always)]
     pub(crate) fn start_pending_lanes<const D: usize, P: Task<T, D>>(
         &mut self,
@@ -73,11 +73,14 @@ impl<T: Lane> FixedSegments<T> {
         x: &mut [N<T>; D],
     ) -> Option<u64> {
         for lane in 0..T::LANES {
-            let Some(end) = self.ended[lane].take() else { continue };
+            let Some(end) = self.segment_ends[lane].take() else { continue };
             let segment = task.next_segment(lane, end, x);
             let steps = segment.as_ref().map_or(0, fixed_steps);
-            self.lanes[lane] =
-                FixedProgress { is_active: segment.is_some(), total: steps, left: steps };
+            self.lanes[lane] = FixedProgress {
+                is_active: segment.is_some(),
+                total_steps: steps,
+                remaining_steps: steps,
+            };
             let (from, to) = segment.map_or((0.0, 0.0), |segment| (segment.start_s, segment.end_s));
             self.clock.start.0.set(lane, from);
             self.clock.end.0.set(lane, to);
@@ -89,36 +92,37 @@ impl<T: Lane> FixedSegments<T> {
             return None;
         }
         let active = self.lanes[..T::LANES].iter().filter(|lane| lane.is_active);
-        active.map(|lane| lane.left.min(STEPS_AT_ONCE)).min()
+        active.map(|lane| lane.remaining_steps.min(STEPS_AT_ONCE)).min()
     }
 
-    /// Ends the segments of lanes that are out of range at `time`, `done` steps after the last call
-    /// of [`Self::start_pending_lanes`]. Returns whether there are any.
+    /// Ends the segments of lanes that are out of range at `time`, `new_steps` steps after the last
+    /// call of [`Self::start_pending_lanes`]. Returns whether there are any.
     #[inline(always)]
-    pub(crate) fn fail(&mut self, in_range: T::Mask, time: N<T>, done: u64) -> bool {
+    pub(crate) fn fail(&mut self, in_range: T::Mask, time: N<T>, new_steps: u64) -> bool {
         let out = !T::bits(in_range);
         for lane in (0..T::LANES).filter(|lane| self.lanes[*lane].is_active && out >> lane & 1 == 1)
         {
-            let made = self.lanes[lane].total - self.lanes[lane].left + done;
-            self.ended[lane] = Some(SegmentEnd::Failed {
+            let accepted_steps =
+                self.lanes[lane].total_steps - self.lanes[lane].remaining_steps + new_steps;
+            self.segment_ends[lane] = Some(SegmentEnd::Failed {
                 reason: Failure::Diverged,
                 time_s: time.0.get(lane),
-                count: Count { accepted: made, rejected: 0 },
+                count: StepCount { accepted: accepted_steps, rejected: 0 },
             });
         }
-        self.ended.iter().any(Option::is_some)
+        self.segment_ends.iter().any(Option::is_some)
     }
 
-    /// Counts `done` steps of every lane, and ends the segments that are completed.
+    /// Counts `new_steps` steps of every lane, and ends the segments that are completed.
     #[inline(always)]
-    pub(crate) fn count_steps(&mut self, done: u64) {
+    pub(crate) fn count_steps(&mut self, new_steps: u64) {
         for lane in 0..T::LANES {
             let progress = &mut self.lanes[lane];
             if progress.is_active {
-                progress.left -= done;
-                if progress.left == 0 && self.ended[lane].is_none() {
-                    self.ended[lane] = Some(SegmentEnd::Completed(Count {
-                        accepted: progress.total,
+                progress.remaining_steps -= new_steps;
+                if progress.remaining_steps == 0 && self.segment_ends[lane].is_none() {
+                    self.segment_ends[lane] = Some(SegmentEnd::Completed(StepCount {
+                        accepted: progress.total_steps,
                         rejected: 0,
                     }));
                 }

@@ -34,16 +34,16 @@ pub trait Lane: Real {
     /// Runs work over lanes of this type as a separate function, compiled once for all callers with
     /// the type's instructions.
     #[inline(always)]
-    fn aside<W: Aside>(self, work: W) -> W::Output {
-        out_of_line(work)
+    fn run_out_of_line<W: OutOfLine>(self, work: W) -> W::Output {
+        call_out_of_line(work)
     }
 }
 
 /// Work over lanes of one type that is compiled once, as a separate function instead of inline in
 /// each caller. It suits long code that runs rarely, because the time to compile a function grows
-/// faster than its length. [`Lane::aside`] runs it in lanes,
+/// faster than its length. [`Lane::run_out_of_line`] runs it in lanes,
 /// [`Simd::one_lane`](crate::Simd::one_lane) in a single one.
-pub trait Aside {
+pub trait OutOfLine {
     /// The result of the work.
     type Output;
     /// Does the work. Mark it `#[inline(always)]`, like [`Kernel::run`](crate::Kernel::run).
@@ -52,6 +52,6 @@ pub trait Aside {
 
 /// Runs work without instructions beyond the target's.
 #[inline(never)]
-pub(crate) fn out_of_line<W: Aside>(work: W) -> W::Output {
+pub(crate) fn call_out_of_line<W: OutOfLine>(work: W) -> W::Output {
     work.run()
 }

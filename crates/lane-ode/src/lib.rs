@@ -127,10 +127,10 @@ pub mod dop853;
 pub mod dopri5;
 mod dual;
 mod fixed;
+mod interval_peaks;
 mod lane;
 mod linear_solve;
 mod num;
-mod part_peaks;
 mod partials;
 mod peaks;
 mod quintic;
@@ -153,17 +153,19 @@ pub use cancel::Cancel;
 pub use control::Tolerance;
 pub use dual::Dual;
 pub use fixed::STEPS_AT_ONCE;
-pub use lane::{Aside, Lane, MAX_LANES};
+pub use interval_peaks::IntervalPeaks;
+pub use lane::{Lane, MAX_LANES, OutOfLine};
 pub use linear_solve::Lu;
 pub use num::{N, Product};
-pub use part_peaks::PartPeaks;
 pub use partials::Partials;
 pub use peaks::Peaks;
 pub use quintic::Sample;
 pub use real::Real;
 pub use simd::{Kernel, Simd, UnsupportedProcessor};
 pub use squares::SquareIntegrals;
-pub use system::{Count, Failure, Forcing, Segment, SegmentEnd, SemiImplicit, Step, System, Task};
+pub use system::{
+    Failure, Forcing, ObservedStep, Segment, SegmentEnd, SemiImplicit, StepCount, System, Task,
+};
 pub use time_above::TimeAbove;
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ impl<const C: usize> Partials<C> {
     ) {
         const { assert!(D == 2 * C, "a state is the coordinates and their speeds") };
         let zero = N(zero);
-        let forcing = system.forcing_aside(zero.lit(t_s).constant());
+        let forcing = system.forcing_out_of_line(zero.lit(t_s).constant());
         let mut constant = [zero.constant(); D];
         for i in 0..D {
             constant[i] = zero.lit(x[i].0).constant();
@@ -45,7 +45,7 @@ impl<const C: usize> Partials<C> {
             for lane in 0..T::LANES.min(D - first) {
                 seeded[first + lane].0.slope.set(lane, 1.0);
             }
-            let slopes = system.derivative_aside(&forcing, &seeded);
+            let slopes = system.derivative_out_of_line(&forcing, &seeded);
             for i in 0..C {
                 let slope = slopes[C + i].0.slope;
                 for lane in 0..T::LANES.min(D - first) {

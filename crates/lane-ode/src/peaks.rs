@@ -12,14 +12,14 @@ use crate::{Lane, N, Sample};
 #[derive(Clone, Copy, Debug)]
 pub struct Peaks<T, const M: usize> {
     peak: [N<T>; M],
-    pub(crate) last: [Sample<T>; M],
+    pub(crate) last_samples: [Sample<T>; M],
 }
 
 impl<T: Lane, const M: usize> Peaks<T, M> {
     /// Creates peaks without samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
-        Self { peak: [zero; M], last: [Sample::still(zero, zero); M] }
+        Self { peak: [zero; M], last_samples: [Sample::still(zero, zero); M] }
     }
 
     /// Resets one lane.
@@ -38,9 +38,9 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     #[inline(always)]
     pub fn begin(&mut self, samples: &[Sample<T>; M], counts: T::Mask) {
         for i in 0..M {
-            self.raise(i, samples[i].value.abs(), counts);
+            self.raise_peak(i, samples[i].value.abs(), counts);
         }
-        self.last = *samples;
+        self.last_samples = *samples;
     }
 
     /// Adds the samples at the end of a step of `length_s` that began at the samples before, in the
@@ -52,9 +52,9 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         let mut highest = zero;
         let mut rises = [zero; M];
         for i in 0..M {
-            let last = self.last[i];
+            let last = self.last_samples[i];
             let now = &samples[i];
-            self.raise(i, now.value.abs(), counts);
+            self.raise_peak(i, now.value.abs(), counts);
             // The height of the control polygon above the peak.
             let polygon = (last.value + third * last.slope)
                 .abs()
@@ -67,13 +67,14 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
             for i in 0..M {
                 let rise = N(T::select(counts, rises[i].0, zero.0));
                 if T::bits(zero.0.less(rise.0)) != 0 {
-                    let inside = Quintic::new(length_s, &self.last[i], &samples[i]).extremum();
+                    let inside =
+                        Quintic::new(length_s, &self.last_samples[i], &samples[i]).extremum();
                     let inside = zero.where_less(rise, inside.abs(), zero);
                     self.peak[i] = N(inside.0.larger(self.peak[i].0));
                 }
             }
         }
-        self.last = *samples;
+        self.last_samples = *samples;
     }
 
     /// Adds samples as [`Peaks::advance`] does, for outputs whose curvatures are not known. A step
@@ -82,13 +83,13 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     pub fn advance_by_slopes(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let mut samples = *samples;
         for i in 0..M {
-            Sample::curve_as_cubic(length_s, &mut self.last[i], &mut samples[i]);
+            Sample::curve_as_cubic(length_s, &mut self.last_samples[i], &mut samples[i]);
         }
         self.advance(length_s, &samples, counts);
     }
 
     #[inline(always)]
-    fn raise(&mut self, i: usize, size: N<T>, counts: T::Mask) {
+    fn raise_peak(&mut self, i: usize, size: N<T>, counts: T::Mask) {
         let raised = size.0.larger(self.peak[i].0);
         self.peak[i] = N(T::select(counts, raised, self.peak[i].0));
     }

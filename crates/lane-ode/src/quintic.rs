@@ -76,18 +76,18 @@ impl<T: Lane> Quintic<T> {
     /// Returns the value where the slope vanishes, or at an end if it does not.
     #[inline(always)]
     pub(crate) fn extremum(&self) -> N<T> {
-        self.value(self.extremum_at())
+        self.value(self.extremum_position())
     }
 
     /// Finds the s at which the slope vanishes, by Newton's method from the zero of a linear slope.
     /// Returns an end if there is none.
     #[inline(always)]
-    pub(crate) fn extremum_at(&self) -> N<T> {
+    pub(crate) fn extremum_position(&self) -> N<T> {
         let c = &self.c;
         let slope_end = c[1] + 2.0 * c[2] + 3.0 * c[3] + 4.0 * c[4] + 5.0 * c[5];
-        let mut s = within_step(c[1] / (c[1] - slope_end));
+        let mut s = clamp_to_step(c[1] / (c[1] - slope_end));
         for _ in 0..4 {
-            s = within_step(s - self.slope(s) / self.curvature(s));
+            s = clamp_to_step(s - self.slope(s) / self.curvature(s));
         }
         s
     }
@@ -126,7 +126,7 @@ impl<T: Lane> Quintic<T> {
 
 /// Clamps s to the range from 0 to 1; NaN becomes 1.
 #[inline(always)]
-pub(crate) fn within_step<T: Lane>(s: N<T>) -> N<T> {
+pub(crate) fn clamp_to_step<T: Lane>(s: N<T>) -> N<T> {
     let s = s.where_less(s.lit(1.0), s, s.lit(1.0));
     s.lit(0.0).where_less(s, s, s.lit(0.0))
 }

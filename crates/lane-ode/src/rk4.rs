@@ -4,7 +4,7 @@
 //! Ordinary Differential Equations I, Table II.1.2.
 
 use crate::fixed::FixedSegments;
-use crate::{Lane, N, Step, System as _, Task};
+use crate::{Lane, N, ObservedStep, System as _, Task};
 use core::hint::black_box;
 
 /// The limit of stability on the imaginary axis: the method is stable up to |h w| = 2 sqrt(2).
@@ -29,15 +29,15 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         // The forcing at the step's start, then at its middle, then at its end, which is the start
         // of the next step. The compiler must not see through the call, or it keeps the forcing in
         // variables and copies all of them in every step.
-        let mut forcing = task.system().forcing_aside(time);
+        let mut forcing = task.system().forcing_out_of_line(time);
         let forcing = black_box(&mut forcing);
         // The states and slopes at the start of this step and of the last one, which swap places,
         // and the states of two stages. They are in one array, so that their addresses need no
         // further registers, and few, so that they fit in the first cache.
         let mut states = [x; 4];
         let mut slopes = [x; 2];
-        let mut now = 0;
-        let mut last = 1;
+        let mut current = 0;
+        let mut previous = 1;
         let mut is_fresh = true;
         let mut done = 0;
         loop {
@@ -47,49 +47,51 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             let next_time = clock.at(index + 1.0);
             // The state at the last step's start is free once this step has been observed.
             let second = 2;
-            let third = last;
+            let third = previous;
             let fourth = 3;
             // The stages are a loop, because four copies of the right-hand side do not fit in the
             // instruction cache.
-            let from = [now, second, third, fourth];
+            let stage_inputs = [current, second, third, fourth];
             for stage in 0..4 {
                 if stage % 2 == 1 {
-                    task.system()
-                        .renew(if stage == 1 { clock.at(index + 0.5) } else { next_time }, forcing);
+                    task.system().update_forcing(
+                        if stage == 1 { clock.at(index + 0.5) } else { next_time },
+                        forcing,
+                    );
                 }
-                let slope = task.system().derivative(forcing, &states[from[stage]]);
+                let slope = task.system().derivative(forcing, &states[stage_inputs[stage]]);
                 if stage == 3 {
                     // x + h (k1 + 2 k2 + 2 k3 + k4) / 6, with h k1 to h k3 from the later stages'
                     // states. No sum of slopes is stored, because stores are the bottleneck of this
                     // loop.
                     for i in 0..D {
-                        let x = states[now][i];
+                        let x = states[current][i];
                         let moved = states[second][i] + states[fourth][i] + 2.0 * states[third][i]
                             - 4.0 * x;
-                        states[last][i] = x + one_third * moved + h_sixth * slope[i];
+                        states[previous][i] = x + one_third * moved + h_sixth * slope[i];
                     }
                     break;
                 }
-                let to = [second, third, fourth][stage];
-                let reach = (h * A[stage]).v();
+                let stage_output = [second, third, fourth][stage];
+                let a_step = (h * A[stage]).v();
                 for i in 0..D {
-                    states[to][i] = states[now][i] + reach * slope[i];
+                    states[stage_output][i] = states[current][i] + a_step * slope[i];
                 }
                 if stage == 0 {
-                    slopes[now] = slope;
+                    slopes[current] = slope;
                     if is_fresh {
-                        task.begin(forcing, &states[now], &slopes[now]);
+                        task.begin(forcing, &states[current], &slopes[current]);
                         is_fresh = false;
                     } else {
                         task.observe(
                             forcing,
-                            &Step {
+                            &ObservedStep {
                                 end_s: time,
                                 length_s: h,
-                                before: &states[last],
-                                slope_before: &slopes[last],
-                                after: &states[now],
-                                slope_after: &slopes[now],
+                                before: &states[previous],
+                                slope_before: &slopes[previous],
+                                after: &states[current],
+                                slope_after: &slopes[current],
                                 dense: None,
                             },
                         );
@@ -102,16 +104,16 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             if is_last {
                 break;
             }
-            (now, last) = (last, now);
+            (current, previous) = (previous, current);
             index = index + 1.0;
             time = next_time;
             done += 1;
-            let in_range = task.system().in_range(&states[now]);
+            let in_range = task.system().in_range(&states[current]);
             if !T::all(in_range) && segments.fail(in_range, time, done) {
                 run = done;
             }
         }
-        x = states[now];
+        x = states[current];
         segments.index = index;
         segments.count_steps(done);
     }

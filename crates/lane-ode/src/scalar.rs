@@ -1,7 +1,7 @@
 //! `f64` as one lane.
 
 use crate::real::operations;
-use crate::{Aside, Lane, Real, Simd, trig};
+use crate::{Lane, OutOfLine, Real, Simd, trig};
 
 impl Real for f64 {
     type Mask = bool;
@@ -60,7 +60,7 @@ impl Lane for f64 {
         u32::from(mask)
     }
     #[inline(always)]
-    fn aside<W: Aside>(self, work: W) -> W::Output {
+    fn run_out_of_line<W: OutOfLine>(self, work: W) -> W::Output {
         Simd::one_lane(work)
     }
 }

@@ -3,8 +3,8 @@
 use core::fmt;
 
 #[cfg(not(target_arch = "x86_64"))]
-use crate::lane::out_of_line as one_lane;
-use crate::{Aside, Lane};
+use crate::lane::call_out_of_line as one_lane;
+use crate::{Lane, OutOfLine};
 #[cfg(target_arch = "x86_64")]
 use x86::one_lane;
 
@@ -161,7 +161,7 @@ impl Simd {
     /// # Panics
     /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].
     #[inline(always)]
-    pub fn one_lane<W: Aside>(work: W) -> W::Output {
+    pub fn one_lane<W: OutOfLine>(work: W) -> W::Output {
         one_lane(work)
     }
 
@@ -219,7 +219,7 @@ macro_rules! entry {
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod x86 {
-    use super::{Aside, Kernel};
+    use super::{Kernel, OutOfLine};
     use crate::x86::{F64x4, F64x8};
 
     entry!(avx512, Kernel, "avx2,fma,avx512f,avx512dq,avx512vl", Avx512, |kernel| {
@@ -227,7 +227,7 @@ mod x86 {
     });
     entry!(avx2, Kernel, "avx2,fma", Avx2, |kernel| kernel.run(unsafe { F64x4::first(0.0) }));
     entry!(scalar, Kernel, "avx2,fma", Avx2, |kernel| kernel.run(0.0_f64));
-    entry!(one_lane, Aside, "avx2,fma", Avx2, |work| work.run());
+    entry!(one_lane, OutOfLine, "avx2,fma", Avx2, |work| work.run());
 }
 
 #[cfg(target_arch = "aarch64")]

@@ -1,6 +1,6 @@
 //! The interface of integrators: systems, trajectories, and the steps that observers receive.
 
-use crate::{Aside, Cancel, Lane, N};
+use crate::{Cancel, Lane, N, OutOfLine};
 
 /// A first-order system x' = f(t, x) with `D` states, over lanes.
 pub trait System<T: Lane, const D: usize> {
@@ -13,18 +13,18 @@ pub trait System<T: Lane, const D: usize> {
     /// Overwrites a forcing of this system with that at another time, which is cheaper than a new
     /// one if forcings are large.
     #[inline(always)]
-    fn renew(&self, t_s: N<T>, forcing: &mut Self::Forcing) {
+    fn update_forcing(&self, t_s: N<T>, forcing: &mut Self::Forcing) {
         *forcing = self.forcing(t_s);
     }
 
     /// Computes [`Self::forcing`] as a function that all callers share, for callers that call it
     /// rarely.
     #[inline(always)]
-    fn forcing_aside(&self, t_s: N<T>) -> Self::Forcing
+    fn forcing_out_of_line(&self, t_s: N<T>) -> Self::Forcing
     where
         Self: Sized,
     {
-        t_s.0.aside(ForcingAside::<T, D, Self> { system: self, t_s })
+        t_s.0.run_out_of_line(ForcingCall::<T, D, Self> { system: self, t_s })
     }
 
     /// Computes f at state `x`.
@@ -32,11 +32,11 @@ pub trait System<T: Lane, const D: usize> {
 
     /// Computes [`Self::derivative`] as a function that all callers share.
     #[inline(always)]
-    fn derivative_aside(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D]
+    fn derivative_out_of_line(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D]
     where
         Self: Sized,
     {
-        x[0].0.aside(DerivativeAside { system: self, forcing, x })
+        x[0].0.run_out_of_line(DerivativeCall { system: self, forcing, x })
     }
 
     /// Returns the lanes whose states are in the model's range. The trajectory of a lane that
@@ -44,12 +44,12 @@ pub trait System<T: Lane, const D: usize> {
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask;
 }
 
-struct ForcingAside<'a, T, const D: usize, S> {
+struct ForcingCall<'a, T, const D: usize, S> {
     system: &'a S,
     t_s: N<T>,
 }
 
-impl<T: Lane, const D: usize, S: System<T, D>> Aside for ForcingAside<'_, T, D, S> {
+impl<T: Lane, const D: usize, S: System<T, D>> OutOfLine for ForcingCall<'_, T, D, S> {
     type Output = S::Forcing;
 
     #[inline(always)]
@@ -58,13 +58,13 @@ impl<T: Lane, const D: usize, S: System<T, D>> Aside for ForcingAside<'_, T, D, 
     }
 }
 
-struct DerivativeAside<'a, T: Lane, const D: usize, S: System<T, D>> {
+struct DerivativeCall<'a, T: Lane, const D: usize, S: System<T, D>> {
     system: &'a S,
     forcing: &'a S::Forcing,
     x: &'a [N<T>; D],
 }
 
-impl<T: Lane, const D: usize, S: System<T, D>> Aside for DerivativeAside<'_, T, D, S> {
+impl<T: Lane, const D: usize, S: System<T, D>> OutOfLine for DerivativeCall<'_, T, D, S> {
     type Output = [N<T>; D];
 
     #[inline(always)]
@@ -77,7 +77,7 @@ impl<T: Lane, const D: usize, S: System<T, D>> Aside for DerivativeAside<'_, T, 
 /// on the last argument, in which H is linear.
 pub trait SemiImplicit<T: Lane, const D: usize>: System<T, D> {
     /// Solves k = H(t, x, r + g k) for k, with `g_s` above zero.
-    fn derivative_ahead(
+    fn solve_implicit_stage(
         &self,
         forcing: &Self::Forcing,
         x: &[N<T>; D],
@@ -105,7 +105,7 @@ pub trait Task<T: Lane, const D: usize> {
     fn begin(&mut self, forcing: &Forcing<Self, T, D>, x: &[N<T>; D], dx: &[N<T>; D]);
 
     /// Receives a step of every lane, of zero length in idle lanes.
-    fn observe(&mut self, forcing: &Forcing<Self, T, D>, step: &Step<'_, T, D>);
+    fn observe(&mut self, forcing: &Forcing<Self, T, D>, step: &ObservedStep<'_, T, D>);
 
     /// Returns the cancellation of the computation, which abandons unfinished trajectories. It is
     /// polled at least every [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps, because a segment may
@@ -136,7 +136,7 @@ pub enum SegmentEnd {
     /// The lane had no segment yet.
     Idle,
     /// The segment was integrated to its end.
-    Completed(Count),
+    Completed(StepCount),
     /// The trajectory cannot be continued.
     Failed {
         /// The reason.
@@ -144,7 +144,7 @@ pub enum SegmentEnd {
         /// The time of the last valid state.
         time_s: f64,
         /// The number of steps so far.
-        count: Count,
+        count: StepCount,
     },
 }
 
@@ -161,14 +161,14 @@ pub enum Failure {
 
 /// The number of steps of one segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Count {
+pub struct StepCount {
     /// The number of accepted steps.
     pub accepted: u64,
     /// The number of rejected steps.
     pub rejected: u64,
 }
 
-impl Count {
+impl StepCount {
     /// Adds the steps of another segment.
     pub const fn add(&mut self, other: Self) {
         self.accepted += other.accepted;
@@ -177,7 +177,7 @@ impl Count {
 }
 
 /// A step with the data that an observer needs to interpolate in it.
-pub struct Step<'a, T, const D: usize> {
+pub struct ObservedStep<'a, T, const D: usize> {
     /// The time at the end.
     pub end_s: N<T>,
     /// The length; zero in an idle lane.
@@ -194,7 +194,7 @@ pub struct Step<'a, T, const D: usize> {
     pub dense: Option<&'a [N<T>; D]>,
 }
 
-impl<T: Lane, const D: usize> Step<'_, T, D> {
+impl<T: Lane, const D: usize> ObservedStep<'_, T, D> {
     /// Interpolates the state a fraction `s` (0 to 1) into the step, by the method's dense output
     /// or the cubic through both ends.
     ///

@@ -11,8 +11,8 @@ mod recorders;
 mod trig;
 
 use crate::{
-    Count, Kernel, Lane, MAX_LANES, N, Segment, SegmentEnd, SemiImplicit, Simd, Step, System, Task,
-    Tolerance, additive, dop853, dopri5, rk4,
+    Kernel, Lane, MAX_LANES, N, ObservedStep, Segment, SegmentEnd, SemiImplicit, Simd, StepCount,
+    System, Task, Tolerance, additive, dop853, dopri5, rk4,
 };
 use core::marker::PhantomData;
 
@@ -23,7 +23,7 @@ trait Equation<const D: usize, const P: usize> {
     /// Computes f.
     fn derivative<T: Lane>(p: &[N<T>; P], t_s: N<T>, x: &[N<T>; D]) -> [N<T>; D];
     /// Solves k = H(t, x, r + g k) for k, with H(t, x, x) = f(t, x). By default H is f(t, x).
-    fn derivative_ahead<T: Lane>(
+    fn solve_implicit_stage<T: Lane>(
         p: &[N<T>; P],
         t_s: N<T>,
         x: &[N<T>; D],
@@ -40,14 +40,14 @@ trait Equation<const D: usize, const P: usize> {
 
 /// A member of the family, with its start and its segments.
 #[derive(Clone, Debug)]
-struct Trajectory<const D: usize, const P: usize> {
+struct TestTrajectory<const D: usize, const P: usize> {
     parameters: [f64; P],
     start: [f64; D],
     segments: Vec<Segment>,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Method {
+enum TestMethod {
     Rk4,
     Dop853,
     Dopri5(Tolerance),
@@ -56,11 +56,11 @@ enum Method {
 
 /// The result of a trajectory.
 #[derive(Clone, Copy, Debug)]
-struct Outcome<const D: usize> {
+struct TestOutcome<const D: usize> {
     /// The end of the last segment.
     ended: SegmentEnd,
     /// The steps of all segments.
-    count: Count,
+    count: StepCount,
     /// The state at the end.
     x: [f64; D],
     /// The end of the last step that an observer received.
@@ -69,10 +69,10 @@ struct Outcome<const D: usize> {
     error_inside: f64,
 }
 
-impl<const D: usize> Outcome<D> {
+impl<const D: usize> TestOutcome<D> {
     const NONE: Self = Self {
         ended: SegmentEnd::Idle,
-        count: Count { accepted: 0, rejected: 0 },
+        count: StepCount { accepted: 0, rejected: 0 },
         x: [f64::NAN; D],
         observed_to_s: f64::NAN,
         error_inside: 0.0,
@@ -96,20 +96,20 @@ fn instruction_sets() -> Vec<Simd> {
 /// Solves every trajectory. Returns the outcomes, and the number of allocations of the integration.
 fn solve<E: Equation<D, P>, const D: usize, const P: usize>(
     simd: Simd,
-    method: Method,
-    trajectories: &[Trajectory<D, P>],
-) -> (Vec<Outcome<D>>, u64) {
-    simd.dispatch(Solve::<E, D, P> { method, trajectories, equation: PhantomData })
+    method: TestMethod,
+    trajectories: &[TestTrajectory<D, P>],
+) -> (Vec<TestOutcome<D>>, u64) {
+    simd.dispatch(SolveKernel::<E, D, P> { method, trajectories, equation: PhantomData })
 }
 
-struct Solve<'a, E, const D: usize, const P: usize> {
-    method: Method,
-    trajectories: &'a [Trajectory<D, P>],
+struct SolveKernel<'a, E, const D: usize, const P: usize> {
+    method: TestMethod,
+    trajectories: &'a [TestTrajectory<D, P>],
     equation: PhantomData<E>,
 }
 
-impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, D, P> {
-    type Output = (Vec<Outcome<D>>, u64);
+impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for SolveKernel<'_, E, D, P> {
+    type Output = (Vec<TestOutcome<D>>, u64);
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
@@ -118,13 +118,13 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, 
             trajectories: self.trajectories,
             taken: 0,
             at: [(0, 0); MAX_LANES],
-            outcomes: vec![Outcome::NONE; self.trajectories.len()],
+            outcomes: vec![TestOutcome::NONE; self.trajectories.len()],
         };
         let heap = allocation_counter::measure(|| match self.method {
-            Method::Rk4 => rk4::integrate(zero, &mut batch),
-            Method::Dop853 => dop853::integrate(zero, &mut batch),
-            Method::Dopri5(tolerance) => dopri5::integrate(zero, &mut batch, &tolerance),
-            Method::Additive(tolerance) => additive::integrate(zero, &mut batch, &tolerance),
+            TestMethod::Rk4 => rk4::integrate(zero, &mut batch),
+            TestMethod::Dop853 => dop853::integrate(zero, &mut batch),
+            TestMethod::Dopri5(tolerance) => dopri5::integrate(zero, &mut batch, &tolerance),
+            TestMethod::Additive(tolerance) => additive::integrate(zero, &mut batch, &tolerance),
         });
         (batch.outcomes, heap.count_total)
     }
@@ -133,11 +133,11 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, 
 /// A task that passes trajectories through the lanes, one after another.
 struct Batch<'a, T, E, const D: usize, const P: usize> {
     member: Member<T, E, P>,
-    trajectories: &'a [Trajectory<D, P>],
+    trajectories: &'a [TestTrajectory<D, P>],
     taken: usize,
     /// The trajectory and the segment of each lane.
     at: [(usize, usize); MAX_LANES],
-    outcomes: Vec<Outcome<D>>,
+    outcomes: Vec<TestOutcome<D>>,
 }
 
 /// The member of the family in each lane.
@@ -174,8 +174,14 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> SemiImplicit<T,
     for Member<T, E, P>
 {
     #[inline(always)]
-    fn derivative_ahead(&self, t_s: &N<T>, x: &[N<T>; D], r: &[N<T>; D], g_s: N<T>) -> [N<T>; D] {
-        E::derivative_ahead(&self.p, *t_s, x, r, g_s)
+    fn solve_implicit_stage(
+        &self,
+        t_s: &N<T>,
+        x: &[N<T>; D],
+        r: &[N<T>; D],
+        g_s: N<T>,
+    ) -> [N<T>; D] {
+        E::solve_implicit_stage(&self.p, *t_s, x, r, g_s)
     }
 }
 
@@ -221,7 +227,7 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
 
     fn begin(&mut self, _: &N<T>, _: &[N<T>; D], _: &[N<T>; D]) {}
 
-    fn observe(&mut self, _: &N<T>, step: &Step<'_, T, D>) {
+    fn observe(&mut self, _: &N<T>, step: &ObservedStep<'_, T, D>) {
         for share in [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] {
             let inside = step.at(step.length_s.lit(share));
             for lane in (0..T::LANES).filter(|&lane| step.length_s.0.get(lane) > 0.0) {
@@ -241,9 +247,9 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
 }
 
 /// A nonautonomous equation and an oscillator: x' = w x cos(w t), y' = w z, z' = -w y.
-struct Swing;
+struct SwingEquation;
 
-impl Equation<3, 1> for Swing {
+impl Equation<3, 1> for SwingEquation {
     #[inline(always)]
     fn derivative<T: Lane>(&[w]: &[N<T>; 1], t_s: N<T>, x: &[N<T>; 3]) -> [N<T>; 3] {
         let (_, cos) = (w * t_s).v().sin_cos();
@@ -253,7 +259,7 @@ impl Equation<3, 1> for Swing {
     /// The implicit part of the oscillator is w (1 + y^2), which is more than the whole frequency,
     /// so that the explicit part has the opposite sign.
     #[inline(always)]
-    fn derivative_ahead<T: Lane>(
+    fn solve_implicit_stage<T: Lane>(
         p: &[N<T>; 1],
         t_s: N<T>,
         x: &[N<T>; 3],
@@ -277,9 +283,9 @@ impl Equation<3, 1> for Swing {
 
 /// Two masses with a stiff spring between them, the first one on a soft spring: x1'' = k (x2 - x1)
 /// - x1, x2'' = k (x1 - x2). The stiff spring is implicit.
-struct Coupled;
+struct CoupledEquation;
 
-impl Equation<4, 1> for Coupled {
+impl Equation<4, 1> for CoupledEquation {
     #[inline(always)]
     fn derivative<T: Lane>(&[k]: &[N<T>; 1], _: N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
         let pull = (k * (x[1] - x[0])).v();
@@ -287,7 +293,7 @@ impl Equation<4, 1> for Coupled {
     }
 
     #[inline(always)]
-    fn derivative_ahead<T: Lane>(
+    fn solve_implicit_stage<T: Lane>(
         &[k]: &[N<T>; 1],
         _: N<T>,
         x: &[N<T>; 4],
@@ -306,7 +312,7 @@ impl Equation<4, 1> for Coupled {
     }
 }
 
-impl Trajectory<3, 1> {
+impl TestTrajectory<3, 1> {
     /// Returns a trajectory from 0 to `end_s` in `count` equal segments.
     fn swing(w: f64, end_s: f64, count: u32, step_s: f64) -> Self {
         let edge = |i: u32| end_s * f64::from(i) / f64::from(count);

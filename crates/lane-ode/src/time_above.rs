@@ -59,7 +59,7 @@ impl<T: Lane> TimeAbove<T> {
         let counted = N(T::select(counts, one.0, zero.0));
         let in_doubt = depth.where_less(zero, zero, zero.where_less(height, counted, zero));
         if T::bits(zero.0.less(in_doubt.0)) != 0 {
-            let inside = share_above(&Quintic::new(length_s, &self.last, sample));
+            let inside = positive_share(&Quintic::new(length_s, &self.last, sample));
             share = zero.where_less(in_doubt, inside, share);
         }
         self.time_s += N(T::select(counts, (share * length_s).v().0, zero.0));
@@ -78,16 +78,17 @@ impl<T: Lane> TimeAbove<T> {
 
 /// Returns the share of the step in which the polynomial is above zero.
 #[inline(always)]
-fn share_above<T: Lane>(quintic: &Quintic<T>) -> N<T> {
-    let turn = quintic.extremum_at();
+fn positive_share<T: Lane>(quintic: &Quintic<T>) -> N<T> {
+    let turn = quintic.extremum_position();
     let zero = turn.lit(0.0);
-    above_between(quintic, zero, turn) + above_between(quintic, turn, turn.lit(1.0))
+    positive_length_between(quintic, zero, turn)
+        + positive_length_between(quintic, turn, turn.lit(1.0))
 }
 
 /// Returns the length for which the polynomial is positive between two points, between which it
 /// crosses zero at most once.
 #[inline(always)]
-fn above_between<T: Lane>(quintic: &Quintic<T>, from: N<T>, to: N<T>) -> N<T> {
+fn positive_length_between<T: Lane>(quintic: &Quintic<T>, from: N<T>, to: N<T>) -> N<T> {
     let zero = from.lit(0.0);
     let at_from = quintic.value(from);
     let at_to = quintic.value(to);

@@ -34,7 +34,7 @@ const HALF_PI: [f64; 3] =
 
 /// Computes sine and cosine for |x| up to pi/4.
 #[inline(always)]
-fn within_quarter<T: Real>(x: N<T>) -> (N<T>, N<T>) {
+fn sin_cos_within_quarter<T: Real>(x: N<T>) -> (N<T>, N<T>) {
     let z = x.squared().v();
     let sin = (x * z) * polynomial(&SIN, z) + x;
     let cos = z.squared() * polynomial(&COS, z) + (1.0 - z * 0.5);
@@ -53,17 +53,20 @@ fn polynomial<T: Real>(c: &[f64; 6], z: N<T>) -> N<T> {
 
 /// Rotates sine and cosine of an angle in quadrant 0 by `quadrant` (an integer) quarter turns.
 #[inline(always)]
-fn turned_on<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<T>, N<T>) {
+fn rotate_by_quarter_turns<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<T>, N<T>) {
     // The quadrant as a fraction of a turn: 0, 0.25, 0.5 or 0.75. A multiple of 1/4 less 3/8 rounds
     // to its floor.
     let quarter = (quadrant * 0.25).v();
     let part = quarter - N((quarter - 0.375).0.round());
-    (by_quadrant(part, [sin, cos, -sin, -cos]), by_quadrant(part, [cos, -sin, -cos, sin]))
+    (
+        select_by_quadrant(part, [sin, cos, -sin, -cos]),
+        select_by_quadrant(part, [cos, -sin, -cos, sin]),
+    )
 }
 
 /// Selects the value of the quadrant that `part` (0, 0.25, 0.5 or 0.75 of a turn) stands for.
 #[inline(always)]
-fn by_quadrant<T: Real>(part: N<T>, values: [N<T>; 4]) -> N<T> {
+fn select_by_quadrant<T: Real>(part: N<T>, values: [N<T>; 4]) -> N<T> {
     let upper = part.where_less(part.lit(0.625), values[2], values[3]);
     let lower = part.where_less(part.lit(0.125), values[0], values[1]);
     part.where_less(part.lit(0.375), lower, upper)
@@ -73,10 +76,10 @@ fn by_quadrant<T: Real>(part: N<T>, values: [N<T>; 4]) -> N<T> {
 #[inline(always)]
 pub(crate) fn sin_cos<T: Lane>(x: T) -> (T, T) {
     if T::all(x.abs().less(x.lit(FRAC_PI_4))) {
-        let (sin, cos) = within_quarter(N(x));
+        let (sin, cos) = sin_cos_within_quarter(N(x));
         return (sin.0, cos.0);
     }
-    wide(x)
+    sin_cos_by_lanes(x)
 }
 
 /// Computes sine and cosine lane by lane, out of line, so that the common path stays short. An
@@ -84,7 +87,7 @@ pub(crate) fn sin_cos<T: Lane>(x: T) -> (T, T) {
 /// depend on the others.
 #[cold]
 #[inline(never)]
-fn wide<T: Lane>(x: T) -> (T, T) {
+fn sin_cos_by_lanes<T: Lane>(x: T) -> (T, T) {
     let mut sin = x;
     let mut cos = x;
     for i in 0..T::LANES {
@@ -92,8 +95,8 @@ fn wide<T: Lane>(x: T) -> (T, T) {
         let quadrant = N((x * core::f64::consts::FRAC_2_PI).v().0.round());
         // The first difference is exact: both terms are multiples of 2^-53 and it is below 1.
         let reduced = ((x - quadrant * HALF_PI[0]) - quadrant * HALF_PI[1]) - quadrant * HALF_PI[2];
-        let (s, c) = within_quarter(reduced);
-        let (s, c) = turned_on(quadrant, s, c);
+        let (s, c) = sin_cos_within_quarter(reduced);
+        let (s, c) = rotate_by_quarter_turns(quadrant, s, c);
         sin.set(i, s.0);
         cos.set(i, c.0);
     }
@@ -106,6 +109,6 @@ pub fn sin_cos_turns<T: Lane>(turns: N<T>) -> (N<T>, N<T>) {
     let part = turns - N(turns.0.round());
     let quadrant = N((part * 4.0).v().0.round());
     let rest = part - quadrant * 0.25;
-    let (sin, cos) = within_quarter((rest * core::f64::consts::TAU).v());
-    turned_on(quadrant, sin, cos)
+    let (sin, cos) = sin_cos_within_quarter((rest * core::f64::consts::TAU).v());
+    rotate_by_quarter_turns(quadrant, sin, cos)
 }

@@ -92,10 +92,10 @@ macro_rules! vector {
                 $bits
             }
             #[inline(always)]
-            fn aside<W: $crate::Aside>(self, work: W) -> W::Output {
+            fn run_out_of_line<W: $crate::OutOfLine>(self, work: W) -> W::Output {
                 #[inline(never)]
                 #[target_feature(enable = $features)]
-                fn inner<W: $crate::Aside>(work: W) -> W::Output {
+                fn inner<W: $crate::OutOfLine>(work: W) -> W::Output {
                     work.run()
                 }
                 // SAFETY: as in `lit`.

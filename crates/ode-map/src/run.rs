@@ -3,8 +3,8 @@
 use std::marker::PhantomData;
 
 use lane_ode::{
-    Cancel, Forcing, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd, Simd, Step,
-    Task, Tolerance, dopri5, rk4,
+    Cancel, Forcing, Kernel, Lane, MAX_LANES, N, ObservedStep, Peaks, Sample, Segment, SegmentEnd,
+    Simd, Task, Tolerance, dopri5, rk4,
 };
 
 use crate::Oscillator;
@@ -199,7 +199,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
     }
 
     #[inline(always)]
-    fn observe(&mut self, _: &Forcing<Self, T, D>, step: &Step<'_, T, D>) {
+    fn observe(&mut self, _: &Forcing<Self, T, D>, step: &ObservedStep<'_, T, D>) {
         let (samples, counts) = (self.samples(step.after, step.slope_after), self.counts());
         self.peaks.advance(step.length_s, &samples, counts);
     }

@@ -79,8 +79,8 @@ impl<'a> CachedEvaluator<'a> {
 
     /// Evaluates requests, each identified by its key and covering `rows` points.
     ///
-    /// `axis_values` returns the values of the axes at a point of a request. `respond` reduces the
-    /// results of a request's points, in order, to its response.
+    /// `axis_values` returns the values of the axes at a point of a request. `find_responses`
+    /// reduces the results of a request's points, in order, to its response.
     ///
     /// # Errors
     /// Any [`Stopped`].

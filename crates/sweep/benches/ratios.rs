@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use lane_ode::{Cancel, Simd};
 use washer_model::{
-    BumpStop, Bushing, Dwell, Machine, Method, ModelKind, Point, Profile, Spin, Starts,
-    StepSelector, Timing, capped_method, find_endings, prepare, respond, simulate,
+    BumpStop, Bushing, HeldSpeed, Machine, Method, ModelKind, Point, Profile, Spin, StartRule,
+    StepSelector, Timing, capped_method, find_attractors, find_responses, prepare, simulate,
 };
 
 /// Number of trajectories of a kernel. Basis: the number of lanes of AVX-512. Doubling it takes two
@@ -247,12 +247,12 @@ fn dwells(rounds: usize, pair_s: f64) {
     let point = prepare(Simd::best(), &[(machine, spin)], &timing)
         .remove(0)
         .expect("the paper's machine has an equilibrium");
-    let dwells: Vec<Dwell<'_>> =
-        (0..=140).map(|k| Dwell { point: &point, speed_rpm: 210.0 + f64::from(k) }).collect();
+    let dwells: Vec<HeldSpeed<'_>> =
+        (0..=140).map(|k| HeldSpeed { point: &point, speed_rpm: 210.0 + f64::from(k) }).collect();
     let mut times = vec![Vec::new()];
     for _ in 0..rounds {
         let begin = Instant::now();
-        let found = respond(&dwells, Cancel::Never);
+        let found = find_responses(&dwells, Cancel::Never);
         times[0].push(begin.elapsed().as_secs_f64() * 1e3 / dwells.len() as f64);
         assert!(found.iter().all(Result::is_ok));
     }
@@ -282,11 +282,11 @@ fn motions(rounds: usize) {
         points.expect("the paper's machine has an equilibrium")
     };
     let dwell = prepare_points(1.0);
-    let dwells = [Dwell { point: &dwell[0], speed_rpm: SPEED_RPM }];
-    let starts = Starts { count: TRAJECTORIES, longest_s: 100.0, ..Starts::default() };
-    let find = || find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0);
+    let dwells = [HeldSpeed { point: &dwell[0], speed_rpm: SPEED_RPM }];
+    let starts = StartRule { count: TRAJECTORIES, max_time_s: 100.0, ..StartRule::default() };
+    let find = || find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0);
     // The time is a whole number of windows.
-    let followed_s = find().map(|found| found.motions[0].time_s).expect("it has motions");
+    let followed_s = find().map(|found| found.attractors[0].time_s).expect("it has motions");
     let as_many = prepare_points(followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN * STEP_S);
     let as_long = prepare_points(followed_s);
     let integrate = |points: &[Point]| {
@@ -299,7 +299,7 @@ fn motions(rounds: usize) {
     for _ in 0..rounds {
         let works: [&dyn Fn(); 4] = [
             &|| assert!(find().is_ok()),
-            &|| assert!(respond(&dwells, Cancel::Never)[0].is_ok()),
+            &|| assert!(find_responses(&dwells, Cancel::Never)[0].is_ok()),
             &|| integrate(&as_many),
             &|| integrate(&as_long),
         ];

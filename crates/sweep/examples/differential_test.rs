@@ -296,7 +296,7 @@ fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
     let weight_n = moving_kg * machine.gravity_m_per_s2;
     let metrics = models.iter().flat_map(|(model, a, b)| {
-        plan.model.measures.per_model().zip(a.metrics.iter().zip(&b.metrics)).map(
+        plan.model.measures.model_columns().zip(a.metrics.iter().zip(&b.metrics)).map(
             |(number, (a, b))| {
                 let least = number.metric.scale(plan.window_s, weight_n);
                 (number.column(model), relative_from(least, *a, *b))

@@ -7,10 +7,10 @@ use sweep_engine::columns::{
 };
 use sweep_engine::store::{Column, Done, Holds};
 use sweep_parameter::{Limit, RatioLimits, Worse};
-use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, ModeMotion};
+use washer_model::{Attractor, Channel, Disturbance, GeometryLimit, ModeMotion, StabilityKind};
 use washer_row::{
-    DwellPeaks, GrowingMode, Growth, Level, Measures, Metric, MetricFacts, Outcome, ROW_STATUSES,
-    Trajectory, Verdict, row_status,
+    DwellPeaks, GrowingMode, Growth, Level, Measures, Metric, MetricProperties, Outcome,
+    ROW_STATUSES, Trajectory, Verdict, row_status,
 };
 
 use crate::model::described;
@@ -56,8 +56,8 @@ impl Columns {
         let mut columns = amplitude_columns(
             &descriptions(channels),
             limits,
-            criterion.amplitude(),
-            criterion.ratio(),
+            criterion.amplitude_description(),
+            criterion.ratio_description(),
         );
         columns.extend(washer_verdict_columns(channels, limits));
         columns.extend(gap_columns());
@@ -145,7 +145,7 @@ fn metric_columns(channels: &[Channel], measures: &Measures) -> Vec<WasherColumn
             Metric::Dwell => columns.extend(dwell_columns(channels)),
             Metric::StaticSag => {
                 let sag_m = |row: &ResultRow| row.outcome.static_sag_m;
-                let text = metric.facts().description;
+                let text = metric.properties().description;
                 columns.push(metric_column(metric, metric.column(""), text, sag_m));
             }
             _ => {
@@ -173,12 +173,12 @@ fn metric_column(
     text: impl Into<String>,
     value: impl Fn(&ResultRow) -> Option<f64> + Send + Sync + 'static,
 ) -> WasherColumn {
-    with_limit(metric, ResultColumn::measured(name, metric.facts().unit, text, value))
+    with_limit(metric, ResultColumn::measured(name, metric.properties().unit, text, value))
 }
 
 /// Returns a column with the bad direction and the limit of a metric.
 fn with_limit(metric: Metric, column: WasherColumn) -> WasherColumn {
-    let MetricFacts { worse, limit, .. } = metric.facts();
+    let MetricProperties { worse, limit, .. } = metric.properties();
     let column = column.worse(worse);
     match limit {
         Some(Limit { value, scale }) => column.limit(value, scale),
@@ -188,10 +188,10 @@ fn with_limit(metric: Metric, column: WasherColumn) -> WasherColumn {
 
 /// Returns the columns of the largest deviations of attractors at the plan's held speeds.
 fn dwell_columns(channels: &[Channel]) -> Vec<WasherColumn> {
-    let peaks = |row: &ResultRow| -> Option<DwellPeaks> { row.outcome.dwelt };
+    let peaks = |row: &ResultRow| -> Option<DwellPeaks> { row.outcome.dwell_peaks };
     let mut columns = Vec::new();
     for &channel in channels {
-        let text = format!("{}: {}", channel.description(), Metric::Dwell.facts().description);
+        let text = format!("{}: {}", channel.description(), Metric::Dwell.properties().description);
         let name = format!("dwell_{}", channel.name());
         let deviation = move |row: &ResultRow| Some(peaks(row)?.deviations[channel.index()]);
         let column = ResultColumn::measured(name, channel.unit(), text, deviation);
@@ -203,7 +203,7 @@ fn dwell_columns(channels: &[Channel]) -> Vec<WasherColumn> {
     let text = "what that motion is, as in a file of `sweep dwell`, or that it left the model's \
                 range or did not settle";
     let kind = move |row: &ResultRow| Some(peaks(row)?.kind);
-    columns.push(ResultColumn::name("dwell_kind", text, Ending::KIND_NAMES.to_vec(), kind));
+    columns.push(ResultColumn::name("dwell_kind", text, Attractor::KIND_NAMES.to_vec(), kind));
     columns
 }
 
@@ -260,7 +260,7 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
             "other_frequency_cpm",
             "1/min",
             "the speed less frequency_cpm",
-            Disturbance::other_frequency_cpm,
+            Disturbance::complementary_frequency_cpm,
         ),
         (
             "multiplier_re",
@@ -275,17 +275,17 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
         let name =
             if name.starts_with(prefix) { name.to_owned() } else { format!("{prefix}{name}") };
         let column = ResultColumn::measured(name, unit, text, value);
-        let is_growth = unit == Metric::Growth.facts().unit;
+        let is_growth = unit == Metric::Growth.properties().unit;
         columns.push(if is_growth { with_limit(Metric::Growth, column) } else { column });
     }
     let kind = |row: &ResultRow| Some(growth(row)?.fastest.kind());
     let kind_index = move |row: &ResultRow| Some(kind(row)? as usize);
     let text =
         "what a disturbance turns the response into: stable, period_doubling, quasi_periodic, fold";
-    let names = Kind::ALL.map(Kind::name).to_vec();
+    let names = StabilityKind::ALL.map(StabilityKind::name).to_vec();
     columns.push(ResultColumn::name(format!("{prefix}kind"), text, names, kind_index));
     if !in_map {
-        let stable = move |row: &ResultRow| Some(kind(row)? == Kind::Stable);
+        let stable = move |row: &ResultRow| Some(kind(row)? == StabilityKind::Stable);
         let text = "true where every disturbance decays";
         columns.push(ResultColumn::flag("stable", text, stable));
     }
@@ -319,13 +319,13 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     let end = |name: &str, side: &str, index: usize| {
         let text =
             format!("speed of the fold {side} which the branch is not; null where it has none");
-        let fold_rpm = move |row: &ResultRow| growth(row)?.between_rpm[index];
+        let fold_rpm = move |row: &ResultRow| growth(row)?.fold_speeds_rpm[index];
         ResultColumn::measured(format!("{prefix}branch_{name}_rpm"), "rpm", text, fold_rpm)
     };
     let limits = "what of the machine's geometry the response passes, and so is no motion of the \
                   machine: spring_hooks, damper_ends, clearance; null where nothing";
-    let beyond = |row: &ResultRow| Some(growth(row)?.beyond? as usize);
-    let names = Beyond::ALL.map(Beyond::name).to_vec();
+    let beyond = |row: &ResultRow| Some(growth(row)?.exceeded_limit? as usize);
+    let names = GeometryLimit::ALL.map(GeometryLimit::name).to_vec();
     [
         ResultColumn::new(format!("{prefix}branch"), "1", folds, kind, branch),
         end("from", "below", 0),

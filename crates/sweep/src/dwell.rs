@@ -11,7 +11,7 @@ use std::sync::Arc;
 use lane_ode::{Cancel, Simd};
 use serde_json::{Value, json};
 use sweep_parameter::named;
-use washer_model::{Dwell, Endings, Gauge, Recorders, Starts, State, decimal};
+use washer_model::{AttractorStatus, Attractors, Gauge, HeldSpeed, Recorders, StartRule, decimal};
 use washer_row::Status;
 
 use crate::engine::{Carried, find_motions};
@@ -89,17 +89,17 @@ pub struct AttractorSearch {
 impl fmt::Display for AttractorSearch {
     /// Writes the options that differ from the defaults, as on a command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let usual = Starts::default();
+        let usual = StartRule::default();
         if let Some(carry) = self.carry {
             write!(f, " --carry {}", carry.name())?;
         }
         if self.starts != usual.count as u64 {
             write!(f, " --starts {}", self.starts)?;
         }
-        if self.kick != usual.kick_rad_per_s {
+        if self.kick != usual.max_kick_rad_per_s {
             write!(f, " --kick {}", decimal(self.kick))?;
         }
-        if self.longest != usual.longest_s {
+        if self.longest != usual.max_time_s {
             write!(f, " --longest {}", decimal(self.longest))?;
         }
         if self.sections > 0 {
@@ -167,7 +167,7 @@ impl AttractorSearch {
 /// The search for attractors, prepared for the rows of a plan.
 pub(crate) struct AttractorEngine {
     search: AttractorSearch,
-    starts: Starts,
+    starts: StartRule,
     columns: Vec<DwellColumn>,
 }
 
@@ -177,12 +177,12 @@ impl AttractorEngine {
         let Recorders { mut gauges, .. } = plan.model.measures.recorders();
         gauges[Gauge::ClashTime as usize] = false;
         let wanted = Recorders { gauges, ..Recorders::default() };
-        let starts = Starts {
+        let starts = StartRule {
             count: if search.carry.is_some() { 1 } else { search.starts as usize },
-            kick_rad_per_s: search.kick,
-            longest_s: search.longest,
+            max_kick_rad_per_s: search.kick,
+            max_time_s: search.longest,
             with_threshold: search.threshold,
-            wanted,
+            recorders: wanted,
         };
         Self { search, starts, columns: search.row_columns(plan) }
     }
@@ -209,13 +209,13 @@ impl AttractorEngine {
         &self,
         simd: Simd,
         speeds_rpm: &[f64],
-        requested: &[(u64, Dwell<'_>)],
+        requested: &[(u64, HeldSpeed<'_>)],
         keep: &dyn Fn(Done),
         context: &RunContext<'_>,
     ) {
         let is_stopped = || context.stopped();
         let Some(carry) = self.search.carry else {
-            let dwells: Vec<(Dwell<'_>, Carried)> =
+            let dwells: Vec<(HeldSpeed<'_>, Carried)> =
                 requested.iter().map(|(_, dwell)| (*dwell, None)).collect();
             let found = find_motions(simd, &dwells, &self.starts, Cancel::When(&is_stopped));
             for ((row, _), found) in requested.iter().zip(found) {
@@ -224,13 +224,13 @@ impl AttractorEngine {
             return;
         };
         let speeds = speeds_rpm.len() as u64;
-        let groups: Vec<&[(u64, Dwell<'_>)]> =
+        let groups: Vec<&[(u64, HeldSpeed<'_>)]> =
             requested.chunk_by(|a, b| a.0 / speeds == b.0 / speeds).collect();
         let mut carried: Vec<Carried> = vec![None; groups.len()];
         for step in 0..speeds {
             let position = if carry == Carry::Up { step } else { speeds - 1 - step };
             // The speeds before the first requested row are needed for its start.
-            let is_at_or_after = |(row, _): &(u64, Dwell<'_>)| match carry {
+            let is_at_or_after = |(row, _): &(u64, HeldSpeed<'_>)| match carry {
                 Carry::Up => row % speeds >= position,
                 Carry::Down => row % speeds <= position,
             };
@@ -245,9 +245,9 @@ impl AttractorEngine {
             }
             let dwell = |k: &usize| {
                 let speed_rpm = speeds_rpm[position as usize];
-                (Dwell { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
+                (HeldSpeed { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
             };
-            let dwells: Vec<(Dwell<'_>, Carried)> = needed.iter().map(dwell).collect();
+            let dwells: Vec<(HeldSpeed<'_>, Carried)> = needed.iter().map(dwell).collect();
             let found = find_motions(simd, &dwells, &self.starts, Cancel::When(&is_stopped));
             if is_stopped() {
                 return;
@@ -262,19 +262,19 @@ impl AttractorEngine {
     }
 
     /// Returns the rows of the motions of a point at a speed.
-    fn found_rows(&self, number: u64, found: Result<Endings, Status>) -> Done {
+    fn found_rows(&self, number: u64, found: Result<Attractors, Status>) -> Done {
         let mut found = match found {
             Ok(found) => found,
             Err(status) => return self.failed_row(number, status),
         };
-        for motion in &mut found.motions {
+        for motion in &mut found.attractors {
             let surplus = motion.sections.len().saturating_sub(self.search.sections as usize);
             motion.sections.drain(..surplus);
         }
         let found = Arc::new(found);
         let mut rows = Vec::new();
-        for motion in 0..found.motions.len() {
-            for turn in 0..found.motions[motion].sections.len().max(1) {
+        for motion in 0..found.attractors.len() {
+            for turn in 0..found.attractors[motion].sections.len().max(1) {
                 let dwell_row = DwellRow { found: Ok(Arc::clone(&found)), motion, turn };
                 rows.push(row(&self.columns, &dwell_row));
             }
@@ -285,9 +285,9 @@ impl AttractorEngine {
 
 /// Returns the state from which a machine is taken to the next speed, unless it left the model's
 /// range.
-fn final_state(found: &Endings) -> Carried {
-    let motion = found.motions.first()?;
-    (!matches!(motion.state, State::LeftRange { .. })).then_some(motion.end)
+fn final_state(found: &Attractors) -> Carried {
+    let motion = found.attractors.first()?;
+    (!matches!(motion.status, AttractorStatus::LeftRange { .. })).then_some(motion.end)
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use once_cell::sync::OnceCell;
 use pool::{OutcomeSink, PointSource, Pool};
 use washer_model::{Machine, Method, ModelKind, Point, Spin, StepSelector, Timing, prepare};
 use washer_row::{
-    Demand, Level, LevelRun, Outcome, RefinementLevels, RowRule, Status, integrate_points,
+    Level, LevelRun, Outcome, OutcomePurpose, RefinementLevels, RowRule, Status, integrate_points,
     refinement_levels,
 };
 
@@ -47,7 +47,7 @@ pub(crate) struct CappedRun {
 pub struct ModelEngine<'a> {
     plan: &'a Plan,
     /// The use of the rows, which decides how far they are refined.
-    pub(crate) demand: Demand,
+    pub(crate) demand: OutcomePurpose,
     /// The instruction set of all groups. With `None` each group gets the narrowest that has a lane
     /// for each of its trajectories.
     forced: Option<Simd>,
@@ -95,11 +95,11 @@ impl<'a> ModelEngine<'a> {
         // columns are not known to the engine, so these need complete rows.
         let has_prefix = |prefix| only.is_some_and(|only| only.starts_with(prefix));
         let demand = if has_prefix("ratio_") {
-            Demand::Side
+            OutcomePurpose::Side
         } else if has_prefix("growth_") || has_prefix("dwell_") {
-            Demand::Growth
+            OutcomePurpose::Growth
         } else {
-            Demand::Row
+            OutcomePurpose::Row
         };
         Ok(Self { demand, ..Self::new(plan)? })
     }
@@ -119,7 +119,7 @@ impl<'a> ModelEngine<'a> {
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
         let levels = Arc::default();
-        Self { plan, demand: Demand::Row, forced, timing, rule: rule(plan), levels }
+        Self { plan, demand: OutcomePurpose::Row, forced, timing, rule: rule(plan), levels }
     }
 
     /// Returns an engine for another plan, with the instruction set and the levels of this one.
@@ -158,7 +158,7 @@ impl<'a> ModelEngine<'a> {
             return None;
         }
         let [nonlinear, linear] = self.levels();
-        let methods = [nonlinear.capped(level)?, linear.capped(level)?];
+        let methods = [nonlinear.capped_method(level)?, linear.capped_method(level)?];
         Some(CappedRun { level, methods, checkpoints: self.timing.checkpoints })
     }
 

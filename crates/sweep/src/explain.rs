@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
-    Channel, Crossed, Crossing, Ending, LeftRange, NoEquilibrium, Point, Response, Spin,
-    StepSelector, Timing, cross, modes, peaks_without_departures,
+    Attractor, Channel, Crossing, CrossingEffect, LeftRangeError, NoEquilibrium, Point, Response,
+    Spin, StepSelector, Timing, follow_crossings, modes, peaks_without_departures,
 };
 
 use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
@@ -53,7 +53,7 @@ pub(crate) struct Explanation {
     pub(crate) tongues: Vec<(Tongue, Vec<Passage>)>,
     /// The amplitudes, by channel of the plan, of the same run when it is put on the periodic
     /// response at the entry of each tongue; `None` if no tongue is crossed before the window ends.
-    pub(crate) without_departures: Option<Result<Vec<f64>, LeftRange>>,
+    pub(crate) without_departures: Option<Result<Vec<f64>, LeftRangeError>>,
     /// The deviation of the models, and the share that tongues have in it; `None` without a ratio.
     pub(crate) cause: Option<Cause>,
 }
@@ -97,7 +97,7 @@ pub(crate) struct Passage {
     /// The integral over the passage of the growth at the speed of each instant.
     pub(crate) e_folds: f64,
     /// The growth of disturbances in the passage.
-    pub(crate) crossed: Result<Crossed, LeftRange>,
+    pub(crate) crossed: Result<CrossingEffect, LeftRangeError>,
 }
 
 /// Explains the verdict of a plan's only point. Once the interrupt is raised it ends early, and the
@@ -169,7 +169,7 @@ fn explain_in_pool(
             |finder: &&ResponseFinder<'_>| finder.is_backward == tongue.is_backward;
         finders.iter().find(same_direction).unwrap_or(&finders[0])
     };
-    let ends_in = || -> Vec<Option<Ending>> {
+    let ends_in = || -> Vec<Option<Attractor>> {
         let directions = found.chunk_by(|a, b| a.is_backward == b.is_backward);
         directions.flat_map(|found| tongue::find_endings(finder_for(&found[0]), found)).collect()
     };
@@ -296,7 +296,7 @@ fn swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResult, Error
 }
 
 /// The field of this name of an [`Explanation`].
-type WithoutDepartures = Option<Result<Vec<f64>, LeftRange>>;
+type WithoutDepartures = Option<Result<Vec<f64>, LeftRangeError>>;
 
 /// Returns the passages of the run through each tongue, and the amplitudes of the same run when it
 /// is put on the periodic response at the entry of each tongue.
@@ -337,7 +337,7 @@ fn find_crossings(
         .iter()
         .zip(&responses)
         .map(|((k, from_to_s), [entry, exit])| Crossing {
-            from_to_s: *from_to_s,
+            interval_s: *from_to_s,
             responses: [entry.as_ref(), exit.as_ref()],
             is_backward: tongues[*k].is_backward,
         })
@@ -346,9 +346,9 @@ fn find_crossings(
         return (Vec::new(), None);
     }
     let step_s = reference_step_s(&StepSelector::new([(point, spin)], end_s));
-    let before_end = |crossing: &&Crossing<'_>| crossing.from_to_s[0] < swept.window_s[1];
+    let before_end = |crossing: &&Crossing<'_>| crossing.interval_s[0] < swept.window_s[1];
     let (crossed, peaks) = rayon::join(
-        || cross(point, step_s, &crossings),
+        || follow_crossings(point, step_s, &crossings),
         || {
             crossings.iter().find(before_end)?;
             let peaks = peaks_without_departures(point, step_s, &crossings, swept.window_s);

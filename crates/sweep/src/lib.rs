@@ -83,5 +83,5 @@ pub use sweep_engine::{
     Error, Exit, Interrupt, expect_random_numbers, survive_file_size_limits, tell,
 };
 pub use trace::TraceExtras;
-pub use washer_model::Starts;
+pub use washer_model::StartRule;
 pub use washer_row::{CREEP_M_PER_S, Level, Outcome, Status, Trajectory, Verdict};

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use sweep_files::{ParquetFile, key};
 use washer_live::{Setup, Sliders};
-use washer_model::{Channel, Ending, Kind, ModeOverSpeed, ModelKind, campbell};
+use washer_model::{Attractor, Channel, ModeOverSpeed, ModelKind, StabilityKind, campbell};
 use washer_plot::{Live, Slider};
 use washer_row::{Level, Metric, MetricColumn};
 
@@ -97,7 +97,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let columns = |number: MetricColumn| ModelKind::ALL.map(|model| number.column(model.name()));
     let criterion = plan.model.measures.criterion;
     // The rest of the description is about rows without a ratio, which a page does not have.
-    let ratio = criterion.ratio().split(';').next().unwrap_or_default();
+    let ratio = criterion.ratio_description().split(';').next().unwrap_or_default();
     Ok(Live {
         setup: setup.to_numbers(),
         sliders: axes.chain(further).collect(),
@@ -105,14 +105,14 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         end_s: plan.end_s,
         window_s: plan.window_s,
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
-        criterion_words: [criterion.amplitude(), ratio].map(str::to_owned),
-        metrics: plan.model.measures.per_model().map(columns).collect(),
+        criterion_words: [criterion.amplitude_description(), ratio].map(str::to_owned),
+        metrics: plan.model.measures.model_columns().map(columns).collect(),
         held_speeds_rpm,
         held_metrics: held_metrics.iter().map(|metric| metric.name().to_owned()).collect(),
         has_slow_growth,
-        attractor_kinds: Ending::KIND_NAMES.map(str::to_owned).to_vec(),
+        attractor_kinds: Attractor::KIND_NAMES.map(str::to_owned).to_vec(),
         has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
-        instability_kinds: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
+        instability_kinds: StabilityKind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         compared_channels: compared_channels(&plan).iter().map(|channel| channel.index()).collect(),
         levels: Level::ALL.map(|level| level.name().to_owned()).to_vec(),
         accuracy: setup.rule.accuracy,

@@ -63,8 +63,8 @@ pub fn rk4_mass_scaled(accuracy: f64) -> Integrator {
 /// method, which compares levels.
 pub(crate) fn direct(integrator: &Integrator) -> Option<(Level, Method)> {
     let level = Level::named(integrator.name())?;
-    let mut method = Method::without_numbers(level);
-    match (method.numbers(), &integrator.settings()[..]) {
+    let mut method = Method::with_zero_numbers(level);
+    match (method.numbers_mut(), &integrator.settings()[..]) {
         (MethodNumbers::Step(step_s), [(_, value)]) => *step_s = *value,
         (MethodNumbers::Tolerance(tolerance), &[(_, relative), (_, absolute)]) => {
             *tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };

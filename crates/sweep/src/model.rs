@@ -28,7 +28,7 @@ pub(crate) fn engine_parameter(
         range: parameter.range(),
         source: parameter.source(),
         value: parameter.get(machine, spin),
-        parts: parameter.parts(machine),
+        parts: parameter.single_names(machine),
         window_edge: match parameter.target() {
             Target::Window(edge) => Some(edge),
             _ => None,

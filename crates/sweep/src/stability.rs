@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use lane_ode::{Cancel, Simd};
 use serde_json::json;
-use washer_model::{Dwell, Machine, Point, Response, Spin, Target, prepare};
+use washer_model::{HeldSpeed, Machine, Point, Response, Spin, Target, prepare};
 use washer_row::{Growth, Outcome, Status, Trajectory};
 
 use crate::columns::Columns;
@@ -192,7 +192,7 @@ impl HeldSpeedEvaluator<'_> {
         for &row in rows {
             let speed_rpm = self.held.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
-                Ok(point) => requests.push((row, Dwell { point, speed_rpm })),
+                Ok(point) => requests.push((row, HeldSpeed { point, speed_rpm })),
                 Err(status) => keep(match &self.analysis {
                     HeldAnalysis::Responses(columns) => columns.done(Outcome::failed(row, *status)),
                     HeldAnalysis::Attractors(engine) => engine.failed_row(row, *status),
@@ -201,7 +201,7 @@ impl HeldSpeedEvaluator<'_> {
         }
         match &self.analysis {
             HeldAnalysis::Responses(columns) => {
-                let dwells: Vec<Dwell<'_>> = requests.iter().map(|(_, dwell)| *dwell).collect();
+                let dwells: Vec<HeldSpeed<'_>> = requests.iter().map(|(_, dwell)| *dwell).collect();
                 for ((row, _), found) in
                     requests.iter().zip(find_responses(&dwells, Cancel::When(&is_stopped)))
                 {
@@ -241,8 +241,8 @@ impl HeldSpeedEvaluator<'_> {
             amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
             ..Trajectory::default()
         };
-        let nonlinear = trajectory(&response.nonlinear);
-        let linear = trajectory(&response.linear);
+        let nonlinear = trajectory(&response.nonlinear_peaks);
+        let linear = trajectory(&response.linear_peaks);
         Outcome { growth: Some(Growth::from(response)), ..Outcome::new(row, nonlinear, linear) }
     }
 }

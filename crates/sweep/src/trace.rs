@@ -9,8 +9,8 @@ use std::iter::repeat_n;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde_json::{Value, json};
 use washer_model::{
-    COORDINATES, History, HistoryRequest, Method, ModelKind, NoEquilibrium, Point, Spin, Start,
-    StepSelector, Timing, histories, histories_per_batch, instant_count,
+    COORDINATES, History, HistoryRequest, InitialDeviation, Method, ModelKind, NoEquilibrium,
+    Point, Spin, StepSelector, Timing, histories, histories_per_batch, instant_count,
 };
 
 use crate::engine::{CappedRun, reference_method};
@@ -80,8 +80,8 @@ pub(crate) fn parse_start_value(text: &str) -> Result<StartValue, String> {
 }
 
 /// Returns the start with these values, and all other coordinates at equilibrium.
-pub(crate) fn start_from(values: &[StartValue]) -> Start {
-    let mut start = Start::default();
+pub(crate) fn start_from(values: &[StartValue]) -> InitialDeviation {
+    let mut start = InitialDeviation::default();
     for StartValue { is_speed, index, value } in values {
         if *is_speed { start.speeds[*index] = *value } else { start.deviations[*index] = *value }
     }
@@ -124,7 +124,7 @@ pub(crate) struct TraceSettings {
     pub(crate) every_s: Option<f64>,
     pub(crate) models: Models,
     /// The initial state of both models.
-    pub(crate) start: Start,
+    pub(crate) start: InitialDeviation,
     pub(crate) extras: TraceExtras,
     /// The method by which the point's row was computed with capped modes, for a trace by the same.
     pub(crate) capped: Option<CappedRun>,
@@ -269,7 +269,7 @@ pub(crate) fn trace_all_points(
 struct TraceRun {
     point: Point,
     spin: Spin,
-    start: Start,
+    start: InitialDeviation,
     /// The method of the nonlinear model, and that of the linear one.
     methods: [Method; 2],
     /// The level of the nonlinear model's method.
@@ -330,7 +330,7 @@ fn integrate<'a>(
     kinds.iter().map(|&kind| (kind, all.by_ref().take(runs.len()).collect())).collect()
 }
 
-fn start_json(start: &Start) -> Value {
+fn start_json(start: &InitialDeviation) -> Value {
     json!({
         "deviations": numbered('q', &start.deviations),
         "speeds": numbered('u', &start.speeds),

@@ -118,8 +118,8 @@ pub extern "C" fn history(model: usize, level_index: usize, every_s: f64) -> usi
 /// Writes the growth of disturbances at a point of `value_count` numbers, at the constant speeds
 /// (rpm) that follow it in the input. Output: the code; for each speed the growth of the fastest
 /// disturbance (1/s; NaN without a periodic response), its frequency (cycles per minute), its kind
-/// as an index into [`washer_model::Kind::ALL`], and 1 if the response is on the curve of a machine
-/// that runs up, else 0.
+/// as an index into [`washer_model::StabilityKind::ALL`], and 1 if the response is on the curve of
+/// a machine that runs up, else 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn growth(value_count: usize) -> usize {
     answer_with_setup(|setup, input, output| {
@@ -139,7 +139,7 @@ pub extern "C" fn growth(value_count: usize) -> usize {
 /// Writes the largest attractor of a point of `value_count` numbers at the constant speeds (rpm)
 /// that follow it in the input. Output: the code; the speed at which the tub turns farthest (NaN if
 /// no attractor was found), the attractor's kind as an index into
-/// [`washer_model::Ending::KIND_NAMES`], and the largest deviation of each channel (m, rad).
+/// [`washer_model::Attractor::KIND_NAMES`], and the largest deviation of each channel (m, rad).
 #[unsafe(no_mangle)]
 pub extern "C" fn dwell(value_count: usize) -> usize {
     answer_with_setup(|setup, input, output| {

@@ -3,11 +3,11 @@
 use lane_ode::{Cancel, Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, Disturbance, Dwell, Machine, Method, ModelKind, Point, Response, Spin, Start, Starts,
-    Target, Timing, find_endings, history, prepare, respond,
+    Channel, Disturbance, HeldSpeed, InitialDeviation, Machine, Method, ModelKind, Point, Response,
+    Spin, StartRule, Target, Timing, find_attractors, find_responses, history, prepare,
 };
 use washer_row::{
-    Demand, Deviations, DwellPeaks, Level, LevelRun, Next, Outcome, RefinementLevels,
+    Deviations, DwellPeaks, Level, LevelRun, NextStep, Outcome, OutcomePurpose, RefinementLevels,
     RefinementRule, RowRefinement, RowRule, Status, Trajectory, Verdict, integrate_points,
 };
 
@@ -174,12 +174,12 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
     let point = prepare_point(setup, values)?;
     let levels = refinement_levels(setup, values);
     let rule = &setup.rule;
-    let refinement_rule = RefinementRule { levels, demand: Demand::Row, rule };
+    let refinement_rule = RefinementRule { levels, purpose: OutcomePurpose::Row, row_rule: rule };
     let mut refinement = RowRefinement::default();
     let outcome = loop {
-        match refinement.next(0, &point, refinement_rule) {
-            Next::Done(outcome) => break *outcome,
-            Next::Runs(requests) => {
+        match refinement.next_step(0, &point, refinement_rule) {
+            NextStep::Done(outcome) => break *outcome,
+            NextStep::Runs(requests) => {
                 for (model, level_index) in requests {
                     let model_levels = &levels[model];
                     let perturbed =
@@ -188,13 +188,13 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
                     for run in
                         run_method(model, model_levels.method(level_index), &[start_point], rule)
                     {
-                        refinement.take((model, level_index), run, &point, refinement_rule);
+                        refinement.add_run((model, level_index), run, &point, refinement_rule);
                     }
                 }
             }
         }
     };
-    let finest = [0, 1].map(|model| refinement.finest(model, &point, refinement_rule));
+    let finest = [0, 1].map(|model| refinement.finest_run(model, &point, refinement_rule));
     let [Some(nonlinear), Some(linear)] = finest else { return Err(PointError::NoEquilibrium) };
     let finest = [nonlinear, linear];
     let amplitudes = finest.map(|(run, ..)| run.amplitudes);
@@ -231,7 +231,7 @@ pub fn motion(
     let levels = &refinement_levels(setup, values)[model as usize];
     let level = level_index.and_then(|level_index| levels.levels.get(level_index));
     let level = level.unwrap_or(&levels.levels[quick_level_index(levels)]);
-    let history = history(model, &level.method, &point, &Start::default(), every_s);
+    let history = history(model, &level.method, &point, &InitialDeviation::default(), every_s);
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();
     Ok(PointHistory { failure: history.failure, channels, gaps_m })
@@ -249,11 +249,11 @@ pub fn growth(
     speeds_rpm: &[f64],
 ) -> Result<Vec<Option<(Disturbance, bool)>>, PointError> {
     let point = prepare_point(setup, values)?;
-    let dwells: Vec<Dwell<'_>> =
-        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+    let dwells: Vec<HeldSpeed<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let disturbance =
         |first_response: &Response| (first_response.disturbance(), first_response.is_on_curve);
-    let answers = respond(&dwells, Cancel::Never).into_iter();
+    let answers = find_responses(&dwells, Cancel::Never).into_iter();
     Ok(answers.map(|answer| answer.ok()?.first().map(disturbance)).collect())
 }
 
@@ -268,10 +268,15 @@ pub fn dwell(
     speeds_rpm: &[f64],
 ) -> Result<Option<DwellPeaks>, PointError> {
     let point = prepare_point(setup, values)?;
-    let dwells: Vec<Dwell<'_>> =
-        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+    let dwells: Vec<HeldSpeed<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let no_carried_states = vec![None; dwells.len()];
-    let endings =
-        find_endings(Simd::best(), &dwells, &no_carried_states, &Starts::default(), Cancel::Never);
-    Ok(DwellPeaks::from_endings(speeds_rpm, &endings))
+    let attractors = find_attractors(
+        Simd::best(),
+        &dwells,
+        &no_carried_states,
+        &StartRule::default(),
+        Cancel::Never,
+    );
+    Ok(DwellPeaks::from_attractors(speeds_rpm, &attractors))
 }

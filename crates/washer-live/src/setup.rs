@@ -51,7 +51,7 @@ impl Setup {
     /// Decodes a setup from [`Self::to_numbers`]; `None` for other numbers.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         let direct_levels =
-            || RefinementLevels::direct(Level::Rk4, Method::without_numbers(Level::Rk4));
+            || RefinementLevels::direct(Level::Rk4, Method::with_zero_numbers(Level::Rk4));
         let levels = [0, 1].map(|_| direct_levels());
         let mut setup = Self {
             machine: Machine::paper(),
@@ -152,9 +152,9 @@ fn walk_levels(walk: &mut NumberWalk<'_>, levels: &mut RefinementLevels) -> Opti
 fn walk_level(walk: &mut NumberWalk<'_>, level: &mut RefinementLevel) -> Option<()> {
     walk.choice(&mut level.level, &Level::ALL)?;
     if walk.is_reading() {
-        level.method = Method::without_numbers(level.level);
+        level.method = Method::with_zero_numbers(level.level);
     }
-    match level.method.numbers() {
+    match level.method.numbers_mut() {
         MethodNumbers::Step(step_s) => walk.numbers([step_s]),
         MethodNumbers::Capped(step_s, caps) => {
             walk.numbers([step_s, &mut caps.bearings_rad_per_s])?;

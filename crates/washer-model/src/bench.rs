@@ -46,23 +46,23 @@ impl<F: ModelFamily> Kernel for Evaluate<'_, F> {
         let zero = N(zero);
         let (point, part, caps, evaluations) = self.0;
         let coupling = Coupling::new(zero, caps.as_ref());
-        let model = <F::Over<T> as LaneModel<T>>::splat(zero, point, coupling);
+        let model = <F::OnLanes<T> as LaneModel<T>>::splat(zero, point, coupling);
         let mut x = [zero; STATES];
-        for (x, at_rest) in x.iter_mut().zip(<F::Over<T> as LaneModel<T>>::at_rest(point)) {
+        for (x, at_rest) in x.iter_mut().zip(<F::OnLanes<T> as LaneModel<T>>::at_rest(point)) {
             *x = zero.lit(at_rest);
         }
         let mut t = zero.lit(10.0);
         match part {
             RhsPart::Forcing => {
-                let mut forcing = model.forcing_aside(t);
+                let mut forcing = model.forcing_out_of_line(t);
                 for _ in 0..evaluations {
                     t += zero.lit(1e-4);
-                    model.renew(t, &mut forcing);
+                    model.update_forcing(t, &mut forcing);
                     black_box(&forcing);
                 }
             }
             RhsPart::Derivative => {
-                let forcing = model.forcing_aside(t);
+                let forcing = model.forcing_out_of_line(t);
                 for _ in 0..evaluations {
                     // The compiler does not see through `black_box`, so that it computes nothing
                     // in advance.

@@ -97,7 +97,7 @@ macro_rules! declare {
             /// Returns the name for C, with its zero byte.
             pub const fn c_name(self) -> &'static CStr {
                 match self {
-                    $(Self::$name => terminated(concat!($key, "\0")),)+
+                    $(Self::$name => to_c_string(concat!($key, "\0")),)+
                 }
             }
 
@@ -120,7 +120,7 @@ macro_rules! declare {
 channels!(declare);
 
 /// Returns a name that ends with a zero byte as a C string.
-const fn terminated(name: &'static str) -> &'static CStr {
+const fn to_c_string(name: &'static str) -> &'static CStr {
     match CStr::from_bytes_with_nul(name.as_bytes()) {
         Ok(name) => name,
         Err(_) => panic!("a channel's name has no zero byte"),

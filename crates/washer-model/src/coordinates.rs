@@ -46,7 +46,7 @@ pub(crate) const ROTOR_TURNS: [usize; 4] = [SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, H
 const MIRRORED: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
 
 /// Returns a state's mirror image: that of a mirrored machine whose drum turns the other way.
-pub(crate) fn mirrored(state: &[f64; STATES]) -> [f64; STATES] {
+pub(crate) fn mirror_state(state: &[f64; STATES]) -> [f64; STATES] {
     let mut mirrored = *state;
     for i in MIRRORED {
         mirrored[i] = -mirrored[i];
@@ -57,7 +57,7 @@ pub(crate) fn mirrored(state: &[f64; STATES]) -> [f64; STATES] {
 
 /// Returns `values` as dual numbers with the derivative `slope` in coordinate `j` and 0 elsewhere.
 #[inline(always)]
-pub(crate) fn seeded<T: Lane>(
+pub(crate) fn with_unit_derivative<T: Lane>(
     values: &[N<T>; COORDINATES],
     j: usize,
     slope: f64,

@@ -14,18 +14,18 @@ mod turns;
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::run::model::{LaneModel, Nonlinear};
-use crate::stability::orbit::Row;
-use crate::stability::settings::{Case, Settings};
-use crate::{Dwell, Modes, NoAnswer, Reading, Recorders, Response, respond};
+use crate::stability::period_map::TurnSetup;
+use crate::stability::settings::{HeldCase, Settings};
+use crate::{HeldSpeed, Modes, Reading, Recorders, Response, ResponseError, find_responses};
 use exponent::compute_exponents;
 use lane_ode::{Cancel, Simd};
-use multipliers::{Orbit, growths_per_s};
+use multipliers::{PeriodicOrbit, growths_per_s};
 use starts::{
     Directions, Kick, MODE_DIRECTIONS, add_kick, is_from_rest, kick_directions, kicks, perturb,
     random_kicks,
 };
 use std::sync::Arc;
-use trajectory::{BLOCK, HeldTrajectory, Need, WINDOW, are_close};
+use trajectory::{BLOCK_TURNS, HeldTrajectory, NextComputation, WINDOW_TURNS, are_close};
 use turns::{HeldState, integrate_turns, record_turns};
 
 pub use exponent::Exponent;
@@ -49,34 +49,34 @@ const BISECTIONS: usize = 5;
 
 /// The starts of the trajectories at a held speed, and their length.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Starts {
+pub struct StartRule {
     /// The number of starts, or that of the perturbed responses if it is greater.
     pub count: usize,
     /// The hardest kick (rad/s of the tub's rocking).
-    pub kick_rad_per_s: f64,
+    pub max_kick_rad_per_s: f64,
     /// The maximum time of a trajectory (s).
-    pub longest_s: f64,
+    pub max_time_s: f64,
     /// Whether to search for the smallest kick after which the machine does not return.
     pub with_threshold: bool,
     /// Further records of each motion.
-    pub wanted: Recorders,
+    pub recorders: Recorders,
 }
 
-impl Default for Starts {
+impl Default for StartRule {
     fn default() -> Self {
         Self {
             count: 12,
-            kick_rad_per_s: 6.0,
-            longest_s: 600.0,
+            max_kick_rad_per_s: 6.0,
+            max_time_s: 600.0,
             with_threshold: false,
-            wanted: Recorders::default(),
+            recorders: Recorders::default(),
         }
     }
 }
 
 /// The outcome of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum State {
+pub enum AttractorStatus {
     /// The trajectory settled.
     Ok,
     /// The trajectory left the range in which the model holds.
@@ -84,7 +84,7 @@ pub enum State {
         /// The time at which it did, to a turn (s).
         time_s: f64,
     },
-    /// The trajectory did not settle within [`Starts::longest_s`].
+    /// The trajectory did not settle within [`StartRule::max_time_s`].
     NotSettled,
     /// The trajectory looked chaotic, but trajectories from its states ended in other motions.
     Transient {
@@ -96,7 +96,7 @@ pub enum State {
 
 /// The kind of a settled motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Settled {
+pub enum MotionKind {
     /// A motion that repeats.
     Periodic {
         /// The period in turns of the drum.
@@ -117,11 +117,11 @@ pub enum Settled {
 /// A motion in which trajectories at a held speed end: an attractor, or the reason why none was
 /// reached.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ending {
+pub struct Attractor {
     /// The outcome of the first trajectory.
-    pub state: State,
+    pub status: AttractorStatus,
     /// The kind of the motion, if it has settled.
-    pub settled: Option<Settled>,
+    pub motion_kind: Option<MotionKind>,
     /// The number of starts that ended in the motion; 0 if only transients did.
     pub starts: u32,
     /// The smallest kick off the response that led to the motion (rad/s); 0 if a perturbed response
@@ -145,74 +145,85 @@ pub struct Ending {
     /// The states at which the unbalance is up, of at most the last 256 turns; coordinates are from
     /// equilibrium.
     pub sections: Vec<[f64; STATES]>,
-    /// The records of [`Starts::wanted`] over 128 further turns.
+    /// The records of [`StartRule::recorders`] over 128 further turns.
     pub extra: Reading,
 }
 
 /// The motions in which a machine ends at a held speed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Endings {
+pub struct Attractors {
     /// The periodic responses. If none was found, the machine starts from rest.
     pub responses: Vec<Response>,
     /// The motions in the order in which starts led to them: the first is that of the perturbed
     /// periodic response.
-    pub motions: Vec<Ending>,
+    pub attractors: Vec<Attractor>,
     /// The number of starts.
     pub starts: u32,
     /// The smallest tried kick (rad/s) after which the machine does not return to the first motion;
-    /// `None` if it always returns, or without [`Starts::with_threshold`].
+    /// `None` if it always returns, or without [`StartRule::with_threshold`].
     pub threshold_rad_per_s: Option<f64>,
 }
 
 /// Finds the motions in which machines end at held speeds, on lanes of `simd` or of a narrower
-/// instruction set. The results of a dwell do not depend on the other dwells. A dwell with a state
-/// in `carried` has that state, perturbed like a response, as its only start.
+/// instruction set. The results of a dwell do not depend on the other held_speeds. A dwell with a
+/// state in `carried` has that state, perturbed like a response, as its only start.
 ///
-/// # Errors
-/// Returns [`NoAnswer`] for a dwell without an answer, and [`NoAnswer::Stopped`] once `is_stopped`
-/// returns true.
-pub fn find_endings(
+/// # Errors Returns [`ResponseError`] for a dwell without an answer, and [`ResponseError::Stopped`]
+/// once `cancel` is requested.
+pub fn find_attractors(
     simd: Simd,
-    dwells: &[Dwell<'_>],
+    held_speeds: &[HeldSpeed<'_>],
     carried: &[Option<[f64; STATES]>],
-    starts: &Starts,
+    rule: &StartRule,
     cancel: Cancel<'_>,
-) -> Vec<Result<Endings, NoAnswer>> {
-    find_endings_from_responses(simd, dwells, respond(dwells, cancel), carried, starts, cancel)
+) -> Vec<Result<Attractors, ResponseError>> {
+    find_attractors_from_responses(
+        simd,
+        held_speeds,
+        find_responses(held_speeds, cancel),
+        carried,
+        rule,
+        cancel,
+    )
 }
 
-/// Finds motions like [`find_endings`], given the results of [`respond`] for these dwells.
+/// Finds motions like [`find_attractors`], given the results of [`find_responses`] for these
+/// held_speeds.
 ///
 /// # Errors
-/// Returns the errors of [`find_endings`].
-pub fn find_endings_from_responses(
+/// Returns the errors of [`find_attractors`].
+pub fn find_attractors_from_responses(
     simd: Simd,
-    dwells: &[Dwell<'_>],
-    answers: Vec<Result<Vec<Response>, NoAnswer>>,
+    held_speeds: &[HeldSpeed<'_>],
+    response_answers: Vec<Result<Vec<Response>, ResponseError>>,
     carried: &[Option<[f64; STATES]>],
-    starts: &Starts,
+    rule: &StartRule,
     cancel: Cancel<'_>,
-) -> Vec<Result<Endings, NoAnswer>> {
-    let mut searches: Vec<Result<SpeedSearch<'_>, NoAnswer>> = Vec::with_capacity(dwells.len());
+) -> Vec<Result<Attractors, ResponseError>> {
+    let mut searches: Vec<Result<SpeedSearch<'_>, ResponseError>> =
+        Vec::with_capacity(held_speeds.len());
     let mut settings: Option<Settings<'_>> = None;
-    for (k, (dwell, answer)) in dwells.iter().zip(answers).enumerate() {
+    for (k, (held_speed, responses_or_error)) in
+        held_speeds.iter().zip(response_answers).enumerate()
+    {
         // Dwells of the same point share its settings.
-        let is_same_point = |settings: &Settings<'_>| core::ptr::eq(settings.point, dwell.point);
+        let is_same_point =
+            |settings: &Settings<'_>| core::ptr::eq(settings.point, held_speed.point);
         let settings = match settings.take().filter(is_same_point) {
-            Some(known) => settings.insert(known),
-            None => settings.insert(Settings::new(dwell.point)),
+            Some(reusable) => settings.insert(reusable),
+            None => settings.insert(Settings::new(held_speed.point)),
         };
-        let responses = match answer {
+        let responses = match responses_or_error {
             Ok(responses) => responses,
-            Err(NoAnswer::NoResponse) => Vec::new(),
+            Err(ResponseError::NoResponse) => Vec::new(),
             Err(reason) => {
                 searches.push(Err(reason));
                 continue;
             }
         };
         let carried = carried.get(k).copied().flatten();
-        let search = |case| SpeedSearch::new(case, responses, carried, starts);
-        searches.push(settings.case(dwell.speed_rpm).map(search));
+        let search = |held_case| SpeedSearch::new(held_case, responses, carried, rule);
+        searches.push(settings.held_case(held_speed.speed_rpm).map(search));
     }
     let mut is_complete = run_to_end(simd, &mut searches, cancel);
     for search in searches.iter_mut().flatten() {
@@ -222,7 +233,7 @@ pub fn find_endings_from_responses(
     for search in searches.iter_mut().flatten() {
         search.find_transients();
     }
-    if starts.with_threshold {
+    if rule.with_threshold {
         for search in searches.iter_mut().flatten() {
             search.find_brackets();
         }
@@ -236,36 +247,43 @@ pub fn find_endings_from_responses(
             }
         }
     }
-    let found = searches.into_iter().map(|search| match search {
-        Ok(search) if is_complete => Ok(search.into_endings()),
-        Ok(_) => Err(NoAnswer::Stopped),
+    let response_answers = searches.into_iter().map(|search| match search {
+        Ok(search) if is_complete => Ok(search.into_attractors()),
+        Ok(_) => Err(ResponseError::Stopped),
         Err(reason) => Err(reason),
     });
-    let mut found: Vec<Result<(Endings, Row<'_>), NoAnswer>> = found.collect();
-    if starts.wanted.need_all_states() {
-        record_motions(simd, found.iter_mut().flatten(), starts.wanted);
+    let mut response_answers: Vec<Result<(Attractors, TurnSetup<'_>), ResponseError>> =
+        response_answers.collect();
+    if rule.recorders.need_all_states() {
+        record_motions(simd, response_answers.iter_mut().flatten(), rule.recorders);
     }
-    found.into_iter().map(|found| found.map(|(endings, _)| endings)).collect()
+    response_answers
+        .into_iter()
+        .map(|response_answers| response_answers.map(|(attractors, _)| attractors))
+        .collect()
 }
 
 /// Integrates motions further, with the recorders of `wanted`.
 fn record_motions<'a, 'f>(
     simd: Simd,
-    found: impl Iterator<Item = &'f mut (Endings, Row<'a>)>,
+    results: impl Iterator<Item = &'f mut (Attractors, TurnSetup<'a>)>,
     wanted: Recorders,
 ) where
     'a: 'f,
 {
     let mut motions = Vec::new();
     let mut held = Vec::new();
-    for (endings, row) in found {
-        let is_in_range = |motion: &&mut Ending| !matches!(motion.state, State::LeftRange { .. });
-        for motion in endings.motions.iter_mut().filter(is_in_range) {
-            held.push(HeldState { row: *row, state: motion.end });
+    for (attractors, setup) in results {
+        let is_in_range =
+            |motion: &&mut Attractor| !matches!(motion.status, AttractorStatus::LeftRange { .. });
+        for motion in attractors.attractors.iter_mut().filter(is_in_range) {
+            held.push(HeldState { setup: *setup, state: motion.end });
             motions.push(motion);
         }
     }
-    for (motion, (_, extra)) in motions.into_iter().zip(record_turns(simd, &held, WINDOW, wanted)) {
+    for (motion, (_, extra)) in
+        motions.into_iter().zip(record_turns(simd, &held, WINDOW_TURNS, wanted))
+    {
         motion.extra = extra;
     }
 }
@@ -274,50 +292,54 @@ fn record_motions<'a, 'f>(
 /// stopped before.
 fn run_to_end(
     simd: Simd,
-    searches: &mut [Result<SpeedSearch<'_>, NoAnswer>],
+    searches: &mut [Result<SpeedSearch<'_>, ResponseError>],
     cancel: Cancel<'_>,
 ) -> bool {
     loop {
         if cancel.is_requested() {
             return false;
         }
-        let mut running: Vec<&mut HeldTrajectory<'_>> = Vec::new();
-        let mut perturbed = Vec::new();
-        let mut perturbations = Vec::new();
-        let mut repeating: Vec<(&mut HeldTrajectory<'_>, u32)> = Vec::new();
-        let mut orbits: Vec<Orbit<'_, '_>> = Vec::new();
+        let mut needing_turns: Vec<&mut HeldTrajectory<'_>> = Vec::new();
+        let mut needing_exponent = Vec::new();
+        let mut exponent_requests = Vec::new();
+        let mut needing_multipliers: Vec<(&mut HeldTrajectory<'_>, u32)> = Vec::new();
+        let mut orbits: Vec<PeriodicOrbit<'_, '_>> = Vec::new();
         for search in searches.iter_mut().flatten() {
             let direction = search.directions[MODE_DIRECTIONS - 1];
-            let case = &search.case;
+            let held_case = &search.held_case;
             for trajectory in &mut search.trajectories {
-                match trajectory.need {
-                    Need::Turns => running.push(trajectory),
-                    Need::Multipliers(period) => {
-                        orbits.push(Orbit { case, held: trajectory.held, period });
-                        repeating.push((trajectory, period));
+                match trajectory.next_computation {
+                    NextComputation::Turns => needing_turns.push(trajectory),
+                    NextComputation::Multipliers(period) => {
+                        orbits.push(PeriodicOrbit { held_case, held: trajectory.held, period });
+                        needing_multipliers.push((trajectory, period));
                     }
-                    Need::Exponent => {
-                        perturbations.push((trajectory.held, direction));
-                        perturbed.push(trajectory);
+                    NextComputation::Exponent => {
+                        exponent_requests.push((trajectory.held, direction));
+                        needing_exponent.push(trajectory);
                     }
-                    Need::Nothing => {}
+                    NextComputation::Nothing => {}
                 }
             }
         }
-        if running.is_empty() && perturbed.is_empty() && repeating.is_empty() {
+        if needing_turns.is_empty() && needing_exponent.is_empty() && needing_multipliers.is_empty()
+        {
             return true;
         }
         let growths = growths_per_s(&orbits, cancel);
-        for ((trajectory, period), growth_per_s) in repeating.into_iter().zip(growths) {
+        for ((trajectory, period), growth_per_s) in needing_multipliers.into_iter().zip(growths) {
             trajectory.add_growth(period, growth_per_s);
         }
-        let held: Vec<HeldState<'_>> = running.iter().map(|trajectory| trajectory.held).collect();
-        for (trajectory, turns) in running.into_iter().zip(integrate_turns(simd, &held, BLOCK)) {
+        let held: Vec<HeldState<'_>> =
+            needing_turns.iter().map(|trajectory| trajectory.held).collect();
+        for (trajectory, turns) in
+            needing_turns.into_iter().zip(integrate_turns(simd, &held, BLOCK_TURNS))
+        {
             trajectory.add_turns(turns);
         }
-        if !perturbed.is_empty() {
-            let exponents = compute_exponents(simd, &perturbations);
-            for (trajectory, exponent) in perturbed.into_iter().zip(exponents) {
+        if !needing_exponent.is_empty() {
+            let exponents = compute_exponents(simd, &exponent_requests);
+            for (trajectory, exponent) in needing_exponent.into_iter().zip(exponents) {
                 trajectory.add_exponent(exponent);
             }
         }
@@ -341,7 +363,7 @@ enum Origin {
 
 /// The search for the motions of a machine at a held speed.
 struct SpeedSearch<'a> {
-    case: Case<'a>,
+    held_case: HeldCase<'a>,
     responses: Vec<Response>,
     /// The state that is kicked: the first response, or rest without responses.
     kicked_state: [f64; STATES],
@@ -352,7 +374,7 @@ struct SpeedSearch<'a> {
     origins: Vec<Origin>,
     /// The number of trajectories from starts, which come first. Further ones search for the
     /// threshold, or test whether chaos lasts.
-    starts: usize,
+    start_count: usize,
     /// The index of a chaotic trajectory, and those of the trajectories from its states.
     survivors: Vec<(usize, core::ops::Range<usize>)>,
     /// The brackets of the threshold, by direction along mode shapes: the size of a kick after
@@ -364,43 +386,44 @@ struct SpeedSearch<'a> {
 
 impl<'a> SpeedSearch<'a> {
     fn new(
-        case: Case<'a>,
+        held_case: HeldCase<'a>,
         responses: Vec<Response>,
         carried: Option<[f64; STATES]>,
-        starts: &Starts,
+        rule: &StartRule,
     ) -> Self {
-        let point = case.row.point;
-        let frozen: Arc<Modes> = Arc::clone(&case.frozen);
-        let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
-        let kicked_state = responses.first().map_or(rest, |response| response.start);
+        let point = held_case.setup.point;
+        let frozen_modes: Arc<Modes> = Arc::clone(&held_case.frozen_modes);
+        let rest_state = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
+        let kicked_state = responses.first().map_or(rest_state, |response| response.start);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
-        let directions = kick_directions(point, &frozen, random_kicks(starts.count));
+        let directions = kick_directions(point, &frozen_modes, random_kicks(rule.count));
         if let Some(carried) = carried {
-            states.push((perturb(point, &frozen, &carried), Origin::Carried));
+            states.push((perturb(point, &frozen_modes, &carried), Origin::Carried));
         } else {
-            let firsts = responses.iter().map(|response| response.start);
-            let firsts: Vec<_> =
-                if responses.is_empty() { vec![kicked_state] } else { firsts.collect() };
-            let perturbed = |first| (perturb(point, &frozen, first), Origin::Response);
-            states.extend(firsts.iter().map(perturbed));
-            let count = starts.count.saturating_sub(states.len());
-            for kick in kicks(count, starts.kick_rad_per_s) {
+            let response_states = responses.iter().map(|response| response.start);
+            let response_states: Vec<_> =
+                if responses.is_empty() { vec![kicked_state] } else { response_states.collect() };
+            let to_perturbed_start =
+                |first| (perturb(point, &frozen_modes, first), Origin::Response);
+            states.extend(response_states.iter().map(to_perturbed_start));
+            let count = rule.count.saturating_sub(states.len());
+            for kick in kicks(count, rule.max_kick_rad_per_s) {
                 let (state, origin) = match is_from_rest(kick) {
-                    true => (&rest, Origin::Rest),
+                    true => (&rest_state, Origin::Rest),
                     false => (&kicked_state, Origin::Kicked(kick)),
                 };
                 states.push((add_kick(state, &directions, kick), origin));
             }
         }
         let mut search = Self {
-            case,
+            held_case,
             responses,
             kicked_state,
             directions,
-            longest_s: starts.longest_s,
+            longest_s: rule.max_time_s,
             trajectories: Vec::new(),
             origins: Vec::new(),
-            starts: states.len(),
+            start_count: states.len(),
             survivors: Vec::new(),
             brackets: [None; MODE_DIRECTIONS],
             random_threshold: None,
@@ -412,7 +435,7 @@ impl<'a> SpeedSearch<'a> {
     }
 
     fn start(&mut self, state: [f64; STATES], origin: Origin) {
-        let held = HeldState { row: self.case.row, state };
+        let held = HeldState { setup: self.held_case.setup, state };
         let grows = |response: &&Response| response.growth_per_s() > 0.0;
         let unstable = self.responses.iter().filter(grows);
         let unstable_orbits = unstable.map(|response| vec![response.start]).collect();
@@ -422,14 +445,14 @@ impl<'a> SpeedSearch<'a> {
 
     /// Starts trajectories from the states of each chaotic motion.
     fn start_survivors(&mut self) {
-        for chaotic in 0..self.starts {
+        for chaotic in 0..self.start_count {
             if !self.trajectories[chaotic].is_chaotic() || self.find_survivors(chaotic).is_some() {
                 continue;
             }
             let first = self.trajectories.len();
             let unstable_orbits = self.trajectories[chaotic].unstable_orbits().to_vec();
             for state in self.trajectories[chaotic].recent_states() {
-                let held = HeldState { row: self.case.row, state };
+                let held = HeldState { setup: self.held_case.setup, state };
                 self.trajectories.push(HeldTrajectory::survivor(held, unstable_orbits.clone()));
                 self.origins.push(Origin::Trajectory);
             }
@@ -439,9 +462,9 @@ impl<'a> SpeedSearch<'a> {
 
     /// Returns the trajectories that started from states of a trajectory's motion.
     fn find_survivors(&self, trajectory: usize) -> Option<core::ops::Range<usize>> {
-        let ending = self.trajectories[trajectory].ending();
+        let attractor = self.trajectories[trajectory].attractor();
         let is_same_motion = |(other, _): &&(usize, core::ops::Range<usize>)| {
-            are_same(&self.trajectories[*other].ending(), &ending)
+            are_same_motion(&self.trajectories[*other].attractor(), &attractor)
         };
         self.survivors.iter().find(is_same_motion).map(|(_, survivors)| survivors.clone())
     }
@@ -450,7 +473,8 @@ impl<'a> SpeedSearch<'a> {
     /// another motion.
     fn find_transients(&mut self) {
         let mut lives: Vec<(usize, f64)> = Vec::new();
-        for chaotic in (0..self.starts).filter(|&start| self.trajectories[start].is_chaotic()) {
+        for chaotic in (0..self.start_count).filter(|&start| self.trajectories[start].is_chaotic())
+        {
             let Some(survivors) = self.find_survivors(chaotic) else { continue };
             let survivors = &self.trajectories[survivors];
             let ended = survivors.iter().filter(|trajectory| trajectory.has_ended()).count();
@@ -465,8 +489,11 @@ impl<'a> SpeedSearch<'a> {
     }
 
     /// Whether a trajectory ended in the motion of the first one.
-    fn returns(&self, trajectory: usize) -> bool {
-        are_same(&self.trajectories[0].ending(), &self.trajectories[trajectory].ending())
+    fn returns_to_first(&self, trajectory: usize) -> bool {
+        are_same_motion(
+            &self.trajectories[0].attractor(),
+            &self.trajectories[trajectory].attractor(),
+        )
     }
 
     /// Brackets the threshold in every direction along mode shapes, and finds the smallest random
@@ -475,10 +502,10 @@ impl<'a> SpeedSearch<'a> {
         for (trajectory, origin) in self.origins.iter().enumerate() {
             if let Origin::Kicked((direction, size)) = *origin
                 && direction >= MODE_DIRECTIONS
-                && !self.returns(trajectory)
+                && !self.returns_to_first(trajectory)
             {
-                let least = self.random_threshold.map_or(size, |least| least.min(size));
-                self.random_threshold = Some(least);
+                let smallest = self.random_threshold.map_or(size, |smallest| smallest.min(size));
+                self.random_threshold = Some(smallest);
             }
         }
         for direction in 0..MODE_DIRECTIONS {
@@ -487,7 +514,7 @@ impl<'a> SpeedSearch<'a> {
                 if let Origin::Kicked((kick_direction, size)) = *origin
                     && kick_direction == direction
                 {
-                    kicks.push((size, self.returns(trajectory)));
+                    kicks.push((size, self.returns_to_first(trajectory)));
                 }
             }
             kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -514,7 +541,7 @@ impl<'a> SpeedSearch<'a> {
     fn bisect_brackets(&mut self) {
         let midpoints = self.brackets.iter().flatten().count();
         for trajectory in self.trajectories.len() - midpoints..self.trajectories.len() {
-            let returns = self.returns(trajectory);
+            let returns = self.returns_to_first(trajectory);
             if let Origin::Kicked((direction, size)) = self.origins[trajectory]
                 && let Some(bracket) = &mut self.brackets[direction]
             {
@@ -523,49 +550,53 @@ impl<'a> SpeedSearch<'a> {
         }
     }
 
-    fn into_endings(self) -> (Endings, Row<'a>) {
-        let mut motions: Vec<Ending> = Vec::new();
-        for (trajectory, origin) in self.trajectories[..self.starts].iter().zip(&self.origins) {
-            let mut ending = trajectory.ending();
-            ending.least_kick_rad_per_s = match origin {
+    fn into_attractors(self) -> (Attractors, TurnSetup<'a>) {
+        let mut motions: Vec<Attractor> = Vec::new();
+        for (trajectory, origin) in self.trajectories[..self.start_count].iter().zip(&self.origins)
+        {
+            let mut attractor = trajectory.attractor();
+            attractor.least_kick_rad_per_s = match origin {
                 Origin::Response => Some(0.0),
                 Origin::Kicked((_, size)) => Some(*size),
                 Origin::Rest | Origin::Carried | Origin::Trajectory => None,
             };
-            match motions.iter_mut().find(|motion| are_same(motion, &ending)) {
-                Some(known) => known.merge(&ending),
-                None => motions.push(ending),
+            match motions.iter_mut().find(|motion| are_same_motion(motion, &attractor)) {
+                Some(existing) => existing.merge(&attractor),
+                None => motions.push(attractor),
             }
         }
         let ends_of_transients = self.survivors.iter().flat_map(|(_, survivors)| survivors.clone());
         for trajectory in
             ends_of_transients.filter(|&trajectory| self.trajectories[trajectory].has_ended())
         {
-            let ending = Ending { starts: 0, ..self.trajectories[trajectory].ending() };
-            if !motions.iter().any(|motion| are_same(motion, &ending)) {
-                motions.push(ending);
+            let attractor = Attractor { starts: 0, ..self.trajectories[trajectory].attractor() };
+            if !motions.iter().any(|motion| are_same_motion(motion, &attractor)) {
+                motions.push(attractor);
             }
         }
         let mode_thresholds = self.brackets.iter().flatten().map(|[_, above]| *above);
-        let endings = Endings {
-            motions,
-            starts: self.starts as u32,
+        let attractors = Attractors {
+            attractors: motions,
+            starts: self.start_count as u32,
             threshold_rad_per_s: mode_thresholds.chain(self.random_threshold).reduce(f64::min),
             responses: self.responses,
         };
-        (endings, self.case.row)
+        (attractors, self.held_case.setup)
     }
 }
 
 /// Whether two trajectories ended in the same motion.
-fn are_same(a: &Ending, b: &Ending) -> bool {
-    match (a.state, b.state) {
-        (State::LeftRange { .. }, State::LeftRange { .. }) => return true,
-        (State::LeftRange { .. }, _) | (_, State::LeftRange { .. }) => return false,
+fn are_same_motion(a: &Attractor, b: &Attractor) -> bool {
+    match (a.status, b.status) {
+        (AttractorStatus::LeftRange { .. }, AttractorStatus::LeftRange { .. }) => return true,
+        (AttractorStatus::LeftRange { .. }, _) | (_, AttractorStatus::LeftRange { .. }) => {
+            return false;
+        }
         _ => {}
     }
-    let is_irregular = |ending: &Ending| matches!(ending.settled, None | Some(Settled::Chaotic));
-    let tolerance = match (a.settled, b.settled) {
+    let is_irregular =
+        |attractor: &Attractor| matches!(attractor.motion_kind, None | Some(MotionKind::Chaotic));
+    let tolerance = match (a.motion_kind, b.motion_kind) {
         _ if is_irregular(a) && is_irregular(b) => CHAOS_TOLERANCE,
         (None, _) | (_, None) => UNSETTLED_TOLERANCE,
         _ => SETTLED_TOLERANCE,
@@ -573,17 +604,18 @@ fn are_same(a: &Ending, b: &Ending) -> bool {
     are_close(&a.peaks, &b.peaks, tolerance)
 }
 
-impl Endings {
+impl Attractors {
     /// Whether the largest deviations of a motion are near those of a periodic response. A motion
     /// that has not settled there approaches or leaves the response slowly.
-    pub fn is_near_response(&self, motion: &Ending) -> bool {
-        let is_near =
-            |response: &Response| are_close(&motion.peaks, &response.nonlinear, CHAOS_TOLERANCE);
+    pub fn is_near_response(&self, motion: &Attractor) -> bool {
+        let is_near = |response: &Response| {
+            are_close(&motion.peaks, &response.nonlinear_peaks, CHAOS_TOLERANCE)
+        };
         self.responses.iter().any(is_near)
     }
 }
 
-impl Ending {
+impl Attractor {
     /// The names of the kinds of motions: first those of settled motions, then the reasons why a
     /// kind is not known.
     pub const KIND_NAMES: [&str; 8] = [
@@ -599,13 +631,13 @@ impl Ending {
 
     /// Returns the index of the motion's kind in [`Self::KIND_NAMES`].
     pub fn kind(&self) -> usize {
-        match (self.settled, self.state) {
-            (Some(Settled::Periodic { turns }), _) => (turns as usize).min(3) - 1,
-            (Some(Settled::QuasiPeriodic { .. }), _) => 3,
-            (Some(Settled::Chaotic), _) => 4,
-            (None, State::Transient { .. }) => 5,
-            (None, State::LeftRange { .. }) => 6,
-            (None, State::Ok | State::NotSettled) => 7,
+        match (self.motion_kind, self.status) {
+            (Some(MotionKind::Periodic { turns }), _) => (turns as usize).min(3) - 1,
+            (Some(MotionKind::QuasiPeriodic { .. }), _) => 3,
+            (Some(MotionKind::Chaotic), _) => 4,
+            (None, AttractorStatus::Transient { .. }) => 5,
+            (None, AttractorStatus::LeftRange { .. }) => 6,
+            (None, AttractorStatus::Ok | AttractorStatus::NotSettled) => 7,
         }
     }
 
@@ -615,9 +647,9 @@ impl Ending {
         let starts = self.starts + 1;
         let kicks = [self.least_kick_rad_per_s, other.least_kick_rad_per_s];
         let least_kick_rad_per_s = kicks.into_iter().flatten().reduce(f64::min);
-        if self.settled.is_none() && other.settled.is_some() {
+        if self.motion_kind.is_none() && other.motion_kind.is_some() {
             *self = other.clone();
-        } else if matches!(self.settled, None | Some(Settled::Chaotic)) {
+        } else if matches!(self.motion_kind, None | Some(MotionKind::Chaotic)) {
             for (peak, other) in self.peaks.iter_mut().zip(other.peaks) {
                 *peak = peak.max(other);
             }

@@ -3,16 +3,17 @@
 use core::marker::PhantomData;
 use lane_ode::{Dual, Lane, N, Real};
 
-/// A structure of lane values. `One` is the same structure of plain numbers, as one lane holds it.
+/// A structure of lane values. `SingleLane` is the same structure of plain numbers, as one lane
+/// holds it.
 pub(crate) trait InLanes<T: Lane> {
     /// The structure of plain numbers.
-    type One;
+    type SingleLane;
     /// Returns a structure with the same numbers in every lane. `zero` is any value of the lanes.
-    fn splat(zero: N<T>, one: &Self::One) -> Self;
+    fn splat(zero: N<T>, one: &Self::SingleLane) -> Self;
     /// Overwrites a lane.
-    fn set_lane(&mut self, lane: usize, one: &Self::One);
+    fn set_lane(&mut self, lane: usize, one: &Self::SingleLane);
     /// Returns the numbers of a lane.
-    fn get_lane(&self, lane: usize) -> Self::One;
+    fn get_lane(&self, lane: usize) -> Self::SingleLane;
 }
 
 /// A structure that can be made of dual numbers whose derivatives are zero.
@@ -24,7 +25,7 @@ pub(crate) trait ToDual {
 }
 
 impl<T: Lane> InLanes<T> for N<T> {
-    type One = N<f64>;
+    type SingleLane = N<f64>;
     #[inline(always)]
     fn splat(zero: Self, one: &N<f64>) -> Self {
         zero.lit(one.0)
@@ -48,9 +49,9 @@ impl<T: Real> ToDual for N<T> {
 }
 
 impl<T: Lane, A: InLanes<T> + Copy, const K: usize> InLanes<T> for [A; K] {
-    type One = [A::One; K];
+    type SingleLane = [A::SingleLane; K];
     #[inline(always)]
-    fn splat(zero: N<T>, one: &[A::One; K]) -> Self {
+    fn splat(zero: N<T>, one: &[A::SingleLane; K]) -> Self {
         let mut array = [A::splat(zero, &one[0]); K];
         for i in 1..K {
             array[i] = A::splat(zero, &one[i]);
@@ -58,11 +59,11 @@ impl<T: Lane, A: InLanes<T> + Copy, const K: usize> InLanes<T> for [A; K] {
         array
     }
     #[inline(always)]
-    fn set_lane(&mut self, lane: usize, one: &[A::One; K]) {
+    fn set_lane(&mut self, lane: usize, one: &[A::SingleLane; K]) {
         self.iter_mut().zip(one).for_each(|(to, from)| to.set_lane(lane, from));
     }
     #[inline(always)]
-    fn get_lane(&self, lane: usize) -> [A::One; K] {
+    fn get_lane(&self, lane: usize) -> [A::SingleLane; K] {
         core::array::from_fn(|i| self[i].get_lane(lane))
     }
 }
@@ -82,9 +83,9 @@ impl<A: ToDual<Dual: Copy>, const K: usize> ToDual for [A; K] {
 // These functions have loops instead of closures, because only code that is inlined into an entry
 // function is compiled for its instruction set.
 impl<T: Lane, A: InLanes<T>> InLanes<T> for Vec<A> {
-    type One = Vec<A::One>;
+    type SingleLane = Vec<A::SingleLane>;
     #[inline(always)]
-    fn splat(zero: N<T>, one: &Vec<A::One>) -> Self {
+    fn splat(zero: N<T>, one: &Vec<A::SingleLane>) -> Self {
         let mut list = Self::with_capacity(one.len());
         for item in one {
             list.push(A::splat(zero, item));
@@ -93,11 +94,11 @@ impl<T: Lane, A: InLanes<T>> InLanes<T> for Vec<A> {
     }
     /// Overwrites a lane; both lists have the same length.
     #[inline(always)]
-    fn set_lane(&mut self, lane: usize, one: &Vec<A::One>) {
+    fn set_lane(&mut self, lane: usize, one: &Vec<A::SingleLane>) {
         self.iter_mut().zip(one).for_each(|(to, from)| to.set_lane(lane, from));
     }
     #[inline(always)]
-    fn get_lane(&self, lane: usize) -> Vec<A::One> {
+    fn get_lane(&self, lane: usize) -> Vec<A::SingleLane> {
         self.iter().map(|item| item.get_lane(lane)).collect()
     }
 }
@@ -132,7 +133,7 @@ impl<T> InAnyLane<T> {
 }
 
 impl<T: Lane> InLanes<T> for InAnyLane<T> {
-    type One = InAnyLane<f64>;
+    type SingleLane = InAnyLane<f64>;
     #[inline(always)]
     fn splat(_: N<T>, one: &InAnyLane<f64>) -> Self {
         Self::new(one.0)
@@ -175,7 +176,7 @@ macro_rules! lane_struct {
         }
 
         impl<T: lane_ode::Lane> $crate::lanes::InLanes<T> for $name<T> {
-            type One = $name<f64>;
+            type SingleLane = $name<f64>;
             #[inline(always)]
             fn splat(zero: lane_ode::N<T>, one: &$name<f64>) -> Self {
                 Self { $($field: $crate::lanes::InLanes::splat(zero, &one.$field),)* }

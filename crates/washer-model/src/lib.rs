@@ -72,7 +72,7 @@ mod machine;
 mod modes;
 mod nonlinear;
 mod point;
-mod ready;
+mod preparation;
 mod run;
 mod stability;
 mod steps;
@@ -80,12 +80,13 @@ mod steps;
 pub use channel::Channel;
 pub use coordinates::COORDINATES;
 pub use dwell::{
-    Ending, Endings, Exponent, Settled, Starts, State, find_endings, find_endings_from_responses,
+    Attractor, AttractorStatus, Attractors, Exponent, MotionKind, StartRule, find_attractors,
+    find_attractors_from_responses,
 };
 pub use kind::ModelKind;
 pub use linear::Matrices;
 pub use machine::parameters::{
-    Assumption, DataSheet, ElementList, Parameter, Range, Spread, Target, UnknownParameter,
+    Assumption, DataSheet, ElementList, ExpectedRange, Parameter, Range, Target, UnknownParameter,
     decimal, unit_suffix,
 };
 pub use machine::spin::{Profile, Spin};
@@ -103,10 +104,11 @@ pub use nonlinear::coupling::Caps;
 pub use point::friction::FrictionSpeed;
 pub use point::ringing::{Swing, UnresolvedModes};
 pub use point::{NoEquilibrium, Point, Timing};
-pub use ready::prepare;
+pub use preparation::prepare;
 pub use run::equations::{PointEquations, STATE_LEN};
 pub use run::history::{
-    History, HistoryRequest, Instant, Start, histories, histories_per_batch, history, instant_count,
+    History, HistoryRequest, InitialDeviation, InstantOutputs, histories, histories_per_batch,
+    history, instant_count,
 };
 pub use run::suspension::{Forces, stops_at_rest_n};
 pub use run::{
@@ -114,8 +116,9 @@ pub use run::{
     Snapshot, simulate, simulate_until, simulate_with,
 };
 pub use stability::{
-    Beyond, Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant,
-    Response, Responses, cross, exact_motions, peaks_without_departures, respond,
+    Crossing, CrossingEffect, Disturbance, FloquetMode, GeometryLimit, HeldSpeed, LeftRangeError,
+    ParticipatingMode, Response, ResponseCurves, ResponseError, StabilityKind, find_responses,
+    floquet_modes, follow_crossings, peaks_without_departures,
 };
 pub use steps::formula::Formula;
 pub use steps::{StepSelector, capped_method};

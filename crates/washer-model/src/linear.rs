@@ -14,16 +14,20 @@ pub(crate) mod step;
 pub(crate) mod symmetric;
 
 use crate::COORDINATES;
-use crate::coordinates::{ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, seeded};
+use crate::coordinates::{
+    ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, with_unit_derivative,
+};
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLES};
-use crate::linear::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, Terms};
+use crate::linear::rotor_terms::{
+    self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients,
+};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
 use crate::nonlinear::frame::Tilt;
-use crate::nonlinear::{Half, rotor, tub};
-use lane_ode::{Aside, Dual, Lane, N, Real};
+use crate::nonlinear::{Half, assemble_rotor_in_lanes, assemble_tub};
+use lane_ode::{Dual, Lane, N, OutOfLine, Real};
 
 /// The number of entries of all arrays of the rotor. Those of the inertia come last.
 const ALL_ENTRIES: usize = ENTRIES + INERTIA_ENTRIES;
@@ -49,7 +53,7 @@ lane_struct! {
 #[derive(Clone, Debug)]
 pub(crate) struct LinearPoint {
     pub(crate) constants: Constants<f64>,
-    pub(crate) terms: Terms<f64>,
+    pub(crate) terms: RotorCoefficients<f64>,
 }
 
 /// The linearisation of one machine per lane about the equilibrium `q`.
@@ -58,20 +62,20 @@ pub(crate) struct Linearise<'a, T> {
     pub(crate) q: &'a [N<T>; COORDINATES],
 }
 
-impl<T: Lane> Aside for Linearise<'_, T> {
+impl<T: Lane> OutOfLine for Linearise<'_, T> {
     type Output = Vec<LinearPoint>;
 
     #[inline(always)]
     fn run(self) -> Vec<LinearPoint> {
         let Self { machine, q } = self;
         let zero = q[0].lit(0.0);
-        let still = [zero; COORDINATES];
+        let zeros = [zero; COORDINATES];
         let bodies = &machine.bodies;
-        let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load(bodies);
-        let lifted = machine.constant();
+        let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load_on_shaft(bodies);
+        let dual_machine = machine.constant();
 
         // The tub does not depend on the spin.
-        let at_rest = tub(machine, q, &still);
+        let at_rest = assemble_tub(machine, q, &zeros);
         let [tub_stiffness, tub_damping] = tub_tangents(machine, q);
 
         let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
@@ -81,11 +85,12 @@ impl<T: Lane> Aside for Linearise<'_, T> {
             {
                 let angle = (zero.lit(sin), zero.lit(cos));
                 let spin = SpinState::new(angle, zero.lit(speed), zero.lit(acceleration));
-                let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &still);
+                let Half { mut floating, inertia, .. } =
+                    assemble_rotor_in_lanes(bodies, &spin, q, &zeros);
                 floating.apply(&on_shaft);
                 let (force, torque) = floating.generalised_forces();
                 let arm = floating.arm;
-                let lifted_spin = spin.constant();
+                let dual_spin = spin.constant();
                 // The stiffness depends on speed and acceleration. The damping is proportional to
                 // the speed, so that a unit speed determines it.
                 let directions = if kind == 1 { 8 } else { 4 };
@@ -93,11 +98,13 @@ impl<T: Lane> Aside for Linearise<'_, T> {
                     let column = direction % 4;
                     let entry = if direction < 4 { entry::stiffness } else { entry::damping };
                     let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
-                    let q = seeded(q, ROTOR_TURNS[column], dq);
-                    let u = seeded(&still, ROTOR_TURNS[column], du);
-                    let Half { mut floating, .. } = rotor(&lifted.bodies, &lifted_spin, &q, &u);
+                    let q = with_unit_derivative(q, ROTOR_TURNS[column], dq);
+                    let u = with_unit_derivative(&zeros, ROTOR_TURNS[column], du);
+                    let Half { mut floating, .. } =
+                        assemble_rotor_in_lanes(&dual_machine.bodies, &dual_spin, &q, &u);
                     floating.apply(&on_shaft.constant());
-                    let rows: [_; ROWS] = about_centre(floating.generalised_forces(), &arm);
+                    let rows: [_; ROWS] =
+                        transform_to_mass_centre(floating.generalised_forces(), &arm);
                     for row in 0..ROWS {
                         samples[kind][entry(row, column)][k] = -rows[row];
                     }
@@ -130,7 +137,7 @@ impl<T: Lane> Aside for Linearise<'_, T> {
         (0..T::LANES)
             .map(|lane| LinearPoint {
                 constants: constants.get_lane(lane),
-                terms: terms_of_lane(&samples, lane, bodies.is_skewed_in(lane)),
+                terms: rotor_coefficients_of_lane(&samples, lane, bodies.is_skewed_in(lane)),
             })
             .collect()
     }
@@ -143,19 +150,24 @@ pub(crate) fn tub_tangents<T: Lane>(
     q: &[N<T>; COORDINATES],
 ) -> [[[N<T>; 4]; 4]; 2] {
     let zero = q[0].lit(0.0);
-    let still = [zero; COORDINATES];
-    let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load(&machine.bodies);
+    let zeros = [zero; COORDINATES];
+    let on_shaft =
+        Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load_on_shaft(&machine.bodies);
     let on_tub = on_shaft.reaction().constant();
-    let arm = tub(machine, q, &still).floating.arm;
-    let lifted = machine.constant();
+    let arm = assemble_tub(machine, q, &zeros).floating.arm;
+    let dual_machine = machine.constant();
     let mut tangents = [[[zero; 4]; 4]; 2];
     for (column, &j) in TUB.iter().enumerate() {
-        for (matrix, (dq, du)) in tangents.iter_mut().zip([(1.0, 0.0), (0.0, 1.0)]) {
-            let Half { mut floating, .. } = tub(&lifted, &seeded(q, j, dq), &seeded(&still, j, du));
+        for (tangent, (dq, du)) in tangents.iter_mut().zip([(1.0, 0.0), (0.0, 1.0)]) {
+            let Half { mut floating, .. } = assemble_tub(
+                &dual_machine,
+                &with_unit_derivative(q, j, dq),
+                &with_unit_derivative(&zeros, j, du),
+            );
             floating.apply(&on_tub);
-            let rows: [_; 4] = about_centre(floating.generalised_forces(), &arm);
+            let rows: [_; 4] = transform_to_mass_centre(floating.generalised_forces(), &arm);
             for (row, slope) in rows.iter().enumerate() {
-                matrix[row][column] = -*slope;
+                tangent[row][column] = -*slope;
             }
         }
     }
@@ -163,9 +175,9 @@ pub(crate) fn tub_tangents<T: Lane>(
 }
 
 /// Transforms the slopes of generalised forces from the bearing midpoint to the mass centre, with
-/// the equilibrium's arms: the inverse of `Floating::generalised_forces`.
+/// the equilibrium's arms: the inverse of `FloatingChain::generalised_forces`.
 #[inline(always)]
-fn about_centre<T: Real, const R: usize, const ROWS: usize>(
+fn transform_to_mass_centre<T: Real, const R: usize, const ROWS: usize>(
     (midpoint, rotation): ([N<Dual<T>>; 2], [N<Dual<T>>; R]),
     arm: &[[N<T>; 2]; R],
 ) -> [N<T>; ROWS] {
@@ -179,31 +191,32 @@ fn about_centre<T: Real, const R: usize, const ROWS: usize>(
 }
 
 /// Computes the terms of one lane from samples at rest, at unit speed and at unit acceleration.
-fn terms_of_lane<T: Lane>(
+fn rotor_coefficients_of_lane<T: Lane>(
     samples: &[[[N<T>; HARMONICS]; ALL_ENTRIES]; 3],
     lane: usize,
     skewed: bool,
-) -> Terms<f64> {
+) -> RotorCoefficients<f64> {
     let coefficients = |entry: usize| {
         let mut functions = [0.0; FUNCTIONS];
-        let harmonics_at =
-            |kind: usize| harmonics::coefficients(samples[kind][entry].map(|v| v.0.get(lane)));
-        let rest = harmonics_at(0);
+        let harmonics_at = |kind: usize| {
+            harmonics::harmonic_coefficients(samples[kind][entry].map(|v| v.0.get(lane)))
+        };
+        let at_rest = harmonics_at(0);
         let at_speed = harmonics_at(1);
         let accelerated = harmonics_at(2);
-        functions[harmonics::ONE..harmonics::SPEED].copy_from_slice(&rest);
+        functions[harmonics::ONE..harmonics::SPEED].copy_from_slice(&at_rest);
         if (entry::damping(0, 0)..ENTRIES).contains(&entry) {
             functions[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&at_speed);
         } else {
             for harmonic in 0..HARMONICS {
-                functions[harmonics::SPIN + harmonic] = at_speed[harmonic] - rest[harmonic];
+                functions[harmonics::SPIN + harmonic] = at_speed[harmonic] - at_rest[harmonic];
             }
-            functions[harmonics::ACCELERATION] = accelerated[0] - rest[0];
+            functions[harmonics::ACCELERATION] = accelerated[0] - at_rest[0];
         }
         functions
     };
     let inertia = core::array::from_fn(|entry| coefficients(ENTRIES + entry));
-    Terms::gather(&inertia, &core::array::from_fn(coefficients), skewed)
+    RotorCoefficients::select_coefficients(&inertia, &core::array::from_fn(coefficients), skewed)
 }
 
 /// The matrices M, C and K and the force F of Eq. 41 in the coordinates q, for one machine at one
@@ -247,7 +260,7 @@ impl LinearPoint {
         };
         let mut stiffness = [[0.0; COORDINATES]; COORDINATES];
         for j in 0..COORDINATES {
-            let load = unit_deflection(j).load(bodies);
+            let load = unit_deflection(j).load_on_shaft(bodies);
             for (i, row) in stiffness.iter_mut().enumerate() {
                 row[j] = work(i, &load);
             }
@@ -258,10 +271,13 @@ impl LinearPoint {
     /// Computes the matrices at an instant. `bodies` are those of the same machine.
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let c = &self.constants;
-        let (inertia, e) = self.terms.at(&harmonics::functions(spin));
-        let tub = HalfMap { midpoint: [TUB_Y, TUB_Z], turns: TUB_TURNS, arm: c.tub_arm };
-        let rotor =
-            HalfMap { midpoint: [SHAFT_Y, SHAFT_Z], turns: ROTOR_TURNS, arm: entry::arms(&e) };
+        let (inertia, e) = self.terms.at(&harmonics::spin_functions(spin));
+        let tub = MassCentreMap { midpoint: [TUB_Y, TUB_Z], rotations: TUB_TURNS, arm: c.tub_arm };
+        let rotor = MassCentreMap {
+            midpoint: [SHAFT_Y, SHAFT_Z],
+            rotations: ROTOR_TURNS,
+            arm: entry::arms(&e),
+        };
         let mut matrices = Matrices {
             mass: [[0.0; COORDINATES]; COORDINATES],
             damping: [[0.0; COORDINATES]; COORDINATES],
@@ -292,15 +308,15 @@ impl LinearPoint {
 }
 
 /// The map between a half's mass centre and the coordinates.
-struct HalfMap<const R: usize> {
+struct MassCentreMap<const R: usize> {
     midpoint: [usize; 2],
-    turns: [usize; R],
+    rotations: [usize; R],
     arm: [[N<f64>; 2]; R],
 }
 
-impl<const R: usize> HalfMap<R> {
+impl<const R: usize> MassCentreMap<R> {
     /// Computes the generalised forces from the half's force (y, z) and torques about its mass
-    /// centre: the inverse of `about_centre`.
+    /// centre: the inverse of `transform_to_mass_centre`.
     fn generalised_forces(&self, rows: impl Fn(usize) -> N<f64>) -> [f64; COORDINATES] {
         let mut forces = [0.0; COORDINATES];
         let force = [rows(0), rows(1)];
@@ -308,7 +324,7 @@ impl<const R: usize> HalfMap<R> {
             forces[self.midpoint[i]] = force[i].0;
         }
         for (r, [y, z]) in self.arm.into_iter().enumerate() {
-            forces[self.turns[r]] = (rows(2 + r) + y * force[0] + z * force[1]).0;
+            forces[self.rotations[r]] = (rows(2 + r) + y * force[0] + z * force[1]).0;
         }
         forces
     }
@@ -322,20 +338,20 @@ impl<const R: usize> HalfMap<R> {
     ) {
         let m = 1.0 / per_mass.0;
         let arm = &self.arm;
-        let turns = &self.turns;
+        let rotations = &self.rotations;
         for (i, midpoint) in self.midpoint.into_iter().enumerate() {
             mass[midpoint][midpoint] = m;
             for r in 0..R {
-                mass[midpoint][turns[r]] = m * arm[r][i].0;
-                mass[turns[r]][midpoint] = m * arm[r][i].0;
+                mass[midpoint][rotations[r]] = m * arm[r][i].0;
+                mass[rotations[r]][midpoint] = m * arm[r][i].0;
             }
         }
         for r in 0..R {
             for s in 0..=r {
                 let product = arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0;
                 let entry = inertia(r, s).0 + m * product;
-                mass[turns[r]][turns[s]] = entry;
-                mass[turns[s]][turns[r]] = entry;
+                mass[rotations[r]][rotations[s]] = entry;
+                mass[rotations[s]][rotations[r]] = entry;
             }
         }
     }

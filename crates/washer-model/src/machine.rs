@@ -226,7 +226,7 @@ pub struct Foot {
 
 impl Unbalance {
     /// Returns the place across the axis, along d2 and d3 (m). Quarter turns are exact.
-    pub(crate) fn place_m(&self) -> [f64; 2] {
+    pub(crate) fn position_m(&self) -> [f64; 2] {
         let quarters = (self.angle_deg / 90.0).round();
         let (sin, cos) = libm::sincos((self.angle_deg - 90.0 * quarters).to_radians());
         let [y, z] = match quarters.rem_euclid(4.0) {

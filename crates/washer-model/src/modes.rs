@@ -84,17 +84,17 @@ pub struct Modes {
 
 /// Returns the modal assurance criterion of two shapes of unit modal mass, weighted by the mass
 /// matrix: 1 for equal shapes, 0 for orthogonal ones.
-pub(crate) fn assurance(
+pub(crate) fn modal_assurance(
     mass: &[[f64; COORDINATES]; COORDINATES],
     a: &[[f64; 2]; COORDINATES],
     b: &[[f64; 2]; COORDINATES],
 ) -> f64 {
-    let product = inner(mass, a, b);
+    let product = mass_inner_product(mass, a, b);
     product[0] * product[0] + product[1] * product[1]
 }
 
 /// Returns a^H M b as real and imaginary part.
-pub(crate) fn inner(
+pub(crate) fn mass_inner_product(
     mass: &[[f64; COORDINATES]; COORDINATES],
     a: &[[f64; 2]; COORDINATES],
     b: &[[f64; 2]; COORDINATES],
@@ -131,10 +131,12 @@ pub(crate) fn modes_with_caps(
     let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
     let values = decomposition.S().column_vector();
     let vectors = decomposition.U();
-    let shape = |state: usize| unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)]));
-    let similarity = |a: usize, b: usize| assurance(&mass, &shape(a), &shape(b));
+    let shape = |state: usize| {
+        normalize_to_unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)]))
+    };
+    let similarity = |a: usize, b: usize| modal_assurance(&mass, &shape(a), &shape(b));
     let motions = sort_into_modes((0..STATES).map(|k| values[k] * system.unit_per_s), &similarity)?;
-    let modes = motions.map(|(Root { s, magnitude_rad_per_s }, state)| Mode {
+    let modes = motions.map(|(ModeRoot { s, magnitude_rad_per_s }, state)| Mode {
         re_per_s: s.re,
         im_rad_per_s: s.im,
         magnitude_rad_per_s,
@@ -145,19 +147,21 @@ pub(crate) fn modes_with_caps(
 
 /// Computes the eigenvalues of the modes without their shapes, in a third of the time unless
 /// several modes are overdamped.
-pub(crate) fn motions(
+pub(crate) fn mode_roots(
     point: &Point,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
-) -> Result<[Root; COORDINATES], NoModes> {
+) -> Result<[ModeRoot; COORDINATES], NoModes> {
     let system = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
     let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
     if values.iter().filter(|s| s.im == 0.0).count() > 2 {
         // If several modes are overdamped, their shapes decide which two real rates belong to one
         // mode.
-        return Ok(modes_with_caps(point, 0.0, speed_rad_per_s, caps)?.modes.map(|mode| Root {
-            s: c64::new(mode.re_per_s, mode.im_rad_per_s),
-            magnitude_rad_per_s: mode.magnitude_rad_per_s,
+        return Ok(modes_with_caps(point, 0.0, speed_rad_per_s, caps)?.modes.map(|mode| {
+            ModeRoot {
+                s: c64::new(mode.re_per_s, mode.im_rad_per_s),
+                magnitude_rad_per_s: mode.magnitude_rad_per_s,
+            }
         }));
     }
     let values = values.into_iter().map(|s| s * system.unit_per_s);
@@ -166,7 +170,7 @@ pub(crate) fn motions(
 
 /// The eigenvalue of a mode.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Root {
+pub(crate) struct ModeRoot {
     /// The eigenvalue s (1/s), whose imaginary part is not negative.
     pub(crate) s: c64,
     /// The undamped natural frequency, as in [`Mode`].
@@ -179,7 +183,7 @@ pub(crate) struct Root {
 fn sort_into_modes(
     values: impl Iterator<Item = c64>,
     similarity: &dyn Fn(usize, usize) -> f64,
-) -> Result<[(Root, usize); COORDINATES], NoModes> {
+) -> Result<[(ModeRoot, usize); COORDINATES], NoModes> {
     let mut modes = Vec::with_capacity(COORDINATES);
     let mut real = Vec::new();
     for (state, s) in values.enumerate() {
@@ -187,7 +191,7 @@ fn sort_into_modes(
             return Err(NoModes::Eigenvalues);
         }
         if s.im > 0.0 {
-            modes.push((Root { s, magnitude_rad_per_s: magnitude(s) }, state));
+            modes.push((ModeRoot { s, magnitude_rad_per_s: magnitude(s) }, state));
         } else if s.im == 0.0 {
             real.push((s.re, state));
         }
@@ -202,7 +206,7 @@ fn sort_into_modes(
             .max_by(|a, b| similarity_to_slow(a).total_cmp(&similarity_to_slow(b)));
         let (fast, _) = real.remove(partner.ok_or(NoModes::Eigenvalues)?);
         let s = c64::new(0.5 * (slow + fast), 0.0);
-        modes.push((Root { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
+        modes.push((ModeRoot { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
     }
     modes.sort_by(|a, b| a.0.magnitude_rad_per_s.total_cmp(&b.0.magnitude_rad_per_s));
     modes.try_into().map_err(|_| NoModes::Eigenvalues)
@@ -216,7 +220,7 @@ fn magnitude(s: c64) -> f64 {
 
 /// Normalises a vector to unit modal mass, with the phase at which the largest entry is real and
 /// positive, so that other phases are relative to that entry.
-fn unit_mass(
+fn normalize_to_unit_mass(
     mass: &[[f64; COORDINATES]; COORDINATES],
     vector: &[c64; COORDINATES],
 ) -> [[f64; 2]; COORDINATES] {
@@ -226,9 +230,9 @@ fn unit_mass(
             largest = *entry;
         }
     }
-    let turned = vector.map(|v| v * largest.conj() / largest.norm_sqr());
-    let pairs = turned.map(|v| [v.re, v.im]);
-    let scale = inner(mass, &pairs, &pairs)[0].sqrt();
+    let rotated_vector = vector.map(|v| v * largest.conj() / largest.norm_sqr());
+    let pairs = rotated_vector.map(|v| [v.re, v.im]);
+    let scale = mass_inner_product(mass, &pairs, &pairs)[0].sqrt();
     pairs.map(|[re, im]| [re / scale, im / scale])
 }
 
@@ -273,7 +277,7 @@ pub(crate) fn highest_with_caps(
     caps: Option<&Caps>,
 ) -> Result<f64, NoModes> {
     let mut highest = 0.0_f64;
-    let steepest = point.steepest.as_deref().filter(|_| model == ModelKind::Nonlinear);
+    let steepest = point.steepest_model.as_deref().filter(|_| model == ModelKind::Nonlinear);
     let models = core::iter::once(&point.linear).chain(steepest);
     let angles = (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
     for (model, theta) in models.flat_map(|model| angles.clone().map(move |theta| (model, theta))) {
@@ -296,16 +300,16 @@ pub(crate) fn highest_with_caps(
 pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Result<f64, NoModes> {
     let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &still);
-    let together = |matrix: &[[f64; COORDINATES]; COORDINATES]| {
+    let add_rigid_pairs = |matrix: &[[f64; COORDINATES]; COORDINATES]| {
         Mat::from_fn(TUB.len(), TUB.len(), |i, j| {
             let [i, k] = [TUB[i], SHAFT[i]];
             let [j, l] = [TUB[j], SHAFT[j]];
             matrix[i][j] + matrix[i][l] + matrix[k][j] + matrix[k][l]
         })
     };
-    let mass = together(&mass);
+    let mass = add_rigid_pairs(&mass);
     let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;
-    let values = factors.solve(together(&stiffness)).eigenvalues();
+    let values = factors.solve(add_rigid_pairs(&stiffness)).eigenvalues();
     let values = values.map_err(|_| NoModes::Eigenvalues)?;
     let fastest = values.iter().map(|square| magnitude(*square)).fold(0.0, f64::max).sqrt();
     if fastest.is_finite() { Ok(fastest) } else { Err(NoModes::Eigenvalues) }
@@ -347,18 +351,18 @@ fn first_order(
                 matrices.mass[q][q] += inertia;
             }
             let torque_per_speed = (1.0 + BACKWARD_SHARE) * speed_rad_per_s * inertia;
-            let [nine, ten] = HINGE;
-            matrices.damping[nine][ten] -= torque_per_speed;
-            matrices.damping[ten][nine] += torque_per_speed;
+            let [hinge_yaw, hinge_pitch] = HINGE;
+            matrices.damping[hinge_yaw][hinge_pitch] -= torque_per_speed;
+            matrices.damping[hinge_pitch][hinge_yaw] += torque_per_speed;
         }
     }
-    let full = |m: &[[f64; COORDINATES]; COORDINATES]| {
+    let to_matrix = |m: &[[f64; COORDINATES]; COORDINATES]| {
         Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j])
     };
-    let mass = full(&matrices.mass);
+    let mass = to_matrix(&matrices.mass);
     let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;
-    let stiffness = factors.solve(full(&matrices.stiffness));
-    let damping = factors.solve(full(&matrices.damping));
+    let stiffness = factors.solve(to_matrix(&matrices.stiffness));
+    let damping = factors.solve(to_matrix(&matrices.damping));
     let largest = (0..COORDINATES)
         .flat_map(|i| (0..COORDINATES).map(move |j| (i, j)))
         .fold(0.0_f64, |largest, at| largest.max(stiffness[at].abs()));

@@ -5,7 +5,6 @@
 //! A turned by the spin theta, frame E (the hinge's) is S turned by q9, and frame D (the drum's) is
 //! E turned by q10. Names end in `_a`, `_s` or `_e` where the frame is not clear.
 
-pub(crate) mod ahead;
 pub(crate) mod coefficients;
 pub(crate) mod coupling;
 pub(crate) mod elements;
@@ -13,6 +12,7 @@ pub(crate) mod equilibrium;
 pub(crate) mod floating;
 pub(crate) mod forces;
 pub(crate) mod frame;
+pub(crate) mod implicit_stage;
 pub(crate) mod outputs;
 
 use crate::COORDINATES;
@@ -23,14 +23,14 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
-use crate::nonlinear::floating::{Factors, Floating};
-use crate::nonlinear::forces::{Deflection, flexure};
-use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
-use lane_ode::{Aside, Lane, N, Real};
+use crate::nonlinear::floating::{FloatingChain, LdltFactors};
+use crate::nonlinear::forces::{Deflection, flexure_moments};
+use crate::nonlinear::frame::{Tilt, Vec3, add, linear_combination, scale, subtract};
+use lane_ode::{Lane, N, OutOfLine, Real};
 
 /// The tub or the rotor: equations of motion, lower triangle of the inertia, and orientation.
 pub(crate) struct Half<T, const R: usize> {
-    pub(crate) floating: Floating<T, R>,
+    pub(crate) floating: FloatingChain<T, R>,
     pub(crate) inertia: [[N<T>; R]; R],
     pub(crate) tilt: Tilt<T>,
 }
@@ -44,15 +44,15 @@ pub(crate) struct Halves<T> {
 /// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`, with the bearing
 /// forces in both halves.
 #[inline(always)]
-pub(crate) fn halves<T: Lane>(
+pub(crate) fn coupled_halves<T: Lane>(
     machine: &Coefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Halves<T> {
-    let mut tub = tub(machine, q, u);
-    let mut rotor = rotor(&machine.bodies, spin, q, u);
-    let on_shaft = Deflection::new(q, &tub.tilt, &rotor.tilt).load(&machine.bodies);
+    let mut tub = assemble_tub(machine, q, u);
+    let mut rotor = assemble_rotor_in_lanes(&machine.bodies, spin, q, u);
+    let on_shaft = Deflection::new(q, &tub.tilt, &rotor.tilt).load_on_shaft(&machine.bodies);
     tub.floating.apply(&on_shaft.reaction());
     rotor.floating.apply(&on_shaft);
     Halves { tub, rotor }
@@ -71,8 +71,8 @@ pub(crate) fn accelerations<T: Lane>(
 ) -> [N<T>; COORDINATES] {
     let (tub, rotor) = uncoupled_halves(machine, coupling, sag, spin, q, u);
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let tub_factors = Factors::new(tub.inertia);
-    let rotor_factors = Factors::new(rotor.inertia);
+    let tub_factors = LdltFactors::new(tub.inertia);
+    let rotor_factors = LdltFactors::new(rotor.inertia);
     let tub = (&tub.floating, &tub_factors);
     let rotor = (&rotor.floating, &rotor_factors);
     coupling.accelerations(&machine.bodies, spin.speed, &deflection, &sag.bearings, tub, rotor)
@@ -90,26 +90,27 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     u: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; TUB.len()] {
     let (tub, rotor) = uncoupled_halves(machine, coupling, sag, spin, q, u);
-    let tub_factors = Factors::new(tub.inertia);
-    let rotor_factors = Factors::new(rotor.inertia);
+    let tub_factors = LdltFactors::new(tub.inertia);
+    let rotor_factors = LdltFactors::new(rotor.inertia);
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let b = &machine.bodies;
+    let bodies = &machine.bodies;
     let speed = spin.speed;
-    let mut free = [speed; COORDINATES];
+    let mut unloaded_accelerations = [speed; COORDINATES];
     let mut per_load = [[speed; COORDINATES]; 4];
     // The first pass of the loop has no load, so that the code for both cases is compiled once.
-    for loaded in 0..=TUB.len() {
+    for load_number in 0..=TUB.len() {
         let mut floating = tub.floating;
-        if loaded > 0 {
-            floating.add_unit_force(loaded - 1);
+        if load_number > 0 {
+            floating.add_unit_force(load_number - 1);
         }
         let tub = (&floating, &tub_factors);
         let rotor = (&rotor.floating, &rotor_factors);
-        let found = coupling.accelerations(b, speed, &deflection, &sag.bearings, tub, rotor);
-        if loaded == 0 {
-            free = found;
+        let accelerations =
+            coupling.accelerations(bodies, speed, &deflection, &sag.bearings, tub, rotor);
+        if load_number == 0 {
+            unloaded_accelerations = accelerations;
         } else {
-            per_load[loaded - 1] = difference(found, &free);
+            per_load[load_number - 1] = subtract(accelerations, &unloaded_accelerations);
         }
     }
     per_load
@@ -126,29 +127,30 @@ fn uncoupled_halves<T: Lane>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> (Half<T, 2>, Half<T, 4>) {
-    let tub = tub(machine, q, u);
-    let mut rotor = rotor(&machine.bodies, spin, q, u);
-    if let Some(mass) = coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge) {
-        for (place, r) in [2, 3].into_iter().enumerate() {
-            rotor.inertia[r][r] += mass.inertia;
-            rotor.floating.torque[r] += mass.torque[place];
+    let tub = assemble_tub(machine, q, u);
+    let mut rotor = assemble_rotor_in_lanes(&machine.bodies, spin, q, u);
+    if let Some(hinge_mass) = coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge)
+    {
+        for (index, r) in [2, 3].into_iter().enumerate() {
+            rotor.inertia[r][r] += hinge_mass.inertia;
+            rotor.floating.torque[r] += hinge_mass.torque[index];
         }
-        rotor.floating.torque[2] += mass.torque_per_speed * u[HINGE_PITCH];
-        rotor.floating.torque[3] -= mass.torque_per_speed * u[HINGE_YAW];
+        rotor.floating.torque[2] += hinge_mass.torque_per_speed * u[HINGE_PITCH];
+        rotor.floating.torque[3] -= hinge_mass.torque_per_speed * u[HINGE_YAW];
     }
     (tub, rotor)
 }
 
 /// Computes the equations of the tub T about its mass centre.
 #[inline(always)]
-pub(crate) fn tub<T: Lane>(
+pub(crate) fn assemble_tub<T: Lane>(
     machine: &Coefficients<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Half<T, 2> {
     let b = &machine.bodies;
     let tilt = Tilt::tub(q);
-    let motion = tilt.motion(u[TUB_YAW], u[TUB_PITCH]);
+    let motion = tilt.motion_at_constant_speeds(u[TUB_YAW], u[TUB_PITCH]);
     let [x, y, z] = motion.rate;
     let midpoint = [q[TUB_Y], q[TUB_Z]];
     let velocity = [u[TUB_Y], u[TUB_Z]];
@@ -167,14 +169,14 @@ pub(crate) fn tub<T: Lane>(
         b.tub_i22 * motion.acceleration_y + (b.tub_i11 - b.tub_i33) * (x * z),
         ((b.tub_i22 - b.tub_i11) * (x * y)).v(),
     ];
-    let moment = difference(moment, &inertia_moment);
+    let moment = subtract(moment, &inertia_moment);
 
     // The mass centre L_T t1 (Eq. 8): partial velocities in cabinet axes, and acceleration.
     let arm_yaw_x = (centre * tilt.axis_c[2]).v();
     let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
-    let arm_pitch = scaled(centre, tilt.second_c);
-    let axis_drift = tilt.in_cabinet_axes(&motion.axis_acceleration);
-    let drift = scaled(centre, axis_drift);
+    let arm_pitch = scale(centre, tilt.second_c);
+    let axis_drift = tilt.to_cabinet_axes(&motion.axis_acceleration);
+    let drift = scale(centre, axis_drift);
 
     let axial = (b.tub_mass * drift[0]).v();
     let torque_yaw = tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]
@@ -188,7 +190,7 @@ pub(crate) fn tub<T: Lane>(
     let c = tilt.cos_pitch;
     let zero = s.lit(0.0);
     Half {
-        floating: Floating {
+        floating: FloatingChain {
             per_mass: b.tub_per_mass,
             force: [force[0] - b.gravity * b.tub_mass, force[1]],
             drift: [drift[1], drift[2]],
@@ -214,7 +216,7 @@ pub(crate) fn tub<T: Lane>(
 /// reduced mass mu. The terms in mu rho^2 are part of the drum's inertia about the hinge
 /// (`Bodies::drum_i11` ...); those in mu l rho and mu l^2 appear below with `mu_l` and `mu_l2`.
 #[inline(always)]
-pub(crate) fn rotor<T: Lane>(
+pub(crate) fn assemble_rotor_in_lanes<T: Lane>(
     b: &Bodies<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
@@ -222,7 +224,7 @@ pub(crate) fn rotor<T: Lane>(
 ) -> Half<T, 4> {
     if b.is_skewed.holds() {
         let zero = q[0].lit(0.0);
-        return zero.0.aside(SkewedRotor { b, spin, q, u });
+        return zero.0.run_out_of_line(SkewedRotor { b, spin, q, u });
     }
     assemble_rotor::<T, false>(b, spin, q, u)
 }
@@ -237,7 +239,7 @@ struct SkewedRotor<'a, T> {
     u: &'a [N<T>; COORDINATES],
 }
 
-impl<T: Lane> Aside for SkewedRotor<'_, T> {
+impl<T: Lane> OutOfLine for SkewedRotor<'_, T> {
     type Output = Half<T, 4>;
 
     #[inline(always)]
@@ -256,7 +258,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     u: &[N<T>; COORDINATES],
 ) -> Half<T, 4> {
     let tilt = Tilt::shaft(q);
-    let motion = tilt.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
+    let motion = tilt.motion_at_constant_speeds(u[SHAFT_YAW], u[SHAFT_PITCH]);
     let u9 = u[HINGE_YAW];
     let u10 = u[HINGE_PITCH];
     let (s9, c9) = q[HINGE_YAW].sin_cos();
@@ -265,7 +267,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     // Angular velocities, and angular accelerations for constant generalised speeds u: of the shaft
     // in axes S, then of the drum in axes E.
     let omega_s = {
-        let [x, y, z] = into_spin(spin, &motion.rate);
+        let [x, y, z] = to_shaft_axes(spin, &motion.rate);
         [x + spin.speed, y, z]
     };
     let alpha_s = [
@@ -292,10 +294,11 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         rho_acceleration[1] += b.rho_3 * (y * z - alpha_d[0]);
         rho_acceleration[2] -= b.rho_3 * (x * x + y * y);
     }
-    let axis_acceleration_e = into_hinge(s9, c9, &into_spin(spin, &motion.axis_acceleration));
+    let axis_acceleration_e =
+        shaft_to_hinge_axes(s9, c9, &to_shaft_axes(spin, &motion.axis_acceleration));
     let drum_moment_e = {
         let [x, y, z] = k.moment::<SKEWED>(&omega_d, &alpha_d);
-        let [ax, ay, az] = scaled(b.mu_l, axis_acceleration_e);
+        let [ax, ay, az] = scale(b.mu_l, axis_acceleration_e);
         let mut moment = [x + rho[1] * az, y - rho[0] * az, z + (rho[0] * ay - rho[1] * ax)];
         if SKEWED {
             moment[0] -= b.rho_3 * ay;
@@ -314,9 +317,9 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
             b.shaft_i33 * alpha_s[2] + (b.shaft_i22 - b.shaft_i11) * (x * y),
         ]
     };
-    let drum_moment_s = out_of_hinge(s9, c9, &drum_moment_e);
-    let moment = out_of_spin(spin, &sum(shaft_moment, &drum_moment_s));
-    let rho_acceleration_a = out_of_spin(spin, &out_of_hinge(s9, c9, &rho_acceleration));
+    let drum_moment_s = hinge_to_shaft_axes(s9, c9, &drum_moment_e);
+    let moment = from_shaft_axes(spin, &add(shaft_moment, &drum_moment_s));
+    let rho_acceleration_a = from_shaft_axes(spin, &hinge_to_shaft_axes(s9, c9, &rho_acceleration));
     let axis_acceleration = &motion.axis_acceleration;
     let moment = [
         moment[0],
@@ -332,27 +335,28 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         rho_s[0] += s9 * b.rho_3;
         rho_s[2] += c9 * b.rho_3;
     }
-    let rho_a = out_of_spin(spin, &rho_s);
-    let w = tilt.in_cabinet_axes(&[
+    let rho_a = from_shaft_axes(spin, &rho_s);
+    let w = tilt.to_cabinet_axes(&[
         b.along_shaft + b.drum_share * rho_a[0],
         (b.drum_share * rho_a[1]).v(),
         (b.drum_share * rho_a[2]).v(),
     ]);
-    let drift = combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a);
-    let drift = tilt.in_cabinet_axes(&drift);
+    let drift =
+        linear_combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a);
+    let drift = tilt.to_cabinet_axes(&drift);
     let mut arm_9 = {
         let offset = -(b.drum_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
-        scaled(offset, tilt.in_cabinet_axes(&d3_a))
+        scale(offset, tilt.to_cabinet_axes(&d3_a))
     };
     if SKEWED {
         let offset = (b.drum_share * b.rho_3).v();
         let e1_a = [c9, (spin.sin * s9).v(), -(spin.cos * s9).v()];
-        arm_9 = sum(arm_9, &scaled(offset, tilt.in_cabinet_axes(&e1_a)));
+        arm_9 = add(arm_9, &scale(offset, tilt.to_cabinet_axes(&e1_a)));
     }
     let arm_10 = {
         let [x, y] = [-(b.drum_share * rho[1]).v(), (b.drum_share * rho[0]).v()];
-        tilt.in_cabinet_axes(&out_of_spin(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
+        tilt.to_cabinet_axes(&from_shaft_axes(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
     };
     let zero = s9.lit(0.0);
     let arm_7_z = -w[0];
@@ -361,7 +365,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     let axial_arm = [w[2], -(tilt.cos_yaw * w[1]).v(), arm_9[0], arm_10[0]];
 
     // Generalised forces less inertia forces.
-    let [about_9, about_10] = flexure(b.flexure_stiffness, (s9, c9), (s10, c10));
+    let [about_9, about_10] = flexure_moments(b.flexure_stiffness, (s9, c9), (s10, c10));
     let about_centre = [
         -(tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]),
         -moment[2],
@@ -369,7 +373,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         -(about_10 + drum_moment_e[2]),
     ];
     let axial = (b.rotor_mass * drift[0]).v();
-    let axis_drift = tilt.in_cabinet_axes(axis_acceleration);
+    let axis_drift = tilt.to_cabinet_axes(axis_acceleration);
 
     let mut inertia = rotor_inertia::<T, SKEWED>(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {
@@ -379,14 +383,14 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         }
     }
     Half {
-        floating: Floating {
+        floating: FloatingChain {
             per_mass: b.rotor_per_mass,
             force: [-(b.gravity * b.rotor_mass).v(), zero],
             drift: [drift[1], drift[2]],
             arm,
             axis: tilt.axis_partials(),
             axis_drift: [axis_drift[1], axis_drift[2]],
-            torque: difference(about_centre, &scaled(axial, axial_arm)),
+            torque: subtract(about_centre, &scale(axial, axial_arm)),
         },
         inertia,
         tilt,
@@ -480,7 +484,7 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
         l11 += turned * k.k13;
         l33 -= turned * k.k13;
     }
-    let mu_rho = scaled(b.mu_l, *rho_s);
+    let mu_rho = scale(b.mu_l, *rho_s);
 
     // The matrix J: the whole rotor's inertia in axes S; then its entries in axes A (suffix `_a`).
     let across = 2.0 * mu_rho[0] + b.mu_l2;
@@ -491,7 +495,7 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
     if SKEWED {
         l13 += (1.0 - 2.0 * ss) * k.k13;
     }
-    let [_, j12, j13] = out_of_spin(spin, &[j11, l12 - mu_rho[1], l13]);
+    let [_, j12, j13] = from_shaft_axes(spin, &[j11, l12 - mu_rho[1], l13]);
     let half_sum = (0.5 * (j22 + j33)).v();
     let half_difference = (0.5 * (j22 - j33)).v();
     let turned = half_difference * spin.cos_2 - l23 * spin.sin_2;
@@ -501,7 +505,7 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
 
     // The angular momentum per unit speed of q9 and q10.
     let h9_y = k.k22 + mu_rho[0];
-    let h9 = out_of_spin(spin, &[l12, h9_y, l23]);
+    let h9 = from_shaft_axes(spin, &[l12, h9_y, l23]);
     let rho_1 = c9 * mu_rho[0] - s9 * mu_rho[2];
     let mut h10_s = [(k.k33 * s9).v(), -(s9 * mu_rho[1]).v(), k.k33 * c9 + rho_1];
     let mut k23 = s9.lit(0.0);
@@ -511,7 +515,7 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
         h10_s[2] -= s9 * k.k13;
         k23 = k.k23;
     }
-    let h10 = out_of_spin(spin, &h10_s);
+    let h10 = from_shaft_axes(spin, &h10_s);
 
     let s8 = tilt.sin_pitch;
     let c8 = tilt.cos_pitch;
@@ -539,24 +543,24 @@ fn second_derivative<T: Real>(rho: &[N<T>; 2], omega: &Vec3<T>, alpha: &Vec3<T>)
 
 /// Transforms a vector from axes A, which do not spin, to the shaft's axes S.
 #[inline(always)]
-pub(crate) fn into_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
+pub(crate) fn to_shaft_axes<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
     [v[0], spin.cos * v[1] + spin.sin * v[2], spin.cos * v[2] - spin.sin * v[1]]
 }
 
 /// Transforms a vector from the shaft's axes S to axes A, which do not spin.
 #[inline(always)]
-pub(crate) fn out_of_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
+pub(crate) fn from_shaft_axes<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
     [v[0], spin.cos * v[1] - spin.sin * v[2], spin.sin * v[1] + spin.cos * v[2]]
 }
 
 /// Transforms a vector from the shaft's axes S to the hinge's axes E.
 #[inline(always)]
-fn into_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
+fn shaft_to_hinge_axes<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
     [c9 * v[0] - s9 * v[2], v[1], s9 * v[0] + c9 * v[2]]
 }
 
 /// Transforms a vector from the hinge's axes E to the shaft's axes S.
 #[inline(always)]
-pub(crate) fn out_of_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
+pub(crate) fn hinge_to_shaft_axes<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
     [c9 * v[0] + s9 * v[2], v[1], c9 * v[2] - s9 * v[0]]
 }

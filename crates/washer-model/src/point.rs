@@ -66,14 +66,14 @@ pub struct Point {
     pub(crate) machine: Coefficients<f64>,
     pub(crate) equilibrium: [f64; COORDINATES],
     /// The channels at the equilibrium (m, rad).
-    pub(crate) rest: [f64; CHANNELS],
+    pub(crate) channels_at_rest: [f64; CHANNELS],
     pub(crate) linear: LinearPoint,
     pub(crate) linear_outputs: LinearOutputs<f64>,
     /// The speed amplitudes of the dampers with friction.
     pub(crate) friction_speeds: Vec<FrictionSpeed>,
     /// The linear model with the steepest tangents of all elements, which limits explicit steps;
     /// `None` if these are the tangents at equilibrium.
-    pub(crate) steepest: Option<Box<LinearPoint>>,
+    pub(crate) steepest_model: Option<Box<LinearPoint>>,
     pub(crate) stretches: Arc<[SpinStretch]>,
     pub(crate) segments: Arc<[PlannedSegment]>,
     pub(crate) ringing: Ringing,
@@ -162,10 +162,11 @@ impl Point {
     /// that motion by definition. So the nonlinear motion is compared only with amplitudes that the
     /// user gave.
     pub fn friction_speed_factor(&self, model: ModelKind, speeds_m_per_s: &[f64]) -> Option<f64> {
-        let is_compared = |assumed: &&FrictionSpeed| model == ModelKind::Linear || !assumed.is_own;
+        let is_compared =
+            |assumed: &&FrictionSpeed| model == ModelKind::Linear || !assumed.is_from_motion;
         let factor = |assumed: &FrictionSpeed| {
-            let speed = speeds_m_per_s.get(assumed.damper)?.max(assumed.least_m_per_s);
-            let quotient = assumed.speed_m_per_s.max(assumed.least_m_per_s) / speed;
+            let speed = speeds_m_per_s.get(assumed.damper)?.max(assumed.viscous_limit_m_per_s);
+            let quotient = assumed.speed_m_per_s.max(assumed.viscous_limit_m_per_s) / speed;
             Some(quotient.max(1.0 / quotient))
         };
         self.friction_speeds.iter().filter(is_compared).filter_map(factor).reduce(f64::max)
@@ -174,8 +175,10 @@ impl Point {
     /// Returns the point with other speed amplitudes (m/s) for the dampers that have their own, in
     /// the order of these dampers.
     pub(crate) fn with_own_friction_speeds(&self, speeds_m_per_s: &[f64]) -> Self {
-        let mut own = speeds_m_per_s.iter().copied();
-        self.with_friction_speeds(|assumed| if assumed.is_own { own.next() } else { None })
+        let mut own_speeds = speeds_m_per_s.iter().copied();
+        self.with_friction_speeds(
+            |assumed| if assumed.is_from_motion { own_speeds.next() } else { None },
+        )
     }
 
     /// Returns the point with a linear model without friction.
@@ -223,43 +226,46 @@ pub(crate) fn prepare(
     points: &[(Machine, Spin)],
     timing: &Timing,
 ) -> Vec<Result<Point, NoEquilibrium>> {
-    Simd::dispatch_narrow(Prepare { points, courses: courses(points, timing) })
+    Simd::dispatch_narrow(PreparationKernel { points, planned_spins: plan_spins(points, timing) })
 }
 
 /// The kernel that prepares points.
-struct Prepare<'a> {
+struct PreparationKernel<'a> {
     points: &'a [(Machine, Spin)],
-    courses: Vec<SpinCourse>,
+    planned_spins: Vec<PlannedSpin>,
 }
 
-impl Kernel for Prepare<'_> {
+impl Kernel for PreparationKernel<'_> {
     type Output = Vec<Result<Point, NoEquilibrium>>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let zero = N(zero);
         let mut prepared = Vec::with_capacity(self.points.len());
-        let mut courses = self.courses.into_iter();
+        let mut planned_spins = self.planned_spins.into_iter();
         for group in self.points.chunks(T::LANES) {
             let mut machines: Vec<_> =
                 group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
             let lanes = in_lanes(zero, &machines);
-            let (q, solved) = zero.0.aside(equilibrium::SolveEquilibrium { zero, machine: &lanes });
+            let (q, solved) =
+                zero.0.run_out_of_line(equilibrium::SolveEquilibrium { zero, machine: &lanes });
             for (lane, machine) in machines.iter_mut().enumerate() {
                 machine.elements.centre_free_strokes(&q.map(|q| q.0.get(lane)));
             }
-            let steepest = steepest(&machines, &q);
+            let steepest = steepest_tangents(&machines, &q);
             let viscous: Vec<_> =
                 machines.iter().map(Coefficients::with_viscous_friction).collect();
-            let linear = zero.0.aside(Linearise { machine: &in_lanes(zero, &viscous), q: &q });
-            let linear_outputs = zero.0.aside(LineariseOutputs { bodies: &lanes.bodies, q: &q });
-            let still = [zero; COORDINATES];
-            let at_rest = MovingCoordinates { q, u: still, a: still };
+            let linear =
+                zero.0.run_out_of_line(Linearise { machine: &in_lanes(zero, &viscous), q: &q });
+            let linear_outputs =
+                zero.0.run_out_of_line(LineariseOutputs { bodies: &lanes.bodies, q: &q });
+            let zeros = [zero; COORDINATES];
+            let at_rest = MovingCoordinates { q, u: zeros, a: zeros };
             let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
             let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
             let models = zip(zip(machines, linear), zip(linear_outputs, steepest));
-            let given = zip(group, courses.by_ref());
-            for (lane, (model, ((machine, _), course))) in zip(models, given).enumerate() {
+            let inputs = zip(group, planned_spins.by_ref());
+            for (lane, (model, ((machine, _), planned_spin))) in zip(models, inputs).enumerate() {
                 if solved >> lane & 1 == 0 {
                     let q = q.map(|q| q.0.get(lane));
                     let unstable = equilibrium::unstable_motion(&model.0.0, &q);
@@ -274,18 +280,18 @@ impl Kernel for Prepare<'_> {
                     linear.matrices(&coefficients.bodies, &spin)
                 };
                 prepared.push(Ok(Point {
-                    ringing: Ringing::new(machine, course.jumps_rad_per_s2, matrices_at),
+                    ringing: Ringing::new(machine, planned_spin.jumps_rad_per_s2, matrices_at),
                     perturbation: 0.0,
                     instants_s: [].into(),
                     machine: coefficients,
                     equilibrium: q.map(|q| q.0.get(lane)),
-                    rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
+                    channels_at_rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
                     linear,
                     linear_outputs,
                     friction_speeds: FrictionSpeed::all(machine),
-                    steepest,
-                    stretches: course.stretches,
-                    segments: course.segments,
+                    steepest_model: steepest,
+                    stretches: planned_spin.stretches,
+                    segments: planned_spin.segments,
                     weight_n: machine.weight_n(),
                     feet: Feet::new(machine),
                 }));
@@ -307,13 +313,13 @@ fn in_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coefficients
 
 /// Computes the stiffness and the damping of each machine's tub with the steepest tangents of all
 /// elements, at equilibria `q`; `None` if these are the tangents at equilibrium.
-fn steepest<T: Lane>(
+fn steepest_tangents<T: Lane>(
     machines: &[Coefficients<f64>],
     q: &[N<T>; COORDINATES],
 ) -> Vec<Option<[[[N<f64>; 4]; 4]; 2]>> {
     let tangents = |(lane, machine): (usize, &Coefficients<f64>)| {
         let q = q.map(|q| q.0.get(lane));
-        let elements = machine.elements.steepest(&q)?;
+        let elements = machine.elements.with_steepest_tangents(&q)?;
         Some(tub_tangents(&Coefficients { elements, bodies: machine.bodies }, &q.map(N)))
     };
     machines.iter().enumerate().map(tangents).collect()
@@ -321,7 +327,7 @@ fn steepest<T: Lane>(
 
 /// The spin of a trajectory, and the segments of the run.
 #[derive(Clone)]
-struct SpinCourse {
+struct PlannedSpin {
     stretches: Arc<[SpinStretch]>,
     segments: Arc<[PlannedSegment]>,
     /// The sum of all jumps of the drum's acceleration.
@@ -330,18 +336,19 @@ struct SpinCourse {
 
 /// Computes the course of each point's spin. Consecutive points with the same spin share a course,
 /// because a table may have thousands of rows.
-fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<SpinCourse> {
-    let mut courses: Vec<SpinCourse> = Vec::with_capacity(points.len());
+fn plan_spins(points: &[(Machine, Spin)], timing: &Timing) -> Vec<PlannedSpin> {
+    let mut planned_spins: Vec<PlannedSpin> = Vec::with_capacity(points.len());
     for (k, (_, spin)) in points.iter().enumerate() {
-        let shared = if k > 0 && points[k - 1].1 == *spin { courses.last().cloned() } else { None };
-        courses.push(shared.unwrap_or_else(|| {
+        let same_spin =
+            if k > 0 && points[k - 1].1 == *spin { planned_spins.last().cloned() } else { None };
+        planned_spins.push(same_spin.unwrap_or_else(|| {
             let stretches = spin.stretches();
             let jumps_rad_per_s2 = jumps_rad_per_s2(&stretches, timing.end_s);
             let segments = segments(&stretches, timing).into();
-            SpinCourse { segments, jumps_rad_per_s2, stretches: stretches.into() }
+            PlannedSpin { segments, jumps_rad_per_s2, stretches: stretches.into() }
         }));
     }
-    courses
+    planned_spins
 }
 
 /// Divides the run into segments at every kink of the spin, edge of the window and checkpoint.

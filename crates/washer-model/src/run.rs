@@ -19,17 +19,18 @@ pub use snapshots::Snapshot;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::nonlinear::outputs::{RADIAL, squared};
+use crate::nonlinear::outputs::{RADIAL, squared_distance};
 use crate::run::method::{
-    LinearFamily, ModelFamily, NonlinearFamily, Stepper, StepperVisitor, coupling, start_segment,
+    LinearFamily, ModelFamily, NonlinearFamily, Stepper, StepperVisitor, coupling_for_method,
+    start_segment,
 };
 use crate::run::model::LaneModel;
 use crate::{COORDINATES, ModelKind, Point};
-use active_recorders::{ActiveRecorders, ObservedState, StepParts};
+use active_recorders::{ActiveRecorders, ObservedState, Substeps};
 use core::marker::PhantomData;
 use lane_ode::{
-    Aside, Cancel, Count, Failure, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd,
-    Simd, Step, Task,
+    Cancel, Failure, Kernel, Lane, MAX_LANES, N, ObservedStep, OutOfLine, Peaks, Sample, Segment,
+    SegmentEnd, Simd, StepCount, Task,
 };
 
 /// The coordinates at the ends of a trajectory's segments, up to its own end.
@@ -122,14 +123,14 @@ impl<F: ModelFamily, S: Stepper> Kernel for Simulate<'_, F, S> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut task = SimulationTask::<T, F::Over<T>>::new(N(zero), self.0, F::KIND);
+        let mut task = SimulationTask::<T, F::OnLanes<T>>::new(N(zero), self.0, F::KIND);
         self.1.integrate(zero, &mut task);
         task.into_records()
     }
 }
 
 /// The record of a trajectory that has not ended or has failed.
-const EMPTY: Record = Record {
+const EMPTY_RECORD: Record = Record {
     failure: None,
     amplitudes: [f64::NAN; CHANNELS],
     min_gap_m: f64::NAN,
@@ -145,7 +146,7 @@ struct LaneState {
     /// The index of the current segment.
     segment: usize,
     /// The steps up to the current segment.
-    count: Count,
+    count: StepCount,
 }
 
 /// The integration of every point by one model. A lane whose trajectory ends starts the next point.
@@ -159,13 +160,13 @@ struct SimulationTask<'a, T, M> {
     finished: usize,
     lanes: [LaneState; MAX_LANES],
     method: &'a Method,
-    channels: Peaks<T, CHANNELS>,
+    channel_peaks: Peaks<T, CHANNELS>,
     /// The greatest square of the radial distance between the fronts of drum and tub.
-    radial: Peaks<T, 1>,
+    radial_peaks: Peaks<T, 1>,
     /// 1 in lanes that are inside their window, 0 in others.
-    windows: N<T>,
+    in_window: N<T>,
     records: Vec<Record>,
-    active: Option<ActiveRecorders<T>>,
+    active_recorders: Option<ActiveRecorders<T>>,
     /// The coordinates at the ends of each point's segments; empty without that recorder.
     checkpoints: Vec<Checkpoints>,
 }
@@ -205,15 +206,15 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
             return Some(self.start_segment(lane));
         }
         self.finished += 1;
-        let Count { accepted: steps, rejected } = state.count;
+        let StepCount { accepted: steps, rejected } = state.count;
         let record = &mut self.records[state.point];
-        *record = Record { failure, steps, rejected, ..EMPTY };
+        *record = Record { failure, steps, rejected, ..EMPTY_RECORD };
         if failure.is_none() {
-            record.amplitudes = self.channels.lane(lane);
-            let [radial_squared] = self.radial.lane(lane);
+            record.amplitudes = self.channel_peaks.lane(lane);
+            let [radial_squared] = self.radial_peaks.lane(lane);
             record.min_gap_m = point.machine.bodies.clearance.0 - radial_squared.sqrt();
         }
-        if let Some(active) = &mut self.active {
+        if let Some(active) = &mut self.active_recorders {
             active.finish(lane, state.point, point, failure.is_some());
         }
         self.start_next_point(lane, x)
@@ -221,11 +222,11 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
 
     #[inline(always)]
     fn begin(&mut self, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        self.windows.0.aside(RecordStart { task: self, forcing, x, dx });
+        self.in_window.0.run_out_of_line(RecordStart { task: self, forcing, x, dx });
     }
 
     #[inline(always)]
-    fn observe(&mut self, forcing: &M::Forcing, step: &Step<'_, T, STATES>) {
+    fn observe(&mut self, forcing: &M::Forcing, step: &ObservedStep<'_, T, STATES>) {
         let lanes_in_window = self.lanes_in_window();
         let (radial, channels) = self.model.observe(
             forcing,
@@ -234,11 +235,15 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
             T::bits(lanes_in_window) != 0,
         );
         if let Some(channels) = channels {
-            self.channels.advance(step.length_s, &channels, lanes_in_window);
+            self.channel_peaks.advance(step.length_s, &channels, lanes_in_window);
             let times = Some((step.end_s, step.length_s));
             self.record(times, (step.after, step.slope_after), &radial, &channels, lanes_in_window);
         }
-        self.radial.advance(step.length_s, &[squared(&radial)], all_lanes(self.windows));
+        self.radial_peaks.advance(
+            step.length_s,
+            &[squared_distance(&radial)],
+            all_lanes(self.in_window),
+        );
     }
 
     fn cancel(&self) -> Cancel<'_> {
@@ -255,7 +260,7 @@ struct RecordStart<'r, 'a, T: Lane, M: LaneModel<T>> {
     dx: &'r [N<T>; STATES],
 }
 
-impl<T: Lane, M: LaneModel<T>> Aside for RecordStart<'_, '_, T, M> {
+impl<T: Lane, M: LaneModel<T>> OutOfLine for RecordStart<'_, '_, T, M> {
     type Output = ();
 
     #[inline(always)]
@@ -264,10 +269,10 @@ impl<T: Lane, M: LaneModel<T>> Aside for RecordStart<'_, '_, T, M> {
         let lanes_in_window = task.lanes_in_window();
         let (radial, channels) = task.model.observe(forcing, x, dx, T::bits(lanes_in_window) != 0);
         if let Some(channels) = channels {
-            task.channels.begin(&channels, lanes_in_window);
+            task.channel_peaks.begin(&channels, lanes_in_window);
             task.record(None, (x, dx), &radial, &channels, lanes_in_window);
         }
-        task.radial.begin(&[squared(&radial)], all_lanes(task.windows));
+        task.radial_peaks.begin(&[squared_distance(&radial)], all_lanes(task.in_window));
     }
 }
 
@@ -282,25 +287,31 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
     #[inline(always)]
     fn new(zero: N<T>, request: SimulationRequest<'a>, model: ModelKind) -> Self {
         let SimulationRequest { points, method, recorders, cancel } = request;
-        let parts = StepParts::for_method(method);
+        let parts = Substeps::for_method(method);
         let reserved = |point: &&Point| Vec::with_capacity(point.segments.len());
         let checkpoints = match recorders.checkpoints {
             true => points.iter().map(reserved).collect(),
             false => Vec::new(),
         };
         Self {
-            model: M::splat(zero, points[0], coupling(method, zero)),
+            model: M::splat(zero, points[0], coupling_for_method(method, zero)),
             points,
             cancel,
             started: 0,
             finished: 0,
             lanes: [LaneState::default(); MAX_LANES],
             method,
-            channels: Peaks::new(zero),
-            radial: Peaks::new(zero),
-            windows: zero,
-            records: vec![EMPTY; points.len()],
-            active: ActiveRecorders::new(zero, recorders, (model, parts), points[0], points.len()),
+            channel_peaks: Peaks::new(zero),
+            radial_peaks: Peaks::new(zero),
+            in_window: zero,
+            records: vec![EMPTY_RECORD; points.len()],
+            active_recorders: ActiveRecorders::new(
+                zero,
+                recorders,
+                (model, parts),
+                points[0],
+                points.len(),
+            ),
             checkpoints,
         }
     }
@@ -310,7 +321,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         if self.finished < self.points.len() {
             return None;
         }
-        let mut readings = self.active.map_or_else(Vec::new, |active| active.readings);
+        let mut readings = self.active_recorders.map_or_else(Vec::new, |active| active.readings);
         if !self.checkpoints.is_empty() {
             readings.resize(self.checkpoints.len(), Reading::default());
         }
@@ -330,8 +341,8 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         channels: &[Sample<T>; CHANNELS],
         lanes_in_window: T::Mask,
     ) {
-        if let Some(recorders) = &mut self.active {
-            self.windows.0.aside(ObservedState {
+        if let Some(recorders) = &mut self.active_recorders {
+            self.in_window.0.run_out_of_line(ObservedState {
                 recorders,
                 step,
                 x,
@@ -346,12 +357,12 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
     /// Returns the lanes that are inside their windows.
     #[inline(always)]
     fn lanes_in_window(&self) -> T::Mask {
-        self.windows.lit(0.0).0.less(self.windows.0)
+        self.in_window.lit(0.0).0.less(self.in_window.0)
     }
 
     /// Starts the next point in a lane, if there is one.
     fn start_next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Segment> {
-        self.windows.0.set(lane, 0.0);
+        self.in_window.0.set(lane, 0.0);
         // An idle lane has the initial state of its last point, at which the model is defined.
         let is_idle = self.started == self.points.len();
         let index = if is_idle { self.lanes[lane].point } else { self.started };
@@ -365,9 +376,9 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         self.started += 1;
         self.lanes[lane] = LaneState { point: index, ..LaneState::default() };
         self.model.set_point(lane, point);
-        self.channels.reset(lane);
-        self.radial.reset(lane);
-        if let Some(active) = &mut self.active {
+        self.channel_peaks.reset(lane);
+        self.radial_peaks.reset(lane);
+        if let Some(active) = &mut self.active_recorders {
             active.set_point(lane, point);
         }
         Some(self.start_segment(lane))
@@ -378,7 +389,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         let state = &self.lanes[lane];
         let point = self.points[state.point];
         let segment = &point.segments[state.segment];
-        self.windows.0.set(lane, f64::from(u8::from(segment.in_window)));
+        self.in_window.0.set(lane, f64::from(u8::from(segment.in_window)));
         start_segment(&mut self.model, lane, *self.method, point, segment)
     }
 }

@@ -1,18 +1,18 @@
-//! The machine at constant speeds: its periodic response, and whether that is stable.
+//! Periodic responses of the machine at constant speeds, and their stability.
 
-mod branch;
+mod continuation;
 mod corners;
 mod crossing;
-mod exponents;
+mod floquet_modes;
 pub(crate) mod monodromy;
-pub(crate) mod orbit;
-mod participants;
+pub(crate) mod newton;
+mod participation;
+pub(crate) mod period_map;
 #[cfg(test)]
-mod plain;
-pub(crate) mod respond;
-pub(crate) mod search;
+mod reference_monodromy;
+pub(crate) mod responses;
 pub(crate) mod settings;
-mod stepwise;
+mod stepwise_monodromy;
 #[cfg(test)]
 mod tests;
 pub(crate) mod turn;
@@ -23,13 +23,15 @@ use crate::modes::shape::ModeMotion;
 use crate::point::Point;
 use core::f64::consts::TAU;
 
-pub use crossing::{Crossed, Crossing, LeftRange, cross, peaks_without_departures};
-pub use exponents::{Exact, exact_motions};
-pub use respond::{Responses, respond};
+pub use crossing::{
+    Crossing, CrossingEffect, LeftRangeError, follow_crossings, peaks_without_departures,
+};
+pub use floquet_modes::{FloquetMode, floquet_modes};
+pub use responses::{ResponseCurves, find_responses};
 
 /// A machine that turns at a constant speed.
 #[derive(Clone, Copy, Debug)]
-pub struct Dwell<'a> {
+pub struct HeldSpeed<'a> {
     /// The machine.
     pub point: &'a Point,
     /// The drum's speed (rpm), above 0.
@@ -38,7 +40,7 @@ pub struct Dwell<'a> {
 
 /// The way in which a periodic response loses its stability, if it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum StabilityKind {
     /// Every disturbance decays.
     Stable,
     /// A multiplier is below -1: the motion repeats every second turn.
@@ -49,7 +51,7 @@ pub enum Kind {
     Fold,
 }
 
-impl Kind {
+impl StabilityKind {
     /// Every kind.
     pub const ALL: [Self; 4] =
         [Self::Stable, Self::PeriodDoubling, Self::QuasiPeriodic, Self::Fold];
@@ -66,42 +68,43 @@ impl Kind {
     }
 }
 
-/// The periodic response at a constant speed, and what becomes of small disturbances.
+/// A periodic response at a constant speed, and its stability.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
     /// The drum's speed (rpm).
     pub speed_rpm: f64,
     /// Whether it is on the curve of responses that begins at a low speed.
     pub is_on_curve: bool,
-    /// The number of folds that the curve has before this one: 0 is the branch of a machine that
-    /// runs up. It counts on where that curve is lost and another comes down from a high speed; a
-    /// response beside both has one more than the last at its speed.
+    /// The number of folds on the curve before the response: 0 is the branch of a machine that
+    /// runs up. On a second curve, which comes down from a high speed if the first one is lost, the
+    /// numbers continue; a response on neither curve has one more than the last at its speed.
     pub branch: u32,
-    /// Speeds (rpm) of the folds between which that branch lies, lower and upper: none where it
-    /// goes on.
-    pub between_rpm: [Option<f64>; 2],
-    /// The part of the machine's geometry that the nonlinear response passes, if it does.
-    pub beyond: Option<Beyond>,
-    /// Largest deviation from equilibrium over a turn by the nonlinear model, in the order of
+    /// The speeds (rpm) of the lower and of the upper fold at the ends of the branch; `None` at an
+    /// end without a fold.
+    pub fold_speeds_rpm: [Option<f64>; 2],
+    /// The limit of the machine's geometry that the nonlinear response exceeds, if it does.
+    pub exceeded_limit: Option<GeometryLimit>,
+    /// The largest deviations from equilibrium over a turn by the nonlinear model, in the order of
     /// [`Channel::ALL`](crate::Channel::ALL) (m, rad).
-    pub nonlinear: [f64; CHANNELS],
-    /// The deviations by the linear model.
-    pub linear: [f64; CHANNELS],
-    /// The nonlinear response where the unbalance is up: coordinates q1 to q10 (m, rad), then their
-    /// speeds (per s).
+    pub nonlinear_peaks: [f64; CHANNELS],
+    /// The largest deviations from equilibrium over a turn by the linear model.
+    pub linear_peaks: [f64; CHANNELS],
+    /// The state of the nonlinear response at which the unbalance is up: coordinates q1 to q10 (m,
+    /// rad), then their speeds (per s).
     pub start: [f64; STATES],
-    /// Floquet multiplier of the nonlinear response, real and imaginary part (not negative): the
-    /// largest of those whose motion is the suspension's. Motions of the bearings are left out, and
-    /// so are those of the hinge while its modes are fast compared with the drum's speed, because
-    /// these modes are capped.
+    /// The Floquet multiplier of the nonlinear response, real and imaginary part (not negative):
+    /// the largest of those that belong to motions of the suspension. Motions of the bearings are
+    /// left out, and so are those of the hinge while its modes are fast compared with the drum's
+    /// speed, because these modes are capped.
     pub multiplier: [f64; 2],
-    /// Modes that take part in what grows, most first; none if nothing grows.
-    pub participants: Vec<Participant>,
+    /// The modes that take part in the disturbance that grows fastest, the greatest share first;
+    /// empty if no disturbance grows.
+    pub participating_modes: Vec<ParticipatingMode>,
 }
 
-/// A limit of the machine that a motion passes: the equations do not know it.
+/// A limit of the machine's geometry, beyond which the equations do not hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Beyond {
+pub enum GeometryLimit {
     /// A spring's end at the tub passes its hook.
     SpringHooks,
     /// A damper's end at the tub passes its end at the cabinet.
@@ -110,8 +113,8 @@ pub enum Beyond {
     Clearance,
 }
 
-impl Beyond {
-    /// All of it.
+impl GeometryLimit {
+    /// All limits.
     pub const ALL: [Self; 3] = [Self::SpringHooks, Self::DamperEnds, Self::Clearance];
 
     /// Returns the name in result files.
@@ -125,61 +128,61 @@ impl Beyond {
     }
 }
 
-/// A mode of the linear model that takes part in what grows.
+/// A mode of the linear model that takes part in a growing disturbance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Participant {
-    /// The mode's number, the slowest's being 1.
+pub struct ParticipatingMode {
+    /// The number of the mode, 1 for the slowest.
     pub mode: usize,
     /// The damped natural frequency while the drum turns (cycles per minute).
     pub frequency_cpm: f64,
     /// The motion of the mode.
     pub motion: ModeMotion,
-    /// The mode's share of the growing motion's energy.
+    /// The mode's share of the disturbance's energy.
     pub share: f64,
 }
 
-/// A disturbance of a periodic response, by what a turn multiplies it with.
+/// A small disturbance of a periodic response, which a turn multiplies by its Floquet multiplier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disturbance {
     /// The drum's speed (rpm).
     pub speed_rpm: f64,
-    /// Real and imaginary part of the Floquet multiplier.
+    /// The real and the imaginary part of the Floquet multiplier.
     pub multiplier: [f64; 2],
 }
 
 impl Disturbance {
-    /// Returns how fast it grows (1/s); below 0 where it decays.
+    /// Returns the growth of the disturbance (1/s), which is negative if it decays.
     #[must_use]
     pub fn growth_per_s(&self) -> f64 {
         growth_per_s(self.multiplier, self.speed_rpm)
     }
 
-    /// Returns the frequency (cycles per minute), known up to whole multiples of the drum's speed
-    /// and sign: the one from 0 to half the speed.
+    /// Returns the frequency of the disturbance (cycles per minute) from 0 to half the drum's
+    /// speed. Frequencies that differ by sign or by multiples of that speed are equivalent.
     #[must_use]
     pub fn frequency_cpm(&self) -> f64 {
         let [re, im] = self.multiplier;
         libm::atan2(im.abs(), re) / TAU * self.speed_rpm
     }
 
-    /// Returns the speed less the frequency: another that the same multiplier belongs to.
+    /// Returns the drum's speed less the frequency, an equivalent frequency (cycles per minute).
     #[must_use]
-    pub fn other_frequency_cpm(&self) -> f64 {
+    pub fn complementary_frequency_cpm(&self) -> f64 {
         self.speed_rpm - self.frequency_cpm()
     }
 
-    /// Returns the kind of response that it leads to.
+    /// Returns the kind of stability of a response with this as its fastest growing disturbance.
     #[must_use]
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> StabilityKind {
         let [re, im] = self.multiplier;
         if self.growth_per_s() <= 0.0 {
-            Kind::Stable
+            StabilityKind::Stable
         } else if im != 0.0 {
-            Kind::QuasiPeriodic
+            StabilityKind::QuasiPeriodic
         } else if re < 0.0 {
-            Kind::PeriodDoubling
+            StabilityKind::PeriodDoubling
         } else {
-            Kind::Fold
+            StabilityKind::Fold
         }
     }
 }
@@ -191,50 +194,52 @@ impl Response {
         Disturbance { speed_rpm: self.speed_rpm, multiplier: self.multiplier }
     }
 
-    /// Returns how fast the fastest growing disturbance grows (1/s); below 0 where all decay.
+    /// Returns the growth of the fastest growing disturbance (1/s), negative if all decay.
     #[must_use]
     pub fn growth_per_s(&self) -> f64 {
         self.disturbance().growth_per_s()
     }
 
-    /// Returns the frequency as [`Disturbance::frequency_cpm`] does.
+    /// Returns [`Disturbance::frequency_cpm`] of the fastest growing disturbance.
     #[must_use]
     pub fn frequency_cpm(&self) -> f64 {
         self.disturbance().frequency_cpm()
     }
 
-    /// Returns the kind of response that a disturbance leads to.
+    /// Returns the kind of stability of the response.
     #[must_use]
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> StabilityKind {
         self.disturbance().kind()
     }
 }
 
-/// Returns ln |mu| / T.
+/// Returns ln |mu| / T (1/s), with the multiplier mu and the duration T of a turn.
 fn growth_per_s([re, im]: [f64; 2], speed_rpm: f64) -> f64 {
     0.5 * libm::log(re * re + im * im) * speed_rpm / 60.0
 }
 
-/// Why there is no answer at a speed.
+/// The reason why there is no response at a speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NoAnswer {
-    /// The curve of responses does not get to this speed, and Newton's method does not find one.
+pub enum ResponseError {
+    /// The curve of responses does not reach the speed, and Newton's method does not converge.
     #[error("no periodic response was found")]
     NoResponse,
     /// A turn of the drum takes too many steps.
     #[error("the drum is too slow: a turn of it takes more than 32768 steps")]
     TooSlow,
-    /// It was stopped.
+    /// The search was stopped.
     #[error("the search was stopped")]
     Stopped,
-    /// The multipliers cannot be computed.
+    /// The eigenvalues of the monodromy matrix cannot be computed.
     #[error("the Floquet multipliers cannot be found: masses and stiffnesses are too far apart")]
-    Eigenvalues,
+    NoEigenvalues,
 }
 
-/// Digits of a multiplier that count: its last ones are the processor's own.
-const MULTIPLIER_DIGITS: f64 = (1_u64 << 36) as f64;
+/// The reciprocal of the unit to which multipliers are rounded. Basis: the last digits of an
+/// eigenvalue depend on the processor. Doubling it keeps one binary digit more.
+const ROUNDING_PER_UNIT: f64 = (1_u64 << 36) as f64;
 
-pub(crate) fn rounded(part: f64) -> f64 {
-    (part * MULTIPLIER_DIGITS).round_ties_even() / MULTIPLIER_DIGITS
+/// Rounds a number to the digits that do not depend on the processor.
+pub(crate) fn round_last_digits(value: f64) -> f64 {
+    (value * ROUNDING_PER_UNIT).round_ties_even() / ROUNDING_PER_UNIT
 }

@@ -8,7 +8,7 @@
 pub(crate) mod formula;
 
 use crate::highest_frequency_rad_per_s;
-use crate::modes::{highest_with_caps, motions};
+use crate::modes::{highest_with_caps, mode_roots};
 use crate::{Caps, Formula, Method, ModelKind, NoModes, Point, Spin};
 use lane_ode::Cancel;
 
@@ -60,7 +60,7 @@ struct Frequencies<'a> {
 impl<'a> Frequencies<'a> {
     fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, NoModes> {
         let top_rad_per_s = spin.greatest_speed_rad_per_s(end_s);
-        let at_rest = motions(point, 0.0, None)?;
+        let at_rest = mode_roots(point, 0.0, None)?;
         let fastest_at_rest = highest_frequency_rad_per_s(point, 0.0)?;
         let fastest_at_top = highest_frequency_rad_per_s(point, top_rad_per_s)?;
         Ok(Self {
@@ -103,10 +103,10 @@ impl<'a> StepSelector<'a> {
         Self::until(points, end_s, Cancel::Never)
     }
 
-    /// Creates a selector as [`Self::new`] does, but calls `is_stopped` before each machine's
+    /// Creates a selector as [`Self::new`] does, but polls `cancel` before each machine's
     /// eigenvalues.
     ///
-    /// After `is_stopped` has returned true, the selector must not be used.
+    /// Once `cancel` is requested, the selector must not be used.
     pub fn until(
         points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
         end_s: f64,
@@ -122,7 +122,7 @@ impl<'a> StepSelector<'a> {
     pub fn plain_step_s(&self, formula: Formula) -> Option<f64> {
         let machines = self.machines.iter().flatten();
         let steps = machines.map(|machine| formula.limit() / machine.fastest_rad_per_s);
-        steps.reduce(f64::min).map(rounded_down)
+        steps.reduce(f64::min).map(round_down_step)
     }
 
     /// Returns the longest stable step (s) of a model's formula without capped modes.
@@ -175,18 +175,18 @@ impl<'a> StepSelector<'a> {
                 unstable_s = between_s;
             }
         }
-        Ok((stable_s > uncapped_s).then(|| rounded_down(stable_s)))
+        Ok((stable_s > uncapped_s).then(|| round_down_step(stable_s)))
     }
 }
 
 /// Rounds a positive number down to few digits. The last digits of an eigenvalue depend on the
 /// processor and on the system's mathematical library, and a result must not.
-pub(crate) fn rounded_down(number: f64) -> f64 {
-    to_bits(number, STEP_BITS)
+pub(crate) fn round_down_step(number: f64) -> f64 {
+    round_down_to_bits(number, STEP_BITS)
 }
 
 /// Rounds a positive number down to `bits` binary digits behind the first.
-pub(crate) fn to_bits(number: f64, bits: u32) -> f64 {
+pub(crate) fn round_down_to_bits(number: f64, bits: u32) -> f64 {
     let dropped = f64::MANTISSA_DIGITS - 1 - bits;
     f64::from_bits(number.to_bits() >> dropped << dropped)
 }

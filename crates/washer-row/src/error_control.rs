@@ -125,13 +125,13 @@ fn contraction(level: Level) -> f64 {
 /// Returns the error of a level from its difference and that of the level before; `None` if there
 /// is no difference, or it is not a number.
 pub(crate) fn error_of_level(level: Level, differences: &[Option<f64>]) -> Option<f64> {
-    let (last, earlier) = differences.split_last()?;
-    let difference = (*last)?;
-    let before = match earlier.last() {
-        Some(before) => (*before)?,
+    let (last_difference, earlier) = differences.split_last()?;
+    let difference = (*last_difference)?;
+    let previous_difference = match earlier.last() {
+        Some(previous_difference) => (*previous_difference)?,
         None => 0.0,
     };
-    let error = SAFETY_FACTOR * difference.max(before / contraction(level));
+    let error = SAFETY_FACTOR * difference.max(previous_difference / contraction(level));
     error.is_finite().then_some(error)
 }
 

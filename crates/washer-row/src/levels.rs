@@ -19,7 +19,7 @@ impl RefinementLevel {
     pub fn describe(&self, model: ModelKind) -> String {
         let name = self.level.name();
         let mut method = self.method;
-        match method.numbers() {
+        match method.numbers_mut() {
             MethodNumbers::Capped(step_s, caps) => {
                 let order = match Formula::for_model(model) {
                     Formula::Rk4 => 4,
@@ -75,13 +75,13 @@ impl RefinementLevels {
     /// Whether the level at this index has another method than the one before, so that its error
     /// has other terms. The methods are capped modes, the additive method, and the formulas without
     /// capped modes.
-    pub fn begins_family(&self, place: usize) -> bool {
-        let family = |place: usize| {
-            let level = self.levels[place].level;
-            let kind = if level.is_capped() { Level::Capped0 } else { level };
-            (kind, self.unresolved(place))
+    pub fn starts_method_family(&self, level_index: usize) -> bool {
+        let family_at = |level_index: usize| {
+            let level = self.levels[level_index].level;
+            let first_of_kind = if level.is_capped() { Level::Capped0 } else { level };
+            (first_of_kind, self.unresolved_modes(level_index))
         };
-        place > 0 && family(place) != family(place - 1)
+        level_index > 0 && family_at(level_index) != family_at(level_index - 1)
     }
 
     /// Returns the index of the first level whose steps resolve the bearings' modes.
@@ -90,10 +90,10 @@ impl RefinementLevels {
     }
 
     /// Returns the modes that a level does not resolve, if there are any.
-    pub fn unresolved(&self, place: usize) -> Option<UnresolvedModes> {
-        if self.levels[place].level.is_capped() {
+    pub fn unresolved_modes(&self, level_index: usize) -> Option<UnresolvedModes> {
+        if self.levels[level_index].level.is_capped() {
             Some(UnresolvedModes::HingeAndBearings)
-        } else if place < self.first_resolving() {
+        } else if level_index < self.first_resolving() {
             Some(UnresolvedModes::Bearings)
         } else {
             None
@@ -102,24 +102,25 @@ impl RefinementLevels {
 
     /// Returns the index that stands for the perturbed run of a level: the same method from a
     /// slightly different start ([`Point::perturbed`](washer_model::Point::perturbed)).
-    pub const fn perturbed(&self, place: usize) -> usize {
-        self.levels.len() + place
+    pub const fn perturbed_index(&self, level_index: usize) -> usize {
+        self.levels.len() + level_index
     }
 
     /// Whether an index stands for a perturbed run.
-    pub const fn is_perturbed(&self, place: usize) -> bool {
-        place >= self.levels.len()
+    pub const fn is_perturbed(&self, level_index: usize) -> bool {
+        level_index >= self.levels.len()
     }
 
     /// Returns the method of a level, or of its perturbed run.
-    pub fn method(&self, place: usize) -> &Method {
-        &self.levels[place % self.levels.len()].method
+    pub fn method(&self, level_index: usize) -> &Method {
+        &self.levels[level_index % self.levels.len()].method
     }
 
     /// Returns the method of the given capped level; if the model lacks that level, of the finest
     /// coarser capped level.
-    pub fn capped(&self, level: Level) -> Option<Method> {
-        let is_within = |one: &&RefinementLevel| one.level.is_capped() && one.level <= level;
-        self.levels.iter().rfind(is_within).map(|one| one.method)
+    pub fn capped_method(&self, level: Level) -> Option<Method> {
+        let is_within =
+            |candidate: &&RefinementLevel| candidate.level.is_capped() && candidate.level <= level;
+        self.levels.iter().rfind(is_within).map(|candidate| candidate.method)
     }
 }

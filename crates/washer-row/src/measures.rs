@@ -3,7 +3,7 @@
 use sweep_parameter::{Worse, named};
 use washer_model::{Channel, Gauge, Reading, Recorders};
 
-use crate::metrics::{LeastScale, Metric, MetricFacts, MetricSource, PartKind};
+use crate::metrics::{LeastScale, Metric, MetricProperties, MetricSource, PartKind};
 use crate::outcome::{Deviations, Outcome};
 
 /// The greatest deviation of a machine at rest, as a share of the clearance between drum and tub
@@ -42,7 +42,7 @@ named! {
 
 impl Criterion {
     /// Describes a channel's column of one model.
-    pub const fn amplitude(self) -> &'static str {
+    pub const fn amplitude_description(self) -> &'static str {
         match self {
             Self::Peak | Self::Envelope => "largest deviation from equilibrium in the window",
             Self::Rms => "root mean square of the deviation from equilibrium in the window",
@@ -50,7 +50,7 @@ impl Criterion {
     }
 
     /// Describes the column of a channel's ratio, and when it is null.
-    pub const fn ratio(self) -> &'static str {
+    pub const fn ratio_description(self) -> &'static str {
         match self {
             Self::Peak => {
                 "nonlinear over linear amplitude; null where the linear one is zero or a model \
@@ -73,7 +73,7 @@ impl Criterion {
 impl Metric {
     /// Returns the gauge that records the metric; `None` if the models do not have separate values.
     const fn gauge(self) -> Option<Gauge> {
-        match self.facts().source {
+        match self.properties().source {
             MetricSource::Gauge(gauge) => Some(gauge),
             MetricSource::Machine | MetricSource::HeldSpeeds => None,
         }
@@ -86,24 +86,24 @@ impl Metric {
 
     /// Whether the metric is taken at the held speeds of `[stability]`.
     pub const fn is_at_held_speeds(self) -> bool {
-        matches!(self.facts().source, MetricSource::HeldSpeeds)
+        matches!(self.properties().source, MetricSource::HeldSpeeds)
     }
 
     /// Whether the metric has a value for a periodic motion, which has no window. Forces and speeds
     /// have one, times within the window do not.
     pub fn has_periodic_value(self) -> bool {
-        self.is_per_model() && self.facts().scale != LeastScale::Window
+        self.is_per_model() && self.properties().scale != LeastScale::Window
     }
 
     /// Returns the name of the column. It contains `model` only if each model has a value.
     pub fn column(self, model: &str) -> String {
-        column(self.name(), if self.is_per_model() { model } else { "" }, self.facts().unit)
+        column(self.name(), if self.is_per_model() { model } else { "" }, self.properties().unit)
     }
 
     /// Returns the scale that relative differences of smaller values have, in the metric's unit.
     /// Differences of greater values are relative to the value itself.
     pub fn scale(self, window_s: [f64; 2], weight_n: f64) -> f64 {
-        match self.facts().scale {
+        match self.properties().scale {
             LeastScale::Value => 0.0,
             LeastScale::Window => window_s[1] - window_s[0],
             LeastScale::Weight => weight_n,
@@ -132,17 +132,17 @@ pub struct MetricColumn {
 impl MetricColumn {
     /// Returns the part with its number, such as `stop_1`; then the quantity in the column's name
     /// and the column's description. `None` for the column of all parts.
-    fn part_texts(self) -> Option<(String, [&'static str; 2])> {
-        let MetricFacts { part, each_part, .. } = self.metric.facts();
+    fn part_name_and_texts(self) -> Option<(String, [&'static str; 2])> {
+        let MetricProperties { part, each_part, .. } = self.metric.properties();
         let part = format!("{}_{}", part?.name(), self.part? + 1);
         Some((part, each_part?))
     }
 
     /// Returns the name of the column.
     pub fn column(self, model: &str) -> String {
-        match self.part_texts() {
+        match self.part_name_and_texts() {
             Some((part, [quantity, _])) => {
-                column(&format!("{part}_{quantity}"), model, self.metric.facts().unit)
+                column(&format!("{part}_{quantity}"), model, self.metric.properties().unit)
             }
             None => self.metric.column(model),
         }
@@ -150,9 +150,9 @@ impl MetricColumn {
 
     /// Returns the description in column dictionaries and in docs, in one line.
     pub fn description(self) -> &'static str {
-        match self.part_texts() {
+        match self.part_name_and_texts() {
             Some((_, [_, description])) => description,
-            None => self.metric.facts().description,
+            None => self.metric.properties().description,
         }
     }
 
@@ -161,7 +161,7 @@ impl MetricColumn {
         let mut values = reading.gauge(self.metric.gauge()?).iter().copied();
         match self.part {
             Some(part) => values.nth(part),
-            None if self.metric.facts().worse == Worse::Less => values.reduce(f64::min),
+            None if self.metric.properties().worse == Worse::Less => values.reduce(f64::min),
             None => values.reduce(f64::max),
         }
     }
@@ -182,7 +182,7 @@ pub struct Measures {
 impl Measures {
     /// Returns the columns that each model has. [`Trajectory::metrics`](crate::Trajectory::metrics)
     /// has the same order.
-    pub fn per_model(&self) -> impl Iterator<Item = MetricColumn> + '_ {
+    pub fn model_columns(&self) -> impl Iterator<Item = MetricColumn> + '_ {
         self.metrics
             .iter()
             .filter(|metric| metric.is_per_model())
@@ -192,16 +192,17 @@ impl Measures {
     /// Returns the columns of a metric: first that of all parts together, then one for each part if
     /// there are several.
     pub fn metric_columns(&self, metric: Metric) -> impl Iterator<Item = MetricColumn> + use<> {
-        let parts = match metric.facts().each_part.and(metric.facts().part) {
+        let parts = match metric.properties().each_part.and(metric.properties().part) {
             Some(PartKind::Stop) => self.stops,
             Some(PartKind::Foot) => self.feet,
             Some(PartKind::Damper) => self.dampers,
             None => 0,
         };
         let numbered_parts = if parts > 1 { 0..parts } else { 0..0 };
-        let whole = MetricColumn { metric, part: None };
-        let each = numbered_parts.map(move |part| MetricColumn { metric, part: Some(part) });
-        std::iter::once(whole).chain(each)
+        let common_column = MetricColumn { metric, part: None };
+        let part_columns =
+            numbered_parts.map(move |part| MetricColumn { metric, part: Some(part) });
+        std::iter::once(common_column).chain(part_columns)
     }
 
     /// Returns the recorders that the measures need.
@@ -209,7 +210,8 @@ impl Measures {
         Recorders {
             root_mean_squares: self.criterion == Criterion::Rms,
             turns: self.criterion == Criterion::Envelope,
-            gauges: Gauge::ALL.map(|gauge| self.metrics.iter().any(|it| it.gauge() == Some(gauge))),
+            gauges: Gauge::ALL
+                .map(|gauge| self.metrics.iter().any(|metric| metric.gauge() == Some(gauge))),
             ..Recorders::default()
         }
     }
@@ -226,11 +228,11 @@ impl Outcome {
         }
         self.turn_ratios.extend(channels.iter().map(|channel| {
             let i = channel.index();
-            let moves = linear.iter().any(|turn| turn[i] != 0.0);
+            let has_motion = linear.iter().any(|turn| turn[i] != 0.0);
             let ratio = |(nonlinear, linear): (&Deviations, &Deviations)| {
                 nonlinear[i].max(TURN_FLOOR) / linear[i].max(TURN_FLOOR)
             };
-            moves.then(|| nonlinear.iter().zip(linear).map(ratio).fold(0.0, f64::max))
+            has_motion.then(|| nonlinear.iter().zip(linear).map(ratio).fold(0.0, f64::max))
         }));
     }
 
@@ -283,7 +285,7 @@ mod tests {
         let metrics = vec![Metric::SlipMargin, Metric::StopContact, Metric::FootLoad];
         let mut measures = Measures { metrics, stops: 3, feet: 1, ..Measures::default() };
         let columns = |measures: &Measures| -> Vec<String> {
-            measures.per_model().map(|number| number.column("linear")).collect()
+            measures.model_columns().map(|number| number.column("linear")).collect()
         };
         let expected = [
             "slip_margin_linear_n",
@@ -313,7 +315,7 @@ mod tests {
         let metrics = vec![Metric::StopForce, Metric::StopContact, Metric::FootLoad];
         let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
         let found: Vec<_> =
-            measures.per_model().filter_map(|number| number.value(&reading)).collect();
+            measures.model_columns().filter_map(|number| number.value(&reading)).collect();
         assert_eq!(found, [50.0, 20.0, 50.0, 0.3, 0.3, 0.1, -5.0, 90.0, -5.0, 70.0]);
     }
 

@@ -37,7 +37,7 @@ pub(crate) enum LeastScale {
 }
 
 /// The properties of a metric.
-pub struct MetricFacts {
+pub struct MetricProperties {
     pub unit: &'static str,
     /// The description in column dictionaries and in docs, in one line.
     pub description: &'static str,
@@ -58,7 +58,7 @@ pub struct MetricFacts {
 }
 
 /// The facts shared by metrics of the whole machine that every machine has.
-const MACHINE_METRIC: MetricFacts = MetricFacts {
+const MACHINE_METRIC: MetricProperties = MetricProperties {
     unit: "",
     description: "",
     source: MetricSource::Machine,
@@ -70,7 +70,7 @@ const MACHINE_METRIC: MetricFacts = MetricFacts {
 };
 
 /// The common facts of the metrics of the cabinet's feet.
-const FEET_METRIC: MetricFacts = MetricFacts {
+const FEET_METRIC: MetricProperties = MetricProperties {
     part: Some(PartKind::Foot),
     scale: LeastScale::Weight,
     worse: Worse::Less,
@@ -80,7 +80,7 @@ const FEET_METRIC: MetricFacts = MetricFacts {
 
 /// Declares the metrics from a table with a row for each.
 macro_rules! metrics {
-    ($($(#[$attribute:meta])* $Metric:ident = $name:literal: $facts:expr;)+) => {
+    ($($(#[$attribute:meta])* $Metric:ident = $name:literal: $properties:expr;)+) => {
         named! {
             /// An optional number of a row in addition to the amplitudes, with its own columns.
             pub enum Metric {
@@ -91,9 +91,9 @@ macro_rules! metrics {
         impl Metric {
             /// Returns the metric's unit, description, source, parts, scale, bad direction and
             /// limit.
-            pub const fn facts(self) -> MetricFacts {
+            pub const fn properties(self) -> MetricProperties {
                 match self {
-                    $(Self::$Metric => $facts,)+
+                    $(Self::$Metric => $properties,)+
                 }
             }
         }
@@ -102,7 +102,7 @@ macro_rules! metrics {
 
 metrics! {
     /// The greatest force on the cabinet.
-    CabinetForce = "cabinet_force": MetricFacts {
+    CabinetForce = "cabinet_force": MetricProperties {
         unit: "N",
         description: "greatest magnitude in the window of the sum of the forces of all \
                       springs, dampers, stops and bushings on the cabinet (at rest the \
@@ -111,7 +111,7 @@ metrics! {
         ..MACHINE_METRIC
     };
     /// The time for which drum and tub overlap.
-    ClashTime = "clash_time": MetricFacts {
+    ClashTime = "clash_time": MetricProperties {
         unit: "s",
         description: "time in the window with a gap between drum and tub below zero; its \
                       error is a share of the window",
@@ -120,14 +120,14 @@ metrics! {
         ..MACHINE_METRIC
     };
     /// The sag of the machine under its weight.
-    StaticSag = "static_sag": MetricFacts {
+    StaticSag = "static_sag": MetricProperties {
         unit: "m",
         description: "how far the tub's mass centre sinks from where the machine file \
                       draws it to the static equilibrium; null if there is none",
         ..MACHINE_METRIC
     };
     /// The greatest force of a stop.
-    StopForce = "stop_force": MetricFacts {
+    StopForce = "stop_force": MetricProperties {
         unit: "N",
         description: "greatest push of any stop in the window; the linear model has the \
                       tangents of the stops at equilibrium, next to nothing while they are \
@@ -143,7 +143,7 @@ metrics! {
         ..MACHINE_METRIC
     };
     /// The time for which a stop is closed.
-    StopContact = "stop_contact": MetricFacts {
+    StopContact = "stop_contact": MetricProperties {
         unit: "s",
         description: "longest time in the window for which any one stop is closed",
         part: Some(PartKind::Stop),
@@ -153,7 +153,7 @@ metrics! {
         ..MACHINE_METRIC
     };
     /// The least load of a foot of the cabinet.
-    FootLoad = "foot_load": MetricFacts {
+    FootLoad = "foot_load": MetricProperties {
         unit: "N",
         description: "least vertical load of any foot of the cabinet in the window, by \
                       statics; below zero it would lift",
@@ -166,7 +166,7 @@ metrics! {
         ..FEET_METRIC
     };
     /// The least margin of the cabinet against slipping.
-    SlipMargin = "slip_margin": MetricFacts {
+    SlipMargin = "slip_margin": MetricProperties {
         unit: "N",
         description: "least margin of the cabinet against slipping in the window: friction \
                       on all feet together less the horizontal force",
@@ -174,7 +174,7 @@ metrics! {
         ..FEET_METRIC
     };
     /// The least margin of the cabinet against slipping, turning or both.
-    WalkMargin = "walk_margin": MetricFacts {
+    WalkMargin = "walk_margin": MetricProperties {
         unit: "N",
         description: "least margin of the cabinet against slipping, turning or both in the \
                       window: the margin against slipping less what the moment about the \
@@ -183,7 +183,7 @@ metrics! {
         ..FEET_METRIC
     };
     /// The growth of disturbances at held speeds.
-    Growth = "growth": MetricFacts {
+    Growth = "growth": MetricProperties {
         unit: "1/s",
         description: "how fast the fastest growing disturbance of the nonlinear response \
                       grows, at that of the speeds of [stability] at which it is greatest",
@@ -192,7 +192,7 @@ metrics! {
         ..MACHINE_METRIC
     };
     /// The greatest speed of a damper.
-    DamperSpeed = "damper_speed": MetricFacts {
+    DamperSpeed = "damper_speed": MetricProperties {
         unit: "m/s",
         description: "greatest speed along any damper in the window: what \
                       `friction_linear_speed_m_per_s` should be near",
@@ -204,7 +204,7 @@ metrics! {
     };
     // The metric has a column for each channel, in the channel's unit.
     /// The deviations of the attractors at held speeds.
-    Dwell = "dwell": MetricFacts {
+    Dwell = "dwell": MetricProperties {
         description: "largest deviation of any motion that the drum held at any of the \
                       speeds of [stability] ends in (`sweep dwell`)",
         source: MetricSource::HeldSpeeds,

@@ -1,6 +1,6 @@
 //! The outcome of a grid point: one row of the result file.
 
-use washer_model::{Beyond, Channel, Disturbance, Endings, NoAnswer, Response};
+use washer_model::{Attractors, Channel, Disturbance, GeometryLimit, Response, ResponseError};
 
 use crate::Level;
 
@@ -30,12 +30,12 @@ pub enum Status {
     TooSlow,
 }
 
-impl From<NoAnswer> for Status {
-    fn from(none: NoAnswer) -> Self {
-        match none {
-            NoAnswer::NoResponse | NoAnswer::Stopped => Self::NoResponse,
-            NoAnswer::Eigenvalues => Self::NoMultipliers,
-            NoAnswer::TooSlow => Self::TooSlow,
+impl From<ResponseError> for Status {
+    fn from(error: ResponseError) -> Self {
+        match error {
+            ResponseError::NoResponse | ResponseError::Stopped => Self::NoResponse,
+            ResponseError::NoEigenvalues => Self::NoMultipliers,
+            ResponseError::TooSlow => Self::TooSlow,
         }
     }
 }
@@ -83,9 +83,9 @@ pub struct Growth {
     /// The number of folds of the curve before the response.
     pub branch: u32,
     /// The speeds (rpm) of the lower and of the upper fold at the ends of the branch.
-    pub between_rpm: [Option<f64>; 2],
+    pub fold_speeds_rpm: [Option<f64>; 2],
     /// The limit of the machine's geometry that the response exceeds, if it does.
-    pub beyond: Option<Beyond>,
+    pub exceeded_limit: Option<GeometryLimit>,
     /// The disturbance that grows fastest.
     pub fastest: Disturbance,
     /// The modes of the linear model that take part in that disturbance, the greatest share first.
@@ -106,7 +106,7 @@ pub struct GrowingMode {
 impl From<&Response> for Growth {
     fn from(response: &Response) -> Self {
         let mode = |rank: usize| {
-            let participant = response.participants.get(rank)?;
+            let participant = response.participating_modes.get(rank)?;
             Some(GrowingMode {
                 number: participant.mode as u32,
                 name: participant.motion.name_index() as u32,
@@ -116,8 +116,8 @@ impl From<&Response> for Growth {
         Self {
             is_on_curve: response.is_on_curve,
             branch: response.branch,
-            between_rpm: response.between_rpm,
-            beyond: response.beyond,
+            fold_speeds_rpm: response.fold_speeds_rpm,
+            exceeded_limit: response.exceeded_limit,
             fastest: response.disturbance(),
             modes: [mode(0), mode(1)],
         }
@@ -133,25 +133,25 @@ pub struct DwellPeaks {
     /// The speed (rpm) at which the tub has the greatest yaw or pitch.
     pub speed_rpm: f64,
     /// The kind of the attractor with the greatest yaw or pitch: the position in
-    /// [`washer_model::Ending::KIND_NAMES`].
+    /// [`washer_model::Attractor::KIND_NAMES`].
     pub kind: usize,
 }
 
 impl DwellPeaks {
     /// Computes the largest deviations of the attractors found at speeds (rpm); `None` if there are
     /// no attractors. Of attractors with equal rotation the first one gives speed and kind.
-    pub fn from_endings<E>(speeds_rpm: &[f64], found: &[Result<Endings, E>]) -> Option<Self> {
-        let motions = speeds_rpm.iter().zip(found).flat_map(|(&speed_rpm, found)| {
-            let motions = found.iter().flat_map(|found| &found.motions);
-            motions.map(move |motion| (speed_rpm, motion))
+    pub fn from_attractors<E>(speeds_rpm: &[f64], found: &[Result<Attractors, E>]) -> Option<Self> {
+        let attractors = speeds_rpm.iter().zip(found).flat_map(|(&speed_rpm, found)| {
+            let attractors = found.iter().flat_map(|found| &found.attractors);
+            attractors.map(move |motion| (speed_rpm, motion))
         });
-        let mut greatest_rad = 0.0;
-        motions.fold(None, |peaks: Option<Self>, (speed_rpm, motion)| {
-            let this = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind() };
-            let mut peaks = peaks.unwrap_or(this);
-            if this.tub_rotation_rad() > greatest_rad {
-                greatest_rad = this.tub_rotation_rad();
-                peaks = Self { deviations: peaks.deviations, ..this };
+        let mut max_rotation_rad = 0.0;
+        attractors.fold(None, |peaks: Option<Self>, (speed_rpm, motion)| {
+            let candidate = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind() };
+            let mut peaks = peaks.unwrap_or(candidate);
+            if candidate.tub_rotation_rad() > max_rotation_rad {
+                max_rotation_rad = candidate.tub_rotation_rad();
+                peaks = Self { deviations: peaks.deviations, ..candidate };
             }
             for (peak, deviation) in peaks.deviations.iter_mut().zip(motion.peaks) {
                 *peak = peak.max(deviation);
@@ -193,7 +193,7 @@ pub struct Outcome {
     /// held speeds. `None` if the plan does not ask for it or it is unknown.
     pub growth: Option<Growth>,
     /// The largest deviations at the plan's held speeds, if the plan asks for them.
-    pub dwelt: Option<DwellPeaks>,
+    pub dwell_peaks: Option<DwellPeaks>,
     /// The outcomes of other responses at the same point and speed, which are rows after this one.
     pub coexisting: Vec<Outcome>,
 }

@@ -14,7 +14,7 @@ use crate::verdict::Verdict;
 
 /// The purpose of an outcome, on which its accuracy depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Demand {
+pub enum OutcomePurpose {
     /// A row: every number within the accuracy, and the verdict.
     Row,
     /// The ratio's side of the limit, and the ratio itself if it is near the limit.
@@ -29,16 +29,16 @@ pub struct RefinementRule<'a> {
     /// The levels of both models, in the order of [`ModelKind::ALL`].
     pub levels: &'a [RefinementLevels; 2],
     /// The purpose of outcomes.
-    pub demand: Demand,
+    pub purpose: OutcomePurpose,
     /// The numbers that rows take from trajectories, and their accuracy.
-    pub rule: &'a RowRule,
+    pub row_rule: &'a RowRule,
 }
 
 impl<'a> RefinementRule<'a> {
     /// Returns the rule of one model's trajectory of a point.
     fn for_model(&self, model: usize, point: &'a Point) -> ModelRule<'a> {
         let kind = ModelKind::ALL[model];
-        ModelRule { levels: &self.levels[model], rule: self.rule, point, kind }
+        ModelRule { levels: &self.levels[model], rule: self.row_rule, point, kind }
     }
 }
 
@@ -54,22 +54,22 @@ struct ModelRule<'a> {
 impl ModelRule<'_> {
     /// Returns the ringing that a level leaves unresolved, relative to the motion and with the
     /// motion's amplification.
-    fn ringing(&self, level: usize, refinement: &ModelRefinement) -> f64 {
+    fn relative_ringing(&self, level: usize, refinement: &ModelRefinement) -> f64 {
         let Some(run) = &refinement.run else { return 0.0 };
-        let Some(unresolved) = self.levels.unresolved(level) else { return 0.0 };
+        let Some(unresolved) = self.levels.unresolved_modes(level) else { return 0.0 };
         let swing = self.point.ringing(unresolved);
-        let mut greatest = swing.gap_m / self.point.clearance_m();
+        let mut greatest_ringing = swing.gap_m / self.point.clearance_m();
         for (channel, amplitude) in self.rule.channels.iter().zip(&run.trajectory.amplitudes) {
             let swing = swing.channels[channel.index()];
             if swing > 0.0 {
-                greatest = greatest.max(swing / amplitude);
+                greatest_ringing = greatest_ringing.max(swing / amplitude);
             }
         }
         match unresolved {
             UnresolvedModes::HingeAndBearings => {
-                amplification(refinement.first_difference, self.rule.accuracy) * greatest
+                amplification(refinement.first_difference, self.rule.accuracy) * greatest_ringing
             }
-            UnresolvedModes::Bearings => greatest,
+            UnresolvedModes::Bearings => greatest_ringing,
         }
     }
 }
@@ -86,35 +86,36 @@ struct ModelRefinement {
     /// The difference of the first two levels; zero before there are two.
     first_difference: f64,
     /// The comparison with a perturbed run, once there was one.
-    perturbed: Option<Perturbed>,
+    perturbed: Option<PerturbedComparison>,
 }
 
 /// The comparison of a perturbed run with its original.
 #[derive(Clone, Copy, Debug)]
-struct Perturbed {
+struct PerturbedComparison {
     is_chaotic: bool,
     /// The relative difference of its numbers from the original's; `None` if one of them failed.
     difference: Option<f64>,
 }
 
 impl ModelRefinement {
-    fn take(&mut self, level: usize, run: LevelRun, rule: ModelRule<'_>) {
-        let Some(before) = self.run.take() else {
+    fn add_run(&mut self, level: usize, run: LevelRun, rule: ModelRule<'_>) {
+        let Some(previous_run) = self.run.take() else {
             self.level = level;
             self.run = Some(run);
             return;
         };
-        let difference = difference(&before.trajectory, &run.trajectory, rule.point, rule.rule);
+        let difference =
+            relative_difference(&previous_run.trajectory, &run.trajectory, rule.point, rule.rule);
         if rule.levels.is_perturbed(level) {
-            let separations = rule.point.separations(&before.checkpoints, &run.checkpoints);
+            let separations = rule.point.separations(&previous_run.checkpoints, &run.checkpoints);
             let separation = Separation::new(&separations);
             let is_chaotic = separation.is_exponential();
-            self.perturbed = Some(Perturbed { is_chaotic, difference });
-            self.run = Some(before);
+            self.perturbed = Some(PerturbedComparison { is_chaotic, difference });
+            self.run = Some(previous_run);
             return;
         }
         // The earlier differences estimate the error of another method, so that they are dropped.
-        if rule.levels.begins_family(self.level) {
+        if rule.levels.starts_method_family(self.level) {
             self.differences.clear();
         }
         self.differences.push(difference);
@@ -135,11 +136,11 @@ impl ModelRefinement {
 
     /// Returns the error of the finest run; `None` if there is no estimate.
     fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
-        if let Some(Perturbed { is_chaotic: true, difference }) = self.perturbed {
+        if let Some(PerturbedComparison { is_chaotic: true, difference }) = self.perturbed {
             return error_of_chaos((*self.differences.last()?)?, difference?);
         }
         let error = error_of_level(rule.levels.levels[self.level].level, &self.differences)?;
-        Some(error.max(rule.ringing(self.level, self)))
+        Some(error.max(rule.relative_ringing(self.level, self)))
     }
 
     /// Returns the level to run next if the error is above the accuracy or the verdict
@@ -157,14 +158,14 @@ impl ModelRefinement {
         if is_converged && !is_in_doubt {
             return None;
         }
-        let has_little_ringing = |level: &usize| rule.ringing(*level, self) <= accuracy;
-        let is_last = self.level + 1 == levels.levels.len()
+        let has_little_ringing = |level: &usize| rule.relative_ringing(*level, self) <= accuracy;
+        let is_last_useful = self.level + 1 == levels.levels.len()
             || self.level + 1 == levels.first_resolving() && has_little_ringing(&self.level);
-        if is_last {
+        if is_last_useful {
             // A chaotic motion does not converge at any step, which a perturbed run shows.
             let may_be_chaos = !is_converged && rule.kind == ModelKind::Nonlinear;
             let needs_perturbed = may_be_chaos && self.perturbed.is_none();
-            return needs_perturbed.then(|| levels.perturbed(self.level));
+            return needs_perturbed.then(|| levels.perturbed_index(self.level));
         }
         let mut next = self.level + 1;
         // The failure may be due to the capped modes.
@@ -183,7 +184,7 @@ pub struct RowRefinement([ModelRefinement; 2]);
 
 /// The next step of a row.
 #[derive(Clone, Debug)]
-pub enum Next {
+pub enum NextStep {
     /// The runs to do: for each the position of the model in [`ModelKind::ALL`] and the index of
     /// its level.
     Runs(Vec<(usize, usize)>),
@@ -193,26 +194,26 @@ pub enum Next {
 
 impl RowRefinement {
     /// Takes a run that [`Self::next`] has requested.
-    pub fn take(
+    pub fn add_run(
         &mut self,
         (model, level): (usize, usize),
         run: LevelRun,
         point: &Point,
-        with: RefinementRule<'_>,
+        refinement_rule: RefinementRule<'_>,
     ) {
-        self.0[model].take(level, run, with.for_model(model, point));
+        self.0[model].add_run(level, run, refinement_rule.for_model(model, point));
     }
 
     /// Returns the finest run of a model with its level and its error, once there is one. The error
     /// is `None` if there is no estimate.
-    pub fn finest(
+    pub fn finest_run(
         &self,
         model: usize,
         point: &Point,
-        with: RefinementRule<'_>,
+        refinement_rule: RefinementRule<'_>,
     ) -> Option<(&LevelRun, usize, Option<f64>)> {
         let refinement = &self.0[model];
-        let error = refinement.error(with.for_model(model, point));
+        let error = refinement.error(refinement_rule.for_model(model, point));
         refinement.run.as_ref().map(|run| (run, refinement.level, error))
     }
 
@@ -221,46 +222,55 @@ impl RowRefinement {
         self.0[model].run.as_ref().map_or(0, |run| run.trajectory.steps)
     }
 
-    /// Returns the next step, once every requested run has been taken. `id` is the point of the
-    /// outcome.
-    pub fn next(&self, id: u64, point: &Point, with: RefinementRule<'_>) -> Next {
-        if with.demand == Demand::Growth {
-            return Next::Done(Box::new(Outcome::failed(id, Status::Ok)));
+    /// Returns the next step, once every requested run has been taken. `point_index` is the point
+    /// of the outcome.
+    pub fn next_step(
+        &self,
+        point_index: u64,
+        point: &Point,
+        refinement_rule: RefinementRule<'_>,
+    ) -> NextStep {
+        if refinement_rule.purpose == OutcomePurpose::Growth {
+            return NextStep::Done(Box::new(Outcome::failed(point_index, Status::Ok)));
         }
-        let errors = [0, 1].map(|model| self.0[model].error(with.for_model(model, point)));
-        let outcome = self.outcome(id, point, with, errors);
-        let margin = outcome.as_ref().and_then(|outcome| margin(outcome, with.rule));
+        let errors =
+            [0, 1].map(|model| self.0[model].error(refinement_rule.for_model(model, point)));
+        let outcome = self.outcome(point_index, point, refinement_rule, errors);
+        let verdict_margin =
+            outcome.as_ref().and_then(|outcome| relative_margin(outcome, refinement_rule.row_rule));
         let error = errors[0].zip(errors[1]).map(|(nonlinear, linear)| nonlinear + linear);
-        let is_verdict_certain = margin.zip(error).is_some_and(|(margin, error)| error < margin);
+        let is_verdict_certain =
+            verdict_margin.zip(error).is_some_and(|(verdict_margin, error)| error < verdict_margin);
         let mut runs = Vec::new();
-        if !(with.demand == Demand::Side && is_verdict_certain) {
+        if !(refinement_rule.purpose == OutcomePurpose::Side && is_verdict_certain) {
             // An error greater than the margin could change the verdict.
-            let is_in_doubt = margin.is_some() && error.is_some() && !is_verdict_certain;
+            let is_in_doubt = verdict_margin.is_some() && error.is_some() && !is_verdict_certain;
             for (model, refinement) in self.0.iter().enumerate() {
-                let next = refinement.next_level(with.for_model(model, point), is_in_doubt);
+                let next =
+                    refinement.next_level(refinement_rule.for_model(model, point), is_in_doubt);
                 runs.extend(next.map(|level| (model, level)));
             }
         }
         match outcome {
-            Some(outcome) if runs.is_empty() => Next::Done(Box::new(outcome)),
-            _ => Next::Runs(runs),
+            Some(outcome) if runs.is_empty() => NextStep::Done(Box::new(outcome)),
+            _ => NextStep::Runs(runs),
         }
     }
 
     /// Returns the outcome of the runs so far, once both models have run.
     fn outcome(
         &self,
-        id: u64,
+        point_index: u64,
         point: &Point,
-        with: RefinementRule<'_>,
+        refinement_rule: RefinementRule<'_>,
         errors: [Option<f64>; 2],
     ) -> Option<Outcome> {
-        let RefinementRule { levels, rule, .. } = with;
+        let RefinementRule { levels, row_rule: rule, .. } = refinement_rule;
         let [nonlinear, linear] = &self.0;
         let trajectory = |refinement: &ModelRefinement| {
             refinement.run.as_ref().map(|run| run.trajectory.clone())
         };
-        let mut outcome = Outcome::new(id, trajectory(nonlinear)?, trajectory(linear)?);
+        let mut outcome = Outcome::new(point_index, trajectory(nonlinear)?, trajectory(linear)?);
         outcome.compare_turns(&rule.channels);
         outcome.method = levels[0].levels[nonlinear.level].level;
         if rule.measures.metrics.contains(&Metric::StaticSag) {
@@ -268,13 +278,13 @@ impl RowRefinement {
         }
         if levels.iter().all(RefinementLevels::is_checked) {
             let [nonlinear_error, linear_error] = errors;
-            let greatest = |(one, other): (f64, f64)| one.max(other);
+            let greatest = |(a, b): (f64, f64)| a.max(b);
             outcome.error = nonlinear_error.zip(linear_error).map(greatest);
             outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
             // If two levels agree, the motion is not chaotic, and its error is known without a
             // perturbed run.
-            let last = nonlinear.differences.last().copied().flatten();
-            let disagrees = last.is_none_or(|difference| difference > rule.accuracy);
+            let last_difference = nonlinear.differences.last().copied().flatten();
+            let disagrees = last_difference.is_none_or(|difference| difference > rule.accuracy);
             outcome.sensitive = Some(nonlinear.is_chaotic() && disagrees);
         }
         Some(outcome)
@@ -282,7 +292,7 @@ impl RowRefinement {
 }
 
 /// Returns the distance of the ratios from the nearest limit, relative to the limit.
-fn margin(outcome: &Outcome, rule: &RowRule) -> Option<f64> {
+fn relative_margin(outcome: &Outcome, rule: &RowRule) -> Option<f64> {
     let Verdict { least, greatest, .. } = Verdict::new(outcome, rule.channels.len(), rule.limits);
     Some(rule.limits.margin(least?.1, greatest?.1))
 }
@@ -290,36 +300,47 @@ fn margin(outcome: &Outcome, rule: &RowRule) -> Option<f64> {
 /// Returns the greatest relative difference of the numbers that a row takes from two trajectories;
 /// `None` if one of them failed. If both failed, the times of failure are compared, relative to the
 /// run's length.
-fn difference(a: &Trajectory, b: &Trajectory, point: &Point, rule: &RowRule) -> Option<f64> {
-    if a.status != b.status {
+fn relative_difference(
+    first: &Trajectory,
+    second: &Trajectory,
+    point: &Point,
+    rule: &RowRule,
+) -> Option<f64> {
+    if first.status != second.status {
         return None;
     }
-    if b.status != Status::Ok {
-        let (a_s, b_s) = a.fail_time_s.zip(b.fail_time_s)?;
-        return Some((a_s - b_s).abs() / rule.end_s);
+    if second.status != Status::Ok {
+        let (first_s, second_s) = first.fail_time_s.zip(second.fail_time_s)?;
+        return Some((first_s - second_s).abs() / rule.end_s);
     }
-    let mut greatest = 0.0_f64;
-    let mut compare = |a: f64, b: f64, scale: f64| {
-        if a != b {
-            let share = (a - b).abs() / b.abs().max(scale);
+    let mut greatest_difference = 0.0_f64;
+    let mut compare = |first: f64, second: f64, scale: f64| {
+        if first != second {
+            let difference = (first - second).abs() / second.abs().max(scale);
             // A quotient that is NaN counts as an infinite difference.
-            greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
+            greatest_difference = if difference.is_nan() {
+                f64::INFINITY
+            } else {
+                greatest_difference.max(difference)
+            };
         }
     };
-    for (a, b) in a.amplitudes.iter().zip(&b.amplitudes) {
-        compare(*a, *b, 0.0);
+    for (first, second) in first.amplitudes.iter().zip(&second.amplitudes) {
+        compare(*first, *second, 0.0);
     }
-    if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
-        compare(a, b, point.clearance_m());
+    if let Some((first, second)) = first.min_gap_m.zip(second.min_gap_m) {
+        compare(first, second, point.clearance_m());
     }
-    for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.per_model()) {
-        compare(*a, *b, number.metric.scale(rule.window_s, point.weight_n()));
+    for ((first, second), number) in
+        first.metrics.iter().zip(&second.metrics).zip(rule.measures.model_columns())
+    {
+        compare(*first, *second, number.metric.scale(rule.window_s, point.weight_n()));
     }
-    for (a, b) in a.turns.iter().zip(&b.turns) {
+    for (first, second) in first.turns.iter().zip(&second.turns) {
         for channel in &rule.channels {
             let i = channel.index();
-            compare(a[i], b[i], TURN_FLOOR);
+            compare(first[i], second[i], TURN_FLOOR);
         }
     }
-    Some(greatest)
+    Some(greatest_difference)
 }

@@ -77,7 +77,7 @@ pub fn integrate_points(
     let mut friction_speeds = points.iter().flat_map(|point| point.friction_speeds());
     let mut recorders = rule.recorders();
     recorders.gauges[Gauge::DamperSpeed as usize] |=
-        friction_speeds.any(|speed| model == ModelKind::Linear || !speed.is_own);
+        friction_speeds.any(|speed| model == ModelKind::Linear || !speed.is_from_motion);
     let (records, readings) = simulate_until(simd, model, method, points, recorders, cancel)?;
     // There are no readings if no recorder is in use.
     let mut readings = readings.into_iter();
@@ -111,7 +111,7 @@ fn trajectory(
             ..Trajectory::failed(status)
         };
     }
-    let metrics = rule.measures.per_model().filter_map(|column| column.value(&reading));
+    let metrics = rule.measures.model_columns().filter_map(|column| column.value(&reading));
     Trajectory {
         amplitudes: rule.channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
         min_gap_m: Some(record.min_gap_m),

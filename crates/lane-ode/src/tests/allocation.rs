@@ -1,6 +1,6 @@
 //! Tests that the integrators allocate no memory after set-up.
 
-use super::{Method, Swing, Trajectory, instruction_sets, solve};
+use super::{SwingEquation, TestMethod, TestTrajectory, instruction_sets, solve};
 use crate::{SegmentEnd, Tolerance};
 
 #[test]
@@ -12,13 +12,13 @@ fn the_allocation_counter_counts() {
 #[test]
 fn an_integration_allocates_nothing() {
     let trajectories: Vec<_> = (0..21)
-        .map(|i| Trajectory::swing(1.0 + 0.1 * f64::from(i), 3.0, 1 + i % 3, 1e-3))
+        .map(|i| TestTrajectory::swing(1.0 + 0.1 * f64::from(i), 3.0, 1 + i % 3, 1e-3))
         .collect();
     let tolerance = Tolerance { relative: 1e-8, absolute: 1e-8, max_steps: 100_000 };
     for simd in instruction_sets() {
-        let adaptive = [Method::Dopri5(tolerance), Method::Additive(tolerance)];
-        for method in [Method::Rk4, Method::Dop853].into_iter().chain(adaptive) {
-            let (outcomes, asked) = solve::<Swing, 3, 1>(simd, method, &trajectories);
+        let adaptive = [TestMethod::Dopri5(tolerance), TestMethod::Additive(tolerance)];
+        for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(adaptive) {
+            let (outcomes, asked) = solve::<SwingEquation, 3, 1>(simd, method, &trajectories);
             assert!(
                 outcomes
                     .iter()

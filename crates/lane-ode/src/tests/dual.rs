@@ -4,7 +4,7 @@ use crate::{Dual, N, Real};
 
 /// The function f(x) over plain numbers, with one derivative, and with two; and f' and f'' in
 /// closed form.
-struct Case {
+struct DerivativeCase {
     name: &'static str,
     plain: fn(N<f64>) -> N<f64>,
     first: fn(N<Dual<f64>>) -> N<Dual<f64>>,
@@ -15,7 +15,7 @@ struct Case {
 /// Makes a case from one expression, compiled for plain numbers, for duals and for duals of duals.
 macro_rules! case {
     ($name:literal, |$x:ident| $f:expr, |$y:ident| $by_hand:expr) => {
-        Case {
+        DerivativeCase {
             name: $name,
             plain: |$x| ($f).into(),
             first: |$x| ($f).into(),
@@ -25,7 +25,7 @@ macro_rules! case {
     };
 }
 
-const CASES: &[Case] = &[
+const CASES: &[DerivativeCase] = &[
     case!("x + x", |x| x + x, |_x| [2.0, 0.0]),
     case!("x - 3", |x| x - 3.0, |_x| [1.0, 0.0]),
     case!("-x", |x| -x, |_x| [-1.0, 0.0]),

@@ -1,6 +1,6 @@
 //! Tests that a trajectory that fails ends with reason and time, without effect on other lanes.
 
-use super::{Equation, Method, Outcome, Trajectory, instruction_sets, solve};
+use super::{Equation, TestMethod, TestOutcome, TestTrajectory, instruction_sets, solve};
 use crate::{Failure, Lane, N, Segment, SegmentEnd, Tolerance};
 
 /// The equations x' = a x^2 + b / (c - t) + sqrt(d - t), y' = w z, z' = -w y, which diverge, have a
@@ -18,39 +18,39 @@ impl Equation<3, 5> for FailingEquation {
 
 const SEGMENT: Segment = Segment { start_s: 0.0, end_s: 2.0, step_s: 1e-3 };
 
-fn trajectory(parameters: [f64; 5]) -> Trajectory<3, 5> {
+fn trajectory(parameters: [f64; 5]) -> TestTrajectory<3, 5> {
     let segments = vec![Segment { end_s: 0.25, ..SEGMENT }, Segment { start_s: 0.25, ..SEGMENT }];
-    Trajectory { parameters, start: [1.0, 1.0, 0.0], segments }
+    TestTrajectory { parameters, start: [1.0, 1.0, 0.0], segments }
 }
 
 /// Returns a trajectory that does not fail.
-fn sound(i: usize) -> Trajectory<3, 5> {
+fn sound(i: usize) -> TestTrajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, 100.0 + i as f64, 2.0 + 0.37 * i as f64])
 }
 
-fn explodes() -> Trajectory<3, 5> {
+fn explodes() -> TestTrajectory<3, 5> {
     trajectory([1.0, 0.0, 100.0, 100.0, 2.0])
 }
 
-fn has_no_value_after(t_s: f64) -> Trajectory<3, 5> {
+fn has_no_value_after(t_s: f64) -> TestTrajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, t_s, 2.0])
 }
 
-fn runs_into_a_pole_at(t_s: f64) -> Trajectory<3, 5> {
+fn runs_into_a_pole_at(t_s: f64) -> TestTrajectory<3, 5> {
     trajectory([0.0, 1.0, t_s, 100.0, 2.0])
 }
 
-fn is_fast() -> Trajectory<3, 5> {
+fn is_fast() -> TestTrajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, 100.0, 1e4])
 }
 
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 };
-const ADAPTIVE: [Method; 2] = [Method::Dopri5(TOLERANCE), Method::Additive(TOLERANCE)];
+const ADAPTIVE: [TestMethod; 2] = [TestMethod::Dopri5(TOLERANCE), TestMethod::Additive(TOLERANCE)];
 
 /// Solves failing trajectories among sound ones in several orders, and asserts that the sound ones
 /// have the same bits as without failing ones. Returns the outcomes of the failing ones.
-fn among_others(method: Method, failing: &[Trajectory<3, 5>]) -> Vec<Outcome<3>> {
-    let mut ends: Option<Vec<Outcome<3>>> = None;
+fn among_others(method: TestMethod, failing: &[TestTrajectory<3, 5>]) -> Vec<TestOutcome<3>> {
+    let mut ends: Option<Vec<TestOutcome<3>>> = None;
     for simd in instruction_sets() {
         let alone: Vec<_> = (0..12).map(sound).collect();
         let (alone, _) = solve::<FailingEquation, 3, 5>(simd, method, &alone);
@@ -82,7 +82,7 @@ fn among_others(method: Method, failing: &[Trajectory<3, 5>]) -> Vec<Outcome<3>>
     ends.unwrap()
 }
 
-fn failure(outcome: &Outcome<3>) -> (Failure, f64) {
+fn failure(outcome: &TestOutcome<3>) -> (Failure, f64) {
     let SegmentEnd::Failed { reason, time_s, .. } = outcome.ended else {
         panic!("it did not fail: {outcome:?}")
     };
@@ -91,7 +91,7 @@ fn failure(outcome: &Outcome<3>) -> (Failure, f64) {
 
 #[test]
 fn a_diverged_trajectory_ends_alone() {
-    for method in [Method::Rk4, Method::Dop853].into_iter().chain(ADAPTIVE) {
+    for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(ADAPTIVE) {
         let outcomes = among_others(method, &[explodes()]);
         let (reason, time_s) = failure(&outcomes[0]);
         assert_eq!(reason, Failure::Diverged, "{method:?}");
@@ -103,7 +103,7 @@ fn a_diverged_trajectory_ends_alone() {
 
 #[test]
 fn a_state_that_is_not_finite_ends_alone() {
-    for method in [Method::Rk4, Method::Dop853].into_iter().chain(ADAPTIVE) {
+    for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(ADAPTIVE) {
         let outcomes = among_others(method, &[has_no_value_after(0.7), has_no_value_after(0.2)]);
         for (outcome, at_s) in outcomes.iter().zip([0.7, 0.2]) {
             let (reason, time_s) = failure(outcome);

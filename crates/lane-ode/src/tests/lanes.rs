@@ -42,9 +42,9 @@ fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
     ]
 }
 
-struct Operations<'a>(&'a [Operands]);
+struct LaneOperations<'a>(&'a [Operands]);
 
-impl Kernel for Operations<'_> {
+impl Kernel for LaneOperations<'_> {
     type Output = Vec<[f64; RESULTS]>;
 
     #[inline(always)]
@@ -168,15 +168,15 @@ fn check(name: &str, operands: &[Operands], results: &[[f64; RESULTS]]) {
 fn every_operation_of_every_instruction_set_gives_the_bits_of_plain_numbers() {
     let operands = operands();
     for simd in instruction_sets() {
-        check(simd.name(), &operands, &simd.dispatch(Operations(&operands)));
+        check(simd.name(), &operands, &simd.dispatch(LaneOperations(&operands)));
     }
 }
 
 #[test]
 fn every_operation_of_plain_arrays_gives_the_bits_of_plain_numbers() {
     let operands = operands();
-    check("Array<2>", &operands, &Operations(&operands).run(Array([0.0; 2])));
-    check("Array<3>", &operands, &Operations(&operands).run(Array([0.0; 3])));
+    check("Array<2>", &operands, &LaneOperations(&operands).run(Array([0.0; 2])));
+    check("Array<3>", &operands, &LaneOperations(&operands).run(Array([0.0; 3])));
 }
 
 struct CountLanes;

@@ -1,6 +1,8 @@
 //! Tests of the orders of convergence, at the ends of steps and inside them.
 
-use super::{Coupled, Equation, Method, Outcome, Swing, Trajectory, solve};
+use super::{
+    CoupledEquation, Equation, SwingEquation, TestMethod, TestOutcome, TestTrajectory, solve,
+};
 use crate::{Segment, SegmentEnd, Simd, Tolerance};
 
 const END_S: f64 = 6.0;
@@ -10,17 +12,21 @@ const END_S: f64 = 6.0;
 const ANYTHING: Tolerance = Tolerance { relative: 1e30, absolute: 1e30, max_steps: u64::MAX };
 
 /// Returns the error at the end and the largest error inside a step, for each number of steps.
-fn errors(method: Method, steps: &[u32]) -> Vec<[f64; 2]> {
+fn errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
     let trajectories: Vec<_> = steps
         .iter()
         .map(|&n| match method {
-            Method::Rk4 | Method::Dop853 => Trajectory::swing(1.0, END_S, 1, END_S / f64::from(n)),
-            Method::Dopri5(_) | Method::Additive(_) => Trajectory::swing(1.0, END_S, n, END_S),
+            TestMethod::Rk4 | TestMethod::Dop853 => {
+                TestTrajectory::swing(1.0, END_S, 1, END_S / f64::from(n))
+            }
+            TestMethod::Dopri5(_) | TestMethod::Additive(_) => {
+                TestTrajectory::swing(1.0, END_S, n, END_S)
+            }
         })
         .collect();
-    let (outcomes, _) = solve::<Swing, 3, 1>(Simd::best(), method, &trajectories);
-    let exact = Swing::exact(&[1.0], END_S);
-    let of = |(n, outcome): (&u32, Outcome<3>)| {
+    let (outcomes, _) = solve::<SwingEquation, 3, 1>(Simd::best(), method, &trajectories);
+    let exact = SwingEquation::exact(&[1.0], END_S);
+    let of = |(n, outcome): (&u32, TestOutcome<3>)| {
         assert!(matches!(outcome.ended, SegmentEnd::Completed(_)), "{outcome:?}");
         assert_eq!((outcome.count.accepted, outcome.count.rejected), (u64::from(*n), 0));
         let at_end = (0..3).map(|i| (outcome.x[i] - exact[i]).abs()).fold(0.0, f64::max);
@@ -42,7 +48,7 @@ fn slope(steps: &[u32], errors: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Measures the slopes at the end and inside steps.
-fn slopes(name: &str, method: Method, steps: &[u32]) -> [f64; 2] {
+fn slopes(name: &str, method: TestMethod, steps: &[u32]) -> [f64; 2] {
     let errors = errors(method, steps);
     let slopes = [0, 1].map(|which| slope(steps, errors.iter().map(|e| e[which])));
     let [most, least] = [0, steps.len() - 1].map(|i| errors[i][0]);
@@ -55,14 +61,14 @@ fn slopes(name: &str, method: Method, steps: &[u32]) -> [f64; 2] {
 
 #[test]
 fn rk4_and_the_cubic_inside_its_steps_have_order_4() {
-    let [order, between] = slopes("rk4", Method::Rk4, &[200, 283, 400, 566, 800]);
+    let [order, between] = slopes("rk4", TestMethod::Rk4, &[200, 283, 400, 566, 800]);
     assert!((order - 4.0).abs() < 0.1, "order {order}");
     assert!((between - 4.0).abs() < 0.1, "between steps {between}");
 }
 
 #[test]
 fn dop853_has_order_8_and_its_coefficients_are_consistent() {
-    let [order, _] = slopes("dop853", Method::Dop853, &[10, 14, 20, 28]);
+    let [order, _] = slopes("dop853", TestMethod::Dop853, &[10, 14, 20, 28]);
     assert!((7.7..9.3).contains(&order), "order {order}");
 }
 
@@ -80,14 +86,15 @@ fn dop853_is_stable_on_the_imaginary_axis_to_its_limit() {
 fn dopri5_and_its_dense_output_have_order_5() {
     // Dense output of order 4 has a local error of order h^5, which does not accumulate, so that it
     // is as accurate as the method.
-    let [order, between] = slopes("dopri5", Method::Dopri5(ANYTHING), &[64, 91, 128, 181, 256]);
+    let [order, between] = slopes("dopri5", TestMethod::Dopri5(ANYTHING), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
     assert!((between - 5.0).abs() < 0.1, "between steps {between}");
 }
 
 #[test]
 fn the_additive_method_has_order_5() {
-    let [order, between] = slopes("additive", Method::Additive(ANYTHING), &[64, 91, 128, 181, 256]);
+    let [order, between] =
+        slopes("additive", TestMethod::Additive(ANYTHING), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
     // The cubic inside steps has order 4.
     assert!((between - 4.0).abs() < 0.1, "between steps {between}");
@@ -97,15 +104,15 @@ fn the_additive_method_has_order_5() {
 fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
     // If the stiff spring were rigid, the masses would swing at the square root of 1/2.
     let segments = vec![Segment { start_s: 0.0, end_s: 10.0, step_s: 1e-4 }];
-    let trajectory = Trajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], segments };
+    let trajectory = TestTrajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], segments };
     for tolerance in [1e-4, 1e-6] {
         let allowed = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 5_000 };
-        let (outcomes, _) = solve::<Coupled, 4, 1>(
+        let (outcomes, _) = solve::<CoupledEquation, 4, 1>(
             Simd::best(),
-            Method::Additive(allowed),
+            TestMethod::Additive(allowed),
             core::slice::from_ref(&trajectory),
         );
-        let Outcome { ended, x, count, .. } = outcomes[0];
+        let TestOutcome { ended, x, count, .. } = outcomes[0];
         assert!(matches!(ended, SegmentEnd::Completed(_)), "{ended:?}");
         let error = (x[0] - (10.0 * 0.5_f64.sqrt()).cos()).abs();
         eprintln!("additive at {tolerance:e}: error {error:.1e}, {count:?}");
@@ -117,17 +124,17 @@ fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
 
 #[test]
 fn steps_of_dopri5_are_proportional_to_the_fifth_root_of_the_tolerance() {
-    let trajectory = Trajectory::swing(1.0, 20.0, 1, 1e-3);
-    let exact = Swing::exact(&[1.0], 20.0);
+    let trajectory = TestTrajectory::swing(1.0, 20.0, 1, 1e-3);
+    let exact = SwingEquation::exact(&[1.0], 20.0);
     let mut steps = Vec::new();
     for tolerance in [1e-5, 1e-7, 1e-9, 1e-11] {
         let allowed = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 100_000 };
-        let (outcomes, _) = solve::<Swing, 3, 1>(
+        let (outcomes, _) = solve::<SwingEquation, 3, 1>(
             Simd::best(),
-            Method::Dopri5(allowed),
+            TestMethod::Dopri5(allowed),
             core::slice::from_ref(&trajectory),
         );
-        let Outcome { ended, x, count, error_inside, .. } = outcomes[0];
+        let TestOutcome { ended, x, count, error_inside, .. } = outcomes[0];
         assert!(matches!(ended, SegmentEnd::Completed(_)));
         let error = (0..3).map(|i| (x[i] - exact[i]).abs()).fold(error_inside, f64::max);
         eprintln!("dopri5 at {tolerance:e}: error {error:.2e}, {count:?}");
@@ -146,10 +153,10 @@ fn every_segment_ends_where_it_should() {
     // Ends and steps that binary fractions do not hit.
     let ends = [0.1, 0.7, 1.0 / 3.0, 2.2, 5.3, 0.049, 7.77];
     for method in [
-        Method::Rk4,
-        Method::Dop853,
-        Method::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
-        Method::Additive(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
+        TestMethod::Rk4,
+        TestMethod::Dop853,
+        TestMethod::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
+        TestMethod::Additive(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
     ] {
         let trajectories: Vec<_> = ends
             .into_iter()
@@ -157,14 +164,14 @@ fn every_segment_ends_where_it_should() {
                 let edges = [0.0, 0.3 * end_s, 0.31 * end_s, end_s];
                 let segment =
                     |pair: &[f64]| Segment { start_s: pair[0], end_s: pair[1], step_s: 0.007 };
-                Trajectory {
+                TestTrajectory {
                     segments: edges.windows(2).map(segment).collect(),
-                    ..Trajectory::swing(1.0, 1.0, 1, 1.0)
+                    ..TestTrajectory::swing(1.0, 1.0, 1, 1.0)
                 }
             })
             .collect();
         for simd in super::instruction_sets() {
-            let (outcomes, _) = solve::<Swing, 3, 1>(simd, method, &trajectories);
+            let (outcomes, _) = solve::<SwingEquation, 3, 1>(simd, method, &trajectories);
             for (end_s, outcome) in ends.into_iter().zip(outcomes) {
                 assert!(matches!(outcome.ended, SegmentEnd::Completed(_)));
                 assert_eq!(

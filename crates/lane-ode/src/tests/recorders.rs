@@ -2,7 +2,7 @@
 
 use super::array::Array;
 use super::peaks::Waves;
-use crate::{Lane, N, PartPeaks, Peaks, Sample, SquareIntegrals, TimeAbove};
+use crate::{IntervalPeaks, Lane, N, Peaks, Sample, SquareIntegrals, TimeAbove};
 use core::f64::consts::TAU;
 
 fn waves(seed: u64) -> Waves {
@@ -17,7 +17,7 @@ fn waves(seed: u64) -> Waves {
 /// Returns the peaks of the parts between cuts, in `steps` equal steps from 0 to `end`.
 fn parts(waves: &Waves, cuts: &[f64], end: f64, steps: u32) -> Vec<f64> {
     let h = end / f64::from(steps);
-    let mut peaks = PartPeaks::<f64, 1>::new(N(0.0));
+    let mut peaks = IntervalPeaks::<f64, 1>::new(N(0.0));
     peaks.reset(0, cuts);
     peaks.begin(&[waves.sample(0.0)], true);
     for i in 1..=steps {
@@ -59,7 +59,7 @@ fn the_peak_of_a_part_is_that_of_a_separate_trajectory() {
 #[test]
 fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
     let cuts = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
-    let mut together = PartPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
+    let mut together = IntervalPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
     let all: Vec<Waves> = (0..3).map(waves).collect();
     let sample = |t: f64| {
         let mut lanes = Sample::still(N(Array([0.0; 3])), N(Array([0.0; 3])));
@@ -81,7 +81,7 @@ fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
         together.advance(N(Array([t; 3])), h, &sample(t), [true; 3]);
     }
     for lane in 0..3 {
-        let mut alone = PartPeaks::<f64, 1>::new(N(0.0));
+        let mut alone = IntervalPeaks::<f64, 1>::new(N(0.0));
         alone.reset(0, &cuts[lane]);
         alone.begin(&[all[lane].sample(0.0)], true);
         for i in 1..=60 {

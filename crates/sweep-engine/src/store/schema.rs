@@ -155,8 +155,8 @@ impl Column {
         self.declared(data_type, nullable)
     }
 
-    /// Returns the Arrow field of the column, with its unit, description, worse side, limit and mark
-    /// for summaries as metadata.
+    /// Returns the Arrow field of the column, with its unit, description, worse side, limit and
+    /// mark for summaries as metadata.
     pub(crate) fn declared(&self, data_type: DataType, nullable: bool) -> Field {
         let mut metadata = HashMap::from([
             ("unit".to_owned(), self.unit.clone()),

@@ -83,7 +83,11 @@ impl Assumed {
                 parameter.set(&mut other, &mut spin.clone(), *end);
                 parameter.range().contains(*end) && other.violations().is_empty()
             };
-            let ends = assumption.ends(value, machine).into_iter().filter(is_possible).collect();
+            let ends = assumption
+                .expected_bounds(value, machine)
+                .into_iter()
+                .filter(is_possible)
+                .collect();
             all.push(Self { parameter, value, ends });
         }
         all

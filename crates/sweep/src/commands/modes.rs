@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use lane_ode::Cancel;
-use washer_model::{Exact, ModeAtSpeed, ModeOverSpeed, decimal};
+use washer_model::{FloquetMode, ModeAtSpeed, ModeOverSpeed, decimal};
 
 use crate::config::WasherGridInput;
 use crate::library::modes::{ModeAnalysis, ModesInput};
@@ -92,7 +92,7 @@ fn difference_lines(analysis: &ModeAnalysis) -> String {
             .to_owned();
     for mode in 0..modes.len().min(COMPARED_MODES) {
         // The greatest difference (%) over all speeds, with its speed.
-        let greatest = |difference: fn(&ModeAtSpeed, &Exact) -> f64| {
+        let greatest = |difference: fn(&ModeAtSpeed, &FloquetMode) -> f64| {
             let at_speed = |k: usize| {
                 let share = difference(&modes[mode].at_speed[k], exact[k][mode].as_ref()?);
                 share.is_finite().then_some((100.0 * share, speeds[k]))

@@ -153,7 +153,10 @@ fn columns() -> String {
     push_row(&mut text, &["---"; 3]);
     for criterion in Criterion::ALL {
         let name = format!("`{}`", criterion.name());
-        push_row(&mut text, &[&name, criterion.amplitude(), criterion.ratio()]);
+        push_row(
+            &mut text,
+            &[&name, criterion.amplitude_description(), criterion.ratio_description()],
+        );
     }
     let listed = |names: &mut dyn Iterator<Item = &'static str>| {
         names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")

@@ -176,7 +176,7 @@ fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Resu
     let rows: Vec<Vec<String>> = channels.iter().enumerate().map(row).collect();
     let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
     let window = span(plan.window_s, short);
-    let amplitude = plan.model.measures.criterion.amplitude();
+    let amplitude = plan.model.measures.criterion.amplitude_description();
     let point = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
     let mut text = format!("{amplitude}, {window} s{point}:\n{}", table(&headings, &rows, ""));
     // The decisive ratio is one that is beyond its limit, or else the greatest.

@@ -138,7 +138,7 @@ pub(super) fn walk_stability(
 
 /// Returns the part that a metric needs and the machine lacks, with the expected sections.
 pub(crate) fn missing_part(metric: Metric, machine: &Machine) -> Option<&'static str> {
-    let (has_part, part) = match metric.facts().part? {
+    let (has_part, part) = match metric.properties().part? {
         PartKind::Stop => {
             (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
         }

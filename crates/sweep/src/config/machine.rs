@@ -78,7 +78,7 @@ static KEYS: LazyLock<Vec<Vec<MachineKey>>> = LazyLock::new(|| {
         let candidates = (0..SECTIONS.len()).filter_map(|k| Some((rest(&SECTIONS[k])?, k)));
         // A parameter belongs to the section with the longest prefix of its name.
         let own = candidates.min_by_key(|(rest, _)| rest.len());
-        own.into_iter().for_each(|(rest, k)| names[k].push((rest.to_owned(), one.left_out())));
+        own.into_iter().for_each(|(rest, k)| names[k].push((rest.to_owned(), one.default_value())));
     }
     SECTIONS.iter().zip(names).map(|(section, names)| section.keys(&names)).collect()
 });

@@ -25,7 +25,8 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
     let written = draft.report.written();
     let mut notes = Vec::new();
     for parameter in Parameter::all(machine, spin) {
-        let is_typed = written.contains_key(parameter.name()) && !parameter.target().is_several();
+        let is_typed =
+            written.contains_key(parameter.name()) && !parameter.target().has_several_numbers();
         if let Some(value) = parameter.get(machine, spin).filter(|_| is_typed) {
             notes.extend(unusual_note(&parameter, value));
         }

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use sweep_engine::columns::{MODELS, ResultColumn};
 use sweep_engine::store::{Done, Holds};
-use washer_model::{COORDINATES, Channel, Ending, Endings, Response, STATE_LEN, Settled, State};
+use washer_model::{
+    Attractor, AttractorStatus, Attractors, COORDINATES, Channel, MotionKind, Response, STATE_LEN,
+};
 use washer_row::{Measures, MetricColumn, Status};
 
 use super::final_state;
@@ -13,7 +15,7 @@ use crate::engine::Carried;
 /// The data of a row: a motion of a point at a held speed, and one of its turns.
 pub(crate) struct DwellRow {
     /// All motions of the point at this speed, or the reason why there are none.
-    pub(super) found: Result<Arc<Endings>, Status>,
+    pub(super) found: Result<Arc<Attractors>, Status>,
     /// The number of the motion.
     pub(super) motion: usize,
     /// The number of the turn among those that are kept; 0 if none are.
@@ -22,7 +24,7 @@ pub(crate) struct DwellRow {
 
 pub(crate) type DwellColumn = ResultColumn<DwellRow>;
 
-/// Number of the kinds of settled motions, which are the first of [`Ending::KIND_NAMES`].
+/// Number of the kinds of settled motions, which are the first of [`Attractor::KIND_NAMES`].
 const SETTLED_KINDS: usize = 5;
 
 /// The statuses of rows.
@@ -39,17 +41,17 @@ const STATUSES: [&str; 9] = [
 ];
 
 impl DwellRow {
-    fn found(&self) -> Option<&Endings> {
+    fn found(&self) -> Option<&Attractors> {
         self.found.as_deref().ok()
     }
 
-    fn motion(&self) -> Option<&Ending> {
-        self.found()?.motions.get(self.motion)
+    fn motion(&self) -> Option<&Attractor> {
+        self.found()?.attractors.get(self.motion)
     }
 
     /// Returns the motion, if it stayed within the model's range.
-    fn within(&self) -> Option<&Ending> {
-        self.motion().filter(|motion| !matches!(motion.state, State::LeftRange { .. }))
+    fn within(&self) -> Option<&Attractor> {
+        self.motion().filter(|motion| !matches!(motion.status, AttractorStatus::LeftRange { .. }))
     }
 
     /// Returns the periodic response of a machine that runs up.
@@ -62,38 +64,40 @@ impl DwellRow {
     }
 
     fn period_turns(&self) -> Option<u64> {
-        match self.motion()?.settled? {
-            Settled::Periodic { turns } => Some(u64::from(turns)),
-            Settled::QuasiPeriodic { .. } | Settled::Chaotic => None,
+        match self.motion()?.motion_kind? {
+            MotionKind::Periodic { turns } => Some(u64::from(turns)),
+            MotionKind::QuasiPeriodic { .. } | MotionKind::Chaotic => None,
         }
     }
 
     fn frequency_cpm(&self) -> Option<f64> {
-        match self.motion()?.settled? {
-            Settled::QuasiPeriodic { frequency_cpm } => Some(frequency_cpm),
-            Settled::Periodic { .. } | Settled::Chaotic => None,
+        match self.motion()?.motion_kind? {
+            MotionKind::QuasiPeriodic { frequency_cpm } => Some(frequency_cpm),
+            MotionKind::Periodic { .. } | MotionKind::Chaotic => None,
         }
     }
 
     fn life_s(&self) -> Option<f64> {
-        match self.motion()?.state {
-            State::Transient { life_s } => Some(life_s),
-            State::Ok | State::LeftRange { .. } | State::NotSettled => None,
+        match self.motion()?.status {
+            AttractorStatus::Transient { life_s } => Some(life_s),
+            AttractorStatus::Ok
+            | AttractorStatus::LeftRange { .. }
+            | AttractorStatus::NotSettled => None,
         }
     }
 
     fn is_near_response(&self) -> Option<bool> {
-        let motion = self.motion().filter(|motion| motion.state == State::NotSettled)?;
+        let motion = self.motion().filter(|motion| motion.status == AttractorStatus::NotSettled)?;
         Some(self.found()?.is_near_response(motion))
     }
 
     fn status(&self) -> &'static str {
         match self.found {
-            Ok(_) => match self.motion().map(|motion| motion.state) {
-                Some(State::Ok) => "ok",
-                Some(State::LeftRange { .. }) => "left_range",
-                Some(State::Transient { .. }) => "transient",
-                Some(State::NotSettled) | None => "not_settled",
+            Ok(_) => match self.motion().map(|motion| motion.status) {
+                Some(AttractorStatus::Ok) => "ok",
+                Some(AttractorStatus::LeftRange { .. }) => "left_range",
+                Some(AttractorStatus::Transient { .. }) => "transient",
+                Some(AttractorStatus::NotSettled) | None => "not_settled",
             },
             Err(Status::NoEquilibrium) => "no_equilibrium",
             Err(Status::NoMultipliers) => "no_multipliers",
@@ -119,10 +123,10 @@ fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
             |row| Some(&row.within()?.peaks),
         ),
         (MODELS[1], "the same by the linear model, which repeats every turn", |row| {
-            Some(&row.response()?.linear)
+            Some(&row.response()?.linear_peaks)
         }),
         ("periodic", "the same of the nonlinear model's periodic response, stable or not", |row| {
-            Some(&row.response()?.nonlinear)
+            Some(&row.response()?.nonlinear_peaks)
         }),
     ];
     let mut columns = Vec::new();
@@ -168,18 +172,18 @@ pub(crate) fn columns(
     columns.push(ResultColumn::name(
         "kind",
         text,
-        Ending::KIND_NAMES[..SETTLED_KINDS].to_vec(),
+        Attractor::KIND_NAMES[..SETTLED_KINDS].to_vec(),
         DwellRow::kind,
     ));
     let text = "after how many turns it repeats; null where it does not";
     columns.push(count_column("period_turns", text, DwellRow::period_turns));
     columns.extend(channel_columns(channels));
     let is_periodic = |number: &MetricColumn| number.metric.has_periodic_value();
-    for number in measures.per_model().filter(is_periodic) {
+    for number in measures.model_columns().filter(is_periodic) {
         let text = format!("{}, over 128 further turns of the motion", number.description());
         let text = text.replace(" in the window", "");
         let name = number.column(MODELS[0]);
-        let unit = number.metric.facts().unit;
+        let unit = number.metric.properties().unit;
         let value = move |row: &DwellRow| number.value(&row.within()?.extra);
         columns.push(ResultColumn::measured(name, unit, text, value));
     }

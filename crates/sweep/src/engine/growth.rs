@@ -2,7 +2,7 @@
 //! the motions in which machines end.
 
 use lane_ode::{Cancel, Simd};
-use washer_model::{Dwell, Endings, Point, Response, STATE_LEN, Starts, find_endings, respond};
+use washer_model::{Attractors, HeldSpeed, Point, Response, STATE_LEN, StartRule, find_attractors};
 use washer_row::{DwellPeaks, Growth, Metric, Outcome, Status};
 
 use super::map_isolating_panics;
@@ -14,11 +14,11 @@ pub(crate) type Carried = Option<[f64; STATE_LEN]>;
 /// The first response is that of a machine that runs up. Once `cancel` is requested, the result
 /// is meaningless.
 pub(crate) fn find_responses(
-    dwells: &[Dwell<'_>],
+    dwells: &[HeldSpeed<'_>],
     cancel: Cancel<'_>,
 ) -> Vec<Result<Vec<Response>, Status>> {
-    let find_group = |dwells: &[Dwell<'_>]| {
-        let answers = respond(dwells, cancel).into_iter();
+    let find_group = |dwells: &[HeldSpeed<'_>]| {
+        let answers = washer_model::find_responses(dwells, cancel).into_iter();
         answers.map(|answer| answer.map_err(Status::from)).collect()
     };
     map_isolating_panics(dwells, find_group, || Err(Status::Panicked))
@@ -27,30 +27,32 @@ pub(crate) fn find_responses(
 /// Returns the fastest growth of disturbances about the response of a machine that runs up, over
 /// several speeds; the first speed wins a tie.
 ///
-/// `beyond` is the limit of the machine's geometry that this response passes, or else one that a
-/// response at another speed passes. `is_on_curve` holds only if every speed has a response on the
-/// curve of a run-up: otherwise the machine may be in another motion at some of them.
+/// `exceeded_limit` is the limit of the machine's geometry that this response passes, or else one
+/// that a response at another speed passes. `is_on_curve` holds only if every speed has a response
+/// on the curve of a run-up: otherwise the machine may be in another motion at some of them.
 pub(crate) fn fastest_growth(found: &[Result<Vec<Response>, Status>]) -> Option<Growth> {
     let firsts = || found.iter().map(|found| found.as_ref().ok()?.first());
     let faster = |most: &Response, next: &Response| next.growth_per_s() > most.growth_per_s();
     let fastest =
         firsts().flatten().reduce(|most, next| if faster(most, next) { next } else { most })?;
-    let beyond = fastest.beyond.or_else(|| firsts().flatten().find_map(|first| first.beyond));
+    let beyond = fastest
+        .exceeded_limit
+        .or_else(|| firsts().flatten().find_map(|first| first.exceeded_limit));
     let is_on_curve = firsts().all(|first| first.is_some_and(|first| first.is_on_curve));
-    Some(Growth { beyond, is_on_curve, ..Growth::from(fastest) })
+    Some(Growth { exceeded_limit: beyond, is_on_curve, ..Growth::from(fastest) })
 }
 
 /// Returns the motions in which points end at held speeds, or the status of a point without one.
 /// Once `cancel` is requested, the result is meaningless.
 pub(crate) fn find_motions(
     simd: Simd,
-    dwells: &[(Dwell<'_>, Carried)],
-    starts: &Starts,
+    dwells: &[(HeldSpeed<'_>, Carried)],
+    starts: &StartRule,
     cancel: Cancel<'_>,
-) -> Vec<Result<Endings, Status>> {
-    let find_group = |dwells: &[(Dwell<'_>, Carried)]| {
+) -> Vec<Result<Attractors, Status>> {
+    let find_group = |dwells: &[(HeldSpeed<'_>, Carried)]| {
         let (dwells, carried): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
-        let found = find_endings(simd, &dwells, &carried, starts, cancel).into_iter();
+        let found = find_attractors(simd, &dwells, &carried, starts, cancel).into_iter();
         found.map(|found| found.map_err(Status::from)).collect()
     };
     map_isolating_panics(dwells, find_group, || Err(Status::Panicked))
@@ -65,8 +67,8 @@ pub(super) fn add_held_speed_metrics(
     (speeds_rpm, metrics): (&[f64], &[Metric]),
     cancel: Cancel<'_>,
 ) {
-    let at_speeds = |point| speeds_rpm.iter().map(move |&speed_rpm| Dwell { point, speed_rpm });
-    let dwells: Vec<Dwell<'_>> = rows.iter().flat_map(|(_, point)| at_speeds(*point)).collect();
+    let at_speeds = |point| speeds_rpm.iter().map(move |&speed_rpm| HeldSpeed { point, speed_rpm });
+    let dwells: Vec<HeldSpeed<'_>> = rows.iter().flat_map(|(_, point)| at_speeds(*point)).collect();
     if metrics.contains(&Metric::Growth) {
         let found = find_responses(&dwells, cancel);
         for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
@@ -75,9 +77,9 @@ pub(super) fn add_held_speed_metrics(
     }
     if metrics.contains(&Metric::Dwell) {
         let dwells: Vec<_> = dwells.iter().map(|dwell| (*dwell, None)).collect();
-        let found = find_motions(simd, &dwells, &Starts::default(), cancel);
+        let found = find_motions(simd, &dwells, &StartRule::default(), cancel);
         for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
-            outcome.dwelt = DwellPeaks::from_endings(speeds_rpm, found);
+            outcome.dwell_peaks = DwellPeaks::from_attractors(speeds_rpm, found);
         }
     }
 }
@@ -94,13 +96,13 @@ mod tests {
                 speed_rpm,
                 is_on_curve,
                 branch: 0,
-                between_rpm: [None; 2],
-                beyond: None,
-                nonlinear: [0.0; Channel::ALL.len()],
-                linear: [0.0; Channel::ALL.len()],
+                fold_speeds_rpm: [None; 2],
+                exceeded_limit: None,
+                nonlinear_peaks: [0.0; Channel::ALL.len()],
+                linear_peaks: [0.0; Channel::ALL.len()],
                 start: [0.0; STATE_LEN],
                 multiplier: [-1.2, 0.0],
-                participants: Vec::new(),
+                participating_modes: Vec::new(),
             }])
         };
         let [on, other] = [response(240.0, true), response(260.0, true)];

@@ -19,7 +19,7 @@ use std::time::Duration;
 use lane_ode::Cancel;
 use lane_ode::MAX_LANES;
 use washer_model::{Method, Point};
-use washer_row::{Next, Outcome, RefinementRule, RowRefinement, Status};
+use washer_row::{NextStep, Outcome, RefinementRule, RowRefinement, Status};
 
 use super::{ModelEngine, RunContext, growth};
 use crate::plan::Scenario;
@@ -31,7 +31,7 @@ const PREPARE_BATCH: usize = MAX_LANES;
 
 /// Returns the number of runs by a method that a thread takes at once.
 fn batch_size(method: &Method) -> usize {
-    if method.has_own_steps() { 4 * MAX_LANES } else { MAX_LANES }
+    if method.adapts_steps() { 4 * MAX_LANES } else { MAX_LANES }
 }
 
 impl ModelEngine<'_> {
@@ -77,12 +77,12 @@ struct RowTask {
 
 impl RowTask {
     /// Returns the runs that the row needs next, or its outcome. No run may be pending.
-    fn next(&self, rule: RefinementRule<'_>) -> Next {
+    fn next(&self, rule: RefinementRule<'_>) -> NextStep {
         match &self.point {
-            Ok(point) => self.refinement.next(self.id, point, rule),
+            Ok(point) => self.refinement.next_step(self.id, point, rule),
             Err(status) => {
                 let method = rule.levels[0].levels[0].level;
-                Next::Done(Box::new(Outcome { method, ..Outcome::failed(self.id, *status) }))
+                NextStep::Done(Box::new(Outcome { method, ..Outcome::failed(self.id, *status) }))
             }
         }
     }
@@ -174,7 +174,7 @@ impl Pool<'_> {
                         let Some(mut row) = state.rows.remove(position) else { continue };
                         row.pending -= 1;
                         if let Ok(point) = &row.point {
-                            row.refinement.take((model, level), run, point, rule);
+                            row.refinement.add_run((model, level), run, point, rule);
                         }
                         rows.push(row);
                     }
@@ -190,7 +190,7 @@ impl Pool<'_> {
     fn rule(&self) -> Option<RefinementRule<'_>> {
         let ModelEngine { demand, rule, .. } = self.engine;
         let levels = self.engine.levels_under(self.context)?;
-        Some(RefinementRule { levels, demand: *demand, rule })
+        Some(RefinementRule { levels, purpose: *demand, row_rule: rule })
     }
 
     fn lock(&self) -> MutexGuard<'_, PoolState> {
@@ -214,14 +214,14 @@ impl Pool<'_> {
         let mut done = Vec::new();
         for mut row in rows {
             let next = if row.pending > 0 {
-                Next::Runs(Vec::new())
+                NextStep::Runs(Vec::new())
             } else {
                 // Rows of a stopped run are dropped.
                 let Some(rule) = self.rule() else { break };
                 row.next(rule)
             };
             match next {
-                Next::Runs(kinds) => {
+                NextStep::Runs(kinds) => {
                     let position = row.id;
                     row.pending += kinds.len();
                     for (model, level) in kinds {
@@ -229,7 +229,7 @@ impl Pool<'_> {
                     }
                     state.rows.insert(position, row);
                 }
-                Next::Done(outcome) => done.push((*outcome, row.point)),
+                NextStep::Done(outcome) => done.push((*outcome, row.point)),
             }
         }
         state.busy_threads -= 1;

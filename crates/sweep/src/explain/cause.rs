@@ -5,7 +5,7 @@
 //! have added to the difference of the two models, and the motion without it. Tongues are the cause
 //! of a verdict if the motion without them keeps the limit.
 
-use washer_model::{History, Method, ModelKind, Point, Spin, Start, history};
+use washer_model::{History, InitialDeviation, Method, ModelKind, Point, Spin, history};
 
 use super::profile::growth_at;
 use super::{Passage, SweptResult};
@@ -51,7 +51,9 @@ pub(super) fn find_cause<'p>(
 ) -> Option<Cause> {
     let (position, _) = swept.verdict.greatest?;
     let channel = swept.channels[position].index();
-    let run = |model| history(model, &Method::Rk4 { step_s }, point, &Start::default(), INTERVAL_S);
+    let run = |model| {
+        history(model, &Method::Rk4 { step_s }, point, &InitialDeviation::default(), INTERVAL_S)
+    };
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(run);
     let value = |history: &History<'_>, k: usize| Some(history.instant(k)?.channels[channel]);
     let count = nonlinear.len().min(linear.len());

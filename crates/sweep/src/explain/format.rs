@@ -1,6 +1,8 @@
 //! An explanation as text.
 
-use washer_model::{Channel, Ending, Kind, LeftRange, Settled, State, decimal};
+use washer_model::{
+    Attractor, AttractorStatus, Channel, LeftRangeError, MotionKind, StabilityKind, decimal,
+};
 
 use sweep_engine::commands::cells::short;
 
@@ -204,10 +206,12 @@ fn over_estimates(swept: &SweptResult) -> bool {
 fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: &[Passage]) {
     let at = &tongue.at;
     let kind = match at.kind() {
-        Kind::PeriodDoubling => "its period doubles",
-        Kind::QuasiPeriodic => "a second frequency appears that is no multiple of the speed",
-        Kind::Fold => "it jumps to another motion",
-        Kind::Stable => "it is stable",
+        StabilityKind::PeriodDoubling => "its period doubles",
+        StabilityKind::QuasiPeriodic => {
+            "a second frequency appears that is no multiple of the speed"
+        }
+        StabilityKind::Fold => "it jumps to another motion",
+        StabilityKind::Stable => "it is stable",
     };
     let [from, to] = tongue.from_to_rpm;
     let growth =
@@ -218,14 +222,14 @@ fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages
     let low = at.frequency_cpm();
     let high = at.speed_rpm - at.frequency_cpm();
     let lines = match at.kind() {
-        Kind::PeriodDoubling => format!("at half the speed, {low:.2} per minute"),
-        Kind::Fold => "none beside those of the turn".to_owned(),
-        Kind::QuasiPeriodic | Kind::Stable => {
+        StabilityKind::PeriodDoubling => format!("at half the speed, {low:.2} per minute"),
+        StabilityKind::Fold => "none beside those of the turn".to_owned(),
+        StabilityKind::QuasiPeriodic | StabilityKind::Stable => {
             format!("at {low:.2} and {high:.2} per minute, which add up to the speed")
         }
     };
     push_line(text, "lines", lines);
-    for mode in &at.participants {
+    for mode in &at.participating_modes {
         let number = mode.mode;
         let motion = mode.motion;
         let cpm = mode.frequency_cpm;
@@ -255,24 +259,26 @@ fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages
 }
 
 /// Returns a description of the motion in which a machine ends.
-fn ending_words(motion: &Ending) -> String {
+fn ending_words(motion: &Attractor) -> String {
     let amplitudes = [Channel::TubYaw, Channel::TubPitch].map(|channel| {
         let name = channel.name().replace('_', " ");
         format!("{name} {}", milli(motion.peaks[channel.index()], channel))
     });
     let after = format!("after {:.0} s", motion.time_s);
-    let kind = match (motion.settled, motion.state) {
-        (Some(Settled::Periodic { turns: 1 }), _) => "repeating every turn".to_owned(),
-        (Some(Settled::Periodic { turns }), _) => format!("repeating every {turns} turns"),
-        (Some(Settled::QuasiPeriodic { .. }), _) => "with two frequencies".to_owned(),
-        (Some(Settled::Chaotic), _) => "chaotic".to_owned(),
-        (None, State::LeftRange { .. }) => {
+    let kind = match (motion.motion_kind, motion.status) {
+        (Some(MotionKind::Periodic { turns: 1 }), _) => "repeating every turn".to_owned(),
+        (Some(MotionKind::Periodic { turns }), _) => format!("repeating every {turns} turns"),
+        (Some(MotionKind::QuasiPeriodic { .. }), _) => "with two frequencies".to_owned(),
+        (Some(MotionKind::Chaotic), _) => "chaotic".to_owned(),
+        (None, AttractorStatus::LeftRange { .. }) => {
             return format!("beyond the model's range, {after}");
         }
-        (None, State::Transient { life_s }) => {
+        (None, AttractorStatus::Transient { life_s }) => {
             format!("a transient that lasts {life_s:.0} s on average and then ends elsewhere")
         }
-        (None, State::Ok | State::NotSettled) => format!("not settled {after}"),
+        (None, AttractorStatus::Ok | AttractorStatus::NotSettled) => {
+            format!("not settled {after}")
+        }
     };
     format!("{}, {kind}, if the drum is held there (`sweep dwell`)", amplitudes.join(", "))
 }
@@ -321,7 +327,7 @@ fn push_passage(text: &mut String, passage: &Passage) {
     let mut words =
         format!("from {from:.3} to {to:.3} s{cut}: {folds:.2} e-folds, a factor of {factor}");
     match &passage.crossed {
-        Err(LeftRange { time_s }) => {
+        Err(LeftRangeError { time_s }) => {
             words += &format!("; the run leaves the model's range at {time_s:.3} s");
         }
         Ok(crossed) => {
@@ -372,7 +378,7 @@ fn push_conclusion(text: &mut String, found: &Explanation) {
         None => "no tongue is crossed before the window ends: no unstable response explains the \
              difference of the models"
             .to_owned(),
-        Some(Err(LeftRange { time_s })) => format!(
+        Some(Err(LeftRangeError { time_s })) => format!(
             "put on the periodic response as it enters each tongue, the run leaves the model's \
              range at {time_s:.3} s: the failure is not due to motion left over from earlier \
              resonances"

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
-use washer_model::{Channel, Ending, LeftRange, Participant};
+use washer_model::{Attractor, Channel, LeftRangeError, ParticipatingMode};
 
 use super::{Explanation, Passage, SpeedScan, SweptResult, Tongue};
 
@@ -20,7 +20,7 @@ pub(crate) fn to_json(found: &Explanation) -> Value {
                 "ratio_max_channel": greatest.map(|(_, channel)| channel.name()),
             })
         }
-        Err(LeftRange { time_s }) => json!({ "left_range_at_s": time_s }),
+        Err(LeftRangeError { time_s }) => json!({ "left_range_at_s": time_s }),
     });
     let scan = |is_backward: bool| {
         found.scans.iter().find(|scan| scan.is_backward == is_backward).map(scan_json)
@@ -96,11 +96,11 @@ fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Va
         "growth_at_rpm": at.speed_rpm,
         "frequency_cpm": at.frequency_cpm(),
         "other_frequency_cpm": at.speed_rpm - at.frequency_cpm(),
-        "modes": at.participants.iter().map(participant).collect::<Value>(),
+        "modes": at.participating_modes.iter().map(participant).collect::<Value>(),
         "resonance": tongue.resonance,
         "crossed": passages.iter().map(passage).collect::<Value>(),
         "ends_in": tongue.ends_in.as_ref().map(|motion| json!({
-            "kind": Ending::KIND_NAMES[motion.kind()],
+            "kind": Attractor::KIND_NAMES[motion.kind()],
             "amplitudes": by_channel(swept, &swept.plan_channels(&motion.peaks)),
             "followed_s": motion.time_s,
         })),
@@ -108,7 +108,7 @@ fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Va
     })
 }
 
-fn participant(mode: &Participant) -> Value {
+fn participant(mode: &ParticipatingMode) -> Value {
     json!({
         "mode": mode.mode,
         "name": mode.motion.to_string(),

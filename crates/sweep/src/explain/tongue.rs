@@ -6,8 +6,8 @@ use rayon::iter::ParallelIterator as _;
 use rayon::slice::ParallelSlice as _;
 use serde::Serialize;
 use washer_model::{
-    Beyond, Dwell, Ending, Kind, Point, Response, Responses, Starts, find_endings_from_responses,
-    modes,
+    Attractor, GeometryLimit, HeldSpeed, Point, Response, ResponseCurves, StabilityKind, StartRule,
+    find_attractors_from_responses, modes,
 };
 
 use super::prepare_scenario;
@@ -91,14 +91,14 @@ pub(crate) struct ResponseFinder<'a> {
     /// A function that is called with the number of speeds that are done.
     pub(crate) count_speeds: &'a (dyn Fn(usize) + Sync),
     /// The curve of responses over speed, once it is followed.
-    pub(crate) curves: Vec<Responses<'a>>,
+    pub(crate) curves: Vec<ResponseCurves<'a>>,
 }
 
 impl ResponseFinder<'_> {
     /// Follows the curve of responses up to a speed (rpm).
     pub(crate) fn follow(&mut self, fastest_rpm: f64) {
         let cancel = Cancel::Flag(self.interrupt.flag());
-        self.curves = Responses::follow(&[(self.point, fastest_rpm)], None, cancel);
+        self.curves = ResponseCurves::continue_curves(&[(self.point, fastest_rpm)], None, cancel);
     }
 
     /// Returns the response of a machine that runs up at each speed, if there is one. It uses all
@@ -111,7 +111,7 @@ impl ResponseFinder<'_> {
             if cancel.is_requested() {
                 return vec![None; speeds.len()];
             }
-            let found = Responses::at(&mut self.curves.clone(), &requests, cancel);
+            let found = ResponseCurves::find_at_speeds(&mut self.curves.clone(), &requests, cancel);
             (self.count_speeds)(found.len());
             let first = |answer: Result<Vec<_>, _>| answer.ok()?.into_iter().next();
             found.into_iter().map(first).collect::<Vec<_>>()
@@ -152,7 +152,7 @@ pub(crate) struct Tongue {
     /// The damping that closes the tongue, once it is searched for.
     pub(crate) closing: Option<Closing>,
     /// The motion of a drum held at the speed of the greatest growth, once it is computed.
-    pub(crate) ends_in: Option<Ending>,
+    pub(crate) ends_in: Option<Attractor>,
 }
 
 /// Two frequencies of modes, or one twice, whose sum or difference is a multiple of the speed.
@@ -208,7 +208,7 @@ pub(crate) struct SpeedScan {
     /// Speeds (rpm) at which the response is not on the curve of a machine that runs up.
     pub(crate) off_curve_rpm: Vec<f64>,
     /// Speeds (rpm) at which the response exceeds the machine's geometry, and the limit exceeded.
-    pub(crate) beyond: Vec<(f64, Beyond)>,
+    pub(crate) beyond: Vec<(f64, GeometryLimit)>,
 }
 
 /// Finds the tongues within a range of speeds.
@@ -219,7 +219,7 @@ pub(crate) fn find_tongues(
     let responses = finder.find_responses(&speeds.values());
     let found = || responses.iter().flatten();
     let on_curve = found().filter(|response| response.is_on_curve);
-    let fold_speeds = on_curve.filter_map(|response| response.between_rpm[1]);
+    let fold_speeds = on_curve.filter_map(|response| response.fold_speeds_rpm[1]);
     let mut jumps_rpm: Vec<f64> = fold_speeds.filter(|&rpm| rpm <= speeds.to).collect();
     jumps_rpm.dedup();
     let kind = |response: &Option<Response>| response.as_ref().map(Response::kind);
@@ -228,14 +228,14 @@ pub(crate) fn find_tongues(
     for same_kind in responses.chunk_by(|a, b| kind(a) == kind(b)) {
         let before = next.checked_sub(1).map(|last| &responses[last]);
         next += same_kind.len();
-        let unstable_kind = kind(&same_kind[0]).filter(|kind| *kind != Kind::Stable);
+        let unstable_kind = kind(&same_kind[0]).filter(|kind| *kind != StabilityKind::Stable);
         let Some(unstable_kind) = unstable_kind else { continue };
         let run: Vec<&Response> = same_kind.iter().flatten().collect();
         let edge = |inside: &Response, beyond: Option<&Option<Response>>| match beyond {
             None => (inside.speed_rpm, TongueEnd::Range),
             Some(None) => (inside.speed_rpm, TongueEnd::NoResponse),
             Some(Some(other)) => {
-                let is_stable = other.kind() == Kind::Stable;
+                let is_stable = other.kind() == StabilityKind::Stable;
                 let inside = speed_and_growth(inside);
                 let rpm = edge_rpm(finder, unstable_kind, inside, speed_and_growth(other));
                 (rpm, if is_stable { TongueEnd::Edge } else { TongueEnd::OtherKind })
@@ -246,7 +246,7 @@ pub(crate) fn find_tongues(
         tongues.push(tongue(finder, unstable_kind, &run, [from, to]));
     }
     let without_response = responses.iter().filter(|response| response.is_none()).count();
-    let beyond = found().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect();
+    let beyond = found().filter_map(|it| Some((it.speed_rpm, it.exceeded_limit?))).collect();
     let off_curve = found().filter(|response| !response.is_on_curve);
     let off_curve_rpm = off_curve.map(|response| response.speed_rpm).collect();
     let is_backward = finder.is_backward;
@@ -255,20 +255,24 @@ pub(crate) fn find_tongues(
 
 /// Finds the motion in which a drum ends that is held at the speed of each tongue's greatest
 /// growth, starting from the slightly disturbed response.
-pub(crate) fn find_endings(finder: &ResponseFinder<'_>, tongues: &[Tongue]) -> Vec<Option<Ending>> {
-    let dwell = |tongue: &Tongue| Dwell { point: finder.point, speed_rpm: tongue.at.speed_rpm };
-    let dwells: Vec<Dwell<'_>> = tongues.iter().map(dwell).collect();
+pub(crate) fn find_endings(
+    finder: &ResponseFinder<'_>,
+    tongues: &[Tongue],
+) -> Vec<Option<Attractor>> {
+    let dwell = |tongue: &Tongue| HeldSpeed { point: finder.point, speed_rpm: tongue.at.speed_rpm };
+    let dwells: Vec<HeldSpeed<'_>> = tongues.iter().map(dwell).collect();
     let responses = tongues.iter().map(|tongue| Ok(vec![tongue.at.clone()])).collect();
-    let starts = Starts { count: 1, ..Starts::default() };
+    let starts = StartRule { count: 1, ..StartRule::default() };
     let cancel = Cancel::Flag(finder.interrupt.flag());
-    let found = find_endings_from_responses(finder.simd, &dwells, responses, &[], &starts, cancel);
-    found.into_iter().map(|found| found.ok()?.motions.into_iter().next()).collect()
+    let found =
+        find_attractors_from_responses(finder.simd, &dwells, responses, &[], &starts, cancel);
+    found.into_iter().map(|found| found.ok()?.attractors.into_iter().next()).collect()
 }
 
 /// Returns the tongue of a run of speeds with responses of one kind, between two ends.
 fn tongue(
     finder: &ResponseFinder<'_>,
-    kind: Kind,
+    kind: StabilityKind,
     run: &[&Response],
     [from, to]: [(f64, TongueEnd); 2],
 ) -> Tongue {
@@ -327,7 +331,7 @@ fn trials_about_root(open: [f64; 2], closed: [f64; 2], tolerance: f64) -> Vec<f6
 /// without it. Each of the two is a speed with its growth.
 fn edge_rpm(
     finder: &ResponseFinder<'_>,
-    kind: Kind,
+    kind: StabilityKind,
     mut inside: [f64; 2],
     mut outside: [f64; 2],
 ) -> f64 {
@@ -353,7 +357,7 @@ fn edge_rpm(
 /// its speeds.
 fn greatest_growth(
     finder: &ResponseFinder<'_>,
-    kind: Kind,
+    kind: StabilityKind,
     run: &[&Response],
     growths: &[[f64; 2]],
 ) -> Response {
@@ -386,19 +390,19 @@ fn nearest_resonance(point: &Point, at: &Response) -> Option<ModeResonance> {
         Some(found.modes.iter().map(washer_model::Mode::frequency_rpm).collect())
     };
     let frequencies = frequencies(at.speed_rpm)?;
-    let named: Vec<usize> = at.participants.iter().map(|mode| mode.mode - 1).collect();
+    let named: Vec<usize> = at.participating_modes.iter().map(|mode| mode.mode - 1).collect();
     let pairs: Vec<(usize, usize)> = match (at.kind(), named.as_slice()) {
         (_, []) => return None,
-        (Kind::QuasiPeriodic, &[one]) => {
+        (StabilityKind::QuasiPeriodic, &[one]) => {
             (0..SUSPENSION_MODES).filter(|other| *other != one).map(|other| (one, other)).collect()
         }
-        (Kind::QuasiPeriodic, &[one, other, ..]) => vec![(one, other)],
+        (StabilityKind::QuasiPeriodic, &[one, other, ..]) => vec![(one, other)],
         (_, named) => named.iter().map(|&one| (one, one)).collect(),
     };
     let admits = |order: &u32| match at.kind() {
-        Kind::PeriodDoubling => order % 2 == 1,
-        Kind::Fold => order.is_multiple_of(2),
-        Kind::QuasiPeriodic | Kind::Stable => true,
+        StabilityKind::PeriodDoubling => order % 2 == 1,
+        StabilityKind::Fold => order.is_multiple_of(2),
+        StabilityKind::QuasiPeriodic | StabilityKind::Stable => true,
     };
     let meeting = |(one, other): (usize, usize), sign: f64, order: u32| {
         // Sums name the lower mode first, differences the higher frequency.
@@ -492,7 +496,7 @@ impl Tongue {
             points.iter().flatten().map(|point| (point, range_rpm[1])).collect();
         // The curves begin below the tongue, at the response of the machine with its own damping.
         let below = finder.find_responses(&[range_rpm[0]]).pop().flatten();
-        let mut curves = Responses::follow(&machines, below.as_ref(), cancel);
+        let mut curves = ResponseCurves::continue_curves(&machines, below.as_ref(), cancel);
         let mut growths = vec![f64::NEG_INFINITY; machines.len()];
         let mut around = vec![range_rpm; machines.len()];
         let mut count = DAMPING_TRIAL_SPEEDS;
@@ -507,7 +511,7 @@ impl Tongue {
                     speeds.map(move |rpm| (k, rpm))
                 })
                 .collect();
-            let found = Responses::at(&mut curves, &requests, cancel);
+            let found = ResponseCurves::find_at_speeds(&mut curves, &requests, cancel);
             (finder.count_speeds)(found.len());
             // The speed of a greater growth than before; 0 if this round has none.
             let mut greatest_rpm = vec![0.0; machines.len()];

@@ -450,8 +450,9 @@ fn single_numbers(
     if !is_fixed_kind(&found) {
         return Err(format!("`{name}` is no number of the machine"));
     }
-    let parts = found.parts(machine);
-    let is_free = |free: &Free| free.parameter.parts(machine).iter().any(|it| parts.contains(it));
+    let parts = found.single_names(machine);
+    let is_free =
+        |free: &Free| free.parameter.single_names(machine).iter().any(|it| parts.contains(it));
     if free.iter().any(is_free) {
         return Err(format!("`{name}` is free: only fixed numbers have a tolerance"));
     }
@@ -485,17 +486,17 @@ fn fixed_numbers(
 ) -> Vec<(Parameter, f64)> {
     let machine = &case.plan.model.machine;
     let spin = case.spin();
-    let parts = |parameter: &Parameter| parameter.parts(machine);
+    let parts = |parameter: &Parameter| parameter.single_names(machine);
     let mut taken: Vec<_> = free.iter().flat_map(|free| parts(&free.parameter)).collect();
     let mut found = Vec::new();
     // The last that is given of a number holds.
     let given = given.iter().rev().map(|(parameter, tolerance)| (parameter.clone(), *tolerance));
     let all = || Parameter::all(machine, spin).into_iter().filter(is_fixed_kind);
-    let shared = all().filter(|parameter| parameter.target().is_several());
-    let single = all().filter(|parameter| !parameter.target().is_several());
+    let shared = all().filter(|parameter| parameter.target().has_several_numbers());
+    let single = all().filter(|parameter| !parameter.target().has_several_numbers());
     // A number that a machine file may leave out and does belongs to a part that is not there.
     let is_there = |parameter: &Parameter| {
-        parameter.left_out().is_none_or(|value| parameter.get(machine, spin) != Some(value))
+        parameter.default_value().is_none_or(|value| parameter.get(machine, spin) != Some(value))
     };
     let by_kind = |parameter: Parameter| {
         let tolerance = FixedTolerance::by_kind(parameter.name(), parameter.unit());

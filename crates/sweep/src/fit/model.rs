@@ -191,7 +191,7 @@ impl Problem<'_> {
             let files = self.cases.iter().enumerate().filter(|(case, _)| free.is_of(*case));
             let files: Vec<&str> = files.map(|(_, case)| &*case.measured.name).collect();
             let from = format!("fit to {}", files.join(", "));
-            let parts = free.parameter.parts(&plan.model.machine).into_iter();
+            let parts = free.parameter.single_names(&plan.model.machine).into_iter();
             written.0.extend(parts.map(|part| (part.into_owned(), from.clone())));
         }
         written

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use serde::Serialize;
-use washer_model::{Dwell, Parameter, Response};
+use washer_model::{HeldSpeed, Parameter, Response};
 use washer_row::{Growth, Outcome, Status, Verdict as RowVerdict};
 
 use super::algebra::{dot, middle_95};
@@ -182,8 +182,8 @@ impl OnMap<'_> {
             return None;
         }
         let point = prepare_point(machine, spin, &timing(plan)).ok()?;
-        let dwells: Vec<Dwell<'_>> =
-            speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+        let dwells: Vec<HeldSpeed<'_>> =
+            speeds.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
         Some(find_responses(&dwells, self.problem.cancel))
     }
 

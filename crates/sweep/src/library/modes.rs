@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 use washer_model::{
-    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Profile, Spin, Timing,
-    campbell_until, exact_motions,
+    COORDINATES, FloquetMode, Machine, ModeAtSpeed, ModeOverSpeed, Point, Profile, Spin, Timing,
+    campbell_until, floquet_modes,
 };
 
 use super::check_speeds;
@@ -82,7 +82,7 @@ pub(crate) struct ModeAnalysis {
     pub(crate) modes: Vec<ModeOverSpeed>,
     /// The exact motion of each mode at each speed, if it was requested. There is none at
     /// standstill, where theta is frozen, nor for a mode that was not found at theta = 0.
-    pub(crate) exact: Option<Vec<Vec<Option<Exact>>>>,
+    pub(crate) exact: Option<Vec<Vec<Option<FloquetMode>>>>,
     /// The speed amplitudes (m/s) at which friction is linearised, by damper.
     pub(crate) friction_speeds: Map<String, Value>,
 }
@@ -163,15 +163,16 @@ impl ModeAnalysis {
         let description = "greatest damped natural frequency over a turn";
         add("frequency_max_rpm", "rpm", description, |at| at.greatest_rpm);
         if let Some(exact) = &self.exact {
-            let mut add = |name: &str, unit: &str, description: &str, value: fn(&Exact) -> f64| {
-                let values = rows().map(|(k, mode)| exact[k][mode].as_ref().map(value));
-                table.numbers(name, unit, description, values);
-            };
+            let mut add =
+                |name: &str, unit: &str, description: &str, value: fn(&FloquetMode) -> f64| {
+                    let values = rows().map(|(k, mode)| exact[k][mode].as_ref().map(value));
+                    table.numbers(name, unit, description, values);
+                };
             let description = "frequency by the linear model's Floquet exponent over whole turns, \
                                nearest to frequency_rpm; null at standstill";
-            add("exact_frequency_rpm", "rpm", description, Exact::frequency_rpm);
+            add("exact_frequency_rpm", "rpm", description, FloquetMode::frequency_rpm);
             let description = "share of critical damping by it";
-            add("exact_damping_ratio", "1", description, Exact::damping_ratio);
+            add("exact_damping_ratio", "1", description, FloquetMode::damping_ratio);
         }
         let mut plan = json!({ "name": name, "machine": config::machine_json(machine) });
         if !set.is_empty() {
@@ -189,14 +190,17 @@ fn exact_at_speeds(
     point: &Point,
     speeds_rpm: &[f64],
     modes: &[ModeOverSpeed],
-) -> Result<Vec<Vec<Option<Exact>>>, Error> {
-    let at = |(k, &speed): (usize, &f64)| -> Result<Vec<Option<Exact>>, Error> {
+) -> Result<Vec<Vec<Option<FloquetMode>>>, Error> {
+    let at = |(k, &speed): (usize, &f64)| -> Result<Vec<Option<FloquetMode>>, Error> {
         if speed == 0.0 {
             return Ok(vec![None; modes.len()]);
         }
-        let motions = exact_motions(point, speed).map_err(Error::model)?;
+        let motions = floquet_modes(point, speed).map_err(Error::model)?;
         let exact = |mode: &ModeOverSpeed| {
-            motions.iter().find(|motion| motion.frozen.shape == mode.at_speed[k].shape).copied()
+            motions
+                .iter()
+                .find(|motion| motion.frozen_mode.shape == mode.at_speed[k].shape)
+                .copied()
         };
         Ok(modes.iter().map(exact).collect())
     };

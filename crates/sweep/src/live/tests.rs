@@ -91,8 +91,8 @@ fn motions_of_held_speeds_are_the_rows() {
     let (speeds_rpm, metrics) = take_held_metrics(&mut plan);
     assert_eq!(metrics, [Metric::Dwell]);
     let (setup, _) = setup(&plan, &[]).unwrap();
-    assert!(outcome.dwelt.is_some());
-    assert_eq!(washer_live::dwell(&setup, &values, &speeds_rpm).unwrap(), outcome.dwelt);
+    assert!(outcome.dwell_peaks.is_some());
+    assert_eq!(washer_live::dwell(&setup, &values, &speeds_rpm).unwrap(), outcome.dwell_peaks);
 }
 
 #[test]

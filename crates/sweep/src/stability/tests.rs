@@ -3,7 +3,8 @@
 
 use lane_ode::{Cancel, Simd};
 use washer_model::{
-    Channel, Dwell, Point, Response, Settled, Starts, State, find_endings, respond,
+    AttractorStatus, Channel, HeldSpeed, MotionKind, Point, Response, StartRule, find_attractors,
+    find_responses,
 };
 
 use crate::plan::{prepare_point, timing};
@@ -16,16 +17,19 @@ fn point(name: &str) -> Point {
     prepare_point(model.machine, model.spin, &timing(&plan)).unwrap()
 }
 
-fn find_responses(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
-    let dwells: Vec<Dwell<'_>> =
-        speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-    respond(&dwells, Cancel::Never).into_iter().map(|found| found.unwrap_or_default()).collect()
+fn responses_at(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
+    let held_speeds: Vec<HeldSpeed<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point, speed_rpm }).collect();
+    find_responses(&held_speeds, Cancel::Never)
+        .into_iter()
+        .map(|found| found.unwrap_or_default())
+        .collect()
 }
 
 #[test]
 fn a_textbook_machine_has_a_response_at_every_speed() {
     let speeds_rpm = [452.0, 500.0, 532.0, 660.0, 700.0];
-    for (found, rpm) in find_responses(&point("textbook"), &speeds_rpm).iter().zip(speeds_rpm) {
+    for (found, rpm) in responses_at(&point("textbook"), &speeds_rpm).iter().zip(speeds_rpm) {
         assert!(!found.is_empty(), "{rpm} rpm");
     }
 }
@@ -34,7 +38,7 @@ fn a_textbook_machine_has_a_response_at_every_speed() {
 #[test]
 fn branches_of_a_folded_curve_are_all_found() {
     let speeds_rpm: Vec<f64> = (0..25).map(|k| 144.2 + 0.05 * f64::from(k)).collect();
-    for (found, rpm) in find_responses(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm) {
+    for (found, rpm) in responses_at(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm) {
         let branches: Vec<u32> = found.iter().map(|response| response.branch).collect();
         assert_eq!(branches, [2, 3, 4], "{rpm} rpm");
     }
@@ -44,8 +48,8 @@ fn branches_of_a_folded_curve_are_all_found() {
 /// 7.767 mm with capped modes.
 #[test]
 fn a_response_with_friction_is_found_without_caps() {
-    let found = find_responses(&point("72001_10"), &[264.61]);
-    let drum_m = found[0][0].nonlinear[Channel::DrumFrontZ.index()];
+    let found = responses_at(&point("72001_10"), &[264.61]);
+    let drum_m = found[0][0].nonlinear_peaks[Channel::DrumFrontZ.index()];
     assert!((drum_m / 7.786e-3 - 1.0).abs() < 3e-4, "{drum_m}");
 }
 
@@ -54,11 +58,12 @@ fn a_response_with_friction_is_found_without_caps() {
 #[test]
 fn a_saddle_is_no_attractor() {
     let point = point("74002_13");
-    let dwells = [Dwell { point: &point, speed_rpm: 414.0 }];
-    let starts = Starts { count: 1, ..Starts::default() };
-    let found = find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
-    let motion = &found.motions[0];
-    assert_eq!(motion.settled, Some(Settled::Periodic { turns: 4 }));
+    let dwells = [HeldSpeed { point: &point, speed_rpm: 414.0 }];
+    let starts = StartRule { count: 1, ..StartRule::default() };
+    let found =
+        find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
+    let motion = &found.attractors[0];
+    assert_eq!(motion.motion_kind, Some(MotionKind::Periodic { turns: 4 }));
     let yaw_rad = motion.peaks[Channel::TubYaw.index()];
     assert!((yaw_rad / 50.05e-3 - 1.0).abs() < 5e-3, "{yaw_rad}");
     assert!(motion.exponent.is_some_and(|exponent| exponent.per_s < 0.0));
@@ -68,12 +73,13 @@ fn a_saddle_is_no_attractor() {
 #[ignore = "half a minute"]
 fn chaos_survives_or_is_a_transient() {
     let point = point("74001_8");
-    let dwells = [Dwell { point: &point, speed_rpm: 306.0 }];
-    let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), Cancel::Never);
+    let dwells = [HeldSpeed { point: &point, speed_rpm: 306.0 }];
+    let found = find_attractors(Simd::best(), &dwells, &[], &StartRule::default(), Cancel::Never);
     let found = found.into_iter().next().unwrap().unwrap();
-    assert!(found.motions.iter().all(|motion| motion.settled != Some(Settled::Chaotic)));
-    let is_transient = |state| matches!(state, State::Transient { life_s } if life_s > 0.0);
-    assert!(found.motions.iter().any(|motion| is_transient(motion.state)));
+    assert!(found.attractors.iter().all(|motion| motion.motion_kind != Some(MotionKind::Chaotic)));
+    let is_transient =
+        |state| matches!(state, AttractorStatus::Transient { life_s } if life_s > 0.0);
+    assert!(found.attractors.iter().any(|motion| is_transient(motion.status)));
 }
 
 /// A motion repeats every fourth turn, with amplitudes of 0.1166 and 0.1471 rad. Kicks from the
@@ -82,16 +88,16 @@ fn chaos_survives_or_is_a_transient() {
 #[ignore = "half a minute"]
 fn an_attractor_far_from_the_response_is_found_from_rest() {
     let point = point("74001_11");
-    let dwells = [Dwell { point: &point, speed_rpm: 404.1 }];
-    let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), Cancel::Never);
+    let dwells = [HeldSpeed { point: &point, speed_rpm: 404.1 }];
+    let found = find_attractors(Simd::best(), &dwells, &[], &StartRule::default(), Cancel::Never);
     let found = found.into_iter().next().unwrap().unwrap();
-    let is_expected = |motion: &&washer_model::Ending| {
-        motion.settled == Some(Settled::Periodic { turns: 4 })
+    let is_expected = |motion: &&washer_model::Attractor| {
+        motion.motion_kind == Some(MotionKind::Periodic { turns: 4 })
             && (motion.peaks[Channel::TubYaw.index()] / 0.1166 - 1.0).abs() < 0.02
             && (motion.peaks[Channel::TubPitch.index()] / 0.1471 - 1.0).abs() < 0.02
     };
-    let motion = found.motions.iter().find(is_expected);
-    let motion = motion.unwrap_or_else(|| panic!("{:?}", found.motions));
+    let motion = found.attractors.iter().find(is_expected);
+    let motion = motion.unwrap_or_else(|| panic!("{:?}", found.attractors));
     assert!(motion.exponent.is_some_and(|exponent| exponent.per_s < 0.0), "{motion:?}");
 }
 
@@ -101,16 +107,16 @@ fn an_attractor_far_from_the_response_is_found_from_rest() {
 fn a_textbook_machine_ends_in_its_response() {
     let point = point("textbook");
     let speeds_rpm = [500.0, 700.0];
-    let dwells: Vec<Dwell<'_>> =
-        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-    let starts = Starts { count: 3, ..Starts::default() };
-    let all = find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never);
+    let dwells: Vec<HeldSpeed<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
+    let starts = StartRule { count: 3, ..StartRule::default() };
+    let all = find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never);
     for (found, rpm) in all.into_iter().zip(speeds_rpm) {
         let found = found.unwrap();
-        let motion = &found.motions[0];
-        assert_eq!(motion.settled, Some(Settled::Periodic { turns: 1 }), "{rpm} rpm");
+        let motion = &found.attractors[0];
+        assert_eq!(motion.motion_kind, Some(MotionKind::Periodic { turns: 1 }), "{rpm} rpm");
         let yaw = Channel::TubYaw.index();
-        let yaws_rad = found.responses.iter().map(|response| response.nonlinear[yaw]);
+        let yaws_rad = found.responses.iter().map(|response| response.nonlinear_peaks[yaw]);
         let nearest = yaws_rad
             .map(|yaw_rad| (yaw_rad / motion.peaks[yaw] - 1.0).abs())
             .fold(f64::INFINITY, f64::min);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use lane_ode::Failure;
 use sweep_engine::Table;
-use washer_model::{COORDINATES, Channel, Forces, History, Instant, ModelKind};
+use washer_model::{COORDINATES, Channel, Forces, History, InstantOutputs, ModelKind};
 
 use super::{TraceExtras, TraceRun};
 
@@ -58,7 +58,7 @@ struct ModelColumns<'a> {
     histories: &'a [History<'a>],
     /// The number of instants of each history.
     counts: &'a [usize],
-    instants: Vec<Option<Instant>>,
+    instants: Vec<Option<InstantOutputs>>,
 }
 
 impl<'a> ModelColumns<'a> {
@@ -75,7 +75,7 @@ impl<'a> ModelColumns<'a> {
         &self,
         table: &mut Table,
         (name, unit, description): (&str, &str, &str),
-        quantity: impl Fn(&Instant) -> f64,
+        quantity: impl Fn(&InstantOutputs) -> f64,
     ) {
         let description = format!("{description}, {} model; null from where it failed", self.model);
         let values = self.instants.iter().map(|instant| instant.as_ref().map(&quantity));

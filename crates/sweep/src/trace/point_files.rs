@@ -7,7 +7,7 @@ use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, Paral
 use sweep_engine::store::read;
 use sweep_engine::{StoreError, threads};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
-use washer_model::Start;
+use washer_model::InitialDeviation;
 use washer_row::Level;
 
 use super::{Models, TraceExtras, TraceSettings, trace_scenario};
@@ -55,7 +55,7 @@ pub(crate) fn write_point_traces(
             let settings = TraceSettings {
                 every_s: Some(plan.end_s / TIME_STEPS),
                 models: Models::Both,
-                start: Start::default(),
+                start: InitialDeviation::default(),
                 extras: TraceExtras::default(),
                 capped: level.and_then(|level| engine.capped_run(level)),
             };

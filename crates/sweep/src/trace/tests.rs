@@ -44,7 +44,7 @@ fn a_trace_with_friction_is_as_accurate_as_its_row() {
         let settings = TraceSettings {
             every_s: Some(1e-3),
             models: Models::Nonlinear,
-            start: Start::default(),
+            start: InitialDeviation::default(),
             extras,
             capped: None,
         };
@@ -84,7 +84,7 @@ fn a_trace_by_a_rows_method_is_the_trajectory_of_the_row() {
         let settings = TraceSettings {
             every_s: Some(every_s),
             models: Models::Both,
-            start: Start::default(),
+            start: InitialDeviation::default(),
             extras: TraceExtras::default(),
             capped: Some(capped),
         };
@@ -120,8 +120,13 @@ fn points_integrated_together_have_the_bits_that_each_has_alone() {
     let plan = crate::config::load(&path, &[]).unwrap();
     for (every_s, models) in [(Some(0.03), Models::Both), (None, Models::Nonlinear)] {
         let extras = TraceExtras { rates: true, states: true, forces: true, angle: true };
-        let settings =
-            TraceSettings { every_s, models, start: Start::default(), extras, capped: None };
+        let settings = TraceSettings {
+            every_s,
+            models,
+            start: InitialDeviation::default(),
+            extras,
+            capped: None,
+        };
         let all = trace_all_points(&plan, &settings, Cancel::Never);
         assert_eq!(every_s.is_none(), all.instants < 9 * 20);
         let (all, _) = all.table.finish().unwrap();
@@ -170,7 +175,7 @@ fn the_angle_of_a_whole_turn_is_zero() {
     let settings = TraceSettings {
         every_s: None,
         models: Models::Linear,
-        start: Start::default(),
+        start: InitialDeviation::default(),
         extras,
         capped: None,
     };

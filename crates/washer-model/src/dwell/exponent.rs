@@ -4,7 +4,7 @@
 use super::starts::largest_deviation;
 use super::turns::{HeldState, integrate_turns};
 use crate::coordinates::{COORDINATES, STATES, TUB};
-use crate::stability::orbit::Row;
+use crate::stability::period_map::TurnSetup;
 use core::f64::consts::TAU;
 use lane_ode::Simd;
 
@@ -42,8 +42,8 @@ impl Exponent {
 
 /// Returns the distance of two states: the greatest over the tub's coordinates (m, rad), of which
 /// each has the difference of its speed added, over the drum's speed.
-pub(super) fn distance(row: &Row<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
-    let speed = row.speed_rpm * TAU / 60.0;
+pub(super) fn distance(setup: &TurnSetup<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
+    let speed = setup.speed_rpm * TAU / 60.0;
     let difference = |&i: &usize| {
         let j = COORDINATES + i;
         (a[i] - b[i]).abs() + (a[j] - b[j]).abs() / speed
@@ -59,12 +59,12 @@ pub(super) fn compute_exponents(
 ) -> Vec<Option<Exponent>> {
     let rescaled: Vec<f64> = requests
         .iter()
-        .map(|(held, _)| RESCALED_SEPARATION * largest_deviation(held.row.point, &held.state))
+        .map(|(held, _)| RESCALED_SEPARATION * largest_deviation(held.setup.point, &held.state))
         .collect();
     // Each run is followed by its perturbed run.
     let mut pairs = Vec::with_capacity(2 * requests.len());
     for ((held, direction), rescaled) in requests.iter().zip(&rescaled) {
-        let speed = held.row.speed_rpm * TAU / 60.0;
+        let speed = held.setup.speed_rpm * TAU / 60.0;
         let mut perturbed = *held;
         for i in 0..COORDINATES {
             perturbed.state[COORDINATES + i] += rescaled * speed * direction[i];
@@ -80,8 +80,8 @@ pub(super) fn compute_exponents(
                 parts[k][0] = f64::NAN;
                 continue;
             };
-            let row = pairs[2 * k].row;
-            let separation = distance(&row, &run.end, &perturbed.end);
+            let setup = pairs[2 * k].setup;
+            let separation = distance(&setup, &run.end, &perturbed.end);
             if let Some(counted) = turn.checked_sub(TRANSIENT_TURNS) {
                 parts[k][counted / PART_TURNS] += libm::log(separation / rescaled);
             }
@@ -92,7 +92,7 @@ pub(super) fn compute_exponents(
         }
     }
     let found = parts.iter().zip(requests).map(|(parts, (held, _))| {
-        let part_s = PART_TURNS as f64 * held.row.turn_s();
+        let part_s = PART_TURNS as f64 * held.setup.turn_s();
         let mean = parts.iter().sum::<f64>() / PARTS as f64;
         let squares: f64 = parts.iter().map(|part| (part - mean) * (part - mean)).sum();
         let error = (squares / (PARTS * (PARTS - 1)) as f64).sqrt();

@@ -2,15 +2,15 @@
 
 use super::turns::HeldState;
 use crate::coordinates::STATES;
-use crate::stability::monodromy::{Square, per_unit};
-use crate::stability::orbit::{Asked, turns};
-use crate::stability::respond::leading_multiplier;
-use crate::stability::settings::Case;
+use crate::stability::monodromy::{StateMatrix, per_unit};
+use crate::stability::period_map::{TurnRequest, compute_turns};
+use crate::stability::responses::leading_multiplier;
+use crate::stability::settings::HeldCase;
 use lane_ode::{Cancel, N};
 
 /// A periodic orbit: a state on it, and the turns after which it repeats.
-pub(super) struct Orbit<'c, 'a> {
-    pub(super) case: &'c Case<'a>,
+pub(super) struct PeriodicOrbit<'c, 'a> {
+    pub(super) held_case: &'c HeldCase<'a>,
     pub(super) held: HeldState<'a>,
     pub(super) period: u32,
 }
@@ -18,47 +18,55 @@ pub(super) struct Orbit<'c, 'a> {
 /// Returns the growth (1/s) of the fastest growing disturbance of each orbit, negative if all
 /// decay: ln |mu| over the period, with mu the largest multiplier of the suspension's motions. The
 /// monodromy matrix is the product of those of the turns. It returns `None` for eigenvalues that
-/// are not finite, and for all orbits once `is_stopped` returns true.
-pub(super) fn growths_per_s(orbits: &[Orbit<'_, '_>], cancel: Cancel<'_>) -> Vec<Option<f64>> {
-    let mut matrices: Vec<Option<Square>> = vec![None; orbits.len()];
+/// are not finite, and for all orbits once `cancel` is requested.
+pub(super) fn growths_per_s(
+    orbits: &[PeriodicOrbit<'_, '_>],
+    cancel: Cancel<'_>,
+) -> Vec<Option<f64>> {
+    let mut matrices: Vec<Option<StateMatrix>> = vec![None; orbits.len()];
     let mut states: Vec<[f64; STATES]> = orbits.iter().map(|orbit| orbit.held.state).collect();
-    let longest = orbits.iter().map(|orbit| orbit.period).max().unwrap_or(0);
-    for turn in 0..longest {
-        let open: Vec<usize> = (0..orbits.len()).filter(|&k| turn < orbits[k].period).collect();
-        let asked: Vec<Asked<'_>> = open
+    let max_period = orbits.iter().map(|orbit| orbit.period).max().unwrap_or(0);
+    for turn in 0..max_period {
+        let unfinished: Vec<usize> =
+            (0..orbits.len()).filter(|&k| turn < orbits[k].period).collect();
+        let requests: Vec<TurnRequest<'_>> = unfinished
             .iter()
-            .map(|&k| Asked { row: orbits[k].held.row, start: states[k], is_seen: true })
+            .map(|&k| TurnRequest {
+                setup: orbits[k].held.setup,
+                start: states[k],
+                is_recorded: true,
+            })
             .collect();
-        let turned = turns(&asked, cancel);
+        let results = compute_turns(&requests, cancel);
         if cancel.is_requested() {
             return vec![None; orbits.len()];
         }
-        for (k, turned) in open.into_iter().zip(turned) {
-            states[k] = turned.end;
-            if let Some(seen) = turned.seen {
+        for (k, result) in unfinished.into_iter().zip(results) {
+            states[k] = result.end;
+            if let Some(record) = result.record {
                 matrices[k] = Some(match &matrices[k] {
-                    Some(before) => product(&seen.monodromy, before),
-                    None => seen.monodromy,
+                    Some(previous) => product(&record.monodromy, previous),
+                    None => record.monodromy,
                 });
             }
         }
     }
-    let growth = |(orbit, matrix): (&Orbit<'_, '_>, Option<Square>)| {
-        let row = &orbit.held.row;
-        let matrix = per_unit(&matrix?, row.unit_per_s());
-        let (mu, _) = leading_multiplier(orbit.case, &matrix)?;
-        let period_s = f64::from(orbit.period) * row.turn_s();
-        Some(0.5 * libm::log(mu.norm_sqr()) / period_s)
+    let growth = |(orbit, matrix): (&PeriodicOrbit<'_, '_>, Option<StateMatrix>)| {
+        let setup = &orbit.held.setup;
+        let matrix = per_unit(&matrix?, setup.unit_per_s());
+        let (multiplier, _) = leading_multiplier(orbit.held_case, &matrix)?;
+        let period_s = f64::from(orbit.period) * setup.turn_s();
+        Some(0.5 * libm::log(multiplier.norm_sqr()) / period_s)
     };
     orbits.iter().zip(matrices).map(growth).collect()
 }
 
-fn product(after: &Square, before: &Square) -> Square {
+fn product(last: &StateMatrix, previous: &StateMatrix) -> StateMatrix {
     let mut product = [[N(0.0); STATES]; STATES];
     for i in 0..STATES {
         for k in 0..STATES {
             for j in 0..STATES {
-                product[i][j] += after[i][k] * before[k][j];
+                product[i][j] += last[i][k] * previous[k][j];
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::coordinates::{STATES, TUB, TUB_PITCH, TUB_YAW};
 use crate::modes::shape;
-use crate::stability::rounded;
+use crate::stability::round_last_digits;
 use crate::steps::SUSPENSION_MODES;
 use crate::{COORDINATES, Modes, Point};
 
@@ -34,13 +34,13 @@ pub(super) fn largest_deviation(point: &Point, state: &[f64; STATES]) -> f64 {
 }
 
 /// Returns a state that is perturbed in each of the suspension's modes.
-pub(super) fn perturb(point: &Point, frozen: &Modes, state: &[f64; STATES]) -> [f64; STATES] {
+pub(super) fn perturb(point: &Point, frozen_modes: &Modes, state: &[f64; STATES]) -> [f64; STATES] {
     let size = PERTURBATION * largest_deviation(point, state);
     let mut perturbed = *state;
-    for mode in &frozen.modes[..SUSPENSION_MODES] {
+    for mode in &frozen_modes.modes[..SUSPENSION_MODES] {
         let largest = TUB.iter().map(|&i| mode.shape[i][0].abs()).fold(0.0, f64::max);
         for i in 0..COORDINATES {
-            perturbed[i] += size * rounded(mode.shape[i][0] / largest);
+            perturbed[i] += size * round_last_digits(mode.shape[i][0] / largest);
         }
     }
     perturbed
@@ -52,24 +52,24 @@ pub(super) fn perturb(point: &Point, frozen: &Modes, state: &[f64; STATES]) -> [
 /// A kick along mode shapes turns the tub by 1 rad/s: in the two modes that rock most, and in both
 /// at once. A random one has the kinetic energy of the first, and is uniform over the sphere of
 /// that energy: a basin may lie where no mode shape points.
-pub(super) fn kick_directions(point: &Point, frozen: &Modes, random: usize) -> Directions {
+pub(super) fn kick_directions(point: &Point, frozen_modes: &Modes, random: usize) -> Directions {
     let mut modes: Vec<(usize, f64)> = (0..SUSPENSION_MODES)
         .map(|k| {
-            let motion = shape::motion(point, &frozen.mass, &frozen.modes[k].shape);
+            let motion = shape::motion(point, &frozen_modes.mass, &frozen_modes.modes[k].shape);
             (k, motion.yaw + motion.pitch)
         })
         .collect();
     modes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     // The amplitude of a mode of unit modal mass that turns the tub by 1.
     let amplitude = |rank: usize| -> f64 {
-        let shape = &frozen.modes[modes[rank].0].shape;
+        let shape = &frozen_modes.modes[modes[rank].0].shape;
         let yaw = shape[TUB_YAW][0];
         let pitch = shape[TUB_PITCH][0];
         1.0 / (yaw * yaw + pitch * pitch).sqrt()
     };
     let unit = |rank: usize| -> [f64; COORDINATES] {
-        let shape = &frozen.modes[modes[rank].0].shape;
-        core::array::from_fn(|i| rounded(shape[i][0] * amplitude(rank)))
+        let shape = &frozen_modes.modes[modes[rank].0].shape;
+        core::array::from_fn(|i| round_last_digits(shape[i][0] * amplitude(rank)))
     };
     let first = unit(0);
     let second = unit(1);
@@ -79,11 +79,11 @@ pub(super) fn kick_directions(point: &Point, frozen: &Modes, random: usize) -> D
         let parts: [f64; SUSPENSION_MODES] = core::array::from_fn(|_| normal(&mut numbers));
         let length = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
         let velocity = |i: usize| -> f64 {
-            let shapes = frozen.modes[..SUSPENSION_MODES].iter().map(|mode| mode.shape[i][0]);
+            let shapes = frozen_modes.modes[..SUSPENSION_MODES].iter().map(|mode| mode.shape[i][0]);
             parts.iter().zip(shapes).map(|(part, shape)| part * shape).sum()
         };
         let scale = amplitude(0) / length;
-        directions.push(core::array::from_fn(|i| rounded(scale * velocity(i))));
+        directions.push(core::array::from_fn(|i| round_last_digits(scale * velocity(i))));
     }
     directions
 }

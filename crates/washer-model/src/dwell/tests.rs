@@ -4,8 +4,7 @@ use super::*;
 use crate::coordinates::{COORDINATES, TUB_YAW};
 use crate::tests::elements::machine;
 use crate::tests::reference::reference;
-use crate::{Channel, Method, ModelKind, Spin, Start, Timing, history, prepare};
-use lane_ode::Cancel;
+use crate::{Channel, InitialDeviation, Method, ModelKind, Spin, Timing, history, prepare};
 use serde_json::{Value, json};
 
 const CHANNEL: [(Channel, &str); 4] = [
@@ -31,7 +30,7 @@ fn case_point(case: &Value) -> crate::Point {
 }
 
 /// Returns the greatest relative difference of a motion's amplitudes from those of the reference.
-fn relative_error(motion: &Ending, end: &Value) -> f64 {
+fn relative_error(motion: &Attractor, end: &Value) -> f64 {
     let error = |(channel, name): &(Channel, &str)| {
         (motion.peaks[channel.index()] / end[*name].as_f64().unwrap() - 1.0).abs()
     };
@@ -43,89 +42,103 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
     for case in reference("dwells.json").as_array().unwrap() {
         let name = case["name"].as_str().unwrap();
         let point = case_point(case);
-        let at: Vec<&Value> = case["points"]
+        let reference_points: Vec<&Value> = case["points"]
             .as_array()
             .unwrap()
             .iter()
-            .filter(|at| is_selected(name, at["speed_rpm"].as_f64().unwrap()))
+            .filter(|reference_points| {
+                is_selected(name, reference_points["speed_rpm"].as_f64().unwrap())
+            })
             .collect();
-        let dwells: Vec<Dwell<'_>> = at
+        let dwells: Vec<HeldSpeed<'_>> = reference_points
             .iter()
-            .map(|at| Dwell { point: &point, speed_rpm: at["speed_rpm"].as_f64().unwrap() })
+            .map(|reference_points| HeldSpeed {
+                point: &point,
+                speed_rpm: reference_points["speed_rpm"].as_f64().unwrap(),
+            })
             .collect();
-        let begin = std::time::Instant::now();
-        let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), Cancel::Never);
-        println!("{name}: {} speeds in {:.1} s", at.len(), begin.elapsed().as_secs_f64());
-        for (at, found) in at.iter().zip(found) {
+        let start_time = std::time::Instant::now();
+        let found =
+            find_attractors(Simd::best(), &dwells, &[], &StartRule::default(), Cancel::Never);
+        println!(
+            "{name}: {} speeds in {:.1} s",
+            reference_points.len(),
+            start_time.elapsed().as_secs_f64()
+        );
+        for (reference_points, found) in reference_points.iter().zip(found) {
             let found = found.unwrap();
-            let speed_rpm = at["speed_rpm"].as_f64().unwrap();
+            let speed_rpm = reference_points["speed_rpm"].as_f64().unwrap();
             let growth = found.responses[0].growth_per_s();
             println!("{name} {speed_rpm}: growth {growth:.4}");
-            for motion in &found.motions {
-                let ends = at["ends"].as_array().unwrap();
+            for motion in &found.attractors {
+                let ends = reference_points["ends"].as_array().unwrap();
                 let errors = ends.iter().map(|end| relative_error(motion, end));
                 let nearest = errors.fold(f64::INFINITY, f64::min);
                 let peaks = CHANNEL.map(|(channel, _)| 1e3 * motion.peaks[channel.index()]);
                 println!(
                     "  {:?} {:?} {} of {} after {:.0} s {peaks:.2?} {:?} error {nearest:.1e}",
-                    motion.state,
-                    motion.settled,
+                    motion.status,
+                    motion.motion_kind,
                     motion.starts,
                     found.starts,
                     motion.time_s,
                     motion.exponent,
                 );
             }
-            check_motions(name, speed_rpm, at, &found);
+            check_motions(name, speed_rpm, reference_points, &found);
         }
     }
 }
 
-fn check_motions(name: &str, speed_rpm: f64, at: &Value, found: &Endings) {
+fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, found: &Attractors) {
     // All starts of the reference return to the response there, and its other motion is missing.
     if name == "friction_stops" && speed_rpm > 300.0 {
-        let yaw_rad = |motion: &Ending| motion.peaks[Channel::TubYaw.index()];
-        assert!(found.motions.iter().any(|motion| yaw_rad(motion) > 0.13), "{speed_rpm}");
+        let yaw_rad = |motion: &Attractor| motion.peaks[Channel::TubYaw.index()];
+        assert!(found.attractors.iter().any(|motion| yaw_rad(motion) > 0.13), "{speed_rpm}");
     }
-    let ends = at["ends"].as_array().unwrap();
-    for end in ends {
+    let reference_ends = reference_point["ends"].as_array().unwrap();
+    for end in reference_ends {
         let period = end["period_turns"].as_u64().unwrap();
-        let what = json!([name, speed_rpm, end]);
+        let description = json!([name, speed_rpm, end]);
         // A perturbed start of the reference may still be at the periodic response.
-        let growth = at["growth_per_s"].as_f64().unwrap();
+        let growth = reference_point["growth_per_s"].as_f64().unwrap();
         if growth.abs() < 0.1 && end["start"] == "disturbed" {
             continue;
         }
         if name == "paper_140" && speed_rpm == 305.0 {
-            let chaos: Vec<&Ending> = found
-                .motions
+            let chaotic_attractors: Vec<&Attractor> = found
+                .attractors
                 .iter()
-                .filter(|motion| motion.settled == Some(Settled::Chaotic))
+                .filter(|motion| motion.motion_kind == Some(MotionKind::Chaotic))
                 .collect();
-            assert!(!chaos.is_empty(), "{what}");
+            assert!(!chaotic_attractors.is_empty(), "{description}");
             for (channel, name) in CHANNEL {
                 let expected = end[name].as_f64().unwrap();
-                assert!(chaos[0].peaks[channel.index()] > 0.5 * expected, "{what}");
+                assert!(
+                    chaotic_attractors[0].peaks[channel.index()] > 0.5 * expected,
+                    "{description}"
+                );
             }
             continue;
         }
-        let by_error =
-            |a: &&Ending, b: &&Ending| relative_error(a, end).total_cmp(&relative_error(b, end));
-        let motion = found.motions.iter().min_by(by_error).unwrap();
+        let by_error = |a: &&Attractor, b: &&Attractor| {
+            relative_error(a, end).total_cmp(&relative_error(b, end))
+        };
+        let motion = found.attractors.iter().min_by(by_error).unwrap();
         // Close to the edge of a tongue the reference has an error by its steps of 2e-4 s: RK4 of
         // this crate with these steps gives its 29.34 and 31.75 mrad, with 2.5e-5 s 29.64 and
         // 32.07.
         let tolerance = if name == "friction_heavy" && speed_rpm == 270.0 { 1.6e-2 } else { 5e-3 };
         let error = relative_error(motion, end);
-        assert!(error < tolerance, "{what}: {error}");
-        let is_same_kind = match motion.settled {
+        assert!(error < tolerance, "{description}: {error}");
+        let is_same_kind = match motion.motion_kind {
             // The reference tests periods of at most four turns.
-            Some(Settled::Periodic { turns: turns @ 5.. }) => period == 0 && turns < 17,
-            Some(Settled::Periodic { turns }) => u64::from(turns) == period,
-            Some(Settled::QuasiPeriodic { .. }) => period == 0,
+            Some(MotionKind::Periodic { turns: turns @ 5.. }) => period == 0 && turns < 17,
+            Some(MotionKind::Periodic { turns }) => u64::from(turns) == period,
+            Some(MotionKind::QuasiPeriodic { .. }) => period == 0,
             _ => false,
         };
-        assert!(is_same_kind, "{what}: {:?}", motion.settled);
+        assert!(is_same_kind, "{description}: {:?}", motion.motion_kind);
     }
 }
 
@@ -145,13 +158,14 @@ fn val_more_motions_of_held_speeds_match_an_independent_program() {
 fn slow_decay_is_not_taken_for_a_doubled_period() {
     let point =
         prepare_at(&json!({ "unbalance_mass_kg": 0.4, "damping_n_s_per_m": 140.0 }), 100.0, 1.0);
-    let dwells = [Dwell { point: &point, speed_rpm: 317.0 }];
-    let starts = Starts { longest_s: 120.0, ..Starts::default() };
-    let found = find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
+    let dwells = [HeldSpeed { point: &point, speed_rpm: 317.0 }];
+    let starts = StartRule { max_time_s: 120.0, ..StartRule::default() };
+    let found =
+        find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
     assert!((-2e-3..0.0).contains(&found.responses[0].growth_per_s()));
-    for motion in &found.motions {
-        let settled = motion.settled;
-        assert!(matches!(settled, None | Some(Settled::Periodic { turns: 1 })), "{settled:?}");
+    for motion in &found.attractors {
+        let settled = motion.motion_kind;
+        assert!(matches!(settled, None | Some(MotionKind::Periodic { turns: 1 })), "{settled:?}");
     }
 }
 
@@ -186,20 +200,21 @@ fn number_from_env(name: &str, default: u64) -> u64 {
 #[ignore = "short steps: minutes"]
 fn random_motions_continue_unchanged_in_short_steps() {
     let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 35));
-    let mut counts = [0; Ending::KIND_NAMES.len()];
+    let mut counts = [0; Attractor::KIND_NAMES.len()];
     let mut worst = [0.0_f64; 3];
     for number in 0..number_from_env("MACHINES", 12) {
         let kind = (number % 3) as usize;
         let (keys, speed_rpm) = random_machine(number, &mut numbers);
         let kick_rad_per_s = 1.0 + 5.0 * numbers.f64();
         let point = prepare_at(&keys, 100.0, 1.0);
-        let starts = Starts { count: 4, kick_rad_per_s, ..Starts::default() };
-        let dwells = [Dwell { point: &point, speed_rpm }];
+        let starts =
+            StartRule { count: 4, max_kick_rad_per_s: kick_rad_per_s, ..StartRule::default() };
+        let dwells = [HeldSpeed { point: &point, speed_rpm }];
         let found =
-            find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
-        for motion in &found.motions {
+            find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
+        for motion in &found.attractors {
             counts[motion.kind()] += 1;
-            if matches!(motion.settled, None | Some(Settled::Chaotic)) {
+            if matches!(motion.motion_kind, None | Some(MotionKind::Chaotic)) {
                 continue;
             }
             let (peaks, states) = continue_in_short_steps(&keys, speed_rpm, motion);
@@ -211,10 +226,10 @@ fn random_motions_continue_unchanged_in_short_steps() {
             let error = errors.fold(0.0, f64::max);
             println!(
                 "{number}: {speed_rpm:.1} rpm {:?} {:.0} s, error {error:.1e} {keys}",
-                motion.settled, motion.time_s
+                motion.motion_kind, motion.time_s
             );
             worst[kind] = worst[kind].max(error);
-            if let Some(Settled::Periodic { turns }) = motion.settled {
+            if let Some(MotionKind::Periodic { turns }) = motion.motion_kind {
                 let last = states.len() - 1;
                 let yaw = |back: usize| states[last - back][TUB_YAW] - states[last][TUB_YAW];
                 let yaw_rad = motion.peaks[Channel::TubYaw.index()];
@@ -222,7 +237,7 @@ fn random_motions_continue_unchanged_in_short_steps() {
             }
         }
     }
-    println!("{:?} {counts:?}, worst {worst:?}", Ending::KIND_NAMES);
+    println!("{:?} {counts:?}, worst {worst:?}", Attractor::KIND_NAMES);
     assert!(counts[0] > 0 && counts[1..4].iter().sum::<u32>() > 0);
     assert!(worst.iter().all(|worst| *worst < 1e-2), "{worst:?}");
 }
@@ -241,11 +256,11 @@ fn random_kicks_end_in_motions_that_the_search_found() {
     for number in 0..number_from_env("MACHINES", 6) {
         let (keys, speed_rpm) = random_machine(number, &mut numbers);
         let point = prepare_at(&keys, 100.0, 1.0);
-        let dwells = [Dwell { point: &point, speed_rpm }];
-        let starts = Starts::default();
+        let dwells = [HeldSpeed { point: &point, speed_rpm }];
+        let starts = StartRule::default();
         let found =
-            find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
-        let case = Settings::new(&point).case(speed_rpm).unwrap().without_caps().unwrap();
+            find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
+        let case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
         let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
         let response = found.responses.first().map_or(rest, |response| response.start);
         let held: Vec<HeldState<'_>> = (0..number_from_env("KICKS", 16))
@@ -262,10 +277,10 @@ fn random_kicks_end_in_motions_that_the_search_found() {
                         state[COORDINATES + coordinate] += size_rad_per_s * arm_m * part / length;
                     }
                 }
-                HeldState { row: case.row, state }
+                HeldState { setup: case.setup, state }
             })
             .collect();
-        let turns = (FOLLOWED_S / case.row.turn_s()) as usize;
+        let turns = (FOLLOWED_S / case.setup.turn_s()) as usize;
         for (kick, turned) in integrate_turns(Simd::best(), &held, turns).into_iter().enumerate() {
             let peaks = |turns: &[turns::TurnRecord]| -> [f64; CHANNELS] {
                 core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))
@@ -273,27 +288,28 @@ fn random_kicks_end_in_motions_that_the_search_found() {
             let place = format!("machine {number}, kick {kick}, {speed_rpm:.2} rpm {keys}");
             if turned.len() < turns {
                 settled += 1;
-                let left = |motion: &Ending| matches!(motion.state, State::LeftRange { .. });
-                if !found.motions.iter().any(left) {
+                let left =
+                    |motion: &Attractor| matches!(motion.status, AttractorStatus::LeftRange { .. });
+                if !found.attractors.iter().any(left) {
                     missed.push(format!("{place}: leaves the range"));
                 }
                 continue;
             }
-            let (before, last) = turned[turns - 2 * WINDOW..].split_at(WINDOW);
+            let (before, last) = turned[turns - 2 * WINDOW_TURNS..].split_at(WINDOW_TURNS);
             let before = peaks(before);
             let last = peaks(last);
             if !are_close(&before, &last, SETTLED_TOLERANCE) {
                 continue;
             }
             settled += 1;
-            let is_it = |motion: &Ending| {
-                let share = match motion.settled {
-                    Some(Settled::Chaotic) | None => CHAOS_TOLERANCE,
+            let is_this_motion = |motion: &Attractor| {
+                let share = match motion.motion_kind {
+                    Some(MotionKind::Chaotic) | None => CHAOS_TOLERANCE,
                     Some(_) => 2.0 * SETTLED_TOLERANCE,
                 };
                 are_close(&motion.peaks, &last, share)
             };
-            if !found.motions.iter().any(is_it) {
+            if !found.attractors.iter().any(is_this_motion) {
                 missed.push(format!("{place}: {last:.4?}"));
             }
         }
@@ -307,7 +323,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
 fn continue_in_short_steps(
     keys: &Value,
     speed_rpm: f64,
-    motion: &Ending,
+    motion: &Attractor,
 ) -> ([f64; CHANNELS], Vec<[f64; COORDINATES]>) {
     const SAMPLES: usize = 128;
     const STEP_S: f64 = 2.5e-5;
@@ -315,7 +331,7 @@ fn continue_in_short_steps(
     let turn_s = 60.0 / speed_rpm;
     let point = prepare_at(keys, speed_rpm, TURNS as f64 * turn_s);
     let rest = point.equilibrium();
-    let start = Start {
+    let start = InitialDeviation {
         deviations: core::array::from_fn(|i| motion.end[i] - rest[i]),
         speeds: core::array::from_fn(|i| motion.end[COORDINATES + i]),
     };

@@ -8,22 +8,22 @@ use super::exponent::distance;
 use super::lines::find_strongest_line;
 use super::starts::largest_deviation;
 use super::turns::{HeldState, TurnRecord};
-use super::{Ending, Settled, State};
+use super::{Attractor, AttractorStatus, MotionKind};
 use crate::channel::CHANNELS;
 use crate::coordinates::{STATES, TUB_PITCH, TUB_YAW};
 use crate::{Exponent, Reading};
 
 /// Number of turns between two tests of a trajectory. Doubling it ends trajectories up to 16 turns
 /// later.
-pub(super) const BLOCK: usize = 16;
+pub(super) const BLOCK_TURNS: usize = 16;
 
 /// Number of turns of a window, over which largest deviations are taken. Doubling it doubles the
 /// least time of motions that do not repeat.
-pub(super) const WINDOW: usize = 128;
+pub(super) const WINDOW_TURNS: usize = 128;
 
 /// Longest period that is tested, in turns. Doubling it finds longer periods, but needs more turns
 /// than [`PERIOD_TEST_TURNS`].
-const LONGEST_PERIOD: usize = 16;
+const MAX_PERIOD_TURNS: usize = 16;
 
 /// Number of turns that must repeat. Doubling it doubles the least time of a periodic motion.
 const PERIOD_TEST_TURNS: usize = 32;
@@ -62,11 +62,11 @@ const CHAOS_WINDOW_TOLERANCE: f64 = 0.4;
 
 /// Number of windows before the first Lyapunov exponent of a motion that does not settle; the next
 /// one is computed after twice the turns. Doubling it delays the detection of chaos.
-const FIRST_EXPONENT_WINDOW: usize = 4;
+const WINDOWS_BEFORE_EXPONENT: usize = 4;
 
 /// Maximum rest of the spectrum without the strongest line and its multiples, as a share, for a
 /// motion with two frequencies. Doubling it takes more motions with three frequencies for such.
-const LINE_REST: f64 = 0.1;
+const MAX_SPECTRUM_REST: f64 = 0.1;
 
 /// Tolerance of a period, as a share of the motion's size, with which a motion with a positive
 /// exponent passes from one motion to another. Basis: chaotic motions repeat less well. Doubling it
@@ -75,15 +75,15 @@ const PASSING_PERIOD_TOLERANCE: f64 = 0.05;
 
 /// Maximum rest of the spectrum, as a share, with which a motion with a positive exponent passes
 /// from one motion to another. Basis: chaotic motions have more. Doubling it finds less chaos.
-const PASSING_LINE_REST: f64 = 0.3;
+const PASSING_SPECTRUM_REST: f64 = 0.3;
 
 /// Distance from an unstable orbit, as a share of its size, below which no motion has settled.
 /// Doubling it delays motions that are close to an unstable orbit.
-const ORBIT_CLOSE: f64 = 1e-2;
+const CLOSE_ORBIT_DISTANCE: f64 = 1e-2;
 
 /// Distance from an unstable orbit, as a share of its size, below which a motion that departs from
 /// the orbit has not settled. Doubling it delays large motions about an unstable orbit.
-const ORBIT_NEAR: f64 = 0.5;
+const NEAR_ORBIT_DISTANCE: f64 = 0.5;
 
 /// Minimum ratio of the distances from an unstable orbit in two successive windows with which a
 /// motion departs from it. Doubling it misses slow departures.
@@ -97,11 +97,11 @@ const SURVIVAL_S: f64 = 240.0;
 
 /// Number of trajectories from states of a chaotic motion. Basis: that of [`SURVIVAL_S`]. Doubling
 /// it halves the rate of escape that is detected with the same probability.
-const SURVIVORS: usize = 8;
+const SURVIVOR_COUNT: usize = 8;
 
 /// The computation that a trajectory needs next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Need {
+pub(super) enum NextComputation {
     /// A block of turns.
     Turns,
     /// The multipliers of the periodic orbit, with its period in turns.
@@ -123,12 +123,12 @@ pub(super) struct HeldTrajectory<'a> {
     turn_count: usize,
     /// The number of turns after which the trajectory ends in any case.
     max_turns: usize,
-    pub(super) need: Need,
+    pub(super) next_computation: NextComputation,
     /// The number of turns before which no further exponent is computed.
     next_exponent_turn: usize,
     exponent: Option<Exponent>,
-    state: State,
-    settled: Option<Settled>,
+    state: AttractorStatus,
+    settled: Option<MotionKind>,
 }
 
 impl<'a> HeldTrajectory<'a> {
@@ -137,17 +137,17 @@ impl<'a> HeldTrajectory<'a> {
         unstable_orbits: Vec<Vec<[f64; STATES]>>,
         longest_s: f64,
     ) -> Self {
-        let windows = (longest_s / held.row.turn_s() / WINDOW as f64).ceil().max(2.0);
+        let windows = (longest_s / held.setup.turn_s() / WINDOW_TURNS as f64).ceil().max(2.0);
         Self {
             held,
             unstable_orbits,
-            turns: Vec::with_capacity(2 * WINDOW + BLOCK),
+            turns: Vec::with_capacity(2 * WINDOW_TURNS + BLOCK_TURNS),
             turn_count: 0,
-            max_turns: windows as usize * WINDOW,
-            need: Need::Turns,
+            max_turns: windows as usize * WINDOW_TURNS,
+            next_computation: NextComputation::Turns,
             next_exponent_turn: 0,
             exponent: None,
-            state: State::NotSettled,
+            state: AttractorStatus::NotSettled,
             settled: None,
         }
     }
@@ -160,13 +160,13 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Whether the motion is chaotic, unless survivors show that it is a transient.
     pub(super) fn is_chaotic(&self) -> bool {
-        self.settled == Some(Settled::Chaotic)
+        self.settled == Some(MotionKind::Chaotic)
     }
 
-    /// Returns [`SURVIVORS`] equally spaced states of the last turns.
+    /// Returns [`SURVIVOR_COUNT`] equally spaced states of the last turns.
     pub(super) fn recent_states(&self) -> Vec<[f64; STATES]> {
-        let every = (self.turns.len() / SURVIVORS).max(1);
-        self.turns.iter().rev().step_by(every).take(SURVIVORS).map(|turn| turn.end).collect()
+        let every = (self.turns.len() / SURVIVOR_COUNT).max(1);
+        self.turns.iter().rev().step_by(every).take(SURVIVOR_COUNT).map(|turn| turn.end).collect()
     }
 
     /// Returns the known unstable periodic orbits.
@@ -176,7 +176,7 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Marks the motion as a transient with a mean life (s).
     pub(super) fn mark_transient(&mut self, life_s: f64) {
-        self.state = State::Transient { life_s };
+        self.state = AttractorStatus::Transient { life_s };
         self.settled = None;
     }
 
@@ -187,22 +187,22 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Whether the trajectory has settled or left the model's range.
     pub(super) fn has_ended(&self) -> bool {
-        self.settled.is_some() || matches!(self.state, State::LeftRange { .. })
+        self.settled.is_some() || matches!(self.state, AttractorStatus::LeftRange { .. })
     }
 
-    /// Adds the next [`BLOCK`] turns and chooses the next computation. Fewer turns mean that the
-    /// trajectory has left the model's range.
+    /// Adds the next [`BLOCK_TURNS`] turns and chooses the next computation. Fewer turns mean that
+    /// the trajectory has left the model's range.
     pub(super) fn add_turns(&mut self, turns: Vec<TurnRecord>) {
         self.turn_count += turns.len();
-        if turns.len() < BLOCK {
+        if turns.len() < BLOCK_TURNS {
             let time_s = (self.turn_count + 1) as f64 * self.turn_s();
-            self.state = State::LeftRange { time_s };
-            self.need = Need::Nothing;
+            self.state = AttractorStatus::LeftRange { time_s };
+            self.next_computation = NextComputation::Nothing;
             self.turns.extend(turns);
             return;
         }
         self.turns.extend(turns);
-        let surplus = self.turns.len().saturating_sub(2 * WINDOW);
+        let surplus = self.turns.len().saturating_sub(2 * WINDOW_TURNS);
         self.turns.drain(..surplus);
         if let Some(last) = self.turns.last() {
             self.held.state = last.end;
@@ -211,50 +211,50 @@ impl<'a> HeldTrajectory<'a> {
         if !self.is_near_unstable_orbit() {
             self.test_motion();
         }
-        if self.need == Need::Turns && self.turn_count >= self.max_turns {
-            self.need = Need::Nothing;
+        if self.next_computation == NextComputation::Turns && self.turn_count >= self.max_turns {
+            self.next_computation = NextComputation::Nothing;
         }
     }
 
     /// Tests whether the motion repeats or has two frequencies, or may be chaotic.
     fn test_motion(&mut self) {
-        if let Some(period) = self.clear_period(PERIOD_TOLERANCE)
+        if let Some(period) = self.unambiguous_period(PERIOD_TOLERANCE)
             && self.has_steady_peaks(PERIOD_TEST_TURNS, PERIOD_TOLERANCE)
             && self.remaining_change(period) < REMAINING_TOLERANCE
         {
-            self.need = Need::Multipliers(period);
+            self.next_computation = NextComputation::Multipliers(period);
             return;
         }
-        if !self.turn_count.is_multiple_of(WINDOW) || self.turns.len() < 2 * WINDOW {
+        if !self.turn_count.is_multiple_of(WINDOW_TURNS) || self.turns.len() < 2 * WINDOW_TURNS {
             return;
         }
         let may_compute_exponent = self.turn_count >= self.next_exponent_turn;
-        if self.has_steady_peaks(WINDOW, STEADY_TOLERANCE) {
-            if let Some(period) = self.clear_period(WIDE_PERIOD_TOLERANCE) {
+        if self.has_steady_peaks(WINDOW_TURNS, STEADY_TOLERANCE) {
+            if let Some(period) = self.unambiguous_period(WIDE_PERIOD_TOLERANCE) {
                 if self.remaining_change(period) < REMAINING_TOLERANCE {
-                    self.need = Need::Multipliers(period);
+                    self.next_computation = NextComputation::Multipliers(period);
                 }
-            } else if let Some(quasi_periodic) = self.find_two_frequencies(LINE_REST) {
+            } else if let Some(quasi_periodic) = self.find_two_frequencies(MAX_SPECTRUM_REST) {
                 self.settle(quasi_periodic);
             } else if may_compute_exponent {
-                self.need = Need::Exponent;
+                self.next_computation = NextComputation::Exponent;
             }
         } else if may_compute_exponent
-            && self.turn_count >= FIRST_EXPONENT_WINDOW * WINDOW
-            && self.has_steady_peaks(WINDOW, CHAOS_WINDOW_TOLERANCE)
+            && self.turn_count >= WINDOWS_BEFORE_EXPONENT * WINDOW_TURNS
+            && self.has_steady_peaks(WINDOW_TURNS, CHAOS_WINDOW_TOLERANCE)
         {
-            self.need = Need::Exponent;
+            self.next_computation = NextComputation::Exponent;
         }
     }
 
     /// Adds the growth (1/s) of the fastest growing disturbance of the periodic orbit. An orbit
     /// whose disturbances grow is a saddle, which the trajectory passes.
     pub(super) fn add_growth(&mut self, period: u32, growth_per_s: Option<f64>) {
-        self.need = Need::Turns;
+        self.next_computation = NextComputation::Turns;
         match growth_per_s {
             Some(per_s) if per_s <= 0.0 => {
                 self.exponent = Some(Exponent { per_s, error_per_s: 0.0 });
-                return self.settle(Settled::Periodic { turns: period });
+                return self.settle(MotionKind::Periodic { turns: period });
             }
             Some(_) => {
                 let orbit = self.turns.iter().rev().take(period as usize).map(|turn| turn.end);
@@ -263,61 +263,61 @@ impl<'a> HeldTrajectory<'a> {
             None => {}
         }
         if self.turn_count >= self.max_turns {
-            self.need = Need::Nothing;
+            self.next_computation = NextComputation::Nothing;
         }
     }
 
     /// Adds the largest Lyapunov exponent. A motion with a positive one is chaotic unless it passes
     /// from one motion to another, near which it almost repeats or has few lines.
     pub(super) fn add_exponent(&mut self, exponent: Option<Exponent>) {
-        self.need = Need::Turns;
+        self.next_computation = NextComputation::Turns;
         self.exponent = exponent;
         self.next_exponent_turn = 2 * self.turn_count;
         let is_passing = self.period(PASSING_PERIOD_TOLERANCE).is_some()
-            || self.find_two_frequencies(PASSING_LINE_REST).is_some();
+            || self.find_two_frequencies(PASSING_SPECTRUM_REST).is_some();
         let is_positive = exponent.is_some_and(|exponent| exponent.is_positive());
         if is_positive && !is_passing {
-            self.settle(Settled::Chaotic);
+            self.settle(MotionKind::Chaotic);
         } else if !is_positive
-            && self.has_steady_peaks(WINDOW, STEADY_TOLERANCE)
+            && self.has_steady_peaks(WINDOW_TURNS, STEADY_TOLERANCE)
             && let Some(quasi_periodic) = self.find_two_frequencies(f64::INFINITY)
         {
             self.settle(quasi_periodic);
         } else if self.turn_count >= self.max_turns {
-            self.need = Need::Nothing;
+            self.next_computation = NextComputation::Nothing;
         }
     }
 
-    fn settle(&mut self, settled: Settled) {
-        self.state = State::Ok;
+    fn settle(&mut self, settled: MotionKind) {
+        self.state = AttractorStatus::Ok;
         self.settled = Some(settled);
-        self.need = Need::Nothing;
+        self.next_computation = NextComputation::Nothing;
     }
 
     fn turn_s(&self) -> f64 {
-        self.held.row.turn_s()
+        self.held.setup.turn_s()
     }
 
     /// Returns a state with its coordinates from equilibrium.
     fn deviation(&self, state: &[f64; STATES]) -> [f64; STATES] {
-        let equilibrium = self.held.row.point.equilibrium();
+        let equilibrium = self.held.setup.point.equilibrium();
         core::array::from_fn(|i| state[i] - equilibrium.get(i).copied().unwrap_or(0.0))
     }
 
     /// Returns the motion in which the trajectory ended.
-    pub(super) fn ending(&self) -> Ending {
+    pub(super) fn attractor(&self) -> Attractor {
         let turn_count = match self.settled {
-            Some(Settled::Periodic { .. }) => PERIOD_TEST_TURNS,
-            Some(Settled::QuasiPeriodic { .. }) => WINDOW,
-            Some(Settled::Chaotic) | None => 2 * WINDOW,
+            Some(MotionKind::Periodic { .. }) => PERIOD_TEST_TURNS,
+            Some(MotionKind::QuasiPeriodic { .. }) => WINDOW_TURNS,
+            Some(MotionKind::Chaotic) | None => 2 * WINDOW_TURNS,
         };
         let turns = &self.turns[self.turns.len().saturating_sub(turn_count)..];
-        Ending {
-            state: self.state,
-            settled: self.settled,
+        Attractor {
+            status: self.state,
+            motion_kind: self.settled,
             starts: 1,
             peaks: peaks(turns),
-            min_gap_m: turns.iter().map(|turn| turn.gap_m).fold(f64::INFINITY, f64::min),
+            min_gap_m: turns.iter().map(|turn| turn.min_gap_m).fold(f64::INFINITY, f64::min),
             exponent: self.exponent,
             least_kick_rad_per_s: None,
             time_s: self.time_s(),
@@ -329,21 +329,22 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Whether the trajectory is close to an unstable orbit, or near one and departs from it.
     fn is_near_unstable_orbit(&self) -> bool {
-        let window = (self.turns.len() / 2).min(WINDOW);
+        let window = (self.turns.len() / 2).min(WINDOW_TURNS);
         let (before, after) = self.turns.split_at(self.turns.len() - window);
         self.unstable_orbits.iter().any(|orbit| {
-            let sizes = orbit.iter().map(|state| largest_deviation(self.held.row.point, state));
+            let sizes = orbit.iter().map(|state| largest_deviation(self.held.setup.point, state));
             let size = sizes.fold(0.0, f64::max);
             let orbit_distance = |turn: &TurnRecord| {
                 let distances =
-                    orbit.iter().map(|state| distance(&self.held.row, &turn.end, state));
+                    orbit.iter().map(|state| distance(&self.held.setup, &turn.end, state));
                 distances.fold(f64::INFINITY, f64::min) / size
             };
             let greatest =
                 |turns: &[TurnRecord]| turns.iter().map(orbit_distance).fold(0.0, f64::max);
             let last = greatest(after);
             let previous = greatest(&before[before.len() - window..]);
-            last < ORBIT_CLOSE || (last < ORBIT_NEAR && last > DEPARTURE_RATIO * previous)
+            last < CLOSE_ORBIT_DISTANCE
+                || (last < NEAR_ORBIT_DISTANCE && last > DEPARTURE_RATIO * previous)
         })
     }
 
@@ -358,20 +359,20 @@ impl<'a> HeldTrajectory<'a> {
     /// size.
     fn period(&self, tolerance: f64) -> Option<u32> {
         let first = self.turns.len().checked_sub(PERIOD_TEST_TURNS)?;
-        let deviation = |turn: &TurnRecord| largest_deviation(self.held.row.point, &turn.end);
+        let deviation = |turn: &TurnRecord| largest_deviation(self.held.setup.point, &turn.end);
         let size = self.turns[first..].iter().map(deviation).fold(0.0, f64::max);
         let repeats = |period: &usize| {
             *period <= first
                 && (first..self.turns.len()).all(|k| {
                     let [state, earlier] = [k, k - period].map(|k| &self.turns[k].end);
-                    distance(&self.held.row, state, earlier) < tolerance * size
+                    distance(&self.held.setup, state, earlier) < tolerance * size
                 })
         };
-        (1..=LONGEST_PERIOD).find(repeats).map(|period| period as u32)
+        (1..=MAX_PERIOD_TURNS).find(repeats).map(|period| period as u32)
     }
 
     /// Returns [`Self::period`], if shorter periods fail by [`SHORTER_PERIOD_FACTOR`].
-    fn clear_period(&self, tolerance: f64) -> Option<u32> {
+    fn unambiguous_period(&self, tolerance: f64) -> Option<u32> {
         let period = self.period(tolerance)?;
         (self.period(SHORTER_PERIOD_FACTOR * tolerance) == Some(period)).then_some(period)
     }
@@ -383,23 +384,23 @@ impl<'a> HeldTrajectory<'a> {
         let Some(first) = self.turns.len().checked_sub(3 * stretch) else { return f64::INFINITY };
         let change = |from: usize| {
             let change_at = |k: usize| {
-                distance(&self.held.row, &self.turns[k].end, &self.turns[k + stretch].end)
+                distance(&self.held.setup, &self.turns[k].end, &self.turns[k + stretch].end)
             };
             (from..from + stretch).map(change_at).fold(0.0, f64::max)
         };
         let previous = change(first);
         let last = change(first + stretch);
         let ratio = (last / previous).min(1.0 - MIN_DECREASE);
-        last * ratio / (1.0 - ratio) / largest_deviation(self.held.row.point, &self.held.state)
+        last * ratio / (1.0 - ratio) / largest_deviation(self.held.setup.point, &self.held.state)
     }
 
     /// Returns a motion with two frequencies, if the rest of the spectrum of yaw and pitch once a
     /// turn is below a share.
-    fn find_two_frequencies(&self, max_rest: f64) -> Option<Settled> {
+    fn find_two_frequencies(&self, max_rest: f64) -> Option<MotionKind> {
         let signal = |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end[i]).collect() };
         let line = find_strongest_line(&[signal(TUB_YAW), signal(TUB_PITCH)])?;
-        let frequency_cpm = line.frequency * self.held.row.speed_rpm;
-        (line.rest < max_rest).then_some(Settled::QuasiPeriodic { frequency_cpm })
+        let frequency_cpm = line.frequency * self.held.setup.speed_rpm;
+        (line.rest < max_rest).then_some(MotionKind::QuasiPeriodic { frequency_cpm })
     }
 }
 

@@ -2,17 +2,19 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::run::active_recorders::{ActiveRecorders, StepParts};
+use crate::run::active_recorders::{ActiveRecorders, Substeps};
 use crate::run::model::Nonlinear;
-use crate::stability::orbit::{Row, Watched, by_kind, clock, model};
-use crate::stability::turn::turn;
+use crate::stability::period_map::{
+    TurnRecorder, TurnSetup, lane_model, map_in_batches, step_grid,
+};
+use crate::stability::turn::integrate_turn;
 use crate::{ModelKind, Reading, Recorders};
 use lane_ode::{Kernel, Lane, N, Simd, System as _};
 
 /// The state of a machine at a held speed.
 #[derive(Clone, Copy)]
 pub(super) struct HeldState<'a> {
-    pub(super) row: Row<'a>,
+    pub(super) setup: TurnSetup<'a>,
     /// The state at which the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub(super) state: [f64; STATES],
 }
@@ -25,7 +27,7 @@ pub(super) struct TurnRecord {
     /// The largest deviations from equilibrium (m, rad).
     pub(super) peaks: [f64; CHANNELS],
     /// The least gap between drum and tub at the ends of steps (m).
-    pub(super) gap_m: f64,
+    pub(super) min_gap_m: f64,
 }
 
 /// Integrates a number of turns from each state. A trajectory that leaves the model's range has
@@ -33,104 +35,109 @@ pub(super) struct TurnRecord {
 /// each other.
 pub(super) fn integrate_turns(
     simd: Simd,
-    held: &[HeldState<'_>],
+    held_states: &[HeldState<'_>],
     turns: usize,
 ) -> Vec<Vec<TurnRecord>> {
-    let found = record_turns(simd, held, turns, Recorders::default());
-    found.into_iter().map(|(turns, _)| turns).collect()
+    let results = record_turns(simd, held_states, turns, Recorders::default());
+    results.into_iter().map(|(turns, _)| turns).collect()
 }
 
-/// Integrates like [`integrate_turns`], with the recorders of `wanted` over all turns.
+/// Integrates like [`integrate_turns`], with the recorders of `wanted_recorders` over all turns.
 pub(super) fn record_turns(
     simd: Simd,
-    held: &[HeldState<'_>],
+    held_states: &[HeldState<'_>],
     turns: usize,
-    wanted: Recorders,
+    wanted_recorders: Recorders,
 ) -> Vec<(Vec<TurnRecord>, Reading)> {
-    let find = |held: &[HeldState<'_>]| {
-        let groups = held.chunks(simd.lanes());
-        let group = |held: &[HeldState<'_>]| {
-            simd.narrowed(held.len()).dispatch(TurnsKernel { held, turns, wanted })
+    let integrate_batch = |held_states: &[HeldState<'_>]| {
+        let lane_groups = held_states.chunks(simd.lanes());
+        let integrate_group = |held_states: &[HeldState<'_>]| {
+            simd.narrowed(held_states.len()).dispatch(HeldTurnsKernel {
+                held_states,
+                turns,
+                wanted_recorders,
+            })
         };
-        groups.flat_map(group).collect()
+        lane_groups.flat_map(integrate_group).collect()
     };
-    by_kind(held, |held| (held.row.kind(), false), find)
+    map_in_batches(held_states, |held| (held.setup.batch_key(), false), integrate_batch)
 }
 
 /// The integration of turns from states whose rows are of one kind.
-struct TurnsKernel<'a> {
-    held: &'a [HeldState<'a>],
+struct HeldTurnsKernel<'a> {
+    held_states: &'a [HeldState<'a>],
     turns: usize,
-    wanted: Recorders,
+    wanted_recorders: Recorders,
 }
 
-impl Kernel for TurnsKernel<'_> {
+impl Kernel for HeldTurnsKernel<'_> {
     type Output = Vec<(Vec<TurnRecord>, Reading)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut found = Vec::with_capacity(self.held.len());
-        for held in self.held.chunks(T::LANES) {
-            integrate_lanes(N(zero), held, self.turns, self.wanted, &mut found);
+        let mut results = Vec::with_capacity(self.held_states.len());
+        for held_states in self.held_states.chunks(T::LANES) {
+            integrate_lanes(N(zero), held_states, self.turns, self.wanted_recorders, &mut results);
         }
-        found
+        results
     }
 }
 
 #[inline(always)]
 fn integrate_lanes<T: Lane>(
     zero: N<T>,
-    held: &[HeldState<'_>],
+    held_states: &[HeldState<'_>],
     turns: usize,
-    wanted: Recorders,
-    found: &mut Vec<(Vec<TurnRecord>, Reading)>,
+    wanted_recorders: Recorders,
+    results: &mut Vec<(Vec<TurnRecord>, Reading)>,
 ) {
-    let rows: Vec<Row<'_>> = held.iter().map(|held| held.row).collect();
-    let clock = clock(zero, &rows);
-    let model: Nonlinear<T> = model(zero, &rows);
+    let setups: Vec<TurnSetup<'_>> = held_states.iter().map(|held| held.setup).collect();
+    let grid = step_grid(zero, &setups);
+    let model: Nonlinear<T> = lane_model(zero, &setups);
     let mut states = [[zero; STATES]];
     for lane in 0..T::LANES {
         for i in 0..STATES {
-            states[0][i].0.set(lane, held[lane.min(held.len() - 1)].state[i]);
+            states[0][i].0.set(lane, held_states[lane.min(held_states.len() - 1)].state[i]);
         }
     }
-    let first = found.len();
-    found.extend(held.iter().map(|_| (Vec::with_capacity(turns), Reading::default())));
-    let mut watched = Watched::new(zero, &model, &clock);
-    watched.with_states = false;
-    let parts = StepParts::new(rows[0].caps.is_none());
-    let run = (ModelKind::Nonlinear, parts);
-    watched.extras = ActiveRecorders::new(zero, wanted, run, rows[0].point, held.len());
-    if let Some(extras) = &mut watched.extras {
+    let first_result = results.len();
+    results.extend(held_states.iter().map(|_| (Vec::with_capacity(turns), Reading::default())));
+    let mut recorder = TurnRecorder::new(zero, &model, &grid);
+    recorder.with_states = false;
+    let step_parts = Substeps::new(setups[0].caps.is_none());
+    let run_kind = (ModelKind::Nonlinear, step_parts);
+    recorder.further_recorders =
+        ActiveRecorders::new(zero, wanted_recorders, run_kind, setups[0].point, held_states.len());
+    if let Some(further_recorders) = &mut recorder.further_recorders {
         for lane in 0..T::LANES {
-            extras.set_point(lane, rows[lane.min(rows.len() - 1)].point);
+            further_recorders.set_point(lane, setups[lane.min(setups.len() - 1)].point);
         }
     }
-    for finished in 0..turns {
-        turn(&model, &clock, &mut states, Some(&mut watched));
+    for finished_turns in 0..turns {
+        integrate_turn(&model, &grid, &mut states, Some(&mut recorder));
         let in_range = T::bits(model.in_range(&states[0]));
-        for (lane, held) in held.iter().enumerate() {
-            let (records, _) = &mut found[first + lane];
+        for (lane, held) in held_states.iter().enumerate() {
+            let (records, _) = &mut results[first_result + lane];
             // A trajectory that has left the range has no further records.
-            if in_range >> lane & 1 == 1 && records.len() == finished {
-                let radial_m = watched.radial_squared.0.get(lane).sqrt();
+            if in_range >> lane & 1 == 1 && records.len() == finished_turns {
+                let radial_m = recorder.max_radial_squared.0.get(lane).sqrt();
                 records.push(TurnRecord {
                     end: core::array::from_fn(|i| states[0][i].0.get(lane)),
-                    peaks: watched.peaks.lane(lane),
-                    gap_m: held.row.point.clearance_m() - radial_m,
+                    peaks: recorder.peaks.lane(lane),
+                    min_gap_m: held.setup.point.clearance_m() - radial_m,
                 });
             }
         }
         for lane in 0..T::LANES {
-            watched.peaks.reset(lane);
+            recorder.peaks.reset(lane);
         }
-        watched.radial_squared = zero;
+        recorder.max_radial_squared = zero;
     }
-    if let Some(mut extras) = watched.extras {
-        for (lane, held) in held.iter().enumerate() {
-            let (records, extra) = &mut found[first + lane];
-            extras.finish(lane, lane, held.row.point, records.len() < turns);
-            *extra = core::mem::take(&mut extras.readings[lane]);
+    if let Some(mut further_recorders) = recorder.further_recorders {
+        for (lane, held) in held_states.iter().enumerate() {
+            let (records, reading) = &mut results[first_result + lane];
+            further_recorders.finish(lane, lane, held.setup.point, records.len() < turns);
+            *reading = core::mem::take(&mut further_recorders.readings[lane]);
         }
     }
 }

@@ -17,7 +17,7 @@ pub(crate) const SAMPLES: [(f64, f64); HARMONICS] = [
 
 /// Computes the coefficients of 1, cos, sin, cos 2, sin 2 from values at [`SAMPLES`] (a discrete
 /// Fourier transform).
-pub(crate) fn coefficients(values: [f64; HARMONICS]) -> [f64; HARMONICS] {
+pub(crate) fn harmonic_coefficients(values: [f64; HARMONICS]) -> [f64; HARMONICS] {
     let mut c = [0.0; HARMONICS];
     for (k, value) in values.into_iter().enumerate() {
         let (cos, sin) = SAMPLES[k];
@@ -67,7 +67,7 @@ pub(crate) const FUNCTIONS: usize = 16;
 /// Computes all functions at an instant. The model page (section 5) derives the pairs of theta'^2
 /// and theta''.
 #[inline(always)]
-pub(crate) fn functions<T: Real>(spin: &SpinState<T>) -> [N<T>; FUNCTIONS] {
+pub(crate) fn spin_functions<T: Real>(spin: &SpinState<T>) -> [N<T>; FUNCTIONS] {
     let SpinState { sin, cos, sin_2, cos_2, speed, acceleration, .. } = *spin;
     let squared = (speed * speed).v();
     let mut f = [sin.lit(1.0); FUNCTIONS];

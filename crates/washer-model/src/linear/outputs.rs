@@ -7,7 +7,7 @@
 use crate::channel::{CHANNELS, Channel, channels};
 use crate::coordinates::{
     COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH,
-    TUB_Y, TUB_YAW, TUB_Z, seeded,
+    TUB_Y, TUB_YAW, TUB_Z, with_unit_derivative,
 };
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::sparse::{FurtherTerms, sparse_sums};
@@ -15,7 +15,7 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use core::array::from_fn;
-use lane_ode::{Aside, Lane, N, Real, Sample};
+use lane_ode::{Lane, N, OutOfLine, Real, Sample};
 
 /// The number of columns of an expansion: the slope along each coordinate, then the value at
 /// equilibrium.
@@ -37,11 +37,11 @@ const fn entry(output: usize, part: usize, turning: &[usize], outputs: usize) ->
     if part == 0 {
         return output;
     }
-    let mut before = 0;
-    while turning[before] != output {
-        before += 1;
+    let mut index = 0;
+    while turning[index] != output {
+        index += 1;
     }
-    outputs + 2 * before + part - 1
+    outputs + 2 * index + part - 1
 }
 
 macro_rules! expand {
@@ -128,7 +128,7 @@ impl<T: Lane> LinearOutputs<T> {
         if !self.further_channels.is_empty() {
             self.further_channels.add(&motion.columns(), &mut sums);
         }
-        motion.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
+        motion.combine_harmonics::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
     }
 
     /// Computes the position of the drum's front centre relative to the tub axis, along t2 and t3.
@@ -140,7 +140,7 @@ impl<T: Lane> LinearOutputs<T> {
         if !self.further_radial.is_empty() {
             self.further_radial.add(&motion.columns(), &mut sums);
         }
-        motion.turned::<RADIAL_ENTRIES, RADIAL>(sums, &RADIAL_TURNING)
+        motion.combine_harmonics::<RADIAL_ENTRIES, RADIAL>(sums, &RADIAL_TURNING)
     }
 }
 
@@ -149,11 +149,11 @@ impl<T: Lane> LinearOutputs<T> {
 #[inline(always)]
 fn add_at_rest<T: Real, const ENTRIES: usize, const K: usize>(
     sums: &mut [[N<T>; 3]; ENTRIES],
-    places: &[usize],
+    entries: &[usize],
     at_rest: &[N<T>; K],
 ) {
     for i in 0..K {
-        sums[places[i]][0] += at_rest[i];
+        sums[entries[i]][0] += at_rest[i];
     }
 }
 
@@ -197,19 +197,19 @@ impl<T: Real> LinearMotion<T> {
 
     /// Combines steady, cosine and sine parts to outputs.
     #[inline(always)]
-    fn turned<const ENTRIES: usize, const M: usize>(
+    fn combine_harmonics<const ENTRIES: usize, const M: usize>(
         &self,
         mut sums: [[N<T>; 3]; ENTRIES],
         turning: &[usize],
     ) -> [Sample<T>; M] {
         let zero = self.cos[0].lit(0.0);
-        let mut part = M;
+        let mut entry = M;
         for &output in turning {
-            for turn in [&self.cos, &self.sin] {
-                let product = product(turn, &sums[part]);
-                part += 1;
-                for w in 0..3 {
-                    sums[output][w] += product[w];
+            for harmonic in [&self.cos, &self.sin] {
+                let product = product(harmonic, &sums[entry]);
+                entry += 1;
+                for derivative in 0..3 {
+                    sums[output][derivative] += product[derivative];
                 }
             }
         }
@@ -236,23 +236,24 @@ pub(crate) struct LineariseOutputs<'a, T> {
     pub(crate) q: &'a [N<T>; COORDINATES],
 }
 
-impl<T: Lane> Aside for LineariseOutputs<'_, T> {
+impl<T: Lane> OutOfLine for LineariseOutputs<'_, T> {
     type Output = Vec<LinearOutputs<f64>>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
         let Self { bodies, q } = self;
         let zero = q[0].lit(0.0);
-        let lifted = bodies.constant();
-        let still = [zero.constant(); COORDINATES];
+        let dual_bodies = bodies.constant();
+        let zeros = [zero.constant(); COORDINATES];
         let mut samples = [[[zero; COLUMNS]; OUTPUTS]; 3];
         for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
             let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero, zero).constant();
             for j in 0..COORDINATES {
-                let motion = MovingCoordinates { q: seeded(q, j, 1.0), u: still, a: still };
+                let motion =
+                    MovingCoordinates { q: with_unit_derivative(q, j, 1.0), u: zeros, a: zeros };
                 let axes = Axes::new(&spin, &motion);
-                let channels = axes.channels(&lifted, &motion);
-                let radial = axes.radial(&lifted, &motion);
+                let channels = axes.channels(&dual_bodies, &motion);
+                let radial = axes.radial(&dual_bodies, &motion);
                 for (output, y) in channels.iter().chain(&radial).enumerate() {
                     samples[k][output][AT_REST] = N(y.value.0.value);
                     samples[k][output][j] = N(y.value.0.slope);
@@ -260,13 +261,18 @@ impl<T: Lane> Aside for LineariseOutputs<'_, T> {
             }
         }
         (0..T::LANES)
-            .map(|lane| gather_lane(&samples.get_lane(lane), bodies.is_skewed_in(lane)))
+            .map(|lane| {
+                select_lane_coefficients(&samples.get_lane(lane), bodies.is_skewed_in(lane))
+            })
             .collect()
     }
 }
 
 /// Computes the coefficients of one lane from samples at three angles.
-fn gather_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3], skewed: bool) -> LinearOutputs<f64> {
+fn select_lane_coefficients(
+    samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3],
+    skewed: bool,
+) -> LinearOutputs<f64> {
     let mut channels = [[0.0; COORDINATES]; CHANNEL_ENTRIES];
     let mut channels_at_rest = [0.0; CHANNEL_ENTRIES];
     let mut radial = [[0.0; COORDINATES]; RADIAL_ENTRIES];
@@ -299,8 +305,18 @@ fn gather_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3], skewed: bool) -> Lin
     }
     let [further_channels, further_radial] = if skewed {
         [
-            gather_further(&channels, &channels_at_rest, &ChannelTerms::PLACES, CHANNELS_AT_REST),
-            gather_further(&radial, &radial_at_rest, &RadialTerms::PLACES, &RADIAL_AT_REST),
+            select_further_terms(
+                &channels,
+                &channels_at_rest,
+                &ChannelTerms::POSITIONS,
+                CHANNELS_AT_REST,
+            ),
+            select_further_terms(
+                &radial,
+                &radial_at_rest,
+                &RadialTerms::POSITIONS,
+                &RADIAL_AT_REST,
+            ),
         ]
     } else {
         [FurtherTerms::NONE, FurtherTerms::NONE]
@@ -308,24 +324,24 @@ fn gather_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3], skewed: bool) -> Lin
     LinearOutputs {
         further_channels,
         further_radial,
-        channels: ChannelTerms::gather(&channels),
+        channels: ChannelTerms::select_coefficients(&channels),
         channels_at_rest: from_fn(|k| N(channels_at_rest[CHANNELS_AT_REST[k]])),
-        radial: RadialTerms::gather(&radial),
+        radial: RadialTerms::select_coefficients(&radial),
         radial_at_rest: RADIAL_AT_REST.map(|entry| N(radial_at_rest[entry])),
     }
 }
 
 /// Selects the terms of entries that neither the table's `places` nor the entries `at_rest` name.
-fn gather_further<const ENTRIES: usize>(
+fn select_further_terms<const ENTRIES: usize>(
     slopes: &[[f64; COORDINATES]; ENTRIES],
     values: &[f64; ENTRIES],
-    places: &[(usize, usize)],
+    table_positions: &[(usize, usize)],
     at_rest: &[usize],
 ) -> FurtherTerms<f64> {
-    let all: [[f64; COLUMNS]; ENTRIES] = from_fn(|entry| {
+    let all_coefficients: [[f64; COLUMNS]; ENTRIES] = from_fn(|entry| {
         from_fn(|column| slopes[entry].get(column).copied().unwrap_or(values[entry]))
     });
     let at_rest = at_rest.iter().map(|entry| (*entry, AT_REST));
-    let named: Vec<_> = places.iter().copied().chain(at_rest).collect();
-    FurtherTerms::gather(&all, &named)
+    let table_entries: Vec<_> = table_positions.iter().copied().chain(at_rest).collect();
+    FurtherTerms::select_coefficients(&all_coefficients, &table_entries)
 }

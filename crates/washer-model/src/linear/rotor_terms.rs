@@ -49,7 +49,7 @@ pub(crate) const fn force(row: usize) -> usize {
 
 /// Whether a force depends on a rotation and its speed. Only the force along y does not depend on
 /// the yaw.
-pub(crate) const fn moves(row: usize, column: usize) -> bool {
+pub(crate) const fn depends_on_rotation(row: usize, column: usize) -> bool {
     row > 0 || column > 0
 }
 
@@ -67,7 +67,7 @@ lane_struct! {
     /// The coefficients of all terms of the rotor, for one machine in `f64`, for one machine per
     /// lane in `T`.
     #[derive(Clone, Debug)]
-    Terms {
+    RotorCoefficients {
         inertia: InertiaTerms<T>,
         others: RotorTerms<T>,
         further_inertia: FurtherTerms<T>,
@@ -75,7 +75,7 @@ lane_struct! {
     }
 }
 
-impl<T: Lane> Terms<T> {
+impl<T: Lane> RotorCoefficients<T> {
     /// Computes the inertia's entries at the functions of an instant.
     #[inline(always)]
     pub(crate) fn sum_inertia(
@@ -95,22 +95,24 @@ impl<T: Lane> Terms<T> {
     }
 }
 
-impl Terms<f64> {
+impl RotorCoefficients<f64> {
     /// Selects the terms of a machine from all coefficients. Only a `skewed` drum has further ones.
-    pub(crate) fn gather(
+    pub(crate) fn select_coefficients(
         inertia: &[[f64; FUNCTIONS]; INERTIA_ENTRIES],
         others: &[[f64; FUNCTIONS]; ENTRIES],
         skewed: bool,
     ) -> Self {
         let mut terms = Self {
-            inertia: InertiaTerms::gather(inertia),
-            others: RotorTerms::gather(others),
+            inertia: InertiaTerms::select_coefficients(inertia),
+            others: RotorTerms::select_coefficients(others),
             further_inertia: FurtherTerms::NONE,
             further_others: FurtherTerms::NONE,
         };
         if skewed {
-            terms.further_inertia = FurtherTerms::gather(inertia, &InertiaTerms::PLACES);
-            terms.further_others = FurtherTerms::gather(others, &RotorTerms::PLACES);
+            terms.further_inertia =
+                FurtherTerms::select_coefficients(inertia, &InertiaTerms::POSITIONS);
+            terms.further_others =
+                FurtherTerms::select_coefficients(others, &RotorTerms::POSITIONS);
         }
         terms
     }

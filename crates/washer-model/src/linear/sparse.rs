@@ -10,7 +10,7 @@
 /// Entries that the table lacks keep their values. `Name<f64>` has the coefficients of one machine,
 /// `Name<T>` those of one machine per lane.
 use crate::lanes::{InLanes, ToDual};
-use lane_ode::{Aside, Dual, Lane, N, Real};
+use lane_ode::{Dual, Lane, N, OutOfLine, Real};
 
 macro_rules! sparse_sums {
     (
@@ -29,13 +29,13 @@ macro_rules! sparse_sums {
 
         impl $name<f64> {
             /// The entry and the function of each term.
-            pub(crate) const PLACES: [(usize, usize); [$($first $(, $other)*),+].len()] =
+            pub(crate) const POSITIONS: [(usize, usize); [$($first $(, $other)*),+].len()] =
                 [$(($entry, $first) $(, ($entry, $other))*),+];
 
             /// Selects the coefficients that the table lists.
-            pub(crate) fn gather(all: &[[f64; $functions]; $entries]) -> Self {
+            pub(crate) fn select_coefficients(all: &[[f64; $functions]; $entries]) -> Self {
                 let coefficient = |(entry, function): (usize, usize)| all[entry][function];
-                Self { terms: Self::PLACES.map(|place| lane_ode::N(coefficient(place))) }
+                Self { terms: Self::POSITIONS.map(|position| lane_ode::N(coefficient(position))) }
             }
         }
 
@@ -47,12 +47,12 @@ macro_rules! sparse_sums {
                 functions: &[V; $functions],
                 sums: &mut [V; $entries],
             ) {
-                use $crate::linear::sparse::next;
-                let mut place = 0;
+                use $crate::linear::sparse::take_next;
+                let mut position = 0;
                 $(
-                    let sum = functions[$first].scaled(next(&self.terms, &mut place));
+                    let sum = functions[$first].scaled(take_next(&self.terms, &mut position));
                     $(
-                        let coefficient = next(&self.terms, &mut place);
+                        let coefficient = take_next(&self.terms, &mut position);
                         let sum = sum.plus_scaled(coefficient, functions[$other]);
                     )*
                     // Evaluates the entry's expression at compile time.
@@ -76,17 +76,18 @@ impl FurtherTerms<f64> {
     /// Creates a set without coefficients.
     pub(crate) const NONE: Self = Self { zero: N(0.0), coefficients: Vec::new() };
 
-    /// Selects the coefficients of the table's entries, except those at one of its `places`.
-    pub(crate) fn gather<const FUNCTIONS: usize, const ENTRIES: usize>(
-        all: &[[f64; FUNCTIONS]; ENTRIES],
-        places: &[(usize, usize)],
+    /// Selects the coefficients of the table's entries, except those at one of its `positions`.
+    pub(crate) fn select_coefficients<const FUNCTIONS: usize, const ENTRIES: usize>(
+        all_coefficients: &[[f64; FUNCTIONS]; ENTRIES],
+        positions: &[(usize, usize)],
     ) -> Self {
         let mut coefficients = vec![N(0.0); FUNCTIONS * ENTRIES];
         for entry in 0..ENTRIES {
             for function in 0..FUNCTIONS {
-                let is_of_table = places.iter().any(|place| place.0 == entry);
-                if is_of_table && !places.contains(&(entry, function)) {
-                    coefficients[entry * FUNCTIONS + function] = N(all[entry][function]);
+                let has_table_row = positions.iter().any(|position| position.0 == entry);
+                if has_table_row && !positions.contains(&(entry, function)) {
+                    coefficients[entry * FUNCTIONS + function] =
+                        N(all_coefficients[entry][function]);
                 }
             }
         }
@@ -112,7 +113,7 @@ impl<T: Lane> FurtherTerms<T> {
     ) {
         if !self.is_empty() {
             let coefficients = &self.coefficients;
-            self.zero.0.aside(AddFurtherTerms { coefficients, functions, sums });
+            self.zero.0.run_out_of_line(AddFurtherTerms { coefficients, functions, sums });
         }
     }
 }
@@ -125,7 +126,7 @@ struct AddFurtherTerms<'a, T, V, const FUNCTIONS: usize, const ENTRIES: usize> {
     sums: &'a mut [V; ENTRIES],
 }
 
-impl<T: Lane, V: Summand<T>, const FUNCTIONS: usize, const ENTRIES: usize> Aside
+impl<T: Lane, V: Summand<T>, const FUNCTIONS: usize, const ENTRIES: usize> OutOfLine
     for AddFurtherTerms<'_, T, V, FUNCTIONS, ENTRIES>
 {
     type Output = ();
@@ -144,7 +145,7 @@ impl<T: Lane, V: Summand<T>, const FUNCTIONS: usize, const ENTRIES: usize> Aside
 }
 
 impl<T: Lane> InLanes<T> for FurtherTerms<T> {
-    type One = FurtherTerms<f64>;
+    type SingleLane = FurtherTerms<f64>;
 
     #[inline(always)]
     fn splat(zero: N<T>, one: &FurtherTerms<f64>) -> Self {
@@ -179,9 +180,9 @@ impl<T: Real> ToDual for FurtherTerms<T> {
 
 /// Returns the next coefficient.
 #[inline(always)]
-pub(crate) fn next<T: Copy>(coefficients: &[N<T>], place: &mut usize) -> N<T> {
-    *place += 1;
-    coefficients[*place - 1]
+pub(crate) fn take_next<T: Copy>(coefficients: &[N<T>], position: &mut usize) -> N<T> {
+    *position += 1;
+    coefficients[*position - 1]
 }
 
 /// A summand: a number, or a number with its first two derivatives. Implementations have no loops,

@@ -8,13 +8,15 @@
 use crate::COORDINATES;
 use crate::coordinates::{HINGE_PITCH, HINGE_YAW, ROTOR_TURNS, STATES, TUB};
 use crate::lanes::lane_struct;
-use crate::linear::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, Terms};
+use crate::linear::rotor_terms::{
+    self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients,
+};
 use crate::linear::symmetric::Symmetric4;
 use crate::linear::{Constants, harmonics};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::coupling::{Coupling, HingeMass, mass_scaled_system};
-use crate::nonlinear::floating::{Factors, Floating};
+use crate::nonlinear::floating::{FloatingChain, LdltFactors};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
 use lane_ode::{Lane, N};
 
@@ -46,11 +48,11 @@ impl StepConstants<f64> {
     /// Computes the constants of a machine.
     pub(crate) fn new(b: &Bodies<f64>, c: &Constants<f64>) -> Self {
         let zero = N(0.0);
-        let inertia = Factors::new(c.tub_inertia);
+        let inertia = LdltFactors::new(c.tub_inertia);
         // Computes the tub's accelerations from forces and torques about its mass centre and from
         // loads on its axis.
         let accelerations_under = |[y, z, yaw, pitch]: [N<f64>; 4], load: [N<f64>; 4]| {
-            let floating = Floating {
+            let floating = FloatingChain {
                 per_mass: c.tub_per_mass,
                 force: [y, z],
                 drift: [zero; 2],
@@ -91,7 +93,8 @@ impl StepConstants<f64> {
                 constants.tub_per_speed[row][column] = by_speed[row];
                 constants.tub_per_load[row][column] = by_load[row];
             }
-            let deflection = constants.deflection(&in_order(&by_load, &[zero; 2], &[zero; 4]));
+            let deflection =
+                constants.deflection(&in_coordinate_order(&by_load, &[zero; 2], &[zero; 4]));
             for row in 0..4 {
                 constants.tub_compliance[row][column] = deflection[row];
             }
@@ -105,7 +108,7 @@ impl<T: Lane> StepConstants<T> {
     /// derivatives from accelerations.
     #[inline(always)]
     fn deflection(&self, q: &[N<T>; COORDINATES]) -> [N<T>; 4] {
-        Deflection::linear(q, &self.tub_axis, &self.rotor_axis).rows()
+        Deflection::linear(q, &self.tub_axis, &self.rotor_axis).to_vector()
     }
 
     /// Computes the load of the bearings' springs on the shaft.
@@ -124,16 +127,16 @@ impl<T: Lane> StepConstants<T> {
 
 /// The rotor's arrays at one instant.
 #[derive(Clone, Copy)]
-pub(crate) struct RotorAt<T> {
+pub(crate) struct RotorArrays<T> {
     entries: [N<T>; ENTRIES],
     /// The inverse of the inertia about the mass centre.
-    inverse: Symmetric4<T>,
-    bearings: BearingsAt<T>,
+    inverse_inertia: Symmetric4<T>,
+    bearings: BearingArrays<T>,
 }
 
 /// The bearings with scaled mass at an instant (`nonlinear/coupling.rs`); not computed for springs.
 #[derive(Clone, Copy)]
-struct BearingsAt<T> {
+struct BearingArrays<T> {
     /// The inverse of w^2 K^-1 + C.
     system_inverse: Symmetric4<T>,
     /// The factor of the deflection, w^2 + theta'^2, with w the cap of the bearings' modes.
@@ -149,39 +152,39 @@ struct RotorPerLoad<T> {
     rotation: [[N<T>; 4]; 4],
 }
 
-impl<T: Lane> RotorAt<T> {
+impl<T: Lane> RotorArrays<T> {
     /// Computes the arrays at an instant.
     #[inline(always)]
     pub(crate) fn new(
         constants: &StepConstants<T>,
         coupling: &Coupling<T>,
-        terms: &Terms<T>,
+        terms: &RotorCoefficients<T>,
         spin: &SpinState<T>,
         hinge_mass: Option<HingeMass<T>>,
     ) -> Self {
         let zero = spin.sin.lit(0.0);
-        let nothing = Symmetric4([[zero; 4]; 4]);
-        let bearings = BearingsAt {
-            system_inverse: nothing,
+        let zero_matrix = Symmetric4([[zero; 4]; 4]);
+        let bearings = BearingArrays {
+            system_inverse: zero_matrix,
             per_deflection: zero,
             rotor: RotorPerLoad { translation: [[zero; 4]; 2], rotation: [[zero; 4]; 4] },
         };
-        let mut rotor = Self { entries: [zero; ENTRIES], inverse: nothing, bearings };
-        rotor.renew(constants, coupling, terms, spin, hinge_mass);
+        let mut rotor = Self { entries: [zero; ENTRIES], inverse_inertia: zero_matrix, bearings };
+        rotor.update(constants, coupling, terms, spin, hinge_mass);
         rotor
     }
 
     /// Overwrites the arrays with those of another instant of the same machine.
     #[inline(always)]
-    pub(crate) fn renew(
+    pub(crate) fn update(
         &mut self,
         constants: &StepConstants<T>,
         coupling: &Coupling<T>,
-        terms: &Terms<T>,
+        terms: &RotorCoefficients<T>,
         spin: &SpinState<T>,
         hinge_mass: Option<HingeMass<T>>,
     ) {
-        let functions = harmonics::functions(spin);
+        let functions = harmonics::spin_functions(spin);
         let zero = spin.sin.lit(0.0);
         terms.sum_others(&functions, &mut self.entries);
         // The inverse is a long chain of dependent operations. It comes last, because a stage
@@ -195,20 +198,20 @@ impl<T: Lane> RotorAt<T> {
             }
         }
         if let Some(mass) = hinge_mass {
-            for (place, r) in [2, 3].into_iter().enumerate() {
+            for (index, r) in [2, 3].into_iter().enumerate() {
                 inertia[r][r] += mass.inertia;
-                self.entries[entry::force(2 + r)] += mass.torque[place];
+                self.entries[entry::force(2 + r)] += mass.torque[index];
             }
             self.entries[entry::damping(4, 3)] -= mass.torque_per_speed;
             self.entries[entry::damping(5, 2)] += mass.torque_per_speed;
         }
-        self.inverse = Symmetric4(inertia).inverse();
+        self.inverse_inertia = Symmetric4(inertia).inverse();
         if let Coupling::MassScaled(scaling) = coupling {
             let cap_squared = scaling.bearings_squared;
             let arms = entry::arms(&self.entries);
-            let (rotor, compliance) = RotorPerLoad::new(constants, &self.inverse, &arms);
+            let (rotor, compliance) = RotorPerLoad::new(constants, &self.inverse_inertia, &arms);
             let system = bearing_system(constants, cap_squared, &compliance);
-            self.bearings = BearingsAt {
+            self.bearings = BearingArrays {
                 system_inverse: Symmetric4(system).inverse(),
                 per_deflection: cap_squared + spin.speed * spin.speed,
                 rotor,
@@ -284,16 +287,16 @@ fn bearing_system<T: Lane>(
     mass_scaled_system(cap_squared, c.bearing_compliance, &c.tub_compliance, &rotor.0)
 }
 
-impl<T: Lane> BearingsAt<T> {
+impl<T: Lane> BearingArrays<T> {
     /// Computes the load of the bearings on the tub, from the deflection and from its second
     /// derivative without loads of the bearings.
     #[inline(always)]
-    fn reaction(&self, deflection: &[N<T>; 4], second: &[N<T>; 4]) -> [N<T>; 4] {
-        let mut sum = *second;
+    fn reaction(&self, deflection: &[N<T>; 4], second_derivative: &[N<T>; 4]) -> [N<T>; 4] {
+        let mut right_hand_side = *second_derivative;
         for i in 0..4 {
-            sum[i] += self.per_deflection * deflection[i];
+            right_hand_side[i] += self.per_deflection * deflection[i];
         }
-        self.system_inverse.times(&sum)
+        self.system_inverse.times(&right_hand_side)
     }
 }
 
@@ -302,7 +305,7 @@ impl<T: Lane> BearingsAt<T> {
 pub(crate) fn accelerations<T: Lane>(
     c: &StepConstants<T>,
     coupling: &Coupling<T>,
-    rotor_at: &RotorAt<T>,
+    rotor_at: &RotorArrays<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
@@ -315,22 +318,22 @@ pub(crate) fn accelerations<T: Lane>(
         Coupling::MassScaled(_) => {
             let bearings = &rotor_at.bearings;
             let mut halves = HalfAccelerations::new(c, rotor_at, None, q, u);
-            let second = c.deflection(&halves.in_order());
-            let reaction = bearings.reaction(&deflection, &second);
-            halves.push_apart(c, &bearings.rotor, &reaction);
+            let second_derivative = c.deflection(&halves.in_order());
+            let reaction = bearings.reaction(&deflection, &second_derivative);
+            halves.add_bearing_reaction(c, &bearings.rotor, &reaction);
             halves.in_order()
         }
     }
 }
 
 /// Computes the derivative k of a state for the implicit part of the additive method, as
-/// `nonlinear/ahead.rs` does for the nonlinear model. The springs of bearings and hinge are
-/// evaluated at r + g k with `g` in s, all other forces and the inertia at deviations `q` from
+/// `nonlinear/implicit_stage.rs` does for the nonlinear model. The springs of bearings and hinge
+/// are evaluated at r + g k with `g` in s, all other forces and the inertia at deviations `q` from
 /// equilibrium and speeds `u`.
 #[inline(always)]
-pub(crate) fn derivative_ahead<T: Lane>(
+pub(crate) fn solve_implicit_stage<T: Lane>(
     c: &StepConstants<T>,
-    terms: &Terms<T>,
+    terms: &RotorCoefficients<T>,
     flexure_stiffness: N<T>,
     spin: &SpinState<T>,
     (q, u): (&[N<T>; COORDINATES], &[N<T>; COORDINATES]),
@@ -338,33 +341,34 @@ pub(crate) fn derivative_ahead<T: Lane>(
     g: N<T>,
 ) -> [N<T>; STATES] {
     // The coordinates at r + g k without the term g^2 a.
-    let mut ahead = *q;
+    let mut coordinate_change = *q;
     for i in 0..COORDINATES {
-        ahead[i] = r[i] + g * r[COORDINATES + i];
+        coordinate_change[i] = r[i] + g * r[COORDINATES + i];
     }
     let g_squared = (g * g).v();
     let hinge_mass = HingeMass {
         inertia: (g_squared * flexure_stiffness).v(),
         torque: [
-            (flexure_stiffness * (q[HINGE_YAW] - ahead[HINGE_YAW])).v(),
-            (flexure_stiffness * (q[HINGE_PITCH] - ahead[HINGE_PITCH])).v(),
+            (flexure_stiffness * (q[HINGE_YAW] - coordinate_change[HINGE_YAW])).v(),
+            (flexure_stiffness * (q[HINGE_PITCH] - coordinate_change[HINGE_PITCH])).v(),
         ],
         torque_per_speed: g.lit(0.0),
     };
-    let rotor_at = RotorAt::new(c, &Coupling::Springs, terms, spin, Some(hinge_mass));
+    let rotor_at = RotorArrays::new(c, &Coupling::Springs, terms, spin, Some(hinge_mass));
     let mut halves = HalfAccelerations::new(c, &rotor_at, None, q, u);
     let arms = entry::arms(&rotor_at.entries);
-    let (by_load, compliance) = RotorPerLoad::new(c, &rotor_at.inverse, &arms);
+    let (by_load, compliance) = RotorPerLoad::new(c, &rotor_at.inverse_inertia, &arms);
     let per_g_squared = g_squared.recip();
-    let deflection = c.deflection(&ahead);
-    let mut sum = c.deflection(&halves.in_order());
+    let deflection = c.deflection(&coordinate_change);
+    let mut right_hand_side = c.deflection(&halves.in_order());
     for i in 0..4 {
-        sum[i] += per_g_squared * deflection[i];
+        right_hand_side[i] += per_g_squared * deflection[i];
     }
     // The system is solved by elimination, because determinants overflow in idle lanes, whose g is
     // almost zero.
-    let reaction = Factors::new(bearing_system(c, per_g_squared, &compliance)).solve(sum);
-    halves.push_apart(c, &by_load, &reaction);
+    let reaction =
+        LdltFactors::new(bearing_system(c, per_g_squared, &compliance)).solve(right_hand_side);
+    halves.add_bearing_reaction(c, &by_load, &reaction);
     let a = halves.in_order();
     let mut k = *r;
     for i in 0..COORDINATES {
@@ -386,7 +390,7 @@ impl<T: Lane> HalfAccelerations<T> {
     #[inline(always)]
     fn new(
         c: &StepConstants<T>,
-        rotor_at: &RotorAt<T>,
+        rotor_at: &RotorArrays<T>,
         load: Option<[N<T>; 4]>,
         q: &[N<T>; COORDINATES],
         u: &[N<T>; COORDINATES],
@@ -404,7 +408,7 @@ impl<T: Lane> HalfAccelerations<T> {
         for row in 0..ROWS {
             rotor[row] = e[entry::force(row)];
             for column in 0..4 {
-                if entry::moves(row, column) {
+                if entry::depends_on_rotation(row, column) {
                     rotor[row] -= e[entry::stiffness(row, column)] * q[ROTOR_TURNS[column]];
                 }
             }
@@ -435,12 +439,12 @@ impl<T: Lane> HalfAccelerations<T> {
         }
         for row in 0..ROWS {
             for column in 0..4 {
-                if entry::moves(row, column) {
+                if entry::depends_on_rotation(row, column) {
                     rotor[row] -= e[entry::damping(row, column)] * u[ROTOR_TURNS[column]];
                 }
             }
         }
-        let rotation = rotor_at.inverse.times(&[rotor[2], rotor[3], rotor[4], rotor[5]]);
+        let rotation = rotor_at.inverse_inertia.times(&[rotor[2], rotor[3], rotor[4], rotor[5]]);
         let mut midpoint = [(rotor[0] * c.rotor_per_mass).v(), (rotor[1] * c.rotor_per_mass).v()];
         for r in 0..4 {
             if r > 0 {
@@ -453,7 +457,12 @@ impl<T: Lane> HalfAccelerations<T> {
 
     /// Adds the accelerations by a load of the bearings on the tub, and its opposite on the rotor.
     #[inline(always)]
-    fn push_apart(&mut self, c: &StepConstants<T>, rotor: &RotorPerLoad<T>, on_tub: &[N<T>; 4]) {
+    fn add_bearing_reaction(
+        &mut self,
+        c: &StepConstants<T>,
+        rotor: &RotorPerLoad<T>,
+        on_tub: &[N<T>; 4],
+    ) {
         for column in 0..4 {
             for row in 0..4 {
                 self.tub[row] -= c.tub_per_load[row][column] * on_tub[column];
@@ -467,14 +476,14 @@ impl<T: Lane> HalfAccelerations<T> {
 
     #[inline(always)]
     fn in_order(&self) -> [N<T>; COORDINATES] {
-        in_order(&self.tub, &self.midpoint, &self.rotation)
+        in_coordinate_order(&self.tub, &self.midpoint, &self.rotation)
     }
 }
 
 /// Arranges the accelerations of the tub, of the rotor's midpoint and of the rotor's rotations in
 /// the order of the coordinates.
 #[inline(always)]
-fn in_order<T: Copy>(
+fn in_coordinate_order<T: Copy>(
     tub: &[N<T>; 4],
     midpoint: &[N<T>; 2],
     rotation: &[N<T>; 4],

@@ -35,7 +35,7 @@ const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 pub(crate) struct Feet {
     /// The number of feet, 3 or 4.
     pub(crate) count: usize,
-    pub(crate) spread: LoadDistribution<f64>,
+    pub(crate) distribution: LoadDistribution<f64>,
 }
 
 lane_struct! {
@@ -44,11 +44,11 @@ lane_struct! {
     #[derive(Clone, Copy, Debug)]
     LoadDistribution {
         /// The vertical load of each foot by the cabinet's own weight (N).
-        own: [N<T>; FEET],
+        own_loads: [N<T>; FEET],
         /// The vertical load of each foot per component of a load on the cabinet.
         shares: [[N<T>; LOAD]; FEET],
         /// The position of each foot along c1 and c3 (m).
-        places: [[N<T>; 2]; FEET],
+        positions: [[N<T>; 2]; FEET],
         /// The coefficient of friction.
         friction: N<T>,
         /// The weight of the cabinet (N).
@@ -69,12 +69,12 @@ impl Feet {
             machine.feet.iter().map(|foot| foot.foot_m[axis]).sum::<f64>() / count as f64
         };
         let [mean_x, mean_y, mean_z] = [mean(0), mean(1), mean(2)];
-        let places: Vec<[f64; 2]> = machine
+        let positions: Vec<[f64; 2]> = machine
             .feet
             .iter()
             .map(|foot| [foot.foot_m[0] - mean_x, foot.foot_m[2] - mean_z])
             .collect();
-        let sum = |term: fn(&[f64; 2]) -> f64| places.iter().map(term).sum::<f64>();
+        let sum = |term: fn(&[f64; 2]) -> f64| positions.iter().map(term).sum::<f64>();
         let [xx, xz, zz] = [sum(|p| p[0] * p[0]), sum(|p| p[0] * p[1]), sum(|p| p[1] * p[1])];
         let det = xx * zz - xz * xz;
         let span = xx + zz;
@@ -83,15 +83,15 @@ impl Feet {
         }
         let weight_n = cabinet.mass_kg * machine.gravity_m_per_s2;
         let [centre_x, _, centre_z] = cabinet.centre_m;
-        let mut own = [N(0.0); FEET];
+        let mut own_loads = [N(0.0); FEET];
         let mut shares = [[N(0.0); LOAD]; FEET];
-        for (k, [x, z]) in places.into_iter().enumerate() {
+        for (k, [x, z]) in positions.into_iter().enumerate() {
             // The foot's shares of the sum of loads, and of their first moments about the feet's
             // mean position.
             let per_sum = 1.0 / count as f64;
             let per_x = (zz * x - xz * z) / det;
             let per_z = (xx * z - xz * x) / det;
-            own[k] =
+            own_loads[k] =
                 N(weight_n * (per_sum + per_x * (centre_x - mean_x) + per_z * (centre_z - mean_z)));
             // The sum of loads is -F_y, their first moments in x and z are -M_z - y F_x and M_x - y
             // F_z.
@@ -106,17 +106,21 @@ impl Feet {
             .map(N);
         }
         let place = |k: usize| machine.feet[if k < count { k } else { 0 }].foot_m;
-        let places = core::array::from_fn(|k| [place(k)[0], place(k)[2]].map(N));
+        let positions = core::array::from_fn(|k| [place(k)[0], place(k)[2]].map(N));
         let friction = N(cabinet.friction);
         let weight = N(weight_n);
-        Some(Self { count, spread: LoadDistribution { own, shares, places, friction, weight } })
+        Some(Self {
+            count,
+            distribution: LoadDistribution { own_loads, shares, positions, friction, weight },
+        })
     }
 
     /// Returns the vertical loads of the feet (N) under a load on the cabinet.
     pub(crate) fn loads_n(&self, load: &[f64; LOAD]) -> Vec<f64> {
         let foot_load_n = |k: usize| {
-            let shares = self.spread.shares[k].iter().zip(load);
-            self.spread.own[k].0 + shares.map(|(share, load)| share.0 * load).sum::<f64>()
+            let shares = self.distribution.shares[k].iter().zip(load);
+            self.distribution.own_loads[k].0
+                + shares.map(|(share, load)| share.0 * load).sum::<f64>()
         };
         (0..self.count).map(foot_load_n).collect()
     }
@@ -124,18 +128,19 @@ impl Feet {
     /// Returns the margin against slipping (N) under a load on the cabinet.
     pub(crate) fn slip_margin_n(&self, load: &[f64; LOAD]) -> f64 {
         let [along_x, along_y, along_z, ..] = *load;
-        let LoadDistribution { friction: N(friction), weight: N(weight_n), .. } = self.spread;
+        let LoadDistribution { friction: N(friction), weight: N(weight_n), .. } = self.distribution;
         friction * (weight_n - along_y) - (along_x * along_x + along_z * along_z).sqrt()
     }
 
     /// Returns the margin against walking (N) under a load on the cabinet: against slipping,
     /// turning or both.
     pub(crate) fn walk_margin_n(&self, load: &[f64; LOAD]) -> f64 {
-        let mut carried = [N(0.0); FEET];
-        for (carried, load_n) in carried.iter_mut().zip(self.loads_n(load)) {
-            *carried = N(load_n);
+        let mut foot_loads = [N(0.0); FEET];
+        for (foot_loads, load_n) in foot_loads.iter_mut().zip(self.loads_n(load)) {
+            *foot_loads = N(load_n);
         }
-        self.slip_margin_n(load) - turning_force_n(&self.spread.places, &carried, &load.map(N)).0
+        self.slip_margin_n(load)
+            - turning_force_n(&self.distribution.positions, &foot_loads, &load.map(N)).0
     }
 
     /// Returns the vertical loads of the feet (N) before the machine sags.
@@ -166,34 +171,34 @@ impl Feet {
 /// to the load, at the foot with the longest arm.
 #[inline(always)]
 pub(crate) fn turning_force_n<T: Real>(
-    places: &[[N<T>; 2]; FEET],
-    carried: &[N<T>; FEET],
+    positions: &[[N<T>; 2]; FEET],
+    foot_loads: &[N<T>; FEET],
     load: &[N<T>; LOAD],
 ) -> N<T> {
-    let nothing = load[0].lit(0.0);
+    let zero = load[0].lit(0.0);
     let mut sum = load[0].lit(SMALL_LOAD_N);
-    let mut moments = [nothing; 2];
-    let mut loaded = *carried;
+    let mut moments = [zero; 2];
+    let mut carrying_loads = *foot_loads;
     for k in 0..FEET {
         // A foot that would lift has no friction.
-        loaded[k] = carried[k].where_less(nothing, nothing, carried[k]);
-        sum += loaded[k];
-        moments[0] += loaded[k] * places[k][0];
-        moments[1] += loaded[k] * places[k][1];
+        carrying_loads[k] = foot_loads[k].where_less(zero, zero, foot_loads[k]);
+        sum += carrying_loads[k];
+        moments[0] += carrying_loads[k] * positions[k][0];
+        moments[1] += carrying_loads[k] * positions[k][1];
     }
     let [x, z] = [moments[0] / sum, moments[1] / sum];
-    let mut second = load[0].lit(SMALL_LOAD_N);
-    let mut farthest = nothing;
+    let mut second_moment = load[0].lit(SMALL_LOAD_N);
+    let mut max_squared_arm = zero;
     for k in 0..FEET {
-        let [arm_x, arm_z] = [places[k][0] - x, places[k][1] - z];
+        let [arm_x, arm_z] = [positions[k][0] - x, positions[k][1] - z];
         let squared = arm_x * arm_x + arm_z * arm_z;
-        second += loaded[k] * squared;
-        farthest = farthest.where_less(squared, squared, farthest);
+        second_moment += carrying_loads[k] * squared;
+        max_squared_arm = max_squared_arm.where_less(squared, squared, max_squared_arm);
     }
-    let farthest_m = farthest.sqrt();
-    let least = (load[0].lit(MIN_ARM_M) * farthest_m * sum).v();
+    let max_arm_m = max_squared_arm.sqrt();
+    let least = (load[0].lit(MIN_ARM_M) * max_arm_m * sum).v();
     let moment = load[4] - (z * load[0] - x * load[2]);
-    moment.abs() * farthest_m * sum / second.where_less(least, least, second)
+    moment.abs() * max_arm_m * sum / second_moment.where_less(least, least, second_moment)
 }
 
 #[cfg(test)]
@@ -273,7 +278,7 @@ mod tests {
                 };
                 let arms: Vec<[f64; 2]> =
                     feet.iter().map(|foot| [foot[0] - mean(0), foot[2] - mean(2)]).collect();
-                let second: f64 =
+                let second_moment: f64 =
                     arms.iter().zip(&loads_n).map(|([x, z], n)| n * (x * x + z * z)).sum();
                 let about = |force: [f64; 2], at: [f64; 2]| at[1] * force[0] - at[0] * force[1];
                 let moment = load[4] - about([load[0], load[2]], [mean(0), mean(2)]);
@@ -281,7 +286,7 @@ mod tests {
                 let mut moment_held = 0.0;
                 let mut most = 0.0_f64;
                 for (([x, z], foot), n) in arms.iter().zip(feet).zip(&loads_n) {
-                    let [shared, turned] = [n / all_n, moment * n / second];
+                    let [shared, turned] = [n / all_n, moment * n / second_moment];
                     let force = [-load[0] * shared - turned * z, -load[2] * shared + turned * x];
                     sum = [sum[0] + force[0], sum[1] + force[1]];
                     moment_held += about(force, [foot[0], foot[2]]);

@@ -8,7 +8,7 @@ mod table;
 use std::borrow::Cow;
 use std::fmt;
 
-pub use assumed::{Assumption, DataSheet, Spread};
+pub use assumed::{Assumption, DataSheet, ExpectedRange};
 pub use sweep_parameter::{Range, UnknownParameter, decimal, unit_suffix};
 
 use crate::{BumpStop, Damper, Machine, Spin, Spring};
@@ -61,7 +61,7 @@ struct ParameterRow {
     source: &'static str,
     range: Range,
     /// The value where a machine file leaves the number out, if it may.
-    left_out: Option<f64>,
+    default_value: Option<f64>,
     /// The rule for the value where a file with a data sheet's numbers leaves it out.
     assumption: Option<Assumption>,
     target: Target,
@@ -114,7 +114,7 @@ impl ElementList {
 
 impl Target {
     /// Returns whether the target is several numbers.
-    pub const fn is_several(self) -> bool {
+    pub const fn has_several_numbers(self) -> bool {
         matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
     }
 
@@ -151,7 +151,7 @@ impl Parameter {
     /// by element.
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
         let exists = |row: &&ParameterRow| row.target.check_exists(machine, spin).is_ok();
-        let single = TABLE.iter().filter(exists).map(Self::single);
+        let single = TABLE.iter().filter(exists).map(Self::from_row);
         let numbered = LISTS.iter().flat_map(|list| {
             (0..list.count_in(machine, spin))
                 .flat_map(move |k| list.rows().map(move |row| list.parameter(row, k)))
@@ -165,7 +165,7 @@ impl Parameter {
     /// A name that the table does not have, or a number that the machine or the spin does not have.
     pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
         if let Some(row) = TABLE.iter().find(|row| row.name == name) {
-            return row.target.check_exists(machine, spin).map(|()| Self::single(row));
+            return row.target.check_exists(machine, spin).map(|()| Self::from_row(row));
         }
         for list in LISTS {
             if let Some((number, rest)) = split_numbered(name, list.element) {
@@ -182,8 +182,10 @@ impl Parameter {
                             _ => ("the machine", list.element),
                         };
                         let last = list.first + count - 1;
-                        let there = format!("{owner} has {last} {}", plural(noun, last));
-                        Err(UnknownParameter::not_here(format!("{there}, numbered from 1")))
+                        let existing_numbers = format!("{owner} has {last} {}", plural(noun, last));
+                        Err(UnknownParameter::not_here(format!(
+                            "{existing_numbers}, numbered from 1"
+                        )))
                     }
                 };
             }
@@ -223,8 +225,8 @@ impl Parameter {
     }
 
     /// Returns the value where a machine file leaves the number out, if it may.
-    pub fn left_out(&self) -> Option<f64> {
-        self.row.left_out
+    pub fn default_value(&self) -> Option<f64> {
+        self.row.default_value
     }
 
     /// Returns the rule for the value where a file with a data sheet's numbers leaves it out.
@@ -250,7 +252,7 @@ impl Parameter {
     }
 
     /// Returns the names of the single numbers that the parameter writes.
-    pub fn parts(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
+    pub fn single_names(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
         let numbered = |count: usize, element: &str, number: &str| {
             (1..=count).map(|k| format!("{element}_{k}_{number}").into()).collect()
         };
@@ -266,7 +268,7 @@ impl Parameter {
         }
     }
 
-    fn single(row: &'static ParameterRow) -> Self {
+    fn from_row(row: &'static ParameterRow) -> Self {
         Self { name: Cow::Borrowed(row.name), row, index: 0 }
     }
 }
@@ -298,7 +300,7 @@ fn split_numbered<'a>(name: &'a str, element: &str) -> Option<(usize, &'a str)> 
 }
 
 /// Returns the value that all items share.
-fn common<T>(items: &[T], value: fn(&T) -> f64) -> Option<f64> {
+fn common_value<T>(items: &[T], value: fn(&T) -> f64) -> Option<f64> {
     let first = value(items.first()?);
     items.iter().all(|item| value(item).to_bits() == first.to_bits()).then_some(first)
 }

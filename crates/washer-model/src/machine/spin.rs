@@ -2,7 +2,7 @@
 
 mod turns;
 
-pub(crate) use turns::cuts_s;
+pub(crate) use turns::whole_turn_cuts_s;
 
 use crate::lanes::lane_struct;
 use core::f64::consts::TAU;
@@ -123,7 +123,7 @@ impl Spin {
                     wave_hz: N(1.0 / ramp_s),
                     ..SpinStretch::at_rest(0.0, 0.0)
                 };
-                let turns = up.turns_at_start.0 + ramp_turns(0.0, peak, *ramp_s);
+                let turns = up.turns_at_start.0 + fractional_turns_of_ramp(0.0, peak, *ramp_s);
                 let level =
                     SpinStretch { turns_per_s: N(peak), ..SpinStretch::at_rest(*ramp_s, turns) };
                 vec![up, level]
@@ -171,7 +171,7 @@ pub(crate) fn stretch_at(stretches: &[SpinStretch], t_s: f64) -> usize {
 }
 
 /// Returns the fractional part of the turns of a ramp between two speeds (1/s).
-fn ramp_turns(from: f64, to: f64, duration_s: f64) -> f64 {
+fn fractional_turns_of_ramp(from: f64, to: f64, duration_s: f64) -> f64 {
     let mean = 0.5 * (from + to);
     let turns = mean * duration_s;
     // The rounding error of the product is added to the fractional part, because it is too small to
@@ -188,7 +188,7 @@ fn linear_stretches(points: &[(f64, f64)]) -> Vec<SpinStretch> {
             SpinStretch { turns_per_s: N(speed), ..SpinStretch::at_rest(start_s, turns) };
         if let Some(&(end_s, end_speed)) = points.get(i + 1) {
             stretch.turns_per_s2 = N(0.5 * (end_speed - speed) / (end_s - start_s));
-            turns += ramp_turns(speed, end_speed, end_s - start_s);
+            turns += fractional_turns_of_ramp(speed, end_speed, end_s - start_s);
             turns -= turns.round_ties_even();
         }
         stretches.push(stretch);
@@ -225,9 +225,9 @@ impl<T: Lane> SpinLanes<T> {
             let rounded_bt = slope - self.turns_per_s;
             (self.turns_per_s - (slope - rounded_bt)) + (bt - rounded_bt)
         };
-        let whole = (slope * t).v();
-        let rest = (slope * t - whole) + (bt_error + slope_error) * t;
-        let mut turns = (whole - N(whole.0.round())) + (rest + self.turns_at_start);
+        let product = (slope * t).v();
+        let remainder = (slope * t - product) + (bt_error + slope_error) * t;
+        let mut turns = (product - N(product.0.round())) + (remainder + self.turns_at_start);
         let mut turn_rate = slope + bt;
         let mut turn_acceleration = self.turns_per_s2 + self.turns_per_s2;
         let zero = t.lit(0.0);

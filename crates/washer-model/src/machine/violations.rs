@@ -68,18 +68,19 @@ impl Machine {
     pub fn violations(&self) -> Vec<Violation> {
         // A table without points has no parameters, so that only the machine is checked.
         let no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
-        let mut found = out_of_range(self, &no_spin);
-        let mut joint = self.joint_violations();
+        let mut violations = out_of_range(self, &no_spin);
+        let mut joint_violations = self.joint_violations();
         // A violation of several numbers is not reported if one of them is out of range by itself.
-        let refused = |name: &String| found.iter().any(|one| one.concerns.contains(name));
-        joint.retain(|violation| !violation.concerns.iter().any(refused));
-        found.append(&mut joint);
-        found
+        let is_out_of_range =
+            |name: &String| violations.iter().any(|violation| violation.concerns.contains(name));
+        joint_violations.retain(|violation| !violation.concerns.iter().any(is_out_of_range));
+        violations.append(&mut joint_violations);
+        violations
     }
 
     /// Returns the violations by combinations of numbers, each of which is in its range.
     pub fn joint_violations(&self) -> Vec<Violation> {
-        let mut joint = Vec::new();
+        let mut joint_violations = Vec::new();
         for (body, moments_kg_m2) in [
             ("tub", self.tub.inertia_kg_m2),
             ("shaft", self.shaft.inertia_kg_m2),
@@ -93,7 +94,7 @@ impl Machine {
                 let ii = 11 * (greatest + 1);
                 let moment = decimal(moments_kg_m2[greatest]);
                 let others = format_rounded(sum - moments_kg_m2[greatest]);
-                joint.push(Violation::new(
+                joint_violations.push(Violation::new(
                     format!(
                         "no rigid body has the {body}'s inertia: I{ii} = {moment} exceeds the \
                          other two's sum, {others}"
@@ -110,7 +111,7 @@ impl Machine {
                 let number = k + 1;
                 let length_m = format_rounded(length_m);
                 let end = |end: &str| components(&format!("{element}_{number}_{end}_"), "_m");
-                joint.push(Violation::new(
+                joint_violations.push(Violation::new(
                     format!(
                         "the ends of {element} {number} are {length_m} m apart: it has no direction"
                     ),
@@ -122,7 +123,7 @@ impl Machine {
         for (k, stop) in self.stops.iter().enumerate() {
             if stop.direction_length() < MIN_DISTANCE_M {
                 let number = k + 1;
-                joint.push(Violation::new(
+                joint_violations.push(Violation::new(
                     format!("stop {number} has no direction"),
                     components(&format!("stop_{number}_direction_"), ""),
                     "the way from the tub to the stop, such as [0, 0, 1]; any length but 0 is made \
@@ -139,9 +140,9 @@ impl Machine {
                     if higher_m.abs() > MIN_DISTANCE_M {
                         let number = k + 1;
                         let by_m = format_rounded(higher_m.abs());
-                        let way = if higher_m > 0.0 { "higher" } else { "lower" };
-                        joint.push(Violation::new(
-                            format!("foot {number} stands {by_m} m {way} than foot 1"),
+                        let direction = if higher_m > 0.0 { "higher" } else { "lower" };
+                        joint_violations.push(Violation::new(
+                            format!("foot {number} stands {by_m} m {direction} than foot 1"),
                             [format!("foot_{number}_y_m")],
                             "one height for all feet: the second number of foot_m",
                         ));
@@ -149,7 +150,7 @@ impl Machine {
                 }
                 let loads_n = feet.at_rest_n(self).into_iter().enumerate();
                 let lifted = loads_n.filter(|(_, load_n)| *load_n <= 0.0);
-                joint.extend(lifted.map(|(k, load_n)| {
+                joint_violations.extend(lifted.map(|(k, load_n)| {
                     let number = k + 1;
                     Violation::new(
                         format!("foot {number} lifts at rest: it would carry {load_n:.1} N"),
@@ -167,7 +168,11 @@ impl Machine {
                     }
                 };
                 let feet = (1..=count).flat_map(|foot| components(&format!("foot_{foot}_"), "_m"));
-                joint.push(Violation::new(describe_feet(count, has_cabinet), feet, expected));
+                joint_violations.push(Violation::new(
+                    describe_feet(count, has_cabinet),
+                    feet,
+                    expected,
+                ));
             }
             None => {}
         }
@@ -175,13 +180,13 @@ impl Machine {
             for (k, unbalance) in self.unbalances().enumerate() {
                 if unbalance.mass_kg != 0.0 && unbalance.radius_m == 0.0 {
                     let number = k + 1;
-                    let which = if k == 0 { String::new() } else { format!("{number}_") };
-                    joint.push(Violation::new(
+                    let name_number = if k == 0 { String::new() } else { format!("{number}_") };
+                    joint_violations.push(Violation::new(
                         format!(
                             "unbalance {number} is on the drum's axis and unbalances nothing, \
                              beside others"
                         ),
-                        [format!("unbalance_{which}radius_m")],
+                        [format!("unbalance_{name_number}radius_m")],
                         "a distance from the axis, negative on the other side; a mass on the axis \
                          belongs to the drum",
                     ));
@@ -191,7 +196,7 @@ impl Machine {
         let distance_m = self.bearings.front_x_m - self.bearings.rear_x_m;
         if distance_m < MIN_DISTANCE_M {
             let distance_m = format_rounded(distance_m);
-            joint.push(Violation::new(
+            joint_violations.push(Violation::new(
                 format!("front and rear bearing are {distance_m} m apart and hold no angle"),
                 ["rear", "front"].map(|end| format!("bearing_{end}_x_m")),
                 format!("bearings at least {MIN_DISTANCE_M:e} m apart"),
@@ -200,9 +205,9 @@ impl Machine {
         if self.springs.is_empty() && self.bushings.is_empty() {
             let title = "the machine has no springs and no bushings: nothing carries it".to_owned();
             let expected = "at least one of [[springs]] or [[bushings]] in the machine file";
-            joint.push(Violation::new(title, [], expected));
+            joint_violations.push(Violation::new(title, [], expected));
         }
-        joint
+        joint_violations
     }
 }
 
@@ -213,7 +218,7 @@ fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
         let name = parameter.name();
         let value = parameter.get(machine, spin)?;
         let range = parameter.range();
-        if parameter.target().is_several() || range.contains(value) {
+        if parameter.target().has_several_numbers() || range.contains(value) {
             return None;
         }
         let title = format!("{name} = {} is out of range", decimal(value));
@@ -235,9 +240,9 @@ impl Spin {
     /// independent.
     pub fn joint_violations(&self) -> Vec<Violation> {
         let Self::Table { time_s, speed_rpm } = self else { return Vec::new() };
-        let mut found = Vec::new();
+        let mut violations = Vec::new();
         if time_s.len() != speed_rpm.len() || time_s.is_empty() {
-            found.push(Violation::new(
+            violations.push(Violation::new(
                 describe_table(time_s.len(), speed_rpm.len()),
                 ["spin_speed_rpm", "spin_time_s"].map(str::to_owned),
                 "as many speeds as times, at least one of each",
@@ -245,8 +250,9 @@ impl Spin {
         }
         for (column, values, range) in [("time_s", time_s, TIMES), ("speed_rpm", speed_rpm, SPEEDS)]
         {
-            let bad = values.iter().enumerate().filter(|(_, value)| !range.contains(**value));
-            found.extend(bad.map(|(index, &value)| {
+            let out_of_range_values =
+                values.iter().enumerate().filter(|(_, value)| !range.contains(**value));
+            violations.extend(out_of_range_values.map(|(index, &value)| {
                 let number = decimal(value);
                 let entry = index + 1;
                 let expected = match column {
@@ -266,7 +272,7 @@ impl Spin {
             && TIMES.contains(time_s)
             && time_s != 0.0
         {
-            found.push(Violation::new(
+            violations.push(Violation::new(
                 format!("the spin table starts at {time_s} s"),
                 ["spin_time_s[0]".to_owned()],
                 "a table that starts at time 0",
@@ -278,14 +284,14 @@ impl Spin {
                 && TIMES.contains(time_s)
                 && time_s <= before_s
             {
-                found.push(Violation::new(
+                violations.push(Violation::new(
                     format!("time {time_s} s of the spin table follows {before_s} s"),
                     [format!("spin_time_s[{}]", k + 1)],
                     "times that increase",
                 ));
             }
         }
-        found
+        violations
     }
 }
 
@@ -308,7 +314,7 @@ mod tests {
 
     #[test]
     fn every_violation_is_returned_at_once() {
-        let found = violations_after(|m| {
+        let violations = violations_after(|m| {
             m.tub.mass_kg = -1.0;
             m.shaft.inertia_kg_m2 = [0.1, 0.02, 0.02];
             m.springs[2].tub_m = m.springs[2].cabinet_m;
@@ -316,7 +322,7 @@ mod tests {
             m.bearings.rear_x_m = 0.05;
         });
         assert_eq!(
-            found,
+            violations,
             [
                 "tub_mass_kg = -1 is out of range",
                 "bearing_rear_x_m = 0.05 is out of range",
@@ -358,9 +364,9 @@ mod tests {
         machine.bearings.front_x_m = 1e-9;
         machine.bearings.rear_x_m = -1e-9;
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 1.0, ramp_s: 1.0 };
-        let found = machine.violations();
-        assert_eq!(found.len(), 3, "{found:?}");
-        for name in found.iter().flat_map(|one| &one.concerns) {
+        let violations = machine.violations();
+        assert_eq!(violations.len(), 3, "{violations:?}");
+        for name in violations.iter().flat_map(|violation| &violation.concerns) {
             assert!(Parameter::find(name, &machine, &spin).is_ok(), "{name}");
         }
     }

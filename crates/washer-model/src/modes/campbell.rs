@@ -6,7 +6,7 @@
 //! modal assurance criterion (MAC), weighted by the mass matrix. An interval in which the least MAC
 //! is too small is halved.
 
-use crate::modes::assurance;
+use crate::modes::modal_assurance;
 use crate::modes::shape::motion;
 use crate::{COORDINATES, Mode, ModeMotion, Modes, NoModes, Point, modes};
 use core::f64::consts::TAU;
@@ -92,36 +92,37 @@ pub fn campbell_until(
     cancel: Cancel<'_>,
 ) -> Result<Option<Vec<ModeOverSpeed>>, NoModes> {
     let Some(&lowest) = speeds_rpm.first() else { return Ok(Some(Vec::new())) };
-    let mut followed = Vec::with_capacity(speeds_rpm.len());
+    let mut modes_at_speeds = Vec::with_capacity(speeds_rpm.len());
     let mut current = modes(point, 0.0, rad_per_s(lowest))?;
     for (k, &speed) in speeds_rpm.iter().enumerate() {
         if cancel.is_requested() {
             return Ok(None);
         }
         if k > 0 {
-            current = follow(&current, speeds_rpm[k - 1], speed, &|rpm| {
+            current = follow_modes(&current, speeds_rpm[k - 1], speed, &|rpm| {
                 modes(point, 0.0, rad_per_s(rpm))
             })?;
         }
-        followed.push((average_over_turn(point, speed, &current)?, current.clone()));
+        modes_at_speeds.push((average_over_turn(point, speed, &current)?, current.clone()));
     }
     let over_speed = (0..COORDINATES)
         .map(|mode| {
             let mut resonances = Vec::new();
             for k in 1..speeds_rpm.len() {
-                let excess = [k - 1, k].map(|k| followed[k].0[mode].frequency_rpm - speeds_rpm[k]);
+                let excess =
+                    [k - 1, k].map(|k| modes_at_speeds[k].0[mode].frequency_rpm - speeds_rpm[k]);
                 // An overdamped motion has no resonance, not even at standstill.
                 if (excess[0] > 0.0) != (excess[1] > 0.0) && excess[0] != 0.0 {
-                    let from = &followed[k - 1].1;
-                    let between = [speeds_rpm[k - 1], speeds_rpm[k]];
-                    resonances.extend(find_resonance(point, mode, from, between, excess)?);
+                    let from = &modes_at_speeds[k - 1].1;
+                    let bracket_rpm = [speeds_rpm[k - 1], speeds_rpm[k]];
+                    resonances.extend(find_resonance(point, mode, from, bracket_rpm, excess)?);
                 }
             }
-            let at_speed: Vec<_> = followed.iter().map(|(turn, _)| turn[mode]).collect();
-            let described =
+            let at_speed: Vec<_> = modes_at_speeds.iter().map(|(turn, _)| turn[mode]).collect();
+            let dominant_shape =
                 resonances.first().map_or(at_speed[0].shape, |resonance| resonance.mode.shape);
             Ok(ModeOverSpeed {
-                motion: motion(point, &followed[0].1.mass, &described),
+                motion: motion(point, &modes_at_speeds[0].1.mass, &dominant_shape),
                 at_speed,
                 resonances,
             })
@@ -135,13 +136,13 @@ fn rad_per_s(rpm: f64) -> f64 {
 }
 
 /// Returns the modes at `to` in the order of those at `from`.
-fn follow(
+fn follow_modes(
     start: &Modes,
     from: f64,
     to: f64,
-    at: &dyn Fn(f64) -> Result<Modes, NoModes>,
+    modes_at: &dyn Fn(f64) -> Result<Modes, NoModes>,
 ) -> Result<Modes, NoModes> {
-    follow_halving(start, from, to, at, at(to)?, MAX_HALVINGS)
+    follow_halving(start, from, to, modes_at, modes_at(to)?, MAX_HALVINGS)
 }
 
 /// Follows modes, and halves the interval at most `halvings` times.
@@ -149,7 +150,7 @@ fn follow_halving(
     start: &Modes,
     from: f64,
     to: f64,
-    at: &dyn Fn(f64) -> Result<Modes, NoModes>,
+    modes_at: &dyn Fn(f64) -> Result<Modes, NoModes>,
     end: Modes,
     halvings: u32,
 ) -> Result<Modes, NoModes> {
@@ -157,9 +158,10 @@ fn follow_halving(
     if assurance >= MIN_ASSURANCE || halvings == 0 {
         return Ok(Modes { modes: order.map(|k| end.modes[k]), ..end });
     }
-    let middle = 0.5 * (from + to);
-    let between = follow_halving(start, from, middle, at, at(middle)?, halvings - 1)?;
-    follow_halving(&between, middle, to, at, end, halvings - 1)
+    let midpoint = 0.5 * (from + to);
+    let bracket_rpm =
+        follow_halving(start, from, midpoint, modes_at, modes_at(midpoint)?, halvings - 1)?;
+    follow_halving(&bracket_rpm, midpoint, to, modes_at, end, halvings - 1)
 }
 
 /// Returns for each mode of `start` the index of the mode of `end` that continues it, and the least
@@ -168,7 +170,7 @@ fn match_modes(start: &Modes, end: &Modes) -> ([usize; COORDINATES], f64) {
     let mut pairs = Vec::with_capacity(COORDINATES * COORDINATES);
     for (i, before) in start.modes.iter().enumerate() {
         for (j, after) in end.modes.iter().enumerate() {
-            pairs.push((assurance(&end.mass, &before.shape, &after.shape), i, j));
+            pairs.push((modal_assurance(&end.mass, &before.shape, &after.shape), i, j));
         }
     }
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -193,8 +195,8 @@ fn average_over_turn(
     let mut turn = vec![start.clone()];
     for k in 1..ANGLES {
         let theta = |k: usize| TAU * k as f64 / ANGLES as f64;
-        let at = |theta| modes(point, theta, speed);
-        turn.push(follow(&turn[k - 1], theta(k - 1), theta(k), &at)?);
+        let modes_at = |theta| modes(point, theta, speed);
+        turn.push(follow_modes(&turn[k - 1], theta(k - 1), theta(k), &modes_at)?);
     }
     let rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
     Ok(core::array::from_fn(|mode| {
@@ -230,12 +232,13 @@ fn find_resonance(
     let mut side = 0;
     for _ in 0..MAX_SEARCH {
         let speed_rpm = (low * high_excess - high * low_excess) / (high_excess - low_excess);
-        let end_modes = follow(from, start, speed_rpm, &|rpm| modes(point, 0.0, rad_per_s(rpm)))?;
-        let found =
+        let end_modes =
+            follow_modes(from, start, speed_rpm, &|rpm| modes(point, 0.0, rad_per_s(rpm)))?;
+        let resonance =
             Resonance { speed_rpm, mode: average_over_turn(point, speed_rpm, &end_modes)?[mode] };
-        let excess = found.mode.frequency_rpm - speed_rpm;
+        let excess = resonance.mode.frequency_rpm - speed_rpm;
         if excess.abs() < RESONANCE_RPM {
-            return Ok(Some(found));
+            return Ok(Some(resonance));
         }
         if high - low < RESONANCE_RPM {
             break;

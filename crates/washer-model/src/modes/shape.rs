@@ -4,7 +4,7 @@ use crate::coordinates::{
     HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW,
     TUB_Z,
 };
-use crate::modes::inner;
+use crate::modes::mass_inner_product;
 use crate::{COORDINATES, Point};
 use core::fmt;
 
@@ -123,7 +123,7 @@ pub(crate) fn motion(
     for i in HORIZONTAL {
         in_plane[i] = shape[i];
     }
-    let horizontal = inner(mass, &in_plane, &in_plane)[0];
+    let horizontal = mass_inner_product(mass, &in_plane, &in_plane)[0];
     let plane = if horizontal > PLANE_SHARE {
         MotionPlane::Horizontal
     } else if horizontal < 1.0 - PLANE_SHARE {
@@ -160,16 +160,16 @@ fn rigid_shares(
             rigid[i][0] = 1.0;
         }
         for other in &basis {
-            let along = inner(mass, other, &rigid)[0];
+            let along = mass_inner_product(mass, other, &rigid)[0];
             for i in 0..COORDINATES {
                 rigid[i][0] -= along * other[i][0];
             }
         }
-        let scale = inner(mass, &rigid, &rigid)[0].sqrt();
+        let scale = mass_inner_product(mass, &rigid, &rigid)[0].sqrt();
         basis.push(rigid.map(|[re, _]| [re / scale, 0.0]));
     }
     core::array::from_fn(|k| {
-        let [re, im] = inner(mass, &basis[k], shape);
+        let [re, im] = mass_inner_product(mass, &basis[k], shape);
         re * re + im * im
     })
 }

@@ -93,7 +93,7 @@ impl Bodies<f64> {
             let m_u = unbalance.mass_kg;
             let total = m_d + m_u;
             let dx = unbalance.x_m - x_d;
-            let [y, z] = unbalance.place_m();
+            let [y, z] = unbalance.position_m();
             let dr = y - e;
             let dz = z - e_3;
             let reduced = m_u * m_d / total;

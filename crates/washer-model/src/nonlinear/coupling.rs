@@ -10,7 +10,7 @@ use crate::coordinates::{
 use crate::lanes::{InLanes as _, lane_struct};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
-use crate::nonlinear::floating::{AxisResponse, Factors, Floating};
+use crate::nonlinear::floating::{AxisResponse, FloatingChain, LdltFactors};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
 use crate::nonlinear::frame::Tilt;
 use lane_ode::{Lane, N, Real};
@@ -46,7 +46,7 @@ impl<T: Real> Deflection<T> {
 
     /// Returns offset and tilt as one vector.
     #[inline(always)]
-    pub(crate) fn rows(&self) -> [N<T>; 4] {
+    pub(crate) fn to_vector(&self) -> [N<T>; 4] {
         [self.offset[0], self.offset[1], self.tilt[0], self.tilt[1]]
     }
 }
@@ -62,7 +62,7 @@ pub(crate) enum Coupling<T> {
     /// Springs.
     Springs,
     /// Springs with scaled mass, so that no mode of the bearings is faster than a cap.
-    MassScaled(Scaling<T>),
+    MassScaled(CapCoefficients<T>),
 }
 
 /// The caps of the fast modes.
@@ -77,7 +77,7 @@ pub struct Caps {
 lane_struct! {
     /// The coefficients of the caps.
     #[derive(Clone, Copy)]
-    Scaling {
+    CapCoefficients {
         /// The square of the bearings' cap, rad^2/s^2.
         bearings_squared,
         /// The reciprocal square of the hinge's cap; 0 if the hinge is not capped.
@@ -85,7 +85,7 @@ lane_struct! {
     }
 }
 
-impl Scaling<f64> {
+impl CapCoefficients<f64> {
     fn new(caps: &Caps) -> Self {
         let hinge = caps.hinge_rad_per_s.unwrap_or(f64::INFINITY);
         Self {
@@ -130,13 +130,13 @@ impl<T: Lane> Coupling<T> {
     pub(crate) fn new(zero: N<T>, caps: Option<&Caps>) -> Self {
         // Not `Option::map_or`: its closure would be compiled without the kernel's instruction set.
         let Some(caps) = caps else { return Self::Springs };
-        Self::MassScaled(Scaling::splat(zero, &Scaling::new(caps)))
+        Self::MassScaled(CapCoefficients::splat(zero, &CapCoefficients::new(caps)))
     }
 
     /// Sets the caps of one lane; springs have none.
     pub(crate) fn set_caps(&mut self, lane: usize, caps: &Caps) {
         if let Self::MassScaled(scaling) = self {
-            scaling.set_lane(lane, &Scaling::new(caps));
+            scaling.set_lane(lane, &CapCoefficients::new(caps));
         }
     }
 
@@ -172,11 +172,11 @@ impl<T: Lane> Coupling<T> {
         speed: N<T>,
         deflection: &Deflection<T>,
         sag: &Deflection<T>,
-        (tub, tub_inertia): (&Floating<T, 2>, &Factors<T, 2>),
-        (rotor, rotor_inertia): (&Floating<T, 4>, &Factors<T, 4>),
+        (tub, tub_inertia): (&FloatingChain<T, 2>, &LdltFactors<T, 2>),
+        (rotor, rotor_inertia): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
     ) -> [N<T>; COORDINATES] {
         let on_shaft = match self {
-            Self::Springs => deflection.load(bodies),
+            Self::Springs => deflection.load_on_shaft(bodies),
             Self::MassScaled(scaling) => {
                 let tub_response = tub.response(tub_inertia);
                 let rotor_response = rotor.response(rotor_inertia);
@@ -192,8 +192,8 @@ impl<T: Lane> Coupling<T> {
 /// Computes the accelerations of both halves under a bearing load on the shaft.
 #[inline(always)]
 pub(crate) fn accelerations_under_load<T: Real>(
-    (tub, tub_inertia): (&Floating<T, 2>, &Factors<T, 2>),
-    (rotor, rotor_inertia): (&Floating<T, 4>, &Factors<T, 4>),
+    (tub, tub_inertia): (&FloatingChain<T, 2>, &LdltFactors<T, 2>),
+    (rotor, rotor_inertia): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
     on_shaft: &AxisLoad<T>,
 ) -> [N<T>; COORDINATES] {
     let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia, &on_shaft.reaction());
@@ -238,12 +238,12 @@ pub(crate) fn mass_scaled_load<T: Real>(
     let system =
         mass_scaled_system(cap_squared, b.bearing_compliance(), &tub.compliance, &rotor.compliance);
     let both_squared = cap_squared + speed_squared;
-    let d = deflection.rows();
-    let sag = sag.rows();
+    let d = deflection.to_vector();
+    let sag = sag.to_vector();
     let mut load = d;
     for i in 0..4 {
         load[i] = tub.free[i] - (both_squared * d[i] + rotor.free[i]) + speed_squared * sag[i];
     }
-    let [force_y, force_z, moment_y, moment_z] = Factors::new(system).solve(load);
+    let [force_y, force_z, moment_y, moment_z] = LdltFactors::new(system).solve(load);
     AxisLoad { force: [force_y, force_z], moment: [moment_y, moment_z] }
 }

@@ -11,10 +11,10 @@ pub(crate) mod corners;
 
 use crate::coordinates::{COORDINATES, TUB};
 use crate::lanes::{InAnyLane, lane_struct};
-use crate::nonlinear::frame::{Tilt, Vec3, difference, dot, plus_cross, scaled, sum};
+use crate::nonlinear::frame::{Tilt, Vec3, add, add_cross_product, dot, scale, subtract};
 use crate::{BumpStop, Bushing, Damper, Machine, Spring};
 use core::f64::consts::PI;
-use lane_ode::{Aside, Lane, N, Real};
+use lane_ode::{Lane, N, OutOfLine, Real};
 
 lane_struct! {
     /// The force elements of a machine.
@@ -66,9 +66,9 @@ impl Elements<f64> {
     /// they settle.
     pub(crate) fn centre_free_strokes(&mut self, q: &[f64; COORDINATES]) {
         let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
-        for number in 0..self.dampers.len() {
-            let [length, _] = self.damper_motion(number, &tub);
-            self.dampers[number].rest_length = length;
+        for index in 0..self.dampers.len() {
+            let [length, _] = self.damper_motion(index, &tub);
+            self.dampers[index].rest_length = length;
         }
     }
 
@@ -102,10 +102,14 @@ impl<T: Lane> Elements<T> {
         add_forces(&mut load, &self.dampers, tub, false);
         if self.has_optional.holds() {
             // The copy lets `load` stay in registers if there are no optional forces.
-            let mut whole = load;
+            let mut load_copy = load;
             let motion = *tub;
-            zero.0.aside(OptionalForces { elements: self, tub: &motion, load: &mut whole });
-            load = whole;
+            zero.0.run_out_of_line(OptionalForces {
+                elements: self,
+                tub: &motion,
+                load: &mut load_copy,
+            });
+            load = load_copy;
         }
         load
     }
@@ -115,18 +119,18 @@ impl<T: Lane> Elements<T> {
     /// Computes the depth of a stop's tub point (m; the stop is open below zero), and the stop's
     /// force (N).
     #[inline(always)]
-    pub(crate) fn stop(&self, number: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
-        let stop = &self.stops[number];
+    pub(crate) fn stop(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
+        let stop = &self.stops[index];
         let point = tub.point(&stop.tub);
         [stop.depth(&point), stop.force(&point)]
     }
 
     /// Computes the length of a damper (m) and the speed along it (m/s).
     #[inline(always)]
-    pub(crate) fn damper_motion(&self, number: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
-        let ends = &self.dampers[number].ends;
+    pub(crate) fn damper_motion(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
+        let ends = &self.dampers[index].ends;
         let span = span(&tub.tilt, &tub.midpoint, ends);
-        let velocity = plus_cross(&tub.velocity, &tub.rate, &ends.tub);
+        let velocity = add_cross_product(&tub.velocity, &tub.rate, &ends.tub);
         let length = dot(&span, &span).sqrt();
         [length, dot(&span, &velocity) / length]
     }
@@ -140,7 +144,7 @@ struct OptionalForces<'a, T> {
     load: &'a mut (Vec3<T>, Vec3<T>),
 }
 
-impl<T: Lane> Aside for OptionalForces<'_, T> {
+impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -154,12 +158,12 @@ impl<T: Lane> Aside for OptionalForces<'_, T> {
         }
         for stop in &elements.stops {
             let point = tub.point(&stop.tub);
-            let force = scaled(-stop.force(&point), stop.direction);
-            add_force(load, &stop.tub, &tub.tilt.in_own_axes(&force));
+            let force = scale(-stop.force(&point), stop.direction);
+            add_force(load, &stop.tub, &tub.tilt.to_frame_axes(&force));
         }
         for bushing in &elements.bushings {
             let force = bushing.force(&tub.point(&bushing.tub));
-            add_force(load, &bushing.tub, &tub.tilt.in_own_axes(&force));
+            add_force(load, &bushing.tub, &tub.tilt.to_frame_axes(&force));
         }
     }
 }
@@ -250,7 +254,7 @@ fn equivalent_damping(friction_n: f64, speed_m_per_s: f64) -> f64 {
 
 impl DamperCoefficients<f64> {
     fn new(damper: &Damper) -> Self {
-        // `ready.rs` replaces the default by the speed of the motion.
+        // `preparation.rs` replaces the default by the speed of the motion.
         let speed_m_per_s =
             damper.friction_linear_speed_m_per_s.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S);
         let stroke_m = damper.free_stroke_m;
@@ -484,7 +488,7 @@ impl<T: Real> TubMotion<T> {
     #[inline(always)]
     pub(crate) fn new(q: &[N<T>; 4], u: &[N<T>; 4]) -> Self {
         let tilt = Tilt::new(q[2], q[3]);
-        let rate = tilt.motion(u[2], u[3]).rate;
+        let rate = tilt.motion_at_constant_speeds(u[2], u[3]).rate;
         Self::from_rate(tilt, rate, [q[0], q[1]], [u[0], u[1]])
     }
 
@@ -508,16 +512,17 @@ impl<T: Real> TubMotion<T> {
     /// Transforms a vector from tub axes to cabinet axes.
     #[inline(always)]
     pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
-        self.tilt.in_cabinet_axes(v)
+        self.tilt.to_cabinet_axes(v)
     }
 
     /// Computes the motion of a tub point, given in tub axes from P_T.
     #[inline(always)]
     fn point(&self, tub: &Vec3<T>) -> PointMotion<T> {
-        let mut displacement = difference(self.tilt.in_cabinet_axes(tub), tub);
+        let mut displacement = subtract(self.tilt.to_cabinet_axes(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
-        let velocity = self.tilt.in_cabinet_axes(&plus_cross(&self.velocity, &self.rate, tub));
+        let velocity =
+            self.tilt.to_cabinet_axes(&add_cross_product(&self.velocity, &self.rate, tub));
         PointMotion { displacement, velocity }
     }
 }
@@ -535,7 +540,7 @@ impl<T: Real> TubLine<'_, T> {
     /// Returns l l' for the length l.
     #[inline(always)]
     fn length_times_rate(&self) -> N<T> {
-        dot(&self.span, &plus_cross(&self.tub.velocity, &self.tub.rate, self.end))
+        dot(&self.span, &add_cross_product(&self.tub.velocity, &self.tub.rate, self.end))
     }
 }
 
@@ -623,15 +628,19 @@ fn add_forces<T: Real, E: ForceLaw<T>>(
         let ends = element.ends();
         let line = TubLine { span: span(&tub.tilt, &tub.midpoint, ends), end: &ends.tub, tub };
         let force = if is_optional { element.optional_force(&line) } else { element.force(&line) };
-        add_force(load, &ends.tub, &scaled(force, line.span));
+        add_force(load, &ends.tub, &scale(force, line.span));
     }
 }
 
 /// Adds a force on a tub point, both in tub axes, and the force's moment.
 #[inline(always)]
-fn add_force<T: Real>((total, moment): &mut (Vec3<T>, Vec3<T>), at: &Vec3<T>, force: &Vec3<T>) {
-    *total = sum(*total, force);
-    *moment = plus_cross(moment, at, force);
+fn add_force<T: Real>(
+    (total, moment): &mut (Vec3<T>, Vec3<T>),
+    tub_point: &Vec3<T>,
+    force: &Vec3<T>,
+) {
+    *total = add(*total, force);
+    *moment = add_cross_product(moment, tub_point, force);
 }
 
 /// Returns the vector from the cabinet end to the tub end, in tub axes. The axis t3 has no

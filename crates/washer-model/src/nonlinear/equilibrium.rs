@@ -8,14 +8,15 @@
 //! 4. Stop when an unshifted step is below the tolerance, or when the shift exceeds its limit.
 
 use crate::coordinates::{
-    COORDINATES, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z, seeded,
+    COORDINATES, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
+    with_unit_derivative,
 };
 use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
-use crate::nonlinear::floating::Factors;
-use crate::nonlinear::{Halves, halves};
-use lane_ode::{Aside, Lane, N};
+use crate::nonlinear::floating::LdltFactors;
+use crate::nonlinear::{Halves, coupled_halves};
+use lane_ode::{Lane, N, OutOfLine};
 
 /// The greatest number of Newton steps. Basis: twice the number of undamped ones. Doubling it costs
 /// time for machines without an equilibrium.
@@ -50,7 +51,7 @@ pub(crate) struct SolveEquilibrium<'a, T> {
     pub(crate) machine: &'a Coefficients<T>,
 }
 
-impl<T: Lane> Aside for SolveEquilibrium<'_, T> {
+impl<T: Lane> OutOfLine for SolveEquilibrium<'_, T> {
     type Output = ([N<T>; COORDINATES], u32);
 
     #[inline(always)]
@@ -69,49 +70,51 @@ pub(crate) fn solve_equilibrium<T: Lane>(
     let one = zero.lit(1.0);
     let machine = machine.constant();
     let mut q = [zero; COORDINATES];
-    let mut found = 0_u32;
-    let mut lost = 0_u32;
+    let mut solved_lanes = 0_u32;
+    let mut unsolvable_lanes = 0_u32;
     let mut shift = zero;
     for iteration in 0..MAX_ITERATIONS {
         let mut stiffness = [[zero; COORDINATES]; COORDINATES];
         let mut force = [zero; COORDINATES];
         for j in 0..COORDINATES {
-            let f = static_forces(&machine, &seeded(&q, j, 1.0));
+            let forces = static_forces(&machine, &with_unit_derivative(&q, j, 1.0));
             for i in 0..COORDINATES {
-                stiffness[i][j] = N(f[i].0.slope.neg());
-                force[i] = N(f[i].0.value);
+                stiffness[i][j] = N(forces[i].0.slope.neg());
+                force[i] = N(forces[i].0.value);
             }
             stiffness[j][j] += shift;
         }
-        let factors = Factors::new(stiffness);
+        let factors = LdltFactors::new(stiffness);
         let is_stable = factors.is_positive();
         let step = factors.solve(force);
-        let mut longest = zero;
-        for s in &step {
-            longest = N(s.0.abs().larger(longest.0));
+        let mut largest_step = zero;
+        for component in &step {
+            largest_step = N(component.0.abs().larger(largest_step.0));
         }
-        let scale = longest.where_less(zero.lit(MAX_STEP), one, zero.lit(MAX_STEP) / longest);
+        let scale =
+            largest_step.where_less(zero.lit(MAX_STEP), one, zero.lit(MAX_STEP) / largest_step);
         let scale = if iteration < DAMPED_FROM { scale } else { (scale * DAMPING_FACTOR).v() };
-        let unfinished = !(found | lost);
+        let unfinished = !(solved_lanes | unsolvable_lanes);
         for lane in (0..T::LANES).filter(|lane| unfinished >> lane & 1 == 1) {
-            let added = shift.0.get(lane);
-            let longest = longest.0.get(lane);
-            if is_stable >> lane & 1 == 0 || !longest.is_finite() {
-                lost |= u32::from(added > MAX_SHIFT) << lane;
-                shift.0.set(lane, (10.0 * added).max(MIN_SHIFT));
+            let current_shift = shift.0.get(lane);
+            let largest_step = largest_step.0.get(lane);
+            if is_stable >> lane & 1 == 0 || !largest_step.is_finite() {
+                unsolvable_lanes |= u32::from(current_shift > MAX_SHIFT) << lane;
+                shift.0.set(lane, (10.0 * current_shift).max(MIN_SHIFT));
                 continue;
             }
             for i in 0..COORDINATES {
                 q[i].0.set(lane, q[i].0.get(lane) + scale.0.get(lane) * step[i].0.get(lane));
             }
-            found |= u32::from(added == 0.0 && longest < STEP_TOLERANCE) << lane;
-            shift.0.set(lane, if added > MIN_SHIFT { 0.1 * added } else { 0.0 });
+            solved_lanes |=
+                u32::from(current_shift == 0.0 && largest_step < STEP_TOLERANCE) << lane;
+            shift.0.set(lane, if current_shift > MIN_SHIFT { 0.1 * current_shift } else { 0.0 });
         }
-        if (found | lost) & ((1 << T::LANES) - 1) == (1 << T::LANES) - 1 {
+        if (solved_lanes | unsolvable_lanes) & ((1 << T::LANES) - 1) == (1 << T::LANES) - 1 {
             break;
         }
     }
-    (q, found)
+    (q, solved_lanes)
 }
 
 /// The rigid motions of tub and drum together: name, coordinates, and unit of the stiffness.
@@ -134,7 +137,7 @@ pub(crate) fn unstable_motion(
     let q = q.map(N);
     let stiffness = RIGID_MOTIONS.map(|(_, coordinates, _)| {
         let stiffness_along = |along: usize| {
-            let forces = static_forces(&machine, &seeded(&q, along, 1.0));
+            let forces = static_forces(&machine, &with_unit_derivative(&q, along, 1.0));
             coordinates.iter().map(|&i| -forces[i].0.slope).sum::<f64>()
         };
         coordinates.into_iter().map(stiffness_along).sum::<f64>()
@@ -156,7 +159,7 @@ fn static_forces<T: Lane>(
 ) -> [N<T>; COORDINATES] {
     let zero = q[0].lit(0.0);
     let spin = SpinState::new((zero, zero.lit(1.0)), zero, zero);
-    let Halves { tub, rotor } = halves(machine, &spin, q, &[zero; COORDINATES]);
+    let Halves { tub, rotor } = coupled_halves(machine, &spin, q, &[zero; COORDINATES]);
     let ([f1, f2], [f5, f6]) = tub.floating.generalised_forces();
     let ([f3, f4], [f7, f8, f9, f10]) = rotor.floating.generalised_forces();
     [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]
@@ -174,12 +177,12 @@ mod tests {
             spring.cabinet_m[2] = spring.tub_m[2];
         }
         let coefficients = Coefficients::new(&machine);
-        let (q, found) = solve_equilibrium(N(0.0), &coefficients);
-        assert_eq!(found & 1, 1);
+        let (q, solved_lanes) = solve_equilibrium(N(0.0), &coefficients);
+        assert_eq!(solved_lanes & 1, 1);
         let weight_n = (23.87 + 4.34 + 4.04) * 9.81;
         let sag_m = -(q[0].0 + 0.2068 * q[5].0);
         assert!((sag_m - weight_n / 32_000.0).abs() < 1e-5, "{sag_m} m in the springs' mid-plane");
-        for force in static_forces(&coefficients.constant(), &seeded(&q, 0, 0.0)) {
+        for force in static_forces(&coefficients.constant(), &with_unit_derivative(&q, 0, 0.0)) {
             assert!(force.0.value.abs() < 1e-5, "{} N or N m left", force.0.value);
         }
     }
@@ -198,8 +201,8 @@ mod tests {
                 softness_m: 1e-6,
                 ..BumpStop::default()
             }];
-            let (q, found) = solve_equilibrium(N(0.0), &Coefficients::new(&machine));
-            assert_eq!(found & 1, 1, "{stiffness_n_per_m:e}");
+            let (q, solved_lanes) = solve_equilibrium(N(0.0), &Coefficients::new(&machine));
+            assert_eq!(solved_lanes & 1, 1, "{stiffness_n_per_m:e}");
             let lower_m = -(q[0].0 + 0.3 * q[5].0.sin() - 0.2 * (q[5].0.cos() - 1.0));
             let into_m = lower_m - 0.005;
             // The stop carries about the weight, 320 N, and a part of the springs' moment.
@@ -217,8 +220,8 @@ mod tests {
             spring.cabinet_m[2] = spring.tub_m[2];
         }
         let coefficients = Coefficients::new(&machine);
-        let (q, found) = solve_equilibrium(N(0.0), &coefficients);
-        assert_eq!(found & 1, 0);
+        let (q, solved_lanes) = solve_equilibrium(N(0.0), &coefficients);
+        assert_eq!(solved_lanes & 1, 0);
         let (motion, stiffness, _) = unstable_motion(&coefficients, &q.map(|q| q.0)).unwrap();
         // The springs stand before O, so that yaw moves them sideways.
         assert_eq!(motion, "round the vertical (yaw)");

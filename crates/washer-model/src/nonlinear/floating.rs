@@ -21,7 +21,7 @@ pub(crate) struct AxisResponse<T> {
 /// the axis's yaw about c2, whose partial velocities have no y component; the second is the axis's
 /// pitch.
 #[derive(Clone, Copy)]
-pub(crate) struct Floating<T, const R: usize> {
+pub(crate) struct FloatingChain<T, const R: usize> {
     /// The reciprocal of the chain's mass.
     pub(crate) per_mass: N<T>,
     /// The force on the chain along y and z.
@@ -39,7 +39,7 @@ pub(crate) struct Floating<T, const R: usize> {
     pub(crate) torque: [N<T>; R],
 }
 
-impl<T: Real, const R: usize> Floating<T, R> {
+impl<T: Real, const R: usize> FloatingChain<T, R> {
     /// Adds forces on the axis.
     #[inline(always)]
     pub(crate) fn apply(&mut self, load: &AxisLoad<T>) {
@@ -78,7 +78,7 @@ impl<T: Real, const R: usize> Floating<T, R> {
     /// Computes the accelerations of midpoint and axis and the compliance C = 1/m + G^T J^-1 G.
     /// `inertia` holds the factors of J.
     #[inline(always)]
-    pub(crate) fn response(&self, inertia: &Factors<T, R>) -> AxisResponse<T> {
+    pub(crate) fn response(&self, inertia: &LdltFactors<T, R>) -> AxisResponse<T> {
         let zero = self.per_mass.lit(0.0);
         // The rows of G: the torques that `apply` adds per unit of force and moment, which by
         // virtual work are also the motions of the axis per unit of rotation.
@@ -96,7 +96,7 @@ impl<T: Real, const R: usize> Floating<T, R> {
         // sides.
         for j in 0..R {
             for i in j + 1..R {
-                let l = inertia.below(i, j);
+                let l = inertia.lower_entry(i, j);
                 start[i] -= l * start[j];
                 for k in 0..4 {
                     half[i][k] -= l * half[j][k];
@@ -129,7 +129,7 @@ impl<T: Real, const R: usize> Floating<T, R> {
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
-        inertia: &Factors<T, R>,
+        inertia: &LdltFactors<T, R>,
         load: &AxisLoad<T>,
     ) -> ([N<T>; 2], [N<T>; R]) {
         let (force, torque) = self.with_load(load);
@@ -163,12 +163,12 @@ impl<T: Real, const R: usize> Floating<T, R> {
 
 /// The L D L^T factors of a symmetric positive definite matrix.
 #[derive(Clone, Copy)]
-pub(crate) struct Factors<T, const R: usize> {
+pub(crate) struct LdltFactors<T, const R: usize> {
     /// L below the diagonal, without its unit diagonal, and 1/D on the diagonal.
     packed: [[N<T>; R]; R],
 }
 
-impl<T: Real, const R: usize> Factors<T, R> {
+impl<T: Real, const R: usize> LdltFactors<T, R> {
     /// Factors the lower triangle of `a`.
     #[inline(always)]
     pub(crate) fn new(mut a: [[N<T>; R]; R]) -> Self {
@@ -194,7 +194,7 @@ impl<T: Real, const R: usize> Factors<T, R> {
 
     /// Returns entry (row, column) of L, below the diagonal.
     #[inline(always)]
-    fn below(&self, row: usize, column: usize) -> N<T> {
+    fn lower_entry(&self, row: usize, column: usize) -> N<T> {
         self.packed[row][column]
     }
 

@@ -35,7 +35,7 @@ lane_struct! {
 impl<T: Real> Deflection<T> {
     /// Computes the bearing load on the shaft.
     #[inline(always)]
-    pub(crate) fn load(&self, b: &Bodies<T>) -> AxisLoad<T> {
+    pub(crate) fn load_on_shaft(&self, b: &Bodies<T>) -> AxisLoad<T> {
         let zero = b.front_stiffness.lit(0.0);
         let mut load = AxisLoad { force: [zero; 2], moment: [zero; 2] };
         for (position, stiffness) in
@@ -54,7 +54,7 @@ impl<T: Real> Deflection<T> {
 /// Computes the moments of the flexure about q9 and q10 from their sines and cosines: the
 /// derivatives of K_D phi^2 / 2 with cos phi = cos q9 cos q10.
 #[inline(always)]
-pub(crate) fn flexure<T: Real>(
+pub(crate) fn flexure_moments<T: Real>(
     stiffness: N<T>,
     (s9, c9): (N<T>, N<T>),
     (s10, c10): (N<T>, N<T>),

@@ -12,7 +12,7 @@ pub(crate) type Vec3<T> = [N<T>; 3];
 
 /// Returns k v.
 #[inline(always)]
-pub(crate) fn scaled<T: Real, const K: usize>(k: N<T>, mut v: [N<T>; K]) -> [N<T>; K] {
+pub(crate) fn scale<T: Real, const K: usize>(k: N<T>, mut v: [N<T>; K]) -> [N<T>; K] {
     for x in &mut v {
         *x = (k * *x).v();
     }
@@ -21,7 +21,7 @@ pub(crate) fn scaled<T: Real, const K: usize>(k: N<T>, mut v: [N<T>; K]) -> [N<T
 
 /// Returns a + b.
 #[inline(always)]
-pub(crate) fn sum<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
+pub(crate) fn add<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
     for i in 0..K {
         a[i] += b[i];
     }
@@ -30,7 +30,7 @@ pub(crate) fn sum<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [
 
 /// Returns a - b.
 #[inline(always)]
-pub(crate) fn difference<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
+pub(crate) fn subtract<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
     for i in 0..K {
         a[i] -= b[i];
     }
@@ -39,13 +39,13 @@ pub(crate) fn difference<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K
 
 /// Returns j a + k b.
 #[inline(always)]
-pub(crate) fn combination<T: Real>(j: N<T>, a: &Vec3<T>, k: N<T>, b: &Vec3<T>) -> Vec3<T> {
+pub(crate) fn linear_combination<T: Real>(j: N<T>, a: &Vec3<T>, k: N<T>, b: &Vec3<T>) -> Vec3<T> {
     [j * a[0] + k * b[0], j * a[1] + k * b[1], j * a[2] + k * b[2]]
 }
 
 /// Returns start + a x b.
 #[inline(always)]
-pub(crate) fn plus_cross<T: Real>(start: &Vec3<T>, a: &Vec3<T>, b: &Vec3<T>) -> Vec3<T> {
+pub(crate) fn add_cross_product<T: Real>(start: &Vec3<T>, a: &Vec3<T>, b: &Vec3<T>) -> Vec3<T> {
     [
         start[0] + a[1] * b[2] - a[2] * b[1],
         start[1] + a[2] * b[0] - a[0] * b[2],
@@ -101,7 +101,7 @@ impl<T: Real> Tilt<T> {
 
     /// Transforms a vector from frame axes to cabinet axes. a3 is (sin yaw, 0, cos yaw).
     #[inline(always)]
-    pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+    pub(crate) fn to_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
         let [a1, a2] = [&self.axis_c, &self.second_c];
         [
             a1[0] * v[0] + (a2[0] * v[1] + self.sin_yaw * v[2]),
@@ -112,14 +112,18 @@ impl<T: Real> Tilt<T> {
 
     /// Transforms a vector from cabinet axes to frame axes.
     #[inline(always)]
-    pub(crate) fn in_own_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+    pub(crate) fn to_frame_axes(&self, v: &Vec3<T>) -> Vec3<T> {
         [dot(&self.axis_c, v), dot(&self.second_c, v), self.sin_yaw * v[0] + self.cos_yaw * v[2]]
     }
 
     /// Computes the frame's angular velocity, and its angular acceleration and the second
     /// derivative of its axis at constant generalised speeds.
     #[inline(always)]
-    pub(crate) fn motion(&self, yaw_rate: N<T>, pitch_rate: N<T>) -> TiltMotion<T> {
+    pub(crate) fn motion_at_constant_speeds(
+        &self,
+        yaw_rate: N<T>,
+        pitch_rate: N<T>,
+    ) -> TiltMotion<T> {
         let rate = [(yaw_rate * self.sin_pitch).v(), (yaw_rate * self.cos_pitch).v(), pitch_rate];
         let [x, y, z] = rate;
         TiltMotion {

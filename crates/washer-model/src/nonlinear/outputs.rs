@@ -8,9 +8,9 @@ use crate::coordinates::{
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::frame::{
-    Tilt, TiltMotion, Vec3, combination, difference, plus_cross, scaled, sum,
+    Tilt, TiltMotion, Vec3, add, add_cross_product, linear_combination, scale, subtract,
 };
-use crate::nonlinear::{into_spin, out_of_hinge, out_of_spin};
+use crate::nonlinear::{from_shaft_axes, hinge_to_shaft_axes, to_shaft_axes};
 use lane_ode::{N, Real, Sample};
 
 /// The number of components of the radial distance between drum and tub.
@@ -64,11 +64,16 @@ channels!(declare_outputs);
 
 /// Returns j a + k b.
 #[inline(always)]
-fn blend<T: Real>(j: N<T>, a: &MovingVector<T>, k: N<T>, b: &MovingVector<T>) -> MovingVector<T> {
+fn combine_moving_vectors<T: Real>(
+    j: N<T>,
+    a: &MovingVector<T>,
+    k: N<T>,
+    b: &MovingVector<T>,
+) -> MovingVector<T> {
     MovingVector {
-        value: combination(j, &a.value, k, &b.value),
-        rate: combination(j, &a.rate, k, &b.rate),
-        second: combination(j, &a.second, k, &b.second),
+        value: linear_combination(j, &a.value, k, &b.value),
+        rate: linear_combination(j, &a.rate, k, &b.rate),
+        second: linear_combination(j, &a.second, k, &b.second),
     }
 }
 
@@ -89,20 +94,20 @@ impl<T: Real> Axes<T> {
     pub(crate) fn new(spin: &SpinState<T>, motion: &MovingCoordinates<T>) -> Self {
         let MovingCoordinates { q, u, a } = motion;
         let tub = Tilt::tub(q);
-        let tub_motion = tub.motion(u[TUB_YAW], u[TUB_PITCH]);
+        let tub_motion = tub.motion_at_constant_speeds(u[TUB_YAW], u[TUB_PITCH]);
         let shaft = Tilt::shaft(q);
-        let shaft_motion = shaft.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
+        let shaft_motion = shaft.motion_at_constant_speeds(u[SHAFT_YAW], u[SHAFT_PITCH]);
         let (s9, c9) = q[HINGE_YAW].sin_cos();
 
         // Angular velocities and accelerations of the shaft in axes S and of the drum in axes E, as
-        // in `nonlinear::rotor` but with u'.
+        // in `nonlinear::assemble_rotor` but with u'.
         let omega_s = {
-            let [x, y, z] = into_spin(spin, &shaft_motion.rate);
+            let [x, y, z] = to_shaft_axes(spin, &shaft_motion.rate);
             [x + spin.speed, y, z]
         };
         let alpha_s = {
             let alpha = angular_acceleration(&shaft, &shaft_motion, motion, SHAFT_YAW);
-            let [x, y, z] = into_spin(spin, &alpha);
+            let [x, y, z] = to_shaft_axes(spin, &alpha);
             [x + spin.acceleration, y + spin.speed * omega_s[2], z - spin.speed * omega_s[1]]
         };
         let u9 = u[HINGE_YAW];
@@ -139,16 +144,19 @@ impl<T: Real> Axes<T> {
         b: &Bodies<T>,
         motion: &MovingCoordinates<T>,
     ) -> [Sample<T>; RADIAL] {
-        let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
+        let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let drum_front = self.drum_front(b, motion);
         let [omega, alpha] = &self.tub_turn;
-        let apart = self.tub.in_own_axes(&difference(drum_front.value, &tub_front.value));
-        let velocity = self.tub.in_own_axes(&difference(drum_front.rate, &tub_front.rate));
-        let acceleration = self.tub.in_own_axes(&difference(drum_front.second, &tub_front.second));
+        let apart = self.tub.to_frame_axes(&subtract(drum_front.value, &tub_front.value));
+        let velocity = self.tub.to_frame_axes(&subtract(drum_front.rate, &tub_front.rate));
+        let acceleration = self.tub.to_frame_axes(&subtract(drum_front.second, &tub_front.second));
         // Derivatives in the rotating frame of the tub.
-        let rate = plus_cross(&velocity, &apart, omega);
-        let second =
-            plus_cross(&plus_cross(&acceleration, &apart, alpha), &sum(velocity, &rate), omega);
+        let rate = add_cross_product(&velocity, &apart, omega);
+        let second = add_cross_product(
+            &add_cross_product(&acceleration, &apart, alpha),
+            &add(velocity, &rate),
+            omega,
+        );
         [sample(apart[1], rate[1], second[1]), sample(apart[2], rate[2], second[2])]
     }
 
@@ -159,32 +167,40 @@ impl<T: Real> Axes<T> {
         b: &Bodies<T>,
         motion: &MovingCoordinates<T>,
     ) -> [Sample<T>; CHANNELS] {
-        let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
-        let tub_centre = point(motion, TUB_Y, &self.tub_axis, b.tub_centre);
+        let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front);
+        let tub_centre = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_centre);
         let drum_front = self.drum_front(b, motion);
-        let mut rho = blend(b.rho_1, &self.drum[0], b.rho_2, &self.drum[1]);
+        let mut rho = combine_moving_vectors(b.rho_1, &self.drum[0], b.rho_2, &self.drum[1]);
         let one = b.tub_share.lit(1.0);
         if b.is_skewed.holds() {
-            rho = blend(one, &rho, b.rho_3, &moving_cross(&self.drum[0], &self.drum[1]));
+            rho = combine_moving_vectors(
+                one,
+                &rho,
+                b.rho_3,
+                &moving_cross(&self.drum[0], &self.drum[1]),
+            );
         }
-        let rotor_centre = blend(b.along_shaft, &self.shaft_axis, b.drum_share, &rho);
-        let rotor_centre = point(motion, SHAFT_Y, &rotor_centre, one);
-        let total_centre = blend(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
+        let rotor_centre =
+            combine_moving_vectors(b.along_shaft, &self.shaft_axis, b.drum_share, &rho);
+        let rotor_centre = moving_point(motion, SHAFT_Y, &rotor_centre, one);
+        let total_centre =
+            combine_moving_vectors(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
         channel_motions(&ChannelPoints { tub_front, drum_front, total_centre }, motion)
     }
 
     #[inline(always)]
     fn drum_front(&self, b: &Bodies<T>, motion: &MovingCoordinates<T>) -> MovingVector<T> {
         let one = b.drum_hinge.lit(1.0);
-        let front = blend(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]);
-        point(motion, SHAFT_Y, &front, one)
+        let front =
+            combine_moving_vectors(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]);
+        moving_point(motion, SHAFT_Y, &front, one)
     }
 }
 
 /// Computes the squared distance of the drum's front centre from the tub axis. The distance itself
 /// is not smooth at zero.
 #[inline(always)]
-pub(crate) fn squared<T: Real>([y, z]: &[Sample<T>; RADIAL]) -> Sample<T> {
+pub(crate) fn squared_distance<T: Real>([y, z]: &[Sample<T>; RADIAL]) -> Sample<T> {
     sample(
         y.value * y.value + z.value * z.value,
         (2.0 * (y.value * y.slope + z.value * z.slope)).v(),
@@ -231,12 +247,12 @@ fn moving_axis<T: Real>(
     let zero = rates[0].lit(0.0);
     let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
     let by_pitch = &tilt.second_c;
-    let at_constant_speeds = tilt.in_cabinet_axes(&at.axis_acceleration);
-    let by_accelerations = combination(seconds[0], &by_yaw, seconds[1], by_pitch);
+    let at_constant_speeds = tilt.to_cabinet_axes(&at.axis_acceleration);
+    let by_accelerations = linear_combination(seconds[0], &by_yaw, seconds[1], by_pitch);
     MovingVector {
         value: tilt.axis_c,
-        rate: combination(rates[0], &by_yaw, rates[1], by_pitch),
-        second: sum(at_constant_speeds, &by_accelerations),
+        rate: linear_combination(rates[0], &by_yaw, rates[1], by_pitch),
+        second: add(at_constant_speeds, &by_accelerations),
     }
 }
 
@@ -252,12 +268,12 @@ fn moving_drum_vector<T: Real>(
 ) -> MovingVector<T> {
     let zero = v[0].lit(0.0);
     let still = [zero; 3];
-    let rate = plus_cross(&still, &turn[0], v);
-    let second = plus_cross(&plus_cross(&still, &turn[1], v), &turn[0], &rate);
+    let rate = add_cross_product(&still, &turn[0], v);
+    let second = add_cross_product(&add_cross_product(&still, &turn[1], v), &turn[0], &rate);
     MovingVector {
-        value: out_of_drum(shaft, spin, hinge, v),
-        rate: out_of_drum(shaft, spin, hinge, &rate),
-        second: out_of_drum(shaft, spin, hinge, &second),
+        value: drum_to_cabinet_axes(shaft, spin, hinge, v),
+        rate: drum_to_cabinet_axes(shaft, spin, hinge, &rate),
+        second: drum_to_cabinet_axes(shaft, spin, hinge, &second),
     }
 }
 
@@ -265,38 +281,38 @@ fn moving_drum_vector<T: Real>(
 #[inline(always)]
 fn moving_cross<T: Real>(a: &MovingVector<T>, b: &MovingVector<T>) -> MovingVector<T> {
     let zero = [a.value[0].lit(0.0); 3];
-    let value = plus_cross(&zero, &a.value, &b.value);
-    let rate = plus_cross(&plus_cross(&zero, &a.rate, &b.value), &a.value, &b.rate);
-    let mixed = plus_cross(&zero, &a.rate, &b.rate);
-    let second = plus_cross(&sum(mixed, &mixed), &a.second, &b.value);
-    MovingVector { value, rate, second: plus_cross(&second, &a.value, &b.second) }
+    let value = add_cross_product(&zero, &a.value, &b.value);
+    let rate = add_cross_product(&add_cross_product(&zero, &a.rate, &b.value), &a.value, &b.rate);
+    let mixed = add_cross_product(&zero, &a.rate, &b.rate);
+    let second = add_cross_product(&add(mixed, &mixed), &a.second, &b.value);
+    MovingVector { value, rate, second: add_cross_product(&second, &a.value, &b.second) }
 }
 
 /// Transforms a vector from the hinge's axes E to cabinet axes.
 #[inline(always)]
-fn out_of_drum<T: Real>(
+fn drum_to_cabinet_axes<T: Real>(
     shaft: &Tilt<T>,
     spin: &SpinState<T>,
     (s9, c9): (N<T>, N<T>),
     v: &Vec3<T>,
 ) -> Vec3<T> {
-    shaft.in_cabinet_axes(&out_of_spin(spin, &out_of_hinge(s9, c9, v)))
+    shaft.to_cabinet_axes(&from_shaft_axes(spin, &hinge_to_shaft_axes(s9, c9, v)))
 }
 
 /// Computes the motion of the point at `distance` along an axis from a bearing midpoint. Coordinate
 /// `first` is the midpoint's displacement along c2 and the next one that along c3; midpoints do not
 /// move along c1.
 #[inline(always)]
-fn point<T: Real>(
+fn moving_point<T: Real>(
     motion: &MovingCoordinates<T>,
     first: usize,
     axis: &MovingVector<T>,
     distance: N<T>,
 ) -> MovingVector<T> {
     let mut vector = MovingVector {
-        value: scaled(distance, axis.value),
-        rate: scaled(distance, axis.rate),
-        second: scaled(distance, axis.second),
+        value: scale(distance, axis.value),
+        rate: scale(distance, axis.rate),
+        second: scale(distance, axis.second),
     };
     for i in 0..2 {
         vector.value[1 + i] += motion.q[first + i];

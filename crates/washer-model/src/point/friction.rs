@@ -9,9 +9,9 @@ pub struct FrictionSpeed {
     pub damper: usize,
     pub speed_m_per_s: f64,
     /// Whether the speed was found from the linear motion, not given by the user.
-    pub is_own: bool,
+    pub is_from_motion: bool,
     /// The speed v_s (m/s), below which the force law of friction is that of a viscous damper.
-    pub(crate) least_m_per_s: f64,
+    pub(crate) viscous_limit_m_per_s: f64,
 }
 
 impl FrictionSpeed {
@@ -24,8 +24,8 @@ impl FrictionSpeed {
             (damper.friction_n != 0.0 && damper.free_stroke_m == 0.0).then(|| Self {
                 damper: index,
                 speed_m_per_s: given.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S),
-                is_own: given.is_none(),
-                least_m_per_s: 4.0 * damper.friction_speed_m_per_s / PI,
+                is_from_motion: given.is_none(),
+                viscous_limit_m_per_s: 4.0 * damper.friction_speed_m_per_s / PI,
             })
         };
         machine.dampers.iter().enumerate().filter_map(friction_speed).collect()

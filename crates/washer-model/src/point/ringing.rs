@@ -39,13 +39,13 @@ const ANGLES_RAD: [f64; 4] = [0.0, 0.5 * PI, PI, 1.5 * PI];
 
 /// The deflections of the free machine.
 #[derive(Clone, Copy, Debug, Default)]
-struct Deflection {
+struct FrontDeflection {
     drum_front_m: f64,
     tub_front_m: f64,
     tub_rad: f64,
 }
 
-impl Deflection {
+impl FrontDeflection {
     /// Returns the component-wise maximum.
     fn max(self, other: Self) -> Self {
         Self {
@@ -59,22 +59,22 @@ impl Deflection {
 /// The greatest deflections under all jumps of the drum's acceleration.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ringing {
-    bearings: Deflection,
-    hinge_and_bearings: Deflection,
+    bearings: FrontDeflection,
+    hinge_and_bearings: FrontDeflection,
 }
 
 /// Returns the sum of all jumps of the drum's acceleration before `end_s` (rad/s^2).
 pub(crate) fn jumps_rad_per_s2(stretches: &[SpinStretch], end_s: f64) -> f64 {
-    let mut before = 0.0;
+    let mut previous_rad_per_s2 = 0.0;
     let mut sum = 0.0;
     for (i, stretch) in stretches.iter().enumerate() {
-        let at_s = stretch.start_s.0;
-        if at_s >= end_s {
+        let start_s = stretch.start_s.0;
+        if start_s >= end_s {
             break;
         }
-        sum += (stretch.acceleration_rad_per_s2(at_s) - before).abs();
+        sum += (stretch.acceleration_rad_per_s2(start_s) - previous_rad_per_s2).abs();
         if let Some(next) = stretches.get(i + 1) {
-            before = stretch.acceleration_rad_per_s2(next.start_s.0);
+            previous_rad_per_s2 = stretch.acceleration_rad_per_s2(next.start_s.0);
         }
     }
     sum
@@ -107,8 +107,10 @@ impl Ringing {
         jumps_rad_per_s2: f64,
         matrices_at: impl Fn(f64, f64) -> Matrices,
     ) -> Self {
-        let mut ringing =
-            Self { bearings: Deflection::default(), hinge_and_bearings: Deflection::default() };
+        let mut ringing = Self {
+            bearings: FrontDeflection::default(),
+            hinge_and_bearings: FrontDeflection::default(),
+        };
         for angle_rad in ANGLES_RAD {
             let still = matrices_at(angle_rad, 0.0);
             let accelerated = matrices_at(angle_rad, jumps_rad_per_s2);
@@ -204,7 +206,7 @@ impl<'a> FreeMachine<'a> {
 
     /// Returns the deflections if bearings and hinge deflect by `elastic`. The tub moves against
     /// shaft and drum so that momentum is conserved.
-    fn deflection(&self, machine: &Machine, elastic: &[f64; COORDINATES]) -> Deflection {
+    fn deflection(&self, machine: &Machine, elastic: &[f64; COORDINATES]) -> FrontDeflection {
         let rigid = self.rigid_motion(&self.mass_times(elastic));
         let drum = &machine.drum;
         let tub_m = rigid[TUB_Y].hypot(rigid[TUB_Z]);
@@ -215,7 +217,7 @@ impl<'a> FreeMachine<'a> {
         let drum_front_m = bearings_m
             + drum.front_x_m.abs() * bearings_rad
             + (drum.front_x_m - drum.hinge_x_m).abs() * hinge_rad;
-        Deflection {
+        FrontDeflection {
             drum_front_m: drum_front_m + tub_m + drum.front_x_m.abs() * tub_rad,
             tub_front_m: tub_m + machine.tub.front_x_m.abs() * tub_rad,
             tub_rad,

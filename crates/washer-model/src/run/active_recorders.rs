@@ -1,42 +1,42 @@
 //! The recorders that are in use only on request: root mean squares, turns, gauges and snapshots.
 //!
 //! These recorders run over lanes after every step, in a function that is not inlined
-//! ([`Lane::aside`]), so that the loop over steps is not slower if they are not in use.
+//! ([`Lane::run_out_of_line`]), so that the loop over steps is not slower if they are not in use.
 
 use super::Method;
 use super::loads::{Gauge, Loads};
 use super::snapshots::Snapshots;
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::machine::spin::cuts_s;
-use crate::nonlinear::outputs::{RADIAL, squared};
+use crate::machine::spin::whole_turn_cuts_s;
+use crate::nonlinear::outputs::{RADIAL, squared_distance};
 use crate::{ModelKind, Point, Reading, Recorders};
-use lane_ode::{Aside, Lane, N, PartPeaks, Sample, SquareIntegrals, TimeAbove};
+use lane_ode::{IntervalPeaks, Lane, N, OutOfLine, Sample, SquareIntegrals, TimeAbove};
 
 /// The number of parts of a long step at whose ends loads are evaluated.
 ///
 /// Basis: steps of order 8 last a few ms, and forces peak within them; not measured. Doubling it
 /// doubles the cost of loads.
-const LONG_STEP_PARTS: u32 = 4;
+const LONG_STEP_SUBSTEPS: u32 = 4;
 
 /// The length (s) of the parts of a step with capped modes.
 ///
 /// Basis: forty parts in a period of 25 Hz, the turns of a drum at 1500 rpm. Doubling it halves the
 /// cost of loads and misses more of their peaks.
-const CAPPED_PART_S: f64 = 1e-3;
+const CAPPED_SUBSTEP_S: f64 = 1e-3;
 
 /// The parts of a step at whose ends loads are evaluated.
 #[derive(Clone, Copy)]
-pub(crate) struct StepParts {
+pub(crate) struct Substeps {
     /// The number of parts.
     count: u32,
 }
 
-impl StepParts {
+impl Substeps {
     /// Returns into how many parts each step is divided: one if steps are short because the
-    /// bearings limit them, else [`LONG_STEP_PARTS`].
+    /// bearings limit them, else [`LONG_STEP_SUBSTEPS`].
     pub(crate) const fn new(are_short: bool) -> Self {
-        Self { count: if are_short { 1 } else { LONG_STEP_PARTS } }
+        Self { count: if are_short { 1 } else { LONG_STEP_SUBSTEPS } }
     }
 
     /// Returns into how many parts the steps of a method are divided.
@@ -44,8 +44,8 @@ impl StepParts {
         match method {
             Method::Rk4 { .. } => Self::new(true),
             Method::Capped { step_s, .. } => {
-                let count = (step_s / CAPPED_PART_S).ceil() as u32;
-                Self { count: count.clamp(1, LONG_STEP_PARTS) }
+                let count = (step_s / CAPPED_SUBSTEP_S).ceil() as u32;
+                Self { count: count.clamp(1, LONG_STEP_SUBSTEPS) }
             }
             _ => Self::new(false),
         }
@@ -55,11 +55,11 @@ impl StepParts {
 /// The state of the recorders in use, over lanes.
 pub(crate) struct ActiveRecorders<T> {
     recorders: Recorders,
-    squares: SquareIntegrals<T, CHANNELS>,
-    turns: PartPeaks<T, CHANNELS>,
+    square_integrals: SquareIntegrals<T, CHANNELS>,
+    turn_peaks: IntervalPeaks<T, CHANNELS>,
     loads: Option<Loads<T>>,
     /// The time with a gap below zero.
-    clash: TimeAbove<T>,
+    clash_time: TimeAbove<T>,
     clearance_squared: N<T>,
     snapshots: Option<Snapshots<T>>,
     /// The readings of every point; empty for points that have not ended.
@@ -73,7 +73,7 @@ impl<T: Lane> ActiveRecorders<T> {
     pub(crate) fn new(
         zero: N<T>,
         recorders: Recorders,
-        (model, parts): (ModelKind, StepParts),
+        (model, substeps): (ModelKind, Substeps),
         point: &Point,
         count: usize,
     ) -> Option<Self> {
@@ -84,10 +84,10 @@ impl<T: Lane> ActiveRecorders<T> {
         let snapshots = if recorders.snapshots { Some(Snapshots::new(zero)) } else { None };
         Some(Self {
             recorders,
-            squares: SquareIntegrals::new(zero),
-            turns: PartPeaks::new(zero),
-            loads: Loads::new(zero, recorders.gauges, model, point, parts.count),
-            clash: TimeAbove::new(zero),
+            square_integrals: SquareIntegrals::new(zero),
+            turn_peaks: IntervalPeaks::new(zero),
+            loads: Loads::new(zero, recorders.gauges, model, point, substeps.count),
+            clash_time: TimeAbove::new(zero),
             clearance_squared: zero,
             snapshots,
             readings: vec![Reading::default(); count],
@@ -96,12 +96,12 @@ impl<T: Lane> ActiveRecorders<T> {
 
     /// Begins a point's trajectory in one lane.
     pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
-        self.squares.reset(lane);
+        self.square_integrals.reset(lane);
         let clearance_m = point.machine.bodies.clearance.0;
-        self.clash.reset(lane);
+        self.clash_time.reset(lane);
         self.clearance_squared.0.set(lane, clearance_m * clearance_m);
         if self.recorders.turns {
-            self.turns.reset(lane, &cuts_s(&point.stretches, point.window_s()));
+            self.turn_peaks.reset(lane, &whole_turn_cuts_s(&point.stretches, point.window_s()));
         }
         if let Some(loads) = &mut self.loads {
             loads.set_point(lane, point);
@@ -114,7 +114,7 @@ impl<T: Lane> ActiveRecorders<T> {
     /// Ends a lane's trajectory, that of point `index`. A failed trajectory leaves no readings.
     pub(crate) fn finish(&mut self, lane: usize, index: usize, point: &Point, failed: bool) {
         let recorders = self.recorders;
-        let turns = if recorders.turns { self.turns.finish(lane) } else { Vec::new() };
+        let turns = if recorders.turns { self.turn_peaks.finish(lane) } else { Vec::new() };
         let snapshots = match &mut self.snapshots {
             Some(snapshots) => snapshots.finish(lane),
             None => Vec::new(),
@@ -127,12 +127,12 @@ impl<T: Lane> ActiveRecorders<T> {
         let root_mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let gauges = Gauge::ALL.map(|gauge| match &self.loads {
             _ if !recorders.has_gauge(gauge) => Vec::new(),
-            _ if gauge == Gauge::ClashTime => vec![self.clash.lane(lane)],
+            _ if gauge == Gauge::ClashTime => vec![self.clash_time.lane(lane)],
             Some(loads) => loads.gauge(gauge, lane, point),
             None => Vec::new(),
         });
         let root_mean_squares = match recorders.root_mean_squares {
-            true => Some(self.squares.lane(lane).map(root_mean)),
+            true => Some(self.square_integrals.lane(lane).map(root_mean)),
             false => None,
         };
         let checkpoints = Vec::new();
@@ -154,7 +154,7 @@ pub(crate) struct ObservedState<'a, T: Lane> {
     pub(crate) lanes_in_window: T::Mask,
 }
 
-impl<T: Lane> Aside for ObservedState<'_, T> {
+impl<T: Lane> OutOfLine for ObservedState<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -163,16 +163,18 @@ impl<T: Lane> Aside for ObservedState<'_, T> {
         let recorders = active.recorders;
         if recorders.root_mean_squares {
             match step {
-                Some((_, length_s)) => active.squares.advance(length_s, channels, lanes_in_window),
-                None => active.squares.begin(channels),
+                Some((_, length_s)) => {
+                    active.square_integrals.advance(length_s, channels, lanes_in_window)
+                }
+                None => active.square_integrals.begin(channels),
             }
         }
         if recorders.turns {
             match step {
                 Some((end_s, length_s)) => {
-                    active.turns.advance(end_s, length_s, channels, lanes_in_window)
+                    active.turn_peaks.advance(end_s, length_s, channels, lanes_in_window)
                 }
-                None => active.turns.begin(channels, lanes_in_window),
+                None => active.turn_peaks.begin(channels, lanes_in_window),
             }
         }
         if let Some(loads) = &mut active.loads {
@@ -184,11 +186,13 @@ impl<T: Lane> Aside for ObservedState<'_, T> {
         if recorders.has_gauge(Gauge::ClashTime) {
             // The gap is negative where the square of the radial distance exceeds that of the
             // clearance.
-            let mut overlap = squared(radial);
+            let mut overlap = squared_distance(radial);
             overlap.value -= active.clearance_squared;
             match step {
-                Some((_, length_s)) => active.clash.advance(length_s, &overlap, lanes_in_window),
-                None => active.clash.begin(&overlap),
+                Some((_, length_s)) => {
+                    active.clash_time.advance(length_s, &overlap, lanes_in_window)
+                }
+                None => active.clash_time.begin(&overlap),
             }
         }
     }

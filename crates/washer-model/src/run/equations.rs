@@ -7,7 +7,7 @@ use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::{COORDINATES, ModelKind, Point};
-use lane_ode::{Aside, Dual, N, Partials, Simd};
+use lane_ode::{Dual, N, OutOfLine, Partials, Simd};
 use std::sync::Arc;
 
 /// The length of a state: the ten coordinates q1 to q10 (m, rad), then their speeds.
@@ -26,7 +26,7 @@ pub struct PointEquations {
 /// A model over plain numbers and over dual numbers.
 struct Differentiable<M, J> {
     model: M,
-    dual: J,
+    dual_model: J,
 }
 
 /// The nonlinear or the linear model.
@@ -67,10 +67,10 @@ impl PointEquations {
         self.select_stretch(t_s);
         match &self.model {
             EitherModel::Nonlinear(models) => {
-                Simd::one_lane(Derivative { model: &models.model, t_s, x })
+                Simd::one_lane(DerivativeKernel { model: &models.model, t_s, x })
             }
             EitherModel::Linear(models) => {
-                Simd::one_lane(Derivative { model: &models.model, t_s, x })
+                Simd::one_lane(DerivativeKernel { model: &models.model, t_s, x })
             }
         }
     }
@@ -80,9 +80,11 @@ impl PointEquations {
         self.select_stretch(t_s);
         let partials = match &self.model {
             EitherModel::Nonlinear(models) => {
-                Simd::one_lane(Jacobian { dual: &models.dual, t_s, x })
+                Simd::one_lane(JacobianKernel { dual: &models.dual_model, t_s, x })
             }
-            EitherModel::Linear(models) => Simd::one_lane(Jacobian { dual: &models.dual, t_s, x }),
+            EitherModel::Linear(models) => {
+                Simd::one_lane(JacobianKernel { dual: &models.dual_model, t_s, x })
+            }
         };
         let mut rows = [[0.0; STATES]; STATES];
         for i in 0..COORDINATES {
@@ -105,9 +107,11 @@ impl PointEquations {
         self.select_stretch(t_s);
         match &self.model {
             EitherModel::Nonlinear(models) => {
-                Simd::one_lane(Outputs { model: &models.model, t_s, x })
+                Simd::one_lane(ChannelKernel { model: &models.model, t_s, x })
             }
-            EitherModel::Linear(models) => Simd::one_lane(Outputs { model: &models.model, t_s, x }),
+            EitherModel::Linear(models) => {
+                Simd::one_lane(ChannelKernel { model: &models.model, t_s, x })
+            }
         }
     }
 
@@ -131,24 +135,24 @@ impl<M: LaneModel<f64>, J: LaneModel<Dual<f64>>> Differentiable<M, J> {
     fn new(point: &Point) -> Box<Self> {
         Box::new(Self {
             model: M::splat(N(0.0), point, Coupling::Springs),
-            dual: J::splat(N(0.0).constant(), point, Coupling::Springs),
+            dual_model: J::splat(N(0.0).constant(), point, Coupling::Springs),
         })
     }
 
     fn set_spin(&mut self, stretch: &SpinStretch) {
         self.model.set_spin(0, stretch);
-        self.dual.set_spin(0, stretch);
+        self.dual_model.set_spin(0, stretch);
     }
 }
 
 /// The computation of f.
-struct Derivative<'a, M> {
+struct DerivativeKernel<'a, M> {
     model: &'a M,
     t_s: f64,
     x: &'a [f64; STATES],
 }
 
-impl<M: LaneModel<f64>> Aside for Derivative<'_, M> {
+impl<M: LaneModel<f64>> OutOfLine for DerivativeKernel<'_, M> {
     type Output = [f64; STATES];
     #[inline(always)]
     fn run(self) -> [f64; STATES] {
@@ -158,13 +162,13 @@ impl<M: LaneModel<f64>> Aside for Derivative<'_, M> {
 }
 
 /// The computation of the Jacobian of f by automatic differentiation.
-struct Jacobian<'a, J> {
+struct JacobianKernel<'a, J> {
     dual: &'a J,
     t_s: f64,
     x: &'a [f64; STATES],
 }
 
-impl<J: LaneModel<Dual<f64>>> Aside for Jacobian<'_, J> {
+impl<J: LaneModel<Dual<f64>>> OutOfLine for JacobianKernel<'_, J> {
     type Output = Partials<COORDINATES>;
     #[inline(always)]
     fn run(self) -> Partials<COORDINATES> {
@@ -175,13 +179,13 @@ impl<J: LaneModel<Dual<f64>>> Aside for Jacobian<'_, J> {
 }
 
 /// The computation of the channels and their rates.
-struct Outputs<'a, M> {
+struct ChannelKernel<'a, M> {
     model: &'a M,
     t_s: f64,
     x: &'a [f64; STATES],
 }
 
-impl<M: LaneModel<f64>> Aside for Outputs<'_, M> {
+impl<M: LaneModel<f64>> OutOfLine for ChannelKernel<'_, M> {
     type Output = ([f64; CHANNELS], [f64; CHANNELS]);
     #[inline(always)]
     fn run(self) -> Self::Output {

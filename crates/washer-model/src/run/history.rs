@@ -10,10 +10,10 @@ use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
-use crate::nonlinear::outputs::squared;
+use crate::nonlinear::outputs::squared_distance;
 use crate::run::method::{
-    LinearFamily, ModelFamily, NonlinearFamily, Rk4Stepper, Stepper, StepperVisitor, coupling,
-    start_segment,
+    LinearFamily, ModelFamily, NonlinearFamily, Rk4Stepper, Stepper, StepperVisitor,
+    coupling_for_method, start_segment,
 };
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::run::snapshots::share_of_step;
@@ -21,8 +21,8 @@ use crate::run::suspension::forces;
 use crate::{COORDINATES, Forces, Method, ModelKind, Point};
 use core::marker::PhantomData;
 use lane_ode::{
-    Aside, Cancel, Failure, Kernel, Lane, MAX_LANES, N, Sample, Segment, SegmentEnd, Simd, Step,
-    Task,
+    Cancel, Failure, Kernel, Lane, MAX_LANES, N, ObservedStep, OutOfLine, Sample, Segment,
+    SegmentEnd, Simd, Task,
 };
 
 /// A trajectory at given instants.
@@ -38,7 +38,7 @@ pub struct History<'a> {
 
 /// The outputs of a trajectory at an instant.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Instant {
+pub struct InstantOutputs {
     /// The channels' deviations from equilibrium (m, rad), in the order of `Channel::ALL`.
     pub channels: [f64; CHANNELS],
     /// The channels' rates (m/s, rad/s).
@@ -55,7 +55,7 @@ pub struct Instant {
 
 /// The initial state of a trajectory, relative to rest at equilibrium.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Start {
+pub struct InitialDeviation {
     /// The deviations of the coordinates q1 to q10 from equilibrium (m, rad).
     pub deviations: [f64; COORDINATES],
     /// The speeds u1 to u10 (m/s, rad/s).
@@ -68,7 +68,7 @@ pub fn history<'a>(
     model: ModelKind,
     method: &Method,
     point: &'a Point,
-    start: &Start,
+    start: &InitialDeviation,
     every_s: f64,
 ) -> History<'a> {
     let end_s = point.segments.last().map_or(0.0, |segment| segment.end_s);
@@ -92,7 +92,7 @@ pub struct HistoryRequest<'a> {
     pub point: &'a Point,
     /// The method of integration.
     pub method: Method,
-    pub start: Start,
+    pub start: InitialDeviation,
     /// The instants in order, the first at 0.
     pub times_s: Vec<f64>,
 }
@@ -183,7 +183,7 @@ impl<'a> History<'a> {
     }
 
     /// Computes the outputs at instant `k`; `None` if the trajectory failed before.
-    pub fn instant(&self, k: usize) -> Option<Instant> {
+    pub fn instant(&self, k: usize) -> Option<InstantOutputs> {
         let state = self.states.get(k)?;
         let time_s = self.times_s[k];
         let ([channels, rates, accelerations], gap_m) = match self.model {
@@ -194,7 +194,7 @@ impl<'a> History<'a> {
         if self.model == ModelKind::Nonlinear {
             deviations = core::array::from_fn(|i| state[i] - self.point.equilibrium[i]);
         }
-        Some(Instant {
+        Some(InstantOutputs {
             channels,
             rates,
             accelerations,
@@ -223,7 +223,7 @@ fn outputs<M: LaneModel<f64>>(
     let state = state.map(N);
     let derivative = model.derivative(&forcing, &state);
     let (radial, channels) = model.observe(&forcing, &state, &derivative, true);
-    let gap_m = point.machine.bodies.clearance.0 - squared(&radial).value.0.sqrt();
+    let gap_m = point.machine.bodies.clearance.0 - squared_distance(&radial).value.0.sqrt();
     let channels = channels.unwrap_or([Sample::still(N(f64::NAN), N(f64::NAN)); CHANNELS]);
     let values = channels.map(|sample| sample.value.0);
     let rates = channels.map(|sample| sample.slope.0);
@@ -252,13 +252,13 @@ impl<F: ModelFamily, S: Stepper> Kernel for SampleHistories<'_, F, S> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut task = SamplingTask::<T, F::Over<T>>::new(N(zero), self.requests, self.cancel);
+        let mut task = SamplingTask::<T, F::OnLanes<T>>::new(N(zero), self.requests, self.cancel);
         self.stepper.integrate(zero, &mut task);
         task.sampled
     }
 }
 
-impl<F: ModelFamily, S: Stepper> Aside for SampleHistories<'_, F, S> {
+impl<F: ModelFamily, S: Stepper> OutOfLine for SampleHistories<'_, F, S> {
     type Output = Vec<SampledStates>;
 
     #[inline(always)]
@@ -282,7 +282,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
     #[inline(always)]
     fn new(zero: N<T>, requests: &'a [HistoryRequest<'a>], cancel: Cancel<'a>) -> Self {
         let HistoryRequest { point, method, .. } = &requests[0];
-        let mut model = M::splat(zero, point, coupling(method, zero));
+        let mut model = M::splat(zero, point, coupling_for_method(method, zero));
         for (lane, request) in requests.iter().enumerate().skip(1) {
             model.set_point(lane, request.point);
         }
@@ -343,7 +343,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
     fn begin(&mut self, _: &M::Forcing, _: &[N<T>; STATES], _: &[N<T>; STATES]) {}
 
     #[inline(always)]
-    fn observe(&mut self, _: &M::Forcing, step: &Step<'_, T, STATES>) {
+    fn observe(&mut self, _: &M::Forcing, step: &ObservedStep<'_, T, STATES>) {
         // If a step leaves the range of the model, the states inside it are meaningless too.
         let in_range = T::bits(self.model.in_range(step.after));
         loop {

@@ -3,7 +3,7 @@
 //! The force laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers
 //! for their rates. The linear model's loads are first order in its deviations from equilibrium.
 
-use super::suspension::{deviating, dual, forces, on_cabinet};
+use super::suspension::{dual, forces, load_on_cabinet_axes, tub_with_deviation};
 use crate::coordinates::{STATES, TUB};
 use crate::lanes::{InLanes as _, ToDual as _};
 use crate::machine::feet::{FEET, LOAD, LoadDistribution, turning_force_n};
@@ -63,7 +63,7 @@ const WALK: usize = FEET + 1;
 /// The first-order expansion of a quantity in the tub's coordinates and speeds about equilibrium.
 #[derive(Clone, Copy)]
 struct TubExpansion<T> {
-    rest: N<T>,
+    value_at_rest: N<T>,
     by_coordinate: [N<T>; 4],
     by_speed: [N<T>; 4],
 }
@@ -71,20 +71,20 @@ struct TubExpansion<T> {
 impl<T: Lane> TubExpansion<T> {
     #[inline(always)]
     fn new(zero: N<T>) -> Self {
-        Self { rest: zero, by_coordinate: [zero; 4], by_speed: [zero; 4] }
+        Self { value_at_rest: zero, by_coordinate: [zero; 4], by_speed: [zero; 4] }
     }
 
     /// Sets the value at rest and the derivatives by coordinate `k` in one lane.
     fn set(&mut self, lane: usize, rest: f64, k: usize, by_coordinate: f64, by_speed: f64) {
-        self.rest.0.set(lane, rest);
+        self.value_at_rest.0.set(lane, rest);
         self.by_coordinate[k].0.set(lane, by_coordinate);
         self.by_speed[k].0.set(lane, by_speed);
     }
 
     #[inline(always)]
     fn at(&self, tub: &[Sample<T>; 4]) -> N<Dual<T>> {
-        let mut value = self.rest;
-        let mut slope = self.rest.lit(0.0);
+        let mut value = self.value_at_rest;
+        let mut slope = self.value_at_rest.lit(0.0);
         for k in 0..4 {
             value += self.by_coordinate[k] * tub[k].value;
             value += self.by_speed[k] * tub[k].slope;
@@ -129,7 +129,7 @@ impl LoadSelection {
             on_tub = elements.load_on_tub(tub);
         }
         if self.feet {
-            components[..LOAD].copy_from_slice(&on_cabinet(tub, &on_tub));
+            components[..LOAD].copy_from_slice(&load_on_cabinet_axes(tub, &on_tub));
         }
         for k in 0..self.stops {
             [components[LOAD + 2 * k], components[LOAD + 2 * k + 1]] = elements.stop(k, tub);
@@ -160,7 +160,11 @@ impl<T: Lane> LoadLaws<T> {
         let unit = |state: usize| core::array::from_fn(|i| f64::from(u8::from(i == state)));
         let components_by = |state: usize| {
             let mut components = vec![dual(0.0, 0.0); selection.component_count()];
-            selection.evaluate(&elements, &deviating(point, &unit(state)), &mut components);
+            selection.evaluate(
+                &elements,
+                &tub_with_deviation(point, &unit(state)),
+                &mut components,
+            );
             components
         };
         let force_at = |state: &[f64; STATES]| forces(point, ModelKind::Linear, state).cabinet_n;
@@ -203,15 +207,15 @@ pub(crate) struct Loads<T> {
     /// The square of the force on the cabinet.
     force_squared: Peaks<T, 1>,
     /// The distances of the feet's loads, and of the two margins, below [`REFERENCE_N`].
-    below: Peaks<T, { FEET + 2 }>,
+    below_reference: Peaks<T, { FEET + 2 }>,
     distribution: Option<LoadDistribution<T>>,
     stops: Vec<StopRecord<T>>,
     /// The speed of each damper, if dampers are recorded.
     speeds: Vec<Peaks<T, 1>>,
     /// The coordinates, speeds and accelerations of [`TUB`] at the start of the next step.
-    last: [Sample<T>; 4],
+    previous_tub: [Sample<T>; 4],
     /// The number of parts of a step.
-    parts: u32,
+    substeps: u32,
 }
 
 impl<T: Lane> Loads<T> {
@@ -222,7 +226,7 @@ impl<T: Lane> Loads<T> {
         gauges: Gauges,
         model: ModelKind,
         point: &Point,
-        parts: u32,
+        substeps: u32,
     ) -> Option<Self> {
         let [_, force, element_gauges @ ..] = gauges;
         let with_elements = element_gauges != [false; Gauge::ALL.len() - 2];
@@ -251,7 +255,7 @@ impl<T: Lane> Loads<T> {
             stops.push(StopRecord { force: Peaks::new(zero), contact: TimeAbove::new(zero) });
         }
         let distribution = match &point.feet {
-            Some(feet) if selection.feet => Some(LoadDistribution::splat(zero, &feet.spread)),
+            Some(feet) if selection.feet => Some(LoadDistribution::splat(zero, &feet.distribution)),
             _ => None,
         };
         let mut loads = Self {
@@ -259,12 +263,12 @@ impl<T: Lane> Loads<T> {
             laws,
             components: vec![zero.constant(); selection.component_count()],
             force_squared: Peaks::new(zero),
-            below: Peaks::new(zero),
+            below_reference: Peaks::new(zero),
             distribution,
             stops,
             speeds: vec![Peaks::new(zero); selection.dampers],
-            last: [Sample::still(zero, zero); 4],
-            parts,
+            previous_tub: [Sample::still(zero, zero); 4],
+            substeps,
         };
         for lane in 0..T::LANES {
             loads.set_point(lane, point);
@@ -276,7 +280,7 @@ impl<T: Lane> Loads<T> {
     pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
         self.laws.set_point(lane, point, self.selection);
         self.force_squared.reset(lane);
-        self.below.reset(lane);
+        self.below_reference.reset(lane);
         for stop in &mut self.stops {
             stop.force.reset(lane);
             stop.contact.reset(lane);
@@ -285,7 +289,7 @@ impl<T: Lane> Loads<T> {
             speed.reset(lane);
         }
         if let (Some(distribution), Some(feet)) = (&mut self.distribution, &point.feet) {
-            distribution.set_lane(lane, &feet.spread);
+            distribution.set_lane(lane, &feet.distribution);
         }
     }
 
@@ -295,7 +299,10 @@ impl<T: Lane> Loads<T> {
         let greatest = |peaks: &Peaks<T, 1>| peaks.lane(lane)[0];
         let least = |indices: core::ops::Range<usize>| {
             let indices = if self.distribution.is_some() { indices } else { 0..0 };
-            self.below.lane(lane)[indices].iter().map(|below_n| REFERENCE_N - below_n).collect()
+            self.below_reference.lane(lane)[indices]
+                .iter()
+                .map(|below_n| REFERENCE_N - below_n)
+                .collect()
         };
         match gauge {
             Gauge::ClashTime => Vec::new(),
@@ -309,42 +316,52 @@ impl<T: Lane> Loads<T> {
         }
     }
 
-    /// Records the loads up to a state with derivative `dx`, in the lanes of `inside`. `step` has
-    /// the end and the length of the step (s); it is `None` at the start of a segment.
+    /// Records the loads up to a state with derivative `dx`, in the lanes of `lanes_in_window`.
+    /// `step` has the end and the length of the step (s); it is `None` at the start of a segment.
     #[inline(always)]
     pub(crate) fn record(
         &mut self,
         step: Option<(N<T>, N<T>)>,
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
-        inside: T::Mask,
+        lanes_in_window: T::Mask,
     ) {
-        let now = tub_samples(x, dx);
-        let parts = if step.is_some() { self.parts } else { 1 };
-        let share = 1.0 / f64::from(parts);
+        let tub_now = tub_samples(x, dx);
+        let substeps = if step.is_some() { self.substeps } else { 1 };
+        let share = 1.0 / f64::from(substeps);
         // The end of the step is in the same loop as the other instants, so that the force laws are
         // compiled once.
-        for part in 1..=parts {
-            let mut tub = now;
+        for substep in 1..=substeps {
+            let mut tub = tub_now;
             let mut step_s = None;
             if let Some((_, length_s)) = step {
                 step_s = Some((share * length_s).v());
-                if part < parts {
+                if substep < substeps {
                     for k in 0..4 {
-                        let at = share * f64::from(part);
-                        tub[k] = Sample::between(&self.last[k], &now[k], length_s, at);
+                        let share_of_step = share * f64::from(substep);
+                        tub[k] = Sample::between(
+                            &self.previous_tub[k],
+                            &tub_now[k],
+                            length_s,
+                            share_of_step,
+                        );
                     }
                 }
             }
-            self.record_instant(step_s, &tub, inside);
+            self.record_instant(step_s, &tub, lanes_in_window);
         }
-        self.last = now;
+        self.previous_tub = tub_now;
     }
 
     /// Evaluates and records the loads at one motion of the tub. `step_s` is the time since the
     /// last instant; it is `None` at the start of a segment.
     #[inline(always)]
-    fn record_instant(&mut self, step_s: Option<N<T>>, tub: &[Sample<T>; 4], inside: T::Mask) {
+    fn record_instant(
+        &mut self,
+        step_s: Option<N<T>>,
+        tub: &[Sample<T>; 4],
+        lanes_in_window: T::Mask,
+    ) {
         let Self { selection, laws, components, .. } = self;
         let zero = tub[0].value.lit(0.0);
         let mut force_squared = Sample::still(zero, zero);
@@ -375,24 +392,24 @@ impl<T: Lane> Loads<T> {
             }
         }
         if selection.force {
-            record_peaks(&mut self.force_squared, step_s, &[force_squared], inside);
+            record_peaks(&mut self.force_squared, step_s, &[force_squared], lanes_in_window);
         }
         if let Some(distribution) = &self.distribution {
-            let below = distances_below_reference(distribution, &self.components);
-            record_peaks(&mut self.below, step_s, &below, inside);
+            let below_reference = distances_below_reference(distribution, &self.components);
+            record_peaks(&mut self.below_reference, step_s, &below_reference, lanes_in_window);
         }
         let (stops, damper_speeds) = self.components[LOAD..].split_at(2 * self.stops.len());
         for (record, depth_and_force) in self.stops.iter_mut().zip(stops.chunks(2)) {
             let depth = sample(depth_and_force[0]);
             let force = sample(depth_and_force[1]);
-            record_peaks(&mut record.force, step_s, &[force], inside);
+            record_peaks(&mut record.force, step_s, &[force], lanes_in_window);
             match step_s {
-                Some(step_s) => record.contact.advance_by_slopes(step_s, &depth, inside),
+                Some(step_s) => record.contact.advance_by_slopes(step_s, &depth, lanes_in_window),
                 None => record.contact.begin(&depth),
             }
         }
         for (peaks, speed) in self.speeds.iter_mut().zip(damper_speeds) {
-            record_peaks(peaks, step_s, &[sample(*speed)], inside);
+            record_peaks(peaks, step_s, &[sample(*speed)], lanes_in_window);
         }
     }
 }
@@ -408,20 +425,20 @@ fn distances_below_reference<T: Lane>(
     let reference = components[0].lit(REFERENCE_N);
     let mut load = [reference; LOAD];
     load.copy_from_slice(&components[..LOAD]);
-    let mut below = [sample(reference); FEET + 2];
-    let mut foot_loads = distribution.own;
+    let mut below_reference = [sample(reference); FEET + 2];
+    let mut foot_loads = distribution.own_loads;
     for k in 0..FEET {
         for i in 0..LOAD {
             foot_loads[k] += distribution.shares[k][i] * load[i];
         }
-        below[k] = sample(reference - foot_loads[k]);
+        below_reference[k] = sample(reference - foot_loads[k]);
     }
     let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(ROOT_SUMMAND_N2);
     let slip_margin = distribution.friction * (distribution.weight - load[1]) - squared.sqrt();
-    let walk_margin = slip_margin - turning_force_n(&distribution.places, &foot_loads, &load);
-    below[SLIP] = sample(reference - slip_margin);
-    below[WALK] = sample(reference - walk_margin);
-    below
+    let walk_margin = slip_margin - turning_force_n(&distribution.positions, &foot_loads, &load);
+    below_reference[SLIP] = sample(reference - slip_margin);
+    below_reference[WALK] = sample(reference - walk_margin);
+    below_reference
 }
 
 /// Passes samples to their peaks, after a step of a length (s) or at the start of a segment.
@@ -430,11 +447,11 @@ fn record_peaks<T: Lane, const M: usize>(
     peaks: &mut Peaks<T, M>,
     step_s: Option<N<T>>,
     samples: &[Sample<T>; M],
-    inside: T::Mask,
+    lanes_in_window: T::Mask,
 ) {
     match step_s {
-        Some(step_s) => peaks.advance_by_slopes(step_s, samples, inside),
-        None => peaks.begin(samples, inside),
+        Some(step_s) => peaks.advance_by_slopes(step_s, samples, lanes_in_window),
+        None => peaks.begin(samples, lanes_in_window),
     }
 }
 

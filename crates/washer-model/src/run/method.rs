@@ -88,7 +88,7 @@ pub(crate) trait StepperVisitor<F: ModelFamily>: Sized {
 
 impl Method {
     /// Returns the method of a level with parameters of zero, which the caller sets.
-    pub const fn without_numbers(level: Level) -> Self {
+    pub const fn with_zero_numbers(level: Level) -> Self {
         let caps = Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None };
         let tolerance = Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 };
         match level {
@@ -106,7 +106,7 @@ impl Method {
     }
 
     /// Returns the parameters, to be read or set.
-    pub const fn numbers(&mut self) -> MethodNumbers<'_> {
+    pub const fn numbers_mut(&mut self) -> MethodNumbers<'_> {
         match self {
             Self::Rk4 { step_s } | Self::Dop853 { step_s } => MethodNumbers::Step(step_s),
             Self::Capped { step_s, caps } => MethodNumbers::Capped(step_s, caps),
@@ -117,7 +117,7 @@ impl Method {
     }
 
     /// Whether each lane has its own steps, which an adaptive method chooses.
-    pub const fn has_own_steps(&self) -> bool {
+    pub const fn adapts_steps(&self) -> bool {
         matches!(self, Self::Dopri5(_) | Self::Additive(_))
     }
 
@@ -127,10 +127,12 @@ impl Method {
         visitor: V,
     ) -> V::Output {
         // A match on the formula would compile both arms for each model.
-        const { assert!(F::Capped::FORMULA as u8 == Formula::for_model(F::KIND) as u8) };
+        const { assert!(F::FixedStepStepper::FORMULA as u8 == Formula::for_model(F::KIND) as u8) };
         match *self {
             Self::Rk4 { .. } => visitor.visit(Rk4Stepper),
-            Self::Capped { .. } | Self::Dop853 { .. } => visitor.visit(F::Capped::NEW),
+            Self::Capped { .. } | Self::Dop853 { .. } => {
+                visitor.visit(F::FixedStepStepper::INSTANCE)
+            }
             Self::Dopri5(tolerance) => visitor.visit(Dopri5Stepper(tolerance)),
             Self::Additive(tolerance) => visitor.visit(AdditiveStepper(tolerance)),
         }
@@ -152,7 +154,7 @@ pub(crate) fn start_segment<T: Lane, M: LaneModel<T>>(
     segment: &PlannedSegment,
 ) -> Segment {
     model.set_spin(lane, &point.stretches[segment.stretch]);
-    let step_s = match method.numbers() {
+    let step_s = match method.numbers_mut() {
         MethodNumbers::Step(step_s) | MethodNumbers::Capped(step_s, _) => *step_s,
         MethodNumbers::Tolerance(_) => FIRST_STEP_S,
     };
@@ -161,7 +163,7 @@ pub(crate) fn start_segment<T: Lane, M: LaneModel<T>>(
 
 /// Returns the coupling of tub and rotor by a method's caps.
 #[inline(always)]
-pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
+pub(crate) fn coupling_for_method<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
     let Method::Capped { caps, .. } = method else { return Coupling::Springs };
     Coupling::new(zero, Some(caps))
 }
@@ -169,9 +171,9 @@ pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
 /// The nonlinear or the linear model, as a type that is independent of the lanes.
 pub(crate) trait ModelFamily {
     /// The model over lanes.
-    type Over<T: Lane>: LaneModel<T>;
+    type OnLanes<T: Lane>: LaneModel<T>;
     /// The stepper of [`Method::Capped`] and [`Method::Dop853`], by the model's formula.
-    type Capped: FixedStepper;
+    type FixedStepStepper: FixedStepper;
     /// The model as a value.
     const KIND: ModelKind;
 }
@@ -181,13 +183,13 @@ pub(crate) enum NonlinearFamily {}
 /// The linear model over any lanes.
 pub(crate) enum LinearFamily {}
 impl ModelFamily for NonlinearFamily {
-    type Over<T: Lane> = Nonlinear<T>;
-    type Capped = Dop853Stepper;
+    type OnLanes<T: Lane> = Nonlinear<T>;
+    type FixedStepStepper = Dop853Stepper;
     const KIND: ModelKind = ModelKind::Nonlinear;
 }
 impl ModelFamily for LinearFamily {
-    type Over<T: Lane> = Linear<T>;
-    type Capped = Rk4Stepper;
+    type OnLanes<T: Lane> = Linear<T>;
+    type FixedStepStepper = Rk4Stepper;
     const KIND: ModelKind = ModelKind::Linear;
 }
 
@@ -200,7 +202,7 @@ pub(crate) trait Stepper {
 /// A stepper of fixed steps, which has no parameters.
 pub(crate) trait FixedStepper: Stepper {
     /// The stepper.
-    const NEW: Self;
+    const INSTANCE: Self;
     /// The formula of the stepper.
     const FORMULA: Formula;
 }
@@ -231,11 +233,11 @@ steppers! {
 }
 
 impl FixedStepper for Rk4Stepper {
-    const NEW: Self = Self;
+    const INSTANCE: Self = Self;
     const FORMULA: Formula = Formula::Rk4;
 }
 
 impl FixedStepper for Dop853Stepper {
-    const NEW: Self = Self;
+    const INSTANCE: Self = Self;
     const FORMULA: Formula = Formula::Dop853;
 }

@@ -4,15 +4,15 @@ use crate::channel::CHANNELS;
 use crate::coordinates::{FIRST_ANGLE, STATES, TUB};
 use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
-use crate::linear::rotor_terms::Terms;
-use crate::linear::step::{self, RotorAt, StepConstants};
+use crate::linear::rotor_terms::RotorCoefficients;
+use crate::linear::step::{self, RotorArrays, StepConstants};
 use crate::machine::parameters::MAX_COORDINATE_M;
 use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
-use crate::nonlinear::ahead::derivative_ahead;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::elements::corners::CornerForce;
+use crate::nonlinear::implicit_stage::solve_implicit_stage;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
@@ -47,13 +47,15 @@ pub(crate) trait LaneModel<T: Lane>: SemiImplicit<T, STATES> {
 /// Returns the coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
 fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> MovingCoordinates<T> {
-    let (q, u) = split(x);
-    MovingCoordinates { q, u, a: split(dx).1 }
+    let (q, u) = split_state(x);
+    MovingCoordinates { q, u, a: split_state(dx).1 }
 }
 
 /// Splits a state, or its derivative, into the parts of coordinates and of speeds.
 #[inline(always)]
-pub(crate) fn split<T: Copy>(x: &[N<T>; STATES]) -> ([N<T>; COORDINATES], [N<T>; COORDINATES]) {
+pub(crate) fn split_state<T: Copy>(
+    x: &[N<T>; STATES],
+) -> ([N<T>; COORDINATES], [N<T>; COORDINATES]) {
     (core::array::from_fn(|i| x[i]), core::array::from_fn(|i| x[COORDINATES + i]))
 }
 
@@ -65,7 +67,7 @@ pub(super) fn tub_samples<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> [
 
 /// Joins speeds and accelerations to the derivative of a state.
 #[inline(always)]
-fn joined<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; STATES] {
+fn join_derivative<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; STATES] {
     core::array::from_fn(|i| if i < COORDINATES { u[i] } else { a[i - COORDINATES] })
 }
 
@@ -103,9 +105,9 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
 
     #[inline(always)]
     fn derivative(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
-        let (q, u) = split(x);
+        let (q, u) = split_state(x);
         let Self { machine, coupling, sag, .. } = self;
-        joined(&u, &nonlinear::accelerations(machine, coupling, sag, spin, &q, &u))
+        join_derivative(&u, &nonlinear::accelerations(machine, coupling, sag, spin, &q, &u))
     }
 
     #[inline(always)]
@@ -117,15 +119,15 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
 /// Requires that bearings and hinge are not capped.
 impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
     #[inline(always)]
-    fn derivative_ahead(
+    fn solve_implicit_stage(
         &self,
         spin: &SpinState<T>,
         x: &[N<T>; STATES],
         r: &[N<T>; STATES],
         g_s: N<T>,
     ) -> [N<T>; STATES] {
-        let (q, u) = split(x);
-        derivative_ahead(&self.machine, spin, &q, &u, r, g_s)
+        let (q, u) = split_state(x);
+        solve_implicit_stage(&self.machine, spin, &q, &u, r, g_s)
     }
 }
 
@@ -145,7 +147,7 @@ impl<T: Lane> Nonlinear<T> {
         spin: &SpinState<T>,
         x: &[N<T>; STATES],
     ) -> [[N<T>; COORDINATES]; TUB.len()] {
-        let (q, u) = split(x);
+        let (q, u) = split_state(x);
         nonlinear::accelerations_per_load(&self.machine, &self.coupling, &self.sag, spin, &q, &u)
     }
 }
@@ -157,14 +159,14 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
             coupling,
             machine: Coefficients::splat(zero, &point.machine),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
-            rest: InLanes::splat(zero, &point.rest.map(N)),
+            rest: InLanes::splat(zero, &point.channels_at_rest.map(N)),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)),
         }
     }
 
     fn set_point(&mut self, lane: usize, point: &Point) {
         self.machine.set_lane(lane, &point.machine);
-        self.rest.set_lane(lane, &point.rest.map(N));
+        self.rest.set_lane(lane, &point.channels_at_rest.map(N));
         self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
     }
 
@@ -214,7 +216,7 @@ pub(crate) struct Linear<T> {
     coupling: Coupling<T>,
     flexure_stiffness: N<T>,
     constants: StepConstants<T>,
-    terms: Terms<T>,
+    terms: RotorCoefficients<T>,
     /// The hinge's coordinates q9 and q10 at equilibrium (rad).
     sag: [N<T>; 2],
     outputs: LinearOutputs<T>,
@@ -225,7 +227,7 @@ pub(crate) struct Linear<T> {
 #[derive(Clone, Copy)]
 pub(crate) struct LinearForcing<T> {
     spin: SpinState<T>,
-    rotor: RotorAt<T>,
+    rotor: RotorArrays<T>,
 }
 
 impl<T: Lane> System<T, STATES> for Linear<T> {
@@ -235,22 +237,26 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     fn forcing(&self, t_s: N<T>) -> LinearForcing<T> {
         let spin = self.spin.at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &spin, self.sag);
-        let rotor = RotorAt::new(&self.constants, &self.coupling, &self.terms, &spin, hinge_mass);
+        let rotor =
+            RotorArrays::new(&self.constants, &self.coupling, &self.terms, &spin, hinge_mass);
         LinearForcing { spin, rotor }
     }
 
     #[inline(always)]
-    fn renew(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
+    fn update_forcing(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
         forcing.spin = self.spin.at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &forcing.spin, self.sag);
         let Self { constants, coupling, terms, .. } = self;
-        forcing.rotor.renew(constants, coupling, terms, &forcing.spin, hinge_mass);
+        forcing.rotor.update(constants, coupling, terms, &forcing.spin, hinge_mass);
     }
 
     #[inline(always)]
     fn derivative(&self, forcing: &LinearForcing<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
-        let (q, u) = split(x);
-        joined(&u, &step::accelerations(&self.constants, &self.coupling, &forcing.rotor, &q, &u))
+        let (q, u) = split_state(x);
+        join_derivative(
+            &u,
+            &step::accelerations(&self.constants, &self.coupling, &forcing.rotor, &q, &u),
+        )
     }
 
     #[inline(always)]
@@ -262,16 +268,16 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
 /// Requires that bearings and hinge are not capped.
 impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
     #[inline(always)]
-    fn derivative_ahead(
+    fn solve_implicit_stage(
         &self,
         forcing: &LinearForcing<T>,
         x: &[N<T>; STATES],
         r: &[N<T>; STATES],
         g_s: N<T>,
     ) -> [N<T>; STATES] {
-        let (q, u) = split(x);
+        let (q, u) = split_state(x);
         let Self { constants, terms, flexure_stiffness, .. } = self;
-        step::derivative_ahead(
+        step::solve_implicit_stage(
             constants,
             terms,
             *flexure_stiffness,
@@ -294,7 +300,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
             coupling,
             flexure_stiffness: zero.lit(point.machine.bodies.flexure_stiffness.0),
             constants: StepConstants::splat(zero, &step_constants(point)),
-            terms: Terms::splat(zero, &point.linear.terms),
+            terms: RotorCoefficients::splat(zero, &point.linear.terms),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)).hinge,
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinLanes::splat(zero, &point.stretches[0]),

@@ -47,7 +47,7 @@ impl Snapshot {
 #[derive(Default)]
 struct LaneSnapshots {
     instants_s: Arc<[f64]>,
-    taken: Vec<Snapshot>,
+    snapshots: Vec<Snapshot>,
 }
 
 /// The recorder of snapshots over lanes. Inside a step, an output is the polynomial of degree 5
@@ -69,12 +69,12 @@ impl<T: Lane> Snapshots<T> {
     pub(super) fn set_point(&mut self, lane: usize, point: &Point) {
         let instants_s = Arc::clone(&point.instants_s);
         let taken = Vec::with_capacity(instants_s.len());
-        self.lanes[lane] = LaneSnapshots { instants_s, taken };
+        self.lanes[lane] = LaneSnapshots { instants_s, snapshots: taken };
     }
 
     /// Takes the snapshots of one lane.
     pub(super) fn finish(&mut self, lane: usize) -> Vec<Snapshot> {
-        std::mem::take(&mut self.lanes[lane].taken)
+        std::mem::take(&mut self.lanes[lane].snapshots)
     }
 
     /// Takes the snapshots within a step that ends at a state with derivative `dx` and with
@@ -92,20 +92,20 @@ impl<T: Lane> Snapshots<T> {
             for lane in 0..T::LANES {
                 let end_s = end_s.0.get(lane);
                 let length_s = length_s.0.get(lane);
-                let LaneSnapshots { instants_s, taken } = &mut self.lanes[lane];
+                let LaneSnapshots { instants_s, snapshots: taken } = &mut self.lanes[lane];
                 while let Some(&time_s) = instants_s.get(taken.len())
                     && let Some(share) = share_of_step(time_s, end_s, length_s)
                 {
                     let mut snapshot =
                         Snapshot { channels: [[0.0; 3]; CHANNELS], tub: [[0.0; 2]; 4] };
                     for i in 0..CHANNELS {
-                        let at =
+                        let sample =
                             interpolate(&self.channels[i], &channels[i], lane, length_s, share);
-                        snapshot.channels[i] = [at.value.0, at.slope.0, at.curvature.0];
+                        snapshot.channels[i] = [sample.value.0, sample.slope.0, sample.curvature.0];
                     }
                     for i in 0..4 {
-                        let at = interpolate(&self.tub[i], &tub[i], lane, length_s, share);
-                        snapshot.tub[i] = [at.value.0, at.slope.0];
+                        let sample = interpolate(&self.tub[i], &tub[i], lane, length_s, share);
+                        snapshot.tub[i] = [sample.value.0, sample.slope.0];
                     }
                     taken.push(snapshot);
                 }
@@ -136,7 +136,7 @@ fn interpolate<T: Lane>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::history::{Start, history};
+    use crate::run::history::{InitialDeviation, history};
     use crate::{
         Channel, Machine, Method, Profile, Recorders, Spin, Timing, prepare, simulate_with,
     };
@@ -162,32 +162,34 @@ mod tests {
         let recorders = Recorders { snapshots: true, ..Recorders::default() };
         let method = Method::Rk4 { step_s: 2e-4 };
         for model in ModelKind::ALL {
-            let all: Vec<&Point> = points.iter().collect();
-            let (_, together) = simulate_with(Simd::best(), model, &method, &all, recorders);
-            let (_, alone) = simulate_with(Simd::Scalar, model, &method, &all[1..2], recorders);
-            assert_eq!(together[1].snapshots, alone[0].snapshots);
-            let history = history(model, &method, all[1], &Start::default(), every_s);
-            let mut largest = [0.0_f64; 3];
-            let mut difference = [0.0_f64; 3];
-            let yaw = Channel::TubYaw.index();
-            for (k, snapshot) in alone[0].snapshots.iter().enumerate() {
+            let all_points: Vec<&Point> = points.iter().collect();
+            let (_, in_lanes) = simulate_with(Simd::best(), model, &method, &all_points, recorders);
+            let (_, single) =
+                simulate_with(Simd::Scalar, model, &method, &all_points[1..2], recorders);
+            assert_eq!(in_lanes[1].snapshots, single[0].snapshots);
+            let history =
+                history(model, &method, all_points[1], &InitialDeviation::default(), every_s);
+            let mut largest_values = [0.0_f64; 3];
+            let mut largest_differences = [0.0_f64; 3];
+            let yaw_index = Channel::TubYaw.index();
+            for (k, snapshot) in single[0].snapshots.iter().enumerate() {
                 let expected = history.instant(k).unwrap();
                 let pairs = [
-                    (snapshot.channels[yaw][0], expected.channels[yaw]),
-                    (snapshot.channels[yaw][1], expected.rates[yaw]),
-                    (snapshot.channels[yaw][2], expected.accelerations[yaw]),
+                    (snapshot.channels[yaw_index][0], expected.channels[yaw_index]),
+                    (snapshot.channels[yaw_index][1], expected.rates[yaw_index]),
+                    (snapshot.channels[yaw_index][2], expected.accelerations[yaw_index]),
                 ];
                 for (i, (value, expected)) in pairs.into_iter().enumerate() {
-                    largest[i] = largest[i].max(expected.abs());
-                    difference[i] = difference[i].max((value - expected).abs());
+                    largest_values[i] = largest_values[i].max(expected.abs());
+                    largest_differences[i] = largest_differences[i].max((value - expected).abs());
                 }
-                let force = snapshot.cabinet_force_n(all[1], model);
+                let force = snapshot.cabinet_force_n(all_points[1], model);
                 let expected = history.forces(k).unwrap().cabinet_n;
                 let error_n = (0..3).map(|i| (force[i] - expected[i]).abs()).fold(0.0, f64::max);
                 assert!(error_n < 1e-4, "{error_n} N at {k}");
             }
-            assert_eq!(alone[0].snapshots.len(), instants.len());
-            let errors = [0, 1, 2].map(|i| difference[i] / largest[i]);
+            assert_eq!(single[0].snapshots.len(), instants.len());
+            let errors = [0, 1, 2].map(|i| largest_differences[i] / largest_values[i]);
             assert!(errors[0] < 1e-9 && errors[1] < 1e-6 && errors[2] < 1e-4, "{errors:?}");
         }
     }

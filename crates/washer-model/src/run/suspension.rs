@@ -76,13 +76,13 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
         let (tension, line) = tub.tension(&spring.constant());
         let share = tension / line.length;
         for k in 0..3 {
-            forces.cabinet_n[k] += first_order(model, (share * line.span[k]).v());
+            forces.cabinet_n[k] += first_order_value(model, (share * line.span[k]).v());
         }
-        forces.springs_n.push(first_order(model, tension));
+        forces.springs_n.push(first_order_value(model, tension));
     }
     for damper in &elements.dampers {
         let (tension, line) = tub.tension(&damper.constant());
-        let tension = first_order(model, tension);
+        let tension = first_order_value(model, tension);
         for k in 0..3 {
             forces.cabinet_n[k] += tension * line.span[k].0.value / line.length.0.value;
         }
@@ -90,7 +90,7 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     }
     for stop in &elements.stops {
         let stop = stop.constant();
-        let push = first_order(model, stop.force(&tub.point(&stop.tub)));
+        let push = first_order_value(model, stop.force(&tub.point(&stop.tub)));
         for k in 0..3 {
             forces.cabinet_n[k] += push * stop.direction[k].0.value;
         }
@@ -99,7 +99,7 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     for bushing in &elements.bushings {
         let bushing = bushing.constant();
         let on_tub = bushing.force(&tub.point(&bushing.tub));
-        let force = on_tub.map(|force| first_order(model, -force));
+        let force = on_tub.map(|force| first_order_value(model, -force));
         for k in 0..3 {
             forces.cabinet_n[k] += force[k];
         }
@@ -117,7 +117,7 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
 /// Computes the force (N) and the moment about O (N m) of the suspension on the cabinet, in cabinet
 /// axes, from the load on the tub.
 #[inline(always)]
-pub(super) fn on_cabinet<T: Lane>(
+pub(super) fn load_on_cabinet_axes<T: Lane>(
     tub: &TubMotion<T>,
     (force, moment): &(Vec3<T>, Vec3<T>),
 ) -> [N<T>; LOAD] {
@@ -134,7 +134,10 @@ pub(super) fn dual(value: f64, slope: f64) -> N<Dual<f64>> {
 }
 
 /// Returns the tub's motion at equilibrium with a first-order deviation.
-pub(super) fn deviating(point: &Point, deviations: &[f64; STATES]) -> TubMotion<Dual<f64>> {
+pub(super) fn tub_with_deviation(
+    point: &Point,
+    deviations: &[f64; STATES],
+) -> TubMotion<Dual<f64>> {
     TubMotion::new(
         &TUB.map(|q| dual(point.equilibrium[q], deviations[q])),
         &TUB.map(|q| dual(0.0, deviations[COORDINATES + q])),
@@ -154,9 +157,11 @@ pub(crate) fn load_on_cabinet(
             let [q, u] = [0, COORDINATES].map(|first| TUB.map(|q| dual(state[first + q], 0.0)));
             (elements.constant(), TubMotion::new(&q, &u))
         }
-        ModelKind::Linear => (elements.with_viscous_friction().constant(), deviating(point, state)),
+        ModelKind::Linear => {
+            (elements.with_viscous_friction().constant(), tub_with_deviation(point, state))
+        }
     };
-    let load = on_cabinet(&tub, &elements.load_on_tub(&tub));
+    let load = load_on_cabinet_axes(&tub, &elements.load_on_tub(&tub));
     load.map(|N(first_order)| first_order.value + first_order.slope)
 }
 
@@ -168,7 +173,7 @@ pub fn stops_at_rest_n(point: &Point) -> Vec<f64> {
 /// Computes the speed along each damper (m/s) in the linear model, at deviations from equilibrium.
 pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -> Vec<f64> {
     let elements = point.machine.elements.constant();
-    let tub = deviating(point, deviations);
+    let tub = tub_with_deviation(point, deviations);
     let speed = |number| elements.damper_motion(number, &tub)[1].0.slope;
     (0..elements.dampers.len()).map(speed).collect()
 }
@@ -211,10 +216,10 @@ impl TubState {
 
     /// Computes the motion of a tub point.
     fn point(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
-        let at_first = Ends { cabinet: *tub, tub: *tub };
+        let both_ends = Ends { cabinet: *tub, tub: *tub };
         PointMotion {
-            displacement: tub_from_cabinet(&self.displaced, &at_first),
-            velocity: tub_from_cabinet(&self.moving, &at_first).map(|place| self.velocity(place)),
+            displacement: tub_from_cabinet(&self.displaced, &both_ends),
+            velocity: tub_from_cabinet(&self.moving, &both_ends).map(|place| self.velocity(place)),
         }
     }
 
@@ -230,7 +235,7 @@ impl TubState {
 }
 
 /// Returns the value, or for the linear model the first-order expansion.
-fn first_order(model: ModelKind, value: N<Dual<f64>>) -> f64 {
+fn first_order_value(model: ModelKind, value: N<Dual<f64>>) -> f64 {
     match model {
         ModelKind::Nonlinear => value.0.value,
         ModelKind::Linear => value.0.value + value.0.slope,
@@ -252,7 +257,7 @@ fn tub_from_cabinet(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> 
 
 /// Computes the vector from the cabinet end to the tub end of a tilted tub, in cabinet axes.
 fn from_cabinet<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &Ends<T>) -> Vec3<T> {
-    let tub = tilt.in_cabinet_axes(&ends.tub);
+    let tub = tilt.to_cabinet_axes(&ends.tub);
     [
         tub[0] - ends.cabinet[0],
         tub[1] + q[TUB_Y] - ends.cabinet[1],

@@ -1,88 +1,89 @@
-//! Effects of forces with corners on disturbances.
+//! The effect of forces with corners on disturbances.
 //!
-//! A force F along a motion of the tub adds the response r F to the accelerations. Its derivatives
-//! are r dF + F dr: F and its slopes turn within a step, while r, dr and how the motion hangs on
-//! the tub's coordinates are smooth over a turn.
+//! A force F along a motion of the tub adds the response r F to the accelerations. Its derivative
+//! is r dF + F dr. F and dF change abruptly, within a step, while r, dr and the dependence of the
+//! motion on the tub's coordinates are smooth over a turn.
 
 use crate::coordinates::{COORDINATES, ROTOR_TURNS, STATES, TUB};
 use crate::lanes::lane_struct;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::run::model::Nonlinear;
-use lane_ode::{Aside, Dual, Lane, N};
+use lane_ode::{Dual, Lane, N, OutOfLine};
 
 /// The derivative of every acceleration by each coordinate, then by each speed.
-pub(super) type Slopes = [[N<f64>; STATES]; COORDINATES];
+pub(super) type AccelerationDerivatives = [[N<f64>; STATES]; COORDINATES];
 
-/// Coordinates on which responses hang, the tub's first.
-const BENDS: [usize; TUB.len() + ROTOR_TURNS.len()] = {
+/// The coordinates on which responses depend, the tub's first.
+const RESPONSE_COORDINATES: [usize; TUB.len() + ROTOR_TURNS.len()] = {
     let [a, b, c, d] = TUB;
     let [e, f, g, h] = ROTOR_TURNS;
     [a, b, c, d, e, f, g, h]
 };
 
 lane_struct! {
-    /// A motion that a force with corners hangs on, at an instant.
+    /// A motion on which a force with corners depends, at an instant.
     #[derive(Clone, Copy)]
-    Corner {
-        /// Derivatives of its speed by the tub's speeds, which are its depth's by the coordinates,
+    CornerMotion {
+        /// The derivatives of the motion's speed by the tub's speeds, which equal those of its
+        /// depth by the tub's coordinates.
         by_speed: [N<T>; TUB.len()],
-        /// and of its speed by the coordinates.
-        by_place: [N<T>; TUB.len()],
-        /// The addition of a unit of force along it to the accelerations,
+        /// The derivatives of the motion's speed by the tub's coordinates.
+        by_coordinate: [N<T>; TUB.len()],
+        /// The accelerations by a unit of force along the motion.
         response: [N<T>; COORDINATES],
-        /// and how that changes with coordinates.
-        bend: [[N<T>; BENDS.len()]; COORDINATES],
+        /// The derivatives of the response by [`RESPONSE_COORDINATES`].
+        response_derivative: [[N<T>; RESPONSE_COORDINATES.len()]; COORDINATES],
     }
 }
 
-impl<T: Lane> Corner<T> {
+impl<T: Lane> CornerMotion<T> {
     #[inline(always)]
-    pub(super) fn none(zero: N<T>) -> Self {
-        let none = [zero; TUB.len()];
+    pub(super) fn zero(zero: N<T>) -> Self {
+        let zeros = [zero; TUB.len()];
         Self {
-            by_speed: none,
-            by_place: none,
+            by_speed: zeros,
+            by_coordinate: zeros,
             response: [zero; COORDINATES],
-            bend: [[zero; BENDS.len()]; COORDINATES],
+            response_derivative: [[zero; RESPONSE_COORDINATES.len()]; COORDINATES],
         }
     }
 }
 
-/// The motions of a machine's forces with corners in a state.
-pub(super) struct Corners<'a, T> {
+/// The computation of the motions of all forces with corners at a state.
+pub(super) struct CornerMotions<'a, T> {
     pub(super) model: &'a Nonlinear<Dual<T>>,
     pub(super) spin: &'a SpinState<Dual<T>>,
     pub(super) x: &'a [N<T>; STATES],
 }
 
-impl<T: Lane> Aside for Corners<'_, T> {
-    type Output = Vec<Corner<T>>;
+impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
+    type Output = Vec<CornerMotion<T>>;
 
     #[inline(always)]
-    fn run(self) -> Vec<Corner<T>> {
+    fn run(self) -> Vec<CornerMotion<T>> {
         let Self { model, spin, x } = self;
         let zero = x[0].lit(0.0);
         let mut state = [zero.constant(); STATES];
         for i in 0..STATES {
             state[i] = x[i].constant();
         }
-        let mut corners = vec![Corner::none(zero); model.corner_motions(&state).len()];
-        for by in 0..BENDS.len() {
-            state[BENDS[by]].0.slope = zero.lit(1.0).0;
+        let mut corners = vec![CornerMotion::zero(zero); model.corner_motions(&state).len()];
+        for direction in 0..RESPONSE_COORDINATES.len() {
+            state[RESPONSE_COORDINATES[direction]].0.slope = zero.lit(1.0).0;
             let motions = model.corner_motions(&state);
             let by_load = model.accelerations_per_load(spin, &state);
-            if by < TUB.len() {
+            if direction < TUB.len() {
                 for m in 0..corners.len() {
-                    corners[m].by_place[by] = N(motions[m][1].0.slope);
+                    corners[m].by_coordinate[direction] = N(motions[m][1].0.slope);
                 }
             }
-            // A force loads each coordinate by the derivative of the motion's speed by the
-            // coordinate's (virtual power). A motion's speed is linear in the tub's.
+            // A force loads a coordinate by the derivative of the motion's speed by that
+            // coordinate's speed (virtual power). The motion's speed is linear in the tub's speeds.
             for k in 0..TUB.len() {
                 let mut unit = state;
-                for of in TUB {
-                    unit[COORDINATES + of] = zero.constant();
+                for tub_coordinate in TUB {
+                    unit[COORDINATES + tub_coordinate] = zero.constant();
                 }
                 unit[COORDINATES + TUB[k]] = zero.lit(1.0).constant();
                 let speeds = model.corner_motions(&unit);
@@ -92,50 +93,57 @@ impl<T: Lane> Aside for Corners<'_, T> {
                     corner.by_speed[k] = N(speed.0.value);
                     for i in 0..COORDINATES {
                         let Dual { value, slope } = (speed * by_load[k][i]).v().0;
-                        corner.bend[i][by] += N(slope);
-                        if by == 0 {
+                        corner.response_derivative[i][direction] += N(slope);
+                        if direction == 0 {
                             corner.response[i] += N(value);
                         }
                     }
                 }
             }
-            state[BENDS[by]].0.slope = zero.0;
+            state[RESPONSE_COORDINATES[direction]].0.slope = zero.0;
         }
         corners
     }
 }
 
-impl Corner<f64> {
-    /// Adds another, so many times.
+impl CornerMotion<f64> {
+    /// Adds another motion times a factor.
     #[inline(always)]
-    pub(super) fn add(&mut self, other: &Self, times: f64) {
-        let times = N(times);
+    pub(super) fn add(&mut self, other: &Self, factor: f64) {
+        let factor = N(factor);
         for k in 0..TUB.len() {
-            self.by_speed[k] += times * other.by_speed[k];
-            self.by_place[k] += times * other.by_place[k];
+            self.by_speed[k] += factor * other.by_speed[k];
+            self.by_coordinate[k] += factor * other.by_coordinate[k];
         }
         for i in 0..COORDINATES {
-            self.response[i] += times * other.response[i];
-            for k in 0..BENDS.len() {
-                self.bend[i][k] += times * other.bend[i][k];
+            self.response[i] += factor * other.response[i];
+            for k in 0..RESPONSE_COORDINATES.len() {
+                self.response_derivative[i][k] += factor * other.response_derivative[i][k];
             }
         }
     }
 
-    /// Adds what a force along it adds to the derivatives of the accelerations, so many times.
+    /// Adds the derivatives of the accelerations by a force along the motion, times a factor.
     #[inline(always)]
-    pub(super) fn apply(&self, of: &CornerForce<f64>, times: f64, slopes: &mut Slopes) {
+    pub(super) fn apply(
+        &self,
+        force: &CornerForce<f64>,
+        factor: f64,
+        derivatives: &mut AccelerationDerivatives,
+    ) {
         for i in 0..COORDINATES {
-            for k in 0..BENDS.len() {
-                slopes[i][BENDS[k]] += (of.force * self.bend[i][k]).v() * times;
+            for k in 0..RESPONSE_COORDINATES.len() {
+                derivatives[i][RESPONSE_COORDINATES[k]] +=
+                    (force.force * self.response_derivative[i][k]).v() * factor;
             }
         }
         for k in 0..TUB.len() {
-            let by_speed = (of.by_speed * self.by_speed[k]).v();
-            let by_place = of.by_depth * self.by_speed[k] + of.by_speed * self.by_place[k];
+            let by_speed = (force.by_speed * self.by_speed[k]).v();
+            let by_coordinate =
+                force.by_depth * self.by_speed[k] + force.by_speed * self.by_coordinate[k];
             for i in 0..COORDINATES {
-                slopes[i][TUB[k]] += (self.response[i] * by_place).v() * times;
-                slopes[i][COORDINATES + TUB[k]] += (self.response[i] * by_speed).v() * times;
+                derivatives[i][TUB[k]] += (self.response[i] * by_coordinate).v() * factor;
+                derivatives[i][COORDINATES + TUB[k]] += (self.response[i] * by_speed).v() * factor;
             }
         }
     }

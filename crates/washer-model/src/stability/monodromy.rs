@@ -1,256 +1,276 @@
-//! The effect of a turn on small disturbances of a response.
+//! The monodromy matrix of a response: the effect of a turn on small disturbances.
 //!
 //! A disturbance d obeys d'' = K(t) d + C(t) d', with the partial derivatives of the accelerations
-//! along the response, which dual numbers give. Over a turn these are smooth and periodic but for
-//! what forces with corners do (`corners.rs`), so that they are taken at a few even instants, and
-//! from the trigonometric polynomial through those at all others. Classical Runge-Kutta takes all
-//! disturbances through the turn together. Lanes share a row's instants, then its disturbances.
+//! along the response, by dual numbers. Without forces with corners (`corners.rs`) these are smooth
+//! and periodic. They are computed at a few equally spaced instants, and interpolated by the
+//! trigonometric polynomial in between. Classical Runge-Kutta integrates all disturbances together.
+//! Lanes hold the instants of a turn first, and its disturbances then.
 
-use super::corners::{Corner, Corners, Slopes};
-use super::turn::{Clock, NEXT_STAGE, WEIGHT};
+use super::corners::{AccelerationDerivatives, CornerMotion, CornerMotions};
+use super::turn::{A, B, StepGrid};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::InLanes as _;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::run::model::Nonlinear;
 use faer::Mat;
-use lane_ode::{Aside, Dual, Lane, MAX_LANES, N, System, trig};
+use lane_ode::{Dual, Lane, MAX_LANES, N, OutOfLine, System, trig};
 
-/// Instants a turn at which the derivatives are taken, at most: harmonics of the turn up to the
-/// seventh.
+/// The number of instants of a turn at which derivatives are computed, without corners. Basis: it
+/// resolves harmonics of the turn up to the seventh. Doubling it resolves the fifteenth.
 pub(super) const INSTANTS: usize = 16;
 
-/// The number of instants where forces have corners, which give motions more harmonics.
+/// The number of instants of a turn at which derivatives are computed, if forces have corners.
+/// Basis: corners give motions more harmonics. Doubling it doubles the number of derivatives.
 pub(super) const INSTANTS_AT_CORNERS: usize = 32;
 
-/// Rows and columns of a state's disturbance.
-pub(crate) type Square = [[N<f64>; STATES]; STATES];
+/// A matrix of the derivatives of a state by another one.
+pub(crate) type StateMatrix = [[N<f64>; STATES]; STATES];
 
-/// Returns the matrix of disturbances whose speeds count per a unit (1/s).
-pub(crate) fn per_unit(matrix: &Square, unit_per_s: f64) -> Mat<f64> {
+/// Converts a matrix to speeds with a unit (1/s).
+pub(crate) fn per_unit(matrix: &StateMatrix, unit_per_s: f64) -> Mat<f64> {
     let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
     Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * unit(j) / unit(i))
 }
 
-/// The number of lanes of disturbances taken through a step at once. Basis: they stay in the
-/// nearest cache. Doubling it is slower.
-const BLOCK: usize = 5;
-/// The number of wide lanes that hold all disturbances. Basis: the number of states. Doubling it
-/// leaves lanes empty.
-const WIDE_BLOCK: usize = STATES.div_ceil(MAX_LANES);
+/// The number of vectors of disturbances that are integrated through a step at once. Basis: they
+/// fit in the first cache. Doubling it is slower.
+const BLOCK_LANES: usize = 5;
+/// The number of the widest vectors that hold all disturbances. Basis: the number of states.
+/// Doubling it leaves lanes empty.
+const WIDE_BLOCK_LANES: usize = STATES.div_ceil(MAX_LANES);
 
-/// Steps whose derivatives are kept at once: as many for every turn.
-const AT_ONCE: usize = 8;
+/// The number of steps whose derivatives are interpolated at once. Basis: every number of steps is
+/// a multiple of it. Doubling it needs twice the memory.
+const STEPS_AT_ONCE: usize = 8;
 
-/// Starts, middles and ends of these. Where forces have corners, steps are so short that what is
-/// smooth is a parabola through the first, the middle and the last.
-const PLACES: usize = 2 * AT_ONCE + 1;
+/// The number of starts, middles and ends of these steps. If forces have corners, steps are so
+/// short that the smooth derivatives are a parabola through the first, the middle and the last one.
+const INSTANTS_AT_ONCE: usize = 2 * STEPS_AT_ONCE + 1;
 
-/// Rows along their turns.
-pub(super) struct Along<'a, T> {
+/// The computation of the monodromy matrices of some turns, with the same set-up but for points and
+/// speeds.
+pub(super) struct SmoothMonodromy<'a, T> {
     pub(super) zero: N<T>,
-    /// The weights of [`weights`].
+    /// The result of [`interpolation_weights`].
     pub(super) weights: &'a [Vec<f64>],
-    /// In lanes one row after another, again and again.
+    /// The model, with the turns in lanes one after another, repeated.
     pub(super) model: Nonlinear<Dual<T>>,
-    pub(super) clock: Clock<T>,
-    pub(super) rows: usize,
-    /// At how many even instants of a turn derivatives are taken.
+    pub(super) grid: StepGrid<T>,
+    pub(super) turn_count: usize,
+    /// The number of equally spaced instants of a turn at which derivatives are computed.
     pub(super) instants: usize,
-    /// States in the rows' lanes, at so many instants of the turn or at a multiple of them.
-    pub(super) path: &'a [[N<T>; STATES]],
-    /// Forces with corners in the rows' lanes, at the start, middle and end of all steps.
-    pub(super) forces: &'a [CornerForce<T>],
+    /// The states in the turns' lanes, at the instants or at a multiple of their number.
+    pub(super) states: &'a [[N<T>; STATES]],
+    /// The forces with corners in the turns' lanes, at the start, middle and end of all steps.
+    pub(super) corner_forces: &'a [CornerForce<T>],
 }
 
-/// The smooth coefficients over a turn of a row.
+/// The smooth coefficients of the equations of disturbances at an instant.
 #[derive(Clone)]
-struct Smooth {
-    /// Derivatives, less those of forces with corners.
-    slopes: Slopes,
-    /// These forces' motions.
-    corners: Vec<Corner<f64>>,
+struct SmoothCoefficients {
+    /// The derivatives of the accelerations without those of forces with corners.
+    derivatives: AccelerationDerivatives,
+    /// The motions on which the forces with corners depend.
+    corners: Vec<CornerMotion<f64>>,
 }
 
-impl Smooth {
-    /// The coefficients of no forces.
-    const NONE: Self = Self { slopes: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
+impl SmoothCoefficients {
+    /// Coefficients that are all zero.
+    const NONE: Self = Self { derivatives: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
 }
 
-/// The number of times that each summand counts.
-type Times = [f64; INSTANTS_AT_CORNERS];
+/// The weight of each summand.
+type Weights = [f64; INSTANTS_AT_CORNERS];
 
-/// Sums of the same, each by times of its own. Coordinate by coordinate, so that what is summed
-/// stays in the nearest cache, and several at once, so that what is loaded serves them all.
+/// Computes several weighted sums of the same samples. The sums go by coordinates, so that the
+/// summands stay in the first cache, and by four at a time, so that a loaded summand serves all.
 #[inline(always)]
-fn sum(of: &[Smooth], times: &[Times], sums: &mut [Smooth]) {
-    let ((times_of_four, times_of_rest), (fours, rest)) =
-        (times.as_chunks::<4>(), sums.as_chunks_mut::<4>());
+fn add_weighted(
+    samples: &[SmoothCoefficients],
+    weights: &[Weights],
+    sums: &mut [SmoothCoefficients],
+) {
+    let ((weights_by_four, remaining_weights), (fours, rest)) =
+        (weights.as_chunks::<4>(), sums.as_chunks_mut::<4>());
     for i in 0..COORDINATES {
-        for place in 0..fours.len() {
-            sum_slopes(of, i, &times_of_four[place], &mut fours[place]);
+        for index in 0..fours.len() {
+            add_weighted_slopes(samples, i, &weights_by_four[index], &mut fours[index]);
         }
-        for place in 0..rest.len() {
-            sum_slopes(of, i, &[times_of_rest[place]], core::array::from_mut(&mut rest[place]));
+        for index in 0..rest.len() {
+            add_weighted_slopes(
+                samples,
+                i,
+                &[remaining_weights[index]],
+                core::array::from_mut(&mut rest[index]),
+            );
         }
     }
-    for (place, times) in times.iter().enumerate() {
-        sums[place].corners.clear();
-        for m in 0..of[0].corners.len() {
-            let mut corner = Corner::none(N(0.0));
-            for k in 0..of.len() {
-                corner.add(&of[k].corners[m], times[k]);
+    for (index, weights) in weights.iter().enumerate() {
+        sums[index].corners.clear();
+        for m in 0..samples[0].corners.len() {
+            let mut corner = CornerMotion::zero(N(0.0));
+            for k in 0..samples.len() {
+                corner.add(&samples[k].corners[m], weights[k]);
             }
-            sums[place].corners.push(corner);
+            sums[index].corners.push(corner);
         }
     }
 }
 
-/// Returns the derivatives of one acceleration.
+/// Computes the weighted sums of the derivatives of one acceleration.
 #[inline(always)]
-fn sum_slopes<const SUMS: usize>(
-    of: &[Smooth],
+fn add_weighted_slopes<const SUMS: usize>(
+    samples: &[SmoothCoefficients],
     i: usize,
-    times: &[Times; SUMS],
-    sums: &mut [Smooth; SUMS],
+    weights: &[Weights; SUMS],
+    sums: &mut [SmoothCoefficients; SUMS],
 ) {
     let mut sum = [[N(0.0); STATES]; SUMS];
-    for k in 0..of.len() {
-        for place in 0..SUMS {
+    for k in 0..samples.len() {
+        for index in 0..SUMS {
             for j in 0..STATES {
-                sum[place][j] += of[k].slopes[i][j] * times[place][k];
+                sum[index][j] += samples[k].derivatives[i][j] * weights[index][k];
             }
         }
     }
-    for place in 0..SUMS {
-        sums[place].slopes[i] = sum[place];
+    for index in 0..SUMS {
+        sums[index].derivatives[i] = sum[index];
     }
 }
 
 /// Computes the monodromy matrix of each row's turn.
-impl<T: Lane> Aside for Along<'_, T> {
-    type Output = Vec<Square>;
+impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
+    type Output = Vec<StateMatrix>;
 
     #[inline(always)]
-    fn run(self) -> Vec<Square> {
+    fn run(self) -> Vec<StateMatrix> {
         let Self { zero, weights, .. } = self;
-        let taken = self.take(zero);
-        let block = if T::LANES == MAX_LANES { WIDE_BLOCK } else { BLOCK };
+        let samples = self.sample_coefficients(zero);
+        let block = if T::LANES == MAX_LANES { WIDE_BLOCK_LANES } else { BLOCK_LANES };
         let vectors = STATES.div_ceil(block * T::LANES) * block;
-        let mut columns = vec![vec![[zero; STATES]; vectors]; self.rows];
+        let mut columns = vec![vec![[zero; STATES]; vectors]; self.turn_count];
         for columns in &mut columns {
             for j in 0..STATES {
                 columns[j / T::LANES][j].0.set(j % T::LANES, 1.0);
             }
         }
-        let mut at = vec![Smooth::NONE; PLACES];
-        let mut three = [Smooth::NONE; 3];
-        let mut parabolas = [[0.0; INSTANTS_AT_CORNERS]; PLACES];
-        for k in 0..PLACES {
-            let t = k as f64 / AT_ONCE as f64 - 1.0;
-            let through = [0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)];
-            parabolas[k][..through.len()].copy_from_slice(&through);
+        let mut coefficients = vec![SmoothCoefficients::NONE; INSTANTS_AT_ONCE];
+        let mut endpoints_and_middle = [SmoothCoefficients::NONE; 3];
+        let mut parabolas = [[0.0; INSTANTS_AT_CORNERS]; INSTANTS_AT_ONCE];
+        for k in 0..INSTANTS_AT_ONCE {
+            let t = k as f64 / STEPS_AT_ONCE as f64 - 1.0;
+            let lagrange_weights = [0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)];
+            parabolas[k][..lagrange_weights.len()].copy_from_slice(&lagrange_weights);
         }
-        for first in (0..self.clock.steps).step_by(AT_ONCE) {
-            for (row, columns) in columns.iter_mut().enumerate() {
-                if self.forces.is_empty() {
-                    interpolate(&taken[row], weights, 2 * first, &mut at);
+        for first_step in (0..self.grid.steps).step_by(STEPS_AT_ONCE) {
+            for (turn, columns) in columns.iter_mut().enumerate() {
+                if self.corner_forces.is_empty() {
+                    interpolate(&samples[turn], weights, 2 * first_step, &mut coefficients);
                 } else {
-                    interpolate(&taken[row], weights, 2 * first, &mut three);
-                    sum(&three, &parabolas, &mut at);
-                    for k in 0..PLACES {
-                        self.apply(row, 2 * first + k, 1.0, &mut at[k]);
+                    interpolate(&samples[turn], weights, 2 * first_step, &mut endpoints_and_middle);
+                    add_weighted(&endpoints_and_middle, &parabolas, &mut coefficients);
+                    for k in 0..INSTANTS_AT_ONCE {
+                        self.apply(turn, 2 * first_step + k, 1.0, &mut coefficients[k]);
                     }
                 }
-                let step_s = zero.lit(self.clock.step_s.0.get(row));
-                for k in 0..AT_ONCE {
-                    let start = &at[2 * k].slopes;
-                    let middle = &at[2 * k + 1].slopes;
-                    let end = &at[2 * k + 2].slopes;
-                    let at = [start, middle, middle, end];
+                let step_s = zero.lit(self.grid.step_s.0.get(turn));
+                for k in 0..STEPS_AT_ONCE {
+                    let start = &coefficients[2 * k].derivatives;
+                    let middle = &coefficients[2 * k + 1].derivatives;
+                    let end = &coefficients[2 * k + 2].derivatives;
+                    let coefficients = [start, middle, middle, end];
                     if T::LANES == MAX_LANES {
-                        for block in columns.as_chunks_mut::<WIDE_BLOCK>().0 {
-                            step(zero, step_s, at, block);
+                        for block in columns.as_chunks_mut::<WIDE_BLOCK_LANES>().0 {
+                            integrate_step(zero, step_s, coefficients, block);
                         }
                     } else {
-                        for block in columns.as_chunks_mut::<BLOCK>().0 {
-                            step(zero, step_s, at, block);
+                        for block in columns.as_chunks_mut::<BLOCK_LANES>().0 {
+                            integrate_step(zero, step_s, coefficients, block);
                         }
                     }
                 }
             }
         }
-        let mut found = vec![[[N(0.0); STATES]; STATES]; self.rows];
-        for (found, columns) in found.iter_mut().zip(&columns) {
+        let mut matrices = vec![[[N(0.0); STATES]; STATES]; self.turn_count];
+        for (matrix, columns) in matrices.iter_mut().zip(&columns) {
             for i in 0..STATES {
                 for j in 0..STATES {
-                    found[i][j] = N(columns[j / T::LANES][i].0.get(j % T::LANES));
+                    matrix[i][j] = N(columns[j / T::LANES][i].0.get(j % T::LANES));
                 }
             }
         }
-        found
+        matrices
     }
 }
 
-impl<T: Lane> Along<'_, T> {
-    /// Computes what is taken of each row at its instants.
+impl<T: Lane> SmoothMonodromy<'_, T> {
+    /// Computes the smooth coefficients of each turn at the instants.
     #[inline(always)]
-    fn take(&self, zero: N<T>) -> Vec<Vec<Smooth>> {
-        let shares = T::LANES / self.rows;
-        let last = self.instants - 1;
-        let every = self.path.len() / self.instants;
-        let steps = self.clock.steps / self.instants;
-        let mut taken = vec![vec![Smooth::NONE; self.instants]; self.rows];
-        let mut at = [0; MAX_LANES];
-        let mut found = [[zero; STATES]; COORDINATES];
-        for instant in (0..self.instants).step_by(shares) {
+    fn sample_coefficients(&self, zero: N<T>) -> Vec<Vec<SmoothCoefficients>> {
+        let instants_at_once = T::LANES / self.turn_count;
+        let last_instant = self.instants - 1;
+        let state_stride = self.states.len() / self.instants;
+        let steps_per_instant = self.grid.steps / self.instants;
+        let mut samples = vec![vec![SmoothCoefficients::NONE; self.instants]; self.turn_count];
+        let mut instants = [0; MAX_LANES];
+        let mut derivatives = [[zero; STATES]; COORDINATES];
+        for instant in (0..self.instants).step_by(instants_at_once) {
             let mut step = zero;
             let mut state = [zero; STATES];
             for lane in 0..T::LANES {
-                at[lane] = (instant + (lane / self.rows).min(shares - 1)).min(last);
-                step.0.set(lane, (at[lane] * steps) as f64);
+                instants[lane] = (instant + (lane / self.turn_count).min(instants_at_once - 1))
+                    .min(last_instant);
+                step.0.set(lane, (instants[lane] * steps_per_instant) as f64);
                 for i in 0..STATES {
-                    state[i].0.set(lane, self.path[at[lane] * every][i].0.get(lane % self.rows));
+                    state[i].0.set(
+                        lane,
+                        self.states[instants[lane] * state_stride][i].0.get(lane % self.turn_count),
+                    );
                 }
             }
-            let spin = self.model.forcing_aside((self.clock.step_s * step).v().constant());
-            self.slopes(zero, &spin, &state, &mut found);
+            let spin = self.model.forcing_out_of_line((self.grid.step_s * step).v().constant());
+            self.derivatives(zero, &spin, &state, &mut derivatives);
             let mut corners = Vec::new();
-            if !self.forces.is_empty() {
-                corners = zero.0.aside(Corners { model: &self.model, spin: &spin, x: &state });
+            if !self.corner_forces.is_empty() {
+                corners = zero.0.run_out_of_line(CornerMotions {
+                    model: &self.model,
+                    spin: &spin,
+                    x: &state,
+                });
             }
             for lane in 0..T::LANES {
-                let row = lane % self.rows;
-                let smooth = &mut taken[row][at[lane]];
+                let turn = lane % self.turn_count;
+                let coefficients = &mut samples[turn][instants[lane]];
                 for i in 0..COORDINATES {
                     for j in 0..STATES {
-                        smooth.slopes[i][j] = N(found[i][j].0.get(lane));
+                        coefficients.derivatives[i][j] = N(derivatives[i][j].0.get(lane));
                     }
                 }
-                smooth.corners = corners.iter().map(|corner| corner.get_lane(lane)).collect();
-                self.apply(row, 2 * at[lane] * steps, -1.0, smooth);
+                coefficients.corners = corners.iter().map(|corner| corner.get_lane(lane)).collect();
+                self.apply(turn, 2 * instants[lane] * steps_per_instant, -1.0, coefficients);
             }
         }
-        taken
+        samples
     }
 
-    /// Adds to a row's derivatives at a place of the list of forces what these add, so many times.
+    /// Adds the derivatives of the forces with corners at an instant of a turn, times a sign.
     #[inline(always)]
-    fn apply(&self, row: usize, place: usize, times: f64, to: &mut Smooth) {
-        let count = to.corners.len();
-        for m in 0..count {
-            let force = self.forces[place * count + m].get_lane(row);
-            to.corners[m].apply(&force, times, &mut to.slopes);
+    fn apply(&self, turn: usize, instant: usize, sign: f64, coefficients: &mut SmoothCoefficients) {
+        let corner_count = coefficients.corners.len();
+        for m in 0..corner_count {
+            let force = self.corner_forces[instant * corner_count + m].get_lane(turn);
+            coefficients.corners[m].apply(&force, sign, &mut coefficients.derivatives);
         }
     }
 
-    /// Returns the derivatives at a state.
+    /// Computes the derivatives of the accelerations at a state.
     #[inline(always)]
-    fn slopes(
+    fn derivatives(
         &self,
         zero: N<T>,
         forcing: &<Nonlinear<Dual<T>> as System<Dual<T>, STATES>>::Forcing,
         at: &[N<T>; STATES],
-        slopes: &mut [[N<T>; STATES]; COORDINATES],
+        derivatives: &mut [[N<T>; STATES]; COORDINATES],
     ) {
         let mut state = [zero.constant(); STATES];
         for i in 0..STATES {
@@ -258,93 +278,100 @@ impl<T: Lane> Along<'_, T> {
         }
         for j in 0..STATES {
             state[j].0.slope = zero.lit(1.0).0;
-            let derivative = self.model.derivative_aside(forcing, &state);
+            let derivative = self.model.derivative_out_of_line(forcing, &state);
             state[j].0.slope = zero.0;
             for i in 0..COORDINATES {
-                slopes[i][j] = N(derivative[COORDINATES + i].0.slope);
+                derivatives[i][j] = N(derivative[COORDINATES + i].0.slope);
             }
         }
     }
 }
 
-/// Weights of the values at so many even instants in the trigonometric polynomial through them, at
-/// each place from the first instant up to the second where turns of so many steps need them: at
-/// the ends of steps and halfway between.
+/// Returns the weights of the values at the instants in the trigonometric polynomial through them.
+/// There is a list of weights for the ends and the middle of each step between the first instant
+/// and the second one.
 #[inline(always)]
-pub(super) fn weights(steps: usize, instants: usize) -> Vec<Vec<f64>> {
-    let parts = 2 * steps / instants;
-    let mut weights = vec![vec![0.0; instants]; parts];
+pub(super) fn interpolation_weights(steps: usize, instants: usize) -> Vec<Vec<f64>> {
+    let subdivisions = 2 * steps / instants;
+    let mut weights = vec![vec![0.0; instants]; subdivisions];
     // No closure: it would be compiled without the instruction set.
-    for place in 0..parts {
+    for subdivision in 0..subdivisions {
         for instant in 0..instants {
-            let turns = (place as f64 / parts as f64 - instant as f64) / instants as f64;
+            let turns =
+                (subdivision as f64 / subdivisions as f64 - instant as f64) / instants as f64;
             let mut harmonics = 0.0;
             for harmonic in 1..instants / 2 {
                 harmonics += 2.0 * trig::sin_cos_turns(N(harmonic as f64 * turns)).1.0;
             }
-            let (_, last) = trig::sin_cos_turns(N((instants / 2) as f64 * turns));
-            weights[place][instant] = (1.0 + harmonics + last.0) / instants as f64;
+            let (_, last_cosine) = trig::sin_cos_turns(N((instants / 2) as f64 * turns));
+            weights[subdivision][instant] = (1.0 + harmonics + last_cosine.0) / instants as f64;
         }
     }
     weights
 }
 
-/// Returns what is smooth from a place of [`weights`] on, counted through the turn, at even places
-/// of the next [`PLACES`].
+/// Interpolates the samples of a turn at equally spaced ones of the [`INSTANTS_AT_ONCE`] half steps
+/// from `first_instant` on.
 #[inline(always)]
-fn interpolate(taken: &[Smooth], weights: &[Vec<f64>], from: usize, at: &mut [Smooth]) {
-    let mut times = [[0.0; INSTANTS_AT_CORNERS]; PLACES];
-    let times = &mut times[..at.len()];
-    let every = (PLACES - 1) / (at.len() - 1);
-    for (k, times) in times.iter_mut().enumerate() {
-        let place = from + k * every;
-        let first = place / weights.len();
-        let part = place % weights.len();
-        for (instant, weight) in weights[part].iter().enumerate() {
-            times[(first + instant) % taken.len()] = *weight;
+fn interpolate(
+    samples: &[SmoothCoefficients],
+    weights: &[Vec<f64>],
+    first_instant: usize,
+    coefficients: &mut [SmoothCoefficients],
+) {
+    let mut weights_by_sample = [[0.0; INSTANTS_AT_CORNERS]; INSTANTS_AT_ONCE];
+    let weights_by_sample = &mut weights_by_sample[..coefficients.len()];
+    let stride = (INSTANTS_AT_ONCE - 1) / (coefficients.len() - 1);
+    for (k, weights_by_sample) in weights_by_sample.iter_mut().enumerate() {
+        let position = first_instant + k * stride;
+        let first_sample = position / weights.len();
+        let subdivision = position % weights.len();
+        for (instant, weight) in weights[subdivision].iter().enumerate() {
+            weights_by_sample[(first_sample + instant) % samples.len()] = *weight;
         }
     }
-    sum(taken, times, at);
+    add_weighted(samples, weights_by_sample, coefficients);
 }
 
-/// Integrates a step of some disturbances; the derivatives are those at its stages.
+/// Integrates a step of some disturbances, with the derivatives at the stages.
 #[inline(always)]
-fn step<T: Lane, const BLOCK: usize>(
+fn integrate_step<T: Lane, const BLOCK_LANES: usize>(
     zero: N<T>,
     h: N<T>,
-    at: [&Slopes; 4],
-    block: &mut [[N<T>; STATES]; BLOCK],
+    stage_derivatives: [&AccelerationDerivatives; 4],
+    block: &mut [[N<T>; STATES]; BLOCK_LANES],
 ) {
-    let mut along = *block;
-    let start = along;
+    let mut stage_states = *block;
+    let start_states = stage_states;
     for stage in 0..4 {
-        let slopes = at[stage];
-        let mut accelerations = [[zero; COORDINATES]; BLOCK];
-        // Rows by two, so that what is loaded of a disturbance serves both.
+        let derivatives = stage_derivatives[stage];
+        let mut accelerations = [[zero; COORDINATES]; BLOCK_LANES];
+        // Two rows at a time, so that a loaded component of a disturbance serves both.
         for i in (0..COORDINATES).step_by(2) {
-            let mut sums = [[zero; BLOCK]; 2];
+            let mut row_sums = [[zero; BLOCK_LANES]; 2];
             for j in 0..STATES {
-                let pair = [zero.lit(slopes[i][j].0), zero.lit(slopes[i + 1][j].0)];
-                for c in 0..BLOCK {
-                    sums[0][c] += pair[0] * along[c][j];
-                    sums[1][c] += pair[1] * along[c][j];
+                let row_pair = [zero.lit(derivatives[i][j].0), zero.lit(derivatives[i + 1][j].0)];
+                for c in 0..BLOCK_LANES {
+                    row_sums[0][c] += row_pair[0] * stage_states[c][j];
+                    row_sums[1][c] += row_pair[1] * stage_states[c][j];
                 }
             }
-            for c in 0..BLOCK {
-                accelerations[c][i] = sums[0][c];
-                accelerations[c][i + 1] = sums[1][c];
+            for c in 0..BLOCK_LANES {
+                accelerations[c][i] = row_sums[0][c];
+                accelerations[c][i + 1] = row_sums[1][c];
             }
         }
-        let reach = (h * NEXT_STAGE[stage]).v();
-        let weight = (h * WEIGHT[stage]).v();
-        for c in 0..BLOCK {
+        let a_step = (h * A[stage]).v();
+        let b_step = (h * B[stage]).v();
+        for c in 0..BLOCK_LANES {
             for i in 0..COORDINATES {
-                let speed = along[c][COORDINATES + i];
+                let speed = stage_states[c][COORDINATES + i];
                 let acceleration = accelerations[c][i];
-                along[c][i] = start[c][i] + reach * speed;
-                block[c][i] += weight * speed;
-                along[c][COORDINATES + i] = start[c][COORDINATES + i] + reach * acceleration;
-                block[c][COORDINATES + i] += weight * acceleration;
+                stage_states[c][i] = start_states[c][i] + a_step * speed;
+                block[c][i] += b_step * speed;
+                stage_states[c][COORDINATES + i] =
+                    start_states[c][COORDINATES + i] + a_step * acceleration;
+                block[c][COORDINATES + i] += b_step * acceleration;
             }
         }
     }
@@ -360,10 +387,12 @@ mod tests {
     fn a_trigonometric_polynomial_is_met_between_its_instants() {
         let wave = |turns: f64| 0.3 + (TAU * turns).sin() - 0.5 * (7.0 * TAU * turns + 0.2).cos();
         let values: [f64; INSTANTS] = from_fn(|k| wave(k as f64 / INSTANTS as f64));
-        for (part, weights) in weights(5 * INSTANTS / 2, INSTANTS).iter().enumerate() {
+        for (subdivision, weights) in
+            interpolation_weights(5 * INSTANTS / 2, INSTANTS).iter().enumerate()
+        {
             let sum: f64 = weights.iter().zip(values).map(|(weight, value)| weight * value).sum();
-            let turns = part as f64 / 5.0 / INSTANTS as f64;
-            assert!((sum - wave(turns)).abs() < 1e-14, "{part}: {sum}");
+            let turns = subdivision as f64 / 5.0 / INSTANTS as f64;
+            assert!((sum - wave(turns)).abs() < 1e-14, "{subdivision}: {sum}");
         }
     }
 }

@@ -1,10 +1,10 @@
-//! Steps and caps at constant speeds, and what of a machine's motion they leave right.
+//! The choice of steps and caps at constant speeds, with limits on their effect on the suspension.
 
-use super::NoAnswer;
+use super::ResponseError;
 use super::monodromy::{INSTANTS, INSTANTS_AT_CORNERS};
-use super::orbit::{Row, caps};
+use super::period_map::{TurnSetup, caps_for_steps};
 use crate::coordinates::COORDINATES;
-use crate::modes::{Mode, Modes, highest_frequency_rad_per_s, modes, motions};
+use crate::modes::{Mode, Modes, highest_frequency_rad_per_s, mode_roots, modes};
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
 use crate::steps::{HINGE_TO_DRUM, SUSPENSION_MODES};
@@ -13,329 +13,391 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The factor of the number of steps where so many are not enough.
-const MORE_STEPS: f64 = 1.5;
+/// The factor by which the number of steps grows if caps shift modes too far. Doubling it may take
+/// up to twice as many steps as needed.
+const STEP_COUNT_INCREASE: f64 = 1.5;
 
-/// The part of a capped hinge's shift that affects motions: its law is exact for motion that turns
-/// with the drum.
-const FREE_SHARE: f64 = 0.1;
+/// The share of a capped hinge's shift that counts. Basis: the law of the capped hinge is exact for
+/// motion that turns with the drum, which is most of the motion. Doubling it takes more steps.
+const FREE_MOTION_SHARE: f64 = 0.1;
 
-/// Step times the fastest mode, where none is capped.
-const PLAIN_PHASE: f64 = 1.0;
+/// The product of step and frequency of the fastest mode (rad), if none is capped. Doubling it
+/// makes errors of that mode 16 times as large.
+const UNCAPPED_STEP_PHASE_RAD: f64 = 1.0;
 
-/// The limits for steps, caps and derivatives.
-struct Care {
-    /// Steps of a turn, at least.
-    steps: usize,
-    /// Instants of it at which derivatives are taken.
+/// The limits of steps, caps and derivatives.
+struct AccuracyLimits {
+    /// The least number of steps of a turn.
+    min_steps: usize,
+    /// The number of instants of a turn at which derivatives are computed, without corners.
     instants: usize,
-    /// Longest step times the fastest of the suspension's modes.
-    phase: f64,
-    /// The greatest shift of these modes by caps (1/s, rad/s).
-    shift_per_s: f64,
-    /// Longest steps (s) where friction and stops give forces corners.
-    at_corners_s: f64,
+    /// The greatest product of step and frequency of the suspension's fastest mode (rad).
+    max_phase_rad: f64,
+    /// The greatest shift of the suspension's modes by caps (1/s, rad/s).
+    max_shift_per_s: f64,
+    /// The longest step (s) if friction or stops give forces corners.
+    max_corner_step_s: f64,
 }
 
-/// The use of a setting.
+/// The purpose for which turns are integrated.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Use {
-    Rows,
-    Followed,
+enum Purpose {
+    /// The responses at requested speeds.
+    Response,
+    /// The continuation of the curve, and the linear model.
+    Continuation,
 }
 
-/// The limits for rows.
-const OF_ROWS: Care =
-    Care { steps: 96, instants: INSTANTS, phase: 0.25, shift_per_s: 3e-4, at_corners_s: 1e-4 };
+/// The limits for responses at requested speeds.
+const RESPONSE_LIMITS: AccuracyLimits = AccuracyLimits {
+    min_steps: 96,
+    instants: INSTANTS,
+    max_phase_rad: 0.25,
+    max_shift_per_s: 3e-4,
+    max_corner_step_s: 1e-4,
+};
 
-/// The limits for the linear model, whose forces have no corners, and whose response turns with the
-/// drum; and where smooth responses are only followed: what lies on the curve is looked for anew.
-const OF_FOLLOWED: Care =
-    Care { steps: 48, instants: 8, phase: 0.4, shift_per_s: 3e-3, at_corners_s: f64::INFINITY };
+/// The limits for the continuation of smooth responses, which are computed again at requested
+/// speeds; and for the linear model, whose forces have no corners and whose response turns with the
+/// drum.
+const CONTINUATION_LIMITS: AccuracyLimits = AccuracyLimits {
+    min_steps: 48,
+    instants: 8,
+    max_phase_rad: 0.4,
+    max_shift_per_s: 3e-3,
+    max_corner_step_s: f64::INFINITY,
+};
 
-/// The least number of steps of every turn where responses with corners are followed, and others
-/// that ranges' own steps lose. A hit of a stop rings the hinge, by other steps or caps otherwise,
-/// so that a change of these would break the curve. Basis: it is twice what smooth forces take at
-/// low speeds. Doubling it doubles the time.
-const LEAST_STEPS: usize = 256;
-/// The greatest number of these steps. Basis: they are as short as contacts at usual speeds.
-/// Doubling it makes a curve that is lost take twice as long.
-const MOST_STEPS_FOLLOWED: usize = 2048;
+/// The least number of steps of every turn in the continuation of responses with corners, and of
+/// others whose curve is lost with steps that change from range to range. A hit of a stop makes the
+/// hinge ring, differently with other steps or caps, so that a change of these would break the
+/// curve. Basis: it is twice what smooth forces take at low speeds. Doubling it doubles the time.
+const MIN_CONTINUATION_STEPS: usize = 256;
+/// The greatest number of steps of every turn in the continuation. Basis: these steps are as short
+/// as contacts at usual speeds. Doubling it makes a curve that is lost take twice as long.
+const MAX_CONTINUATION_STEPS: usize = 2048;
 
-/// The share of the slowest mode's frequency from which responses are followed. Basis: the second
-/// harmonic is still below it. Doubling it begins amid resonances.
-const LOWEST_SHARE: f64 = 0.45;
-/// The number of parts of a turn per minute of which that is a multiple. Basis: an eigenvalue's
-/// last digits are below it. Doubling it changes the speed by less than a hundredth rpm.
-const LOWEST_DIGITS: f64 = 64.0;
+/// The speed at which the continuation begins, over the slowest mode's frequency. Basis: the second
+/// harmonic of the speed is still below that mode. Doubling it begins amid resonances.
+const LOWEST_SPEED_RATIO: f64 = 0.45;
+/// The reciprocal of the unit (rpm) to which the first speed is rounded up. Basis: the last digits
+/// of an eigenvalue depend on the processor. Doubling it changes the speed by less than 0.01 rpm.
+const SPEED_ROUNDING_PER_RPM: f64 = 64.0;
 
-/// The speed from which a second curve is followed down, over the fastest mode's frequency. Basis:
-/// responses are small there. Doubling it takes more steps.
-const HIGHEST_SHARE: f64 = 2.0;
+/// The speed from which a second curve is continued down, over the frequency of the suspension's
+/// fastest mode. Basis: responses are small there. Doubling it takes more steps.
+const HIGHEST_SPEED_RATIO: f64 = 2.0;
 
-/// Steps of a turn, at most: a drum so slow that it asks for more leaves its machine at rest, but
-/// for its own unbalance going round.
-const MOST_STEPS: usize = 1 << 15;
+/// The greatest number of steps of a turn. Basis: a drum that needs more is so slow that the
+/// machine follows its unbalance statically. Doubling it allows half the speed.
+const MAX_STEPS: usize = 1 << 15;
 
-/// Ranges of speed in a doubling of it, in each of which steps and caps are chosen once.
-const RANGES: f64 = 4.0;
+/// The number of speed ranges in an octave, in each of which steps and caps are chosen once.
+/// Doubling it chooses them twice as often, and closer to their limits.
+const RANGES_PER_OCTAVE: f64 = 4.0;
 
-/// A row, and what is known of its machine with theta frozen.
+/// A point at a held speed: the set-up of its turns, and its modes with theta frozen.
 #[derive(Clone)]
-pub(crate) struct Case<'a> {
-    pub(crate) row: Row<'a>,
-    /// At the low end of the range that the speed is in.
-    pub(crate) frozen: Arc<Modes>,
-    /// Modes that are judged, the slowest.
-    pub(super) judged: usize,
+pub(crate) struct HeldCase<'a> {
+    pub(crate) setup: TurnSetup<'a>,
+    /// The modes with theta frozen, at the lower end of the speed range.
+    pub(crate) frozen_modes: Arc<Modes>,
+    /// The number of modes, from the slowest on, that the multipliers represent.
+    pub(super) judged_modes: usize,
 }
 
-impl<'a> Case<'a> {
-    /// Returns the case for the machine as it is. A harmonic of the turn may ring its hinge, so
-    /// derivatives are taken at as many instants as where forces have corners: fewer do not see
-    /// that harmonic, and Newton's method fails.
-    pub(crate) fn without_caps(&self) -> Result<Self, NoAnswer> {
-        let steps = plain_steps(self.row.point, self.row.speed_rpm, self.row.turn_s())?;
+impl<'a> HeldCase<'a> {
+    /// Returns the case without caps. A harmonic of the turn may excite the hinge, so that
+    /// derivatives are computed at as many instants as with corners: with fewer, they lack that
+    /// harmonic, and Newton's method fails.
+    pub(crate) fn without_caps(&self) -> Result<Self, ResponseError> {
+        let steps =
+            uncapped_step_count(self.setup.point, self.setup.speed_rpm, self.setup.turn_s())?;
         let steps = steps.next_multiple_of(INSTANTS_AT_CORNERS);
-        let row = Row { steps, instants: INSTANTS_AT_CORNERS, caps: None, ..self.row };
-        Ok(Self { row, frozen: Arc::clone(&self.frozen), judged: self.judged })
+        let setup = TurnSetup { steps, instants: INSTANTS_AT_CORNERS, caps: None, ..self.setup };
+        Ok(Self {
+            setup,
+            frozen_modes: Arc::clone(&self.frozen_modes),
+            judged_modes: self.judged_modes,
+        })
     }
 }
 
-/// Steps of a turn that follow all modes.
-fn plain_steps(point: &Point, speed_rpm: f64, turn_s: f64) -> Result<usize, NoAnswer> {
-    let highest = highest_frequency_rad_per_s(point, speed_rpm * TAU / 60.0)
-        .map_err(|_| NoAnswer::Eigenvalues)?;
-    whole(point, highest * turn_s / PLAIN_PHASE)
+/// Returns the number of steps of a turn that resolve all modes.
+fn uncapped_step_count(point: &Point, speed_rpm: f64, turn_s: f64) -> Result<usize, ResponseError> {
+    let highest_rad_per_s = highest_frequency_rad_per_s(point, speed_rpm * TAU / 60.0)
+        .map_err(|_| ResponseError::NoEigenvalues)?;
+    round_up_steps(point, highest_rad_per_s * turn_s / UNCAPPED_STEP_PHASE_RAD)
 }
 
-/// Returns at how many instants of a machine's turn derivatives are taken, at most.
-fn most_instants(point: &Point) -> usize {
+/// Returns the greatest number of instants of a turn at which derivatives are computed.
+fn max_instants(point: &Point) -> usize {
     if point.machine.elements.are_nonsmooth() { INSTANTS_AT_CORNERS } else { INSTANTS }
 }
 
-/// Returns at least so many steps, a multiple of [`most_instants`].
-fn whole(point: &Point, steps: f64) -> Result<usize, NoAnswer> {
-    let of = most_instants(point) as f64;
-    let steps = of * (steps / of).ceil().max(1.0);
-    if steps > MOST_STEPS as f64 { Err(NoAnswer::TooSlow) } else { Ok(steps as usize) }
+/// Rounds a number of steps up to a multiple of [`max_instants`].
+fn round_up_steps(point: &Point, steps: f64) -> Result<usize, ResponseError> {
+    let divisor = max_instants(point) as f64;
+    let steps = divisor * (steps / divisor).ceil().max(1.0);
+    if steps > MAX_STEPS as f64 { Err(ResponseError::TooSlow) } else { Ok(steps as usize) }
 }
 
-/// Steps and caps at a point's speeds.
+/// The steps and caps of a point at all speeds.
 #[derive(Clone)]
 pub(crate) struct Settings<'a> {
     pub(crate) point: &'a Point,
-    /// Without friction, whose modes are asked for: friction that is taken at a low speed holds the
-    /// linear model, not the machine.
-    free: Cow<'a, Point>,
-    rest: Option<Modes>,
-    /// Modes where ranges begin, by range.
-    frozen: BTreeMap<i64, Result<Arc<Modes>, NoAnswer>>,
-    /// Steps of every turn where responses are followed, at least, if ranges do not choose them.
-    steps: Option<usize>,
+    /// The point without friction, whose modes are used: friction that is linearised at a low speed
+    /// blocks the linear model, but not the machine.
+    frictionless_point: Cow<'a, Point>,
+    modes_at_rest: Option<Modes>,
+    /// The modes at the lower ends of ranges.
+    modes_by_range: BTreeMap<i64, Result<Arc<Modes>, ResponseError>>,
+    /// The least number of steps of every turn in the continuation; `None` if each range has its
+    /// own number.
+    min_continuation_steps: Option<usize>,
     /// The settings by range and use.
-    ranges: BTreeMap<(i64, Use), Result<Setting, NoAnswer>>,
+    settings_by_range: BTreeMap<(i64, Purpose), Result<RangeSetting, ResponseError>>,
 }
 
 /// The setting of a range of speeds.
 #[derive(Clone)]
-struct Setting {
-    frozen: Arc<Modes>,
+struct RangeSetting {
+    frozen_modes: Arc<Modes>,
     steps: usize,
     is_capped: bool,
 }
 
-/// Returns where a range begins (rpm).
-fn begins_rpm(range: i64) -> f64 {
-    libm::exp2(range as f64 / RANGES)
+/// Returns the lower end of a range (rpm).
+fn range_start_rpm(range: i64) -> f64 {
+    libm::exp2(range as f64 / RANGES_PER_OCTAVE)
 }
 
 impl<'a> Settings<'a> {
     pub(crate) fn new(point: &'a Point) -> Self {
-        let free = match point.friction_speeds().is_empty() {
+        let frictionless_point = match point.friction_speeds().is_empty() {
             true => Cow::Borrowed(point),
             false => Cow::Owned(point.without_friction()),
         };
-        let rest = modes(&free, 0.0, 0.0).ok();
+        let modes_at_rest = modes(&frictionless_point, 0.0, 0.0).ok();
         Self {
             point,
-            free,
-            rest,
-            frozen: BTreeMap::new(),
-            steps: point.machine.elements.are_nonsmooth().then_some(LEAST_STEPS),
-            ranges: BTreeMap::new(),
+            frictionless_point,
+            modes_at_rest,
+            modes_by_range: BTreeMap::new(),
+            min_continuation_steps: point
+                .machine
+                .elements
+                .are_nonsmooth()
+                .then_some(MIN_CONTINUATION_STEPS),
+            settings_by_range: BTreeMap::new(),
         }
     }
 
     /// Returns the machine without friction.
     pub(super) fn without_friction(&self) -> &Point {
-        &self.free
+        &self.frictionless_point
     }
 
-    /// Returns from where responses are followed (rpm): below all that the suspension answers to.
-    pub(super) fn lowest_rpm(&self) -> Result<f64, NoAnswer> {
-        self.share_of_mode(LOWEST_SHARE, 0)
+    /// Returns the speed (rpm) from which responses are continued up, below all resonances.
+    pub(super) fn lowest_rpm(&self) -> Result<f64, ResponseError> {
+        self.mode_speed_rpm(LOWEST_SPEED_RATIO, 0)
     }
 
-    /// Returns from where they are followed down: above all that it answers to.
-    pub(super) fn highest_rpm(&self) -> Result<f64, NoAnswer> {
-        self.share_of_mode(HIGHEST_SHARE, SUSPENSION_MODES - 1)
+    /// Returns the speed (rpm) from which responses are continued down, above all resonances of the
+    /// suspension.
+    pub(super) fn highest_rpm(&self) -> Result<f64, ResponseError> {
+        self.mode_speed_rpm(HIGHEST_SPEED_RATIO, SUSPENSION_MODES - 1)
     }
 
-    fn share_of_mode(&self, share: f64, mode: usize) -> Result<f64, NoAnswer> {
-        let rpm = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?.modes[mode].frequency_rpm();
-        // The last digits of an eigenvalue are the processor's own.
-        Ok((share * rpm * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
+    /// Returns a multiple of a mode's frequency at rest, rounded up (rpm).
+    fn mode_speed_rpm(&self, ratio: f64, mode: usize) -> Result<f64, ResponseError> {
+        let frequency_rpm = self.modes_at_rest.as_ref().ok_or(ResponseError::NoEigenvalues)?.modes
+            [mode]
+            .frequency_rpm();
+        // The last digits of an eigenvalue depend on the processor.
+        Ok((ratio * frequency_rpm * SPEED_ROUNDING_PER_RPM).ceil() / SPEED_ROUNDING_PER_RPM)
     }
 
-    /// Returns the case of a speed.
+    /// Returns the case for responses at a speed.
     ///
     /// # Errors
-    /// [`NoAnswer::Eigenvalues`]; [`NoAnswer::TooSlow`].
-    pub(crate) fn case(&mut self, speed_rpm: f64) -> Result<Case<'a>, NoAnswer> {
-        self.chosen(speed_rpm, Use::Rows)
+    /// [`ResponseError::Eigenvalues`]; [`ResponseError::TooSlow`].
+    pub(crate) fn held_case(&mut self, speed_rpm: f64) -> Result<HeldCase<'a>, ResponseError> {
+        self.case_for(speed_rpm, Purpose::Response)
     }
 
-    /// Returns a row for the linear model.
-    pub(super) fn linear(&mut self, row: Row<'a>) -> Row<'a> {
-        self.chosen(row.speed_rpm, Use::Followed).map_or(row, |case| case.row)
+    /// Returns the set-up for the linear model at the speed of another set-up.
+    pub(super) fn linear_setup(&mut self, setup: TurnSetup<'a>) -> TurnSetup<'a> {
+        self.case_for(setup.speed_rpm, Purpose::Continuation)
+            .map_or(setup, |held_case| held_case.setup)
     }
 
-    /// Returns the row of a speed where responses are only followed.
+    /// Returns the set-up at a speed in the continuation.
     ///
     /// # Errors
-    /// As [`Self::case`].
-    pub(super) fn followed(&mut self, speed_rpm: f64) -> Result<Row<'a>, NoAnswer> {
+    /// The errors of [`Self::held_case`].
+    pub(super) fn continuation_setup(
+        &mut self,
+        speed_rpm: f64,
+    ) -> Result<TurnSetup<'a>, ResponseError> {
         let point = self.point;
-        let Some(least) = self.steps else {
-            return Ok(self.chosen(speed_rpm, Use::Followed)?.row);
+        let Some(min_steps) = self.min_continuation_steps else {
+            return Ok(self.case_for(speed_rpm, Purpose::Continuation)?.setup);
         };
-        let steps = self.steps_of_every_turn(least)?;
-        let caps = Some(caps(steps, 60.0 / speed_rpm));
-        Ok(Row { point, speed_rpm, steps, instants: steps, caps })
+        let steps = self.continuation_steps(min_steps)?;
+        let caps = Some(caps_for_steps(steps, 60.0 / speed_rpm));
+        Ok(TurnSetup { point, speed_rpm, steps, instants: steps, caps })
     }
 
-    /// Returns the steps of every turn where responses are followed, at least so many.
-    fn steps_of_every_turn(&self, least: usize) -> Result<usize, NoAnswer> {
-        let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
-        let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
+    /// Returns the number of steps of every turn in the continuation, which is at least
+    /// `min_steps`.
+    fn continuation_steps(&self, min_steps: usize) -> Result<usize, ResponseError> {
+        let modes_at_rest = self.modes_at_rest.as_ref().ok_or(ResponseError::NoEigenvalues)?;
+        let fastest_rad_per_s = modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
         let longest_turn_s = 60.0 / self.lowest_rpm()?;
-        let steps = whole(self.point, fastest * longest_turn_s / OF_FOLLOWED.phase)?;
-        Ok(steps.max(least))
+        let steps = round_up_steps(
+            self.point,
+            fastest_rad_per_s * longest_turn_s / CONTINUATION_LIMITS.max_phase_rad,
+        )?;
+        Ok(steps.max(min_steps))
     }
 
-    /// Returns the steps of a turn where responses are followed, if forces have corners.
+    /// Returns the number of steps of a turn in the continuation, if forces have corners.
     pub(super) fn steps_at_corners(&self) -> Option<usize> {
-        let least = self.steps.filter(|_| self.point.machine.elements.are_nonsmooth())?;
-        self.steps_of_every_turn(least).ok()
+        let min_steps =
+            self.min_continuation_steps.filter(|_| self.point.machine.elements.are_nonsmooth())?;
+        self.continuation_steps(min_steps).ok()
     }
 
-    /// Follows responses by turns of more steps from now on; false if there are enough.
-    pub(super) fn follow_closer(&mut self) -> bool {
-        let steps = self.steps.map_or(LEAST_STEPS, |steps| 2 * steps);
-        self.steps = Some(steps);
-        steps <= MOST_STEPS_FOLLOWED
+    /// Doubles the number of steps in the continuation; returns false if it exceeds its limit.
+    pub(super) fn refine_continuation(&mut self) -> bool {
+        let steps = self.min_continuation_steps.map_or(MIN_CONTINUATION_STEPS, |steps| 2 * steps);
+        self.min_continuation_steps = Some(steps);
+        steps <= MAX_CONTINUATION_STEPS
     }
 
-    fn chosen(&mut self, speed_rpm: f64, of: Use) -> Result<Case<'a>, NoAnswer> {
-        let range = (RANGES * libm::log2(speed_rpm)).floor() as i64;
-        let care = match of {
-            Use::Rows => OF_ROWS,
-            Use::Followed => OF_FOLLOWED,
+    /// Returns the case at a speed for a purpose, with the setting of the speed's range.
+    fn case_for(
+        &mut self,
+        speed_rpm: f64,
+        purpose: Purpose,
+    ) -> Result<HeldCase<'a>, ResponseError> {
+        let range = (RANGES_PER_OCTAVE * libm::log2(speed_rpm)).floor() as i64;
+        let limits = match purpose {
+            Purpose::Response => RESPONSE_LIMITS,
+            Purpose::Continuation => CONTINUATION_LIMITS,
         };
-        let known = self.ranges.get(&(range, of)).cloned();
-        let setting = known.unwrap_or_else(|| {
-            let setting = self.setting(range, &care);
-            self.ranges.insert((range, of), setting.clone());
+        let known_setting = self.settings_by_range.get(&(range, purpose)).cloned();
+        let setting = known_setting.unwrap_or_else(|| {
+            let setting = self.choose_setting(range, &limits);
+            self.settings_by_range.insert((range, purpose), setting.clone());
             setting
         });
-        let Setting { frozen, steps, is_capped } = setting?;
+        let RangeSetting { frozen_modes, steps, is_capped } = setting?;
         let point = self.point;
-        let caps = is_capped.then(|| caps(steps, 60.0 / speed_rpm));
-        let instants = care.instants * most_instants(point) / INSTANTS;
-        let row = Row { point, speed_rpm, steps, instants, caps };
-        let judged = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
-        Ok(Case { row, frozen, judged })
+        let caps = is_capped.then(|| caps_for_steps(steps, 60.0 / speed_rpm));
+        let instants = limits.instants * max_instants(point) / INSTANTS;
+        let setup = TurnSetup { point, speed_rpm, steps, instants, caps };
+        let judged_modes = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
+        Ok(HeldCase { setup, frozen_modes, judged_modes })
     }
 
-    /// Modes where a range begins.
-    fn frozen(&mut self, range: i64) -> Result<Arc<Modes>, NoAnswer> {
-        let found = || modes(&self.free, 0.0, begins_rpm(range) * TAU / 60.0);
-        let found = || found().map(Arc::new).map_err(|_| NoAnswer::Eigenvalues);
-        self.frozen.entry(range).or_insert_with(found).clone()
+    /// Returns the modes at the lower end of a range.
+    fn modes_at_range_start(&mut self, range: i64) -> Result<Arc<Modes>, ResponseError> {
+        let compute_modes =
+            || modes(&self.frictionless_point, 0.0, range_start_rpm(range) * TAU / 60.0);
+        let checked_modes =
+            || compute_modes().map(Arc::new).map_err(|_| ResponseError::NoEigenvalues);
+        self.modes_by_range.entry(range).or_insert_with(checked_modes).clone()
     }
 
-    /// Chooses as many steps a turn as the suspension's modes ask for in a range of speeds, and
-    /// caps as high as these steps allow. Where these would move the suspension's modes, there are
-    /// more steps; where the drum is not slow beside the hinge, there are no caps.
-    fn setting(&mut self, range: i64, care: &Care) -> Result<Setting, NoAnswer> {
+    /// Chooses the number of steps that the suspension's modes need in a range of speeds, and the
+    /// highest caps that are stable with it. If caps shift the suspension's modes too far, there
+    /// are more steps; if the drum is not slow compared with the hinge, there are no caps.
+    fn choose_setting(
+        &mut self,
+        range: i64,
+        limits: &AccuracyLimits,
+    ) -> Result<RangeSetting, ResponseError> {
         let point = self.point;
-        let ends_rpm = [range, range + 1].map(begins_rpm);
-        let frozen = [self.frozen(range)?, self.frozen(range + 1)?];
-        let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
-        let turn_s = 60.0 / ends_rpm[0];
-        let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
-        let mut steps = whole(point, fastest * turn_s / care.phase)?.max(care.steps);
+        let bounds_rpm = [range, range + 1].map(range_start_rpm);
+        let frozen_modes =
+            [self.modes_at_range_start(range)?, self.modes_at_range_start(range + 1)?];
+        let modes_at_rest = self.modes_at_rest.as_ref().ok_or(ResponseError::NoEigenvalues)?;
+        let turn_s = 60.0 / bounds_rpm[0];
+        let fastest_rad_per_s = modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
+        let mut steps = round_up_steps(point, fastest_rad_per_s * turn_s / limits.max_phase_rad)?
+            .max(limits.min_steps);
         if point.machine.elements.are_nonsmooth() {
-            steps = steps.max(whole(point, turn_s / care.at_corners_s)?);
+            steps = steps.max(round_up_steps(point, turn_s / limits.max_corner_step_s)?);
         }
         let mut is_capped = false;
-        let top_rad_per_s = ends_rpm[1] * TAU / 60.0;
-        if rest.modes[SUSPENSION_MODES].magnitude_rad_per_s >= HINGE_TO_DRUM * top_rad_per_s {
-            let highest = rest.modes[COORDINATES - 1].magnitude_rad_per_s;
-            // More steps than that cap nothing.
-            while !is_capped && (steps as f64) < highest * turn_s {
-                let shift = |end: usize| {
-                    let caps = caps(steps, 60.0 / ends_rpm[end]);
-                    shift_per_s(&self.free, ends_rpm[end] * TAU / 60.0, &frozen[end], &caps)
+        let max_speed_rad_per_s = bounds_rpm[1] * TAU / 60.0;
+        if modes_at_rest.modes[SUSPENSION_MODES].magnitude_rad_per_s
+            >= HINGE_TO_DRUM * max_speed_rad_per_s
+        {
+            let highest_rad_per_s = modes_at_rest.modes[COORDINATES - 1].magnitude_rad_per_s;
+            // With more steps no mode is capped.
+            while !is_capped && (steps as f64) < highest_rad_per_s * turn_s {
+                let shift_at = |bound: usize| {
+                    let caps = caps_for_steps(steps, 60.0 / bounds_rpm[bound]);
+                    max_shift_per_s(
+                        &self.frictionless_point,
+                        bounds_rpm[bound] * TAU / 60.0,
+                        &frozen_modes[bound],
+                        &caps,
+                    )
                 };
-                is_capped = shift(0)?.max(shift(1)?) <= care.shift_per_s;
+                is_capped = shift_at(0)?.max(shift_at(1)?) <= limits.max_shift_per_s;
                 if !is_capped {
-                    steps = whole(point, MORE_STEPS * steps as f64)?;
+                    steps = round_up_steps(point, STEP_COUNT_INCREASE * steps as f64)?;
                 }
             }
         }
         if !is_capped {
-            let [low, high] = ends_rpm.map(|rpm| plain_steps(point, rpm, turn_s));
+            let [low, high] = bounds_rpm.map(|rpm| uncapped_step_count(point, rpm, turn_s));
             steps = low?.max(high?);
         }
-        let [frozen, _] = frozen;
-        Ok(Setting { frozen, steps, is_capped })
+        let [frozen_modes, _] = frozen_modes;
+        Ok(RangeSetting { frozen_modes, steps, is_capped })
     }
 }
 
-/// Returns the weighted shift (rad/s) of a suspension mode by the hinge's cap, if it has one, while
-/// the drum turns.
+/// Returns the weighted shift (rad/s) of a suspension mode by the hinge's cap, if there is one,
+/// while the drum turns.
 fn hinge_shift(
     point: &Point,
     mode: &Mode,
-    turning_rad_per_s: f64,
+    speed_rad_per_s: f64,
     cap_rad_per_s: Option<f64>,
 ) -> f64 {
     let Some(cap_rad_per_s) = cap_rad_per_s else { return 0.0 };
-    let frequency = mode.magnitude_rad_per_s;
-    let softening =
-        (frequency * frequency - BACKWARD_SHARE * turning_rad_per_s * turning_rad_per_s).abs()
-            + (1.0 - BACKWARD_SHARE) * frequency * turning_rad_per_s;
-    let in_hinge = softening / (cap_rad_per_s * cap_rad_per_s);
-    FREE_SHARE * 0.5 * mode.hinge_share(point) * frequency * in_hinge
+    let frequency_rad_per_s = mode.magnitude_rad_per_s;
+    let softening_rad2_per_s2 = (frequency_rad_per_s * frequency_rad_per_s
+        - BACKWARD_SHARE * speed_rad_per_s * speed_rad_per_s)
+        .abs()
+        + (1.0 - BACKWARD_SHARE) * frequency_rad_per_s * speed_rad_per_s;
+    let hinge_ratio = softening_rad2_per_s2 / (cap_rad_per_s * cap_rad_per_s);
+    FREE_MOTION_SHARE * 0.5 * mode.hinge_share(point) * frequency_rad_per_s * hinge_ratio
 }
 
-/// Returns how far caps move the suspension's modes.
-fn shift_per_s(
+/// Returns the greatest shift of the suspension's modes by caps, in the complex plane.
+fn max_shift_per_s(
     point: &Point,
     speed_rad_per_s: f64,
-    frozen: &Modes,
+    frozen_modes: &Modes,
     caps: &Caps,
-) -> Result<f64, NoAnswer> {
+) -> Result<f64, ResponseError> {
     let bearing_caps = Caps { hinge_rad_per_s: None, ..*caps };
-    let capped =
-        motions(point, speed_rad_per_s, Some(&bearing_caps)).map_err(|_| NoAnswer::Eigenvalues)?;
-    let shifts = frozen.modes.iter().zip(&capped).take(SUSPENSION_MODES).map(|(mode, capped)| {
-        let slower = capped.s.re - mode.re_per_s;
-        let detuned = capped.s.im - mode.im_rad_per_s;
-        let hinge_shift_per_s = hinge_shift(point, mode, speed_rad_per_s, caps.hinge_rad_per_s);
-        (slower * slower + detuned * detuned).sqrt() + hinge_shift_per_s
-    });
+    let capped = mode_roots(point, speed_rad_per_s, Some(&bearing_caps))
+        .map_err(|_| ResponseError::NoEigenvalues)?;
+    let shifts =
+        frozen_modes.modes.iter().zip(&capped).take(SUSPENSION_MODES).map(|(mode, capped)| {
+            let decay_shift = capped.s.re - mode.re_per_s;
+            let frequency_shift = capped.s.im - mode.im_rad_per_s;
+            let hinge_shift_per_s = hinge_shift(point, mode, speed_rad_per_s, caps.hinge_rad_per_s);
+            (decay_shift * decay_shift + frequency_shift * frequency_shift).sqrt()
+                + hinge_shift_per_s
+        });
     Ok(shifts.fold(0.0, f64::max))
 }

@@ -3,15 +3,17 @@
 
 mod company;
 
-use super::orbit::{Row, linear_responses};
-use super::plain::{Plain, Trace};
-use super::search::{Solve, finish};
+use super::newton::{NewtonSearch, run_searches};
+use super::period_map::{TurnSetup, linear_responses_with_own_friction};
+use super::reference_monodromy::{ReferenceMonodromy, TraceIntegral};
 use super::settings::Settings;
 use super::*;
 use crate::coordinates::COORDINATES;
 use crate::steps::SUSPENSION_MODES;
 use crate::tests::reference::reference;
-use crate::{BumpStop, Channel, Machine, Method, ModelKind, Spin, Start, Timing, history, prepare};
+use crate::{
+    BumpStop, Channel, InitialDeviation, Machine, Method, ModelKind, Spin, Timing, history, prepare,
+};
 use faer::{Mat, c64};
 use lane_ode::{Cancel, Simd};
 use serde_json::Value;
@@ -56,29 +58,30 @@ fn list(name: &str) -> Vec<Value> {
 }
 
 /// The responses of one machine at these speeds.
-fn over(machine: Machine, speeds_rpm: &[f64]) -> Vec<Response> {
-    over_point(&prepared(machine, 100.0), speeds_rpm)
+fn responses_of_machine(machine: Machine, speeds_rpm: &[f64]) -> Vec<Response> {
+    responses_of_point(&prepared(machine, 100.0), speeds_rpm)
 }
 
-fn over_point(point: &Point, speeds_rpm: &[f64]) -> Vec<Response> {
-    let dwells: Vec<_> = speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-    all(&dwells).into_iter().map(|responses| responses.unwrap().remove(0)).collect()
+fn responses_of_point(point: &Point, speeds_rpm: &[f64]) -> Vec<Response> {
+    let held_speeds: Vec<_> =
+        speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point, speed_rpm }).collect();
+    all_responses(&held_speeds).into_iter().map(|responses| responses.unwrap().remove(0)).collect()
 }
 
 /// All responses of some dwells.
-fn all(dwells: &[Dwell<'_>]) -> Vec<Result<Vec<Response>, NoAnswer>> {
-    respond(dwells, Cancel::Never)
+fn all_responses(held_speeds: &[HeldSpeed<'_>]) -> Vec<Result<Vec<Response>, ResponseError>> {
+    find_responses(held_speeds, Cancel::Never)
 }
 
-fn at(machine: Machine, speed_rpm: f64) -> Response {
-    over(machine, &[speed_rpm]).remove(0)
+fn response_at(machine: Machine, speed_rpm: f64) -> Response {
+    responses_of_machine(machine, &[speed_rpm]).remove(0)
 }
 
 /// The multipliers of the machine as it is, by plain Runge-Kutta.
-fn plain(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
+fn reference_multipliers(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
     let point = prepared(machine, speed_rpm);
-    let row = Settings::new(&point).case(speed_rpm).unwrap().row;
-    let matrix = Simd::one_lane(Plain::new(&row, start, 1e4).unwrap()).unwrap();
+    let setup = Settings::new(&point).held_case(speed_rpm).unwrap().setup;
+    let matrix = Simd::one_lane(ReferenceMonodromy::new(&setup, start, 1e4).unwrap()).unwrap();
     let matrix = Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0);
     let mut multipliers = matrix.eigenvalues().unwrap();
     multipliers.sort_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()));
@@ -86,30 +89,30 @@ fn plain(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
 }
 
 /// Finds a row's response near a state, and every multiplier.
-fn found(row: &Row<'_>, start: [f64; STATES]) -> ([f64; STATES], Vec<c64>) {
-    let mut solves = [Solve::new(*row, start, None)];
-    assert!(finish(&mut solves, Cancel::Never));
-    let [solve] = solves;
-    let (start, seen) = solve.found().unwrap();
-    let unit = |i: usize| if i < COORDINATES { 1.0 } else { row.unit_per_s() };
-    let matrix = Mat::from_fn(STATES, STATES, |i, j| seen.monodromy[i][j].0 * unit(j) / unit(i));
+fn find_response(setup: &TurnSetup<'_>, start: [f64; STATES]) -> ([f64; STATES], Vec<c64>) {
+    let mut searches = [NewtonSearch::new(*setup, start, None)];
+    assert!(run_searches(&mut searches, Cancel::Never));
+    let [search] = searches;
+    let (start, record) = search.into_response().unwrap();
+    let unit = |i: usize| if i < COORDINATES { 1.0 } else { setup.unit_per_s() };
+    let matrix = Mat::from_fn(STATES, STATES, |i, j| record.monodromy[i][j].0 * unit(j) / unit(i));
     (start, matrix.eigenvalues().unwrap())
 }
 
 #[test]
 fn val_growth_and_amplitudes_match_an_independent_program() {
     for case in list("points") {
-        let ours = at(paper(&case), number(&case, "speed_rpm"));
+        let ours = response_at(paper(&case), number(&case, "speed_rpm"));
         let [growth, frequency] = ["growth_per_s", "frequency_cpm"].map(|name| number(&case, name));
         // If all decays, the hinge decays slowest, which is left out here.
         if growth > 0.0 {
-            let apart = ours.growth_per_s() - growth;
-            assert!(apart.abs() < 1e-3, "{case}: {apart:e}");
-            let apart = ours.frequency_cpm() - frequency;
-            assert!(apart.abs() < 1e-2, "{case}: {apart:e}");
+            let difference = ours.growth_per_s() - growth;
+            assert!(difference.abs() < 1e-3, "{case}: {difference:e}");
+            let difference = ours.frequency_cpm() - frequency;
+            assert!(difference.abs() < 1e-2, "{case}: {difference:e}");
         }
         for (channel, name) in [(6, "amplitude_tub_yaw_rad"), (7, "amplitude_tub_pitch_rad")] {
-            let error = ours.nonlinear[channel] / number(&case, name) - 1.0;
+            let error = ours.nonlinear_peaks[channel] / number(&case, name) - 1.0;
             println!("{name} {error:e} growth {:e}", ours.growth_per_s() - growth);
             // The reference takes the largest of its steps' ends, 1e-4 s apart, and so misses up to
             // this of a peak.
@@ -117,9 +120,9 @@ fn val_growth_and_amplitudes_match_an_independent_program() {
             assert!(-1e-5 < error && error < 1e-5 + between_steps, "{case}: {error:e}");
         }
         let kind = match (growth > 0.0, number(&case, "frequency_cpm")) {
-            (false, _) => Kind::Stable,
-            (true, frequency) if 2.0 * frequency == ours.speed_rpm => Kind::PeriodDoubling,
-            (true, _) => Kind::QuasiPeriodic,
+            (false, _) => StabilityKind::Stable,
+            (true, frequency) if 2.0 * frequency == ours.speed_rpm => StabilityKind::PeriodDoubling,
+            (true, _) => StabilityKind::QuasiPeriodic,
         };
         assert_eq!(ours.kind(), kind, "{case}");
     }
@@ -131,8 +134,10 @@ fn val_edges_match_an_independent_program() {
         let edges: Vec<f64> =
             case["edges_rpm"].as_array().unwrap().iter().map(|e| e.as_f64().unwrap()).collect();
         let beside: Vec<f64> = edges.iter().flat_map(|edge| [edge - 0.05, edge + 0.05]).collect();
-        let unstable: Vec<bool> =
-            over(paper(&case), &beside).iter().map(|r| r.kind() != Kind::Stable).collect();
+        let unstable: Vec<bool> = responses_of_machine(paper(&case), &beside)
+            .iter()
+            .map(|r| r.kind() != StabilityKind::Stable)
+            .collect();
         assert_eq!(unstable, [false, true, true, false, false, true, true, false], "{case}");
     }
 }
@@ -144,7 +149,8 @@ fn val_the_damping_that_closes_a_tongue_matches_an_independent_program() {
         let speeds: Vec<f64> = (0..40).map(|k| from + 0.25 * f64::from(k)).collect();
         let largest = |beside: f64| {
             let damping = number(&case, "damping_n_s_per_m") + beside;
-            let responses = over(with(number(&case, "unbalance_mass_kg"), damping), &speeds);
+            let responses =
+                responses_of_machine(with(number(&case, "unbalance_mass_kg"), damping), &speeds);
             responses.iter().map(Response::growth_per_s).fold(f64::NEG_INFINITY, f64::max)
         };
         let [below, above] = [largest(-0.5), largest(0.5)];
@@ -162,17 +168,17 @@ fn multipliers_are_those_of_the_machine_as_it_is() {
         (with(1.0, 250.0), 303.0),
         (with(0.4, 140.0), 1200.0),
     ] {
-        let ours = at(machine.clone(), speed_rpm);
-        let theirs = plain(machine, speed_rpm, ours.start);
+        let ours = response_at(machine.clone(), speed_rpm);
+        let theirs = reference_multipliers(machine, speed_rpm, ours.start);
         let mu = c64::new(ours.multiplier[0], ours.multiplier[1]);
         let nearest = theirs
             .iter()
             .min_by(|a, b| (**a - mu).norm().total_cmp(&(**b - mu).norm()))
             .map(|mu| growth_per_s([mu.re, mu.im], speed_rpm))
             .unwrap();
-        let apart = ours.growth_per_s() - nearest;
-        println!("{speed_rpm}: {} {apart:e}", ours.growth_per_s());
-        assert!(apart.abs() < 2e-4, "{speed_rpm}: {nearest} {apart:e}");
+        let difference = ours.growth_per_s() - nearest;
+        println!("{speed_rpm}: {} {difference:e}", ours.growth_per_s());
+        assert!(difference.abs() < 2e-4, "{speed_rpm}: {nearest} {difference:e}");
         // Nothing else grows; what decays as slowly as this is the hinge.
         for other in theirs.iter().map(|mu| growth_per_s([mu.re, mu.im], speed_rpm)) {
             let is_ours = other <= nearest.max(-0.1) + 1e-9;
@@ -189,24 +195,27 @@ fn growth_of_a_stable_response_hardly_depends_on_stiff_bearings() {
         let mut machine = crate::tests::friction::machine(0.4, [40.0, 40.0], None);
         machine.bearings.front_stiffness_n_per_m = stiffness_n_per_m;
         machine.bearings.rear_stiffness_n_per_m = stiffness_n_per_m;
-        at(machine, 420.0).growth_per_s()
+        response_at(machine, 420.0).growth_per_s()
     };
     let uncapped_per_s = at(1e8);
     for stiffness_n_per_m in [1e9, 5e10] {
         let growth_per_s = at(stiffness_n_per_m);
         println!("{stiffness_n_per_m:e} N/m: {growth_per_s}, uncapped {uncapped_per_s}");
-        let apart = growth_per_s / uncapped_per_s - 1.0;
-        assert!(apart.abs() < 0.1, "{stiffness_n_per_m:e} N/m: {growth_per_s}, {uncapped_per_s}");
+        let difference = growth_per_s / uncapped_per_s - 1.0;
+        assert!(
+            difference.abs() < 0.1,
+            "{stiffness_n_per_m:e} N/m: {growth_per_s}, {uncapped_per_s}"
+        );
     }
 }
 
 /// Returns how far a small disturbance of a dwell moves the machine from turn to turn: what the
 /// response itself has in it drops out.
-fn simulated(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COORDINATES]> {
+fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COORDINATES]> {
     let speed_rpm = response.speed_rpm;
     let point = prepared(machine, speed_rpm);
     let step_s = if point.machine.elements.are_nonsmooth() { 5e-5 } else { 2e-4 };
-    let mut start = Start::default();
+    let mut start = InitialDeviation::default();
     for i in 0..COORDINATES {
         start.deviations[i] = response.start[i] - point.equilibrium()[i];
         start.speeds[i] = response.start[COORDINATES + i];
@@ -217,16 +226,16 @@ fn simulated(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COO
     let turn_s = 60.0 / speed_rpm;
     let method = Method::Rk4 { step_s };
     let history = history(ModelKind::Nonlinear, &method, &point, &start, turn_s);
-    let turns = (TIMING.end_s.min(end_s) / turn_s) as usize;
+    let turn_count = (TIMING.end_s.min(end_s) / turn_s) as usize;
     let states: Vec<[f64; COORDINATES]> =
-        (0..turns).map(|k| history.instant(k).unwrap().deviations).collect();
+        (0..turn_count).map(|k| history.instant(k).unwrap().deviations).collect();
     states.windows(2).map(|pair| core::array::from_fn(|i| pair[1][i] - pair[0][i])).collect()
 }
 
 /// Returns how fast that grows.
 fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
     // A thousandfold at most: after that the disturbance is not small.
-    let moved = simulated(machine, response, 7.0 / response.growth_per_s());
+    let moved = simulated_moves(machine, response, 7.0 / response.growth_per_s());
     let turns_per_s = response.speed_rpm / 60.0;
     largest_multiplier(&moved).ln() * turns_per_s
 }
@@ -239,32 +248,33 @@ fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
 /// many the equations are singular, and their solution is rounding, so a further one is fitted only
 /// if fewer leave more than rounding, and a third only if a pair leaves more than motions that have
 /// nearly decayed.
-fn largest_multiplier(moved: &[[f64; COORDINATES]]) -> f64 {
+fn largest_multiplier(moves: &[[f64; COORDINATES]]) -> f64 {
     /// The greatest parts of the moves that a single multiplier and a pair leave, if they are all.
     const LEFT: [f64; 2] = [1e-6, 1e-2];
-    let late = &moved[moved.len().div_ceil(2)..];
-    let fit = |count: usize| {
+    let late_moves = &moves[moves.len().div_ceil(2)..];
+    let fit_count = |count: usize| {
         use faer::linalg::solvers::SolveLstsq as _;
-        let rows = (late.len() - count) * COORDINATES;
-        let at = |row: usize, turn: usize| late[row / COORDINATES + turn][row % COORDINATES];
-        let before = Mat::from_fn(rows, count, at);
-        let after = Mat::from_fn(rows, 1, |i, _| at(i, count));
-        let factors = before.qr().solve_lstsq(&after);
-        let left = (&before * &factors - &after).norm_l2() / after.norm_l2();
+        let rows = (late_moves.len() - count) * COORDINATES;
+        let at = |row: usize, turn: usize| late_moves[row / COORDINATES + turn][row % COORDINATES];
+        let earlier_moves = Mat::from_fn(rows, count, at);
+        let next_moves = Mat::from_fn(rows, 1, |i, _| at(i, count));
+        let factors = earlier_moves.qr().solve_lstsq(&next_moves);
+        let residual_share =
+            (&earlier_moves * &factors - &next_moves).norm_l2() / next_moves.norm_l2();
         let companion = Mat::from_fn(count, count, |i, k| match i + 1 == count {
             true => factors[(k, 0)],
             false => f64::from(u8::from(k == i + 1)),
         });
-        let sizes = companion.eigenvalues().unwrap().into_iter().map(|mu| mu.norm());
-        (sizes.fold(0.0, f64::max), left)
+        let magnitudes = companion.eigenvalues().unwrap().into_iter().map(|mu| mu.norm());
+        (magnitudes.fold(0.0, f64::max), residual_share)
     };
-    let [single, pair] = [1, 2].map(fit);
+    let [single, pair] = [1, 2].map(fit_count);
     if single.1 < LEFT[0] {
         single.0
     } else if pair.1 < LEFT[1] {
         pair.0
     } else {
-        fit(3).0
+        fit_count(3).0
     }
 }
 
@@ -272,11 +282,11 @@ fn largest_multiplier(moved: &[[f64; COORDINATES]]) -> f64 {
 #[test]
 fn the_largest_multiplier_is_found_of_one_to_three() {
     let shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (1.0 + i as f64));
-    let other: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (i as f64 - 4.3));
-    let moves = |of: &dyn Fn(i32) -> [f64; 2]| -> Vec<[f64; COORDINATES]> {
+    let other_shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (i as f64 - 4.3));
+    let moves = |coordinates_at: &dyn Fn(i32) -> [f64; 2]| -> Vec<[f64; COORDINATES]> {
         let at = |k: i32| {
-            let [a, b] = of(k);
-            core::array::from_fn(|i| a * shape[i] + b * other[i])
+            let [a, b] = coordinates_at(k);
+            core::array::from_fn(|i| a * shape[i] + b * other_shape[i])
         };
         (0..60).map(at).collect()
     };
@@ -287,15 +297,23 @@ fn the_largest_multiplier_is_found_of_one_to_three() {
         [size * (2.1 * f64::from(k)).cos(), size * (2.1 * f64::from(k)).sin()]
     });
     assert!((largest_multiplier(&pair) - 1.07).abs() < 1e-6, "{}", largest_multiplier(&pair));
-    let two = moves(&|k| [(-1.09_f64).powi(k), 1.05_f64.powi(k)]);
-    assert!((largest_multiplier(&two) - 1.09).abs() < 1e-6, "{}", largest_multiplier(&two));
+    let real_pair = moves(&|k| [(-1.09_f64).powi(k), 1.05_f64.powi(k)]);
+    assert!(
+        (largest_multiplier(&real_pair) - 1.09).abs() < 1e-6,
+        "{}",
+        largest_multiplier(&real_pair)
+    );
     // The shares of a machine whose pair and third multiplier grow nearly as fast.
-    let three = moves(&|k| {
+    let pair_and_real = moves(&|k| {
         let size = 1.25_f64.powi(k);
         let pair = size * (2.1 * f64::from(k)).cos();
         [pair, 0.5 * size * (2.1 * f64::from(k)).sin() + (-1.2_f64).powi(k)]
     });
-    assert!((largest_multiplier(&three) - 1.25).abs() < 1e-6, "{}", largest_multiplier(&three));
+    assert!(
+        (largest_multiplier(&pair_and_real) - 1.25).abs() < 1e-6,
+        "{}",
+        largest_multiplier(&pair_and_real)
+    );
 }
 
 #[test]
@@ -304,11 +322,11 @@ fn disturbances_of_simulated_dwells_grow_as_fast() {
         list("points").into_iter().filter(|case| number(case, "growth_per_s") > 0.2).collect();
     assert!(growing.len() >= 10);
     for case in growing.iter().take(10) {
-        let response = at(paper(case), number(case, "speed_rpm"));
-        let simulated = simulated_growth_per_s(paper(case), &response);
-        let error = simulated / response.growth_per_s() - 1.0;
+        let response = response_at(paper(case), number(case, "speed_rpm"));
+        let simulated_moves = simulated_growth_per_s(paper(case), &response);
+        let error = simulated_moves / response.growth_per_s() - 1.0;
         println!("{error:e}");
-        assert!(error.abs() < 0.01, "{case}: {simulated}");
+        assert!(error.abs() < 0.01, "{case}: {simulated_moves}");
     }
 }
 
@@ -346,15 +364,20 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
             };
             model + turning
         });
-        let row = Settings::new(&point).case(speed_rpm).unwrap().row;
-        let rest =
+        let setup = Settings::new(&point).held_case(speed_rpm).unwrap().setup;
+        let rest_state =
             core::array::from_fn(|i| if i < COORDINATES { point.equilibrium()[i] } else { 0.0 });
-        let ours = found(&row, rest).1;
+        let ours = find_response(&setup, rest_state).1;
         // The suspension's.
-        let slow = system.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
-        let slow: Vec<c64> = slow.collect();
-        assert_eq!(slow.len(), 2 * SUSPENSION_MODES, "{slow:?}");
-        for s in slow {
+        let suspension_eigenvalues =
+            system.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
+        let suspension_eigenvalues: Vec<c64> = suspension_eigenvalues.collect();
+        assert_eq!(
+            suspension_eigenvalues.len(),
+            2 * SUSPENSION_MODES,
+            "{suspension_eigenvalues:?}"
+        );
+        for s in suspension_eigenvalues {
             let mu = (s * turn_s).exp();
             let nearest = ours.iter().map(|our| (our - mu).norm()).fold(f64::INFINITY, f64::min);
             println!("{speed_rpm}: {s} {nearest:e}");
@@ -366,13 +389,13 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
 #[test]
 fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
     let point = prepared(with(0.4, 140.0), 250.0);
-    let capped = Settings::new(&point).case(250.0).unwrap().row;
+    let capped = Settings::new(&point).held_case(250.0).unwrap().setup;
     // With steps so short that the formula takes nothing from the capped modes.
-    let row = Row { steps: 32 * capped.steps, ..capped };
-    let near = at(with(0.4, 140.0), 250.0).start;
-    let (start, multipliers) = found(&row, near);
+    let setup = TurnSetup { steps: 32 * capped.steps, ..capped };
+    let near = response_at(with(0.4, 140.0), 250.0).start;
+    let (start, multipliers) = find_response(&setup, near);
     let product = multipliers.into_iter().product::<c64>();
-    let trace = Simd::one_lane(Trace { row, start });
+    let trace = Simd::one_lane(TraceIntegral { setup, start });
     let error = product.re.ln() / trace - 1.0;
     println!("{product} {trace} {error:e}");
     assert!(error.abs() < 1e-5 && product.im.abs() < 1e-9, "{product} {trace} {error:e}");
@@ -381,19 +404,22 @@ fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
 #[test]
 fn responses_do_not_depend_on_company() {
     let points = [with(0.4, 140.0), with(0.9, 90.0), with(0.05, 300.0)].map(|m| prepared(m, 100.0));
-    let mut rubs = with(0.4, 20.0);
-    add_elements(&mut rubs, &mut fastrand::Rng::with_seed(1));
-    let rubs = prepared(rubs, 100.0);
-    let dwells: Vec<_> = (0..30)
-        .map(|k| Dwell { point: &points[k % 3], speed_rpm: 20.0 + 40.0 * k as f64 })
-        .chain([240.0, 270.0, 300.0].map(|speed_rpm| Dwell { point: &rubs, speed_rpm }))
+    let mut point_with_elements = with(0.4, 20.0);
+    add_elements(&mut point_with_elements, &mut fastrand::Rng::with_seed(1));
+    let point_with_elements = prepared(point_with_elements, 100.0);
+    let held_speeds: Vec<_> = (0..30)
+        .map(|k| HeldSpeed { point: &points[k % 3], speed_rpm: 20.0 + 40.0 * k as f64 })
+        .chain(
+            [240.0, 270.0, 300.0]
+                .map(|speed_rpm| HeldSpeed { point: &point_with_elements, speed_rpm }),
+        )
         .collect();
-    let together = all(&dwells);
-    for (dwell, answer) in dwells.iter().zip(&together).step_by(8) {
-        assert_eq!(&all(&[*dwell])[0], answer);
+    let answers = all_responses(&held_speeds);
+    for (held_speed, answer) in held_speeds.iter().zip(&answers).step_by(8) {
+        assert_eq!(&all_responses(&[*held_speed])[0], answer);
     }
     // At 20 rpm, the first, a machine is slower than where its curve begins.
-    assert!(together[0].as_ref().unwrap()[0].is_on_curve);
+    assert!(answers[0].as_ref().unwrap()[0].is_on_curve);
 }
 
 /// Followed both ways every 0.25 rpm by an independent program, and lost where it folds.
@@ -403,31 +429,37 @@ fn val_branches_match_an_independent_program() {
         let machine = with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"));
         let point = prepared(machine, 100.0);
         let mut folds_rpm = Vec::new();
-        for (way, lost) in [("up", "up_lost_after_rpm"), ("down", "down_lost_below_rpm")] {
-            let rows = case[way].as_array().unwrap();
-            let dwells: Vec<Dwell<'_>> = rows
+        for (direction, lost_key) in [("up", "up_lost_after_rpm"), ("down", "down_lost_below_rpm")]
+        {
+            let reference_rows = case[direction].as_array().unwrap();
+            let held_speeds: Vec<HeldSpeed<'_>> = reference_rows
                 .iter()
-                .map(|row| Dwell { point: &point, speed_rpm: number(row, "speed_rpm") })
+                .map(|reference_row| HeldSpeed {
+                    point: &point,
+                    speed_rpm: number(reference_row, "speed_rpm"),
+                })
                 .collect();
-            for (row, responses) in rows.iter().zip(all(&dwells)) {
+            for (reference_row, responses) in reference_rows.iter().zip(all_responses(&held_speeds))
+            {
                 let responses = responses.unwrap();
-                let ours = if way == "up" { responses.first() } else { responses.last() }.unwrap();
+                let ours =
+                    if direction == "up" { responses.first() } else { responses.last() }.unwrap();
                 for (channel, name) in [(6, "tub_yaw_rad"), (7, "tub_pitch_rad")] {
-                    let error = ours.nonlinear[channel] / number(row, name) - 1.0;
-                    assert!(error.abs() < 1e-4, "{row}: {name} {error:e}");
+                    let error = ours.nonlinear_peaks[channel] / number(reference_row, name) - 1.0;
+                    assert!(error.abs() < 1e-4, "{reference_row}: {name} {error:e}");
                 }
-                let growth = number(row, "growth_per_s");
+                let growth = number(reference_row, "growth_per_s");
                 if growth > 0.0 {
-                    let apart = ours.growth_per_s() - growth;
-                    assert!(apart.abs() < 5e-3, "{row}: {apart:e}");
+                    let difference = ours.growth_per_s() - growth;
+                    assert!(difference.abs() < 5e-3, "{reference_row}: {difference:e}");
                 }
-                folds_rpm.extend(ours.between_rpm);
+                folds_rpm.extend(ours.fold_speeds_rpm);
             }
-            if let Some(lost_rpm) = case[lost].as_f64() {
+            if let Some(lost_rpm) = case[lost_key].as_f64() {
                 let nearest = folds_rpm.iter().flatten().map(|rpm: &f64| (rpm - lost_rpm).abs());
                 let nearest = nearest.fold(f64::INFINITY, f64::min);
                 println!("{lost_rpm} rpm: a fold {nearest} rpm from it");
-                assert!(nearest < 0.1, "{lost}: {folds_rpm:?}");
+                assert!(nearest < 0.1, "{lost_key}: {folds_rpm:?}");
             }
         }
     }
@@ -437,17 +469,25 @@ fn val_branches_match_an_independent_program() {
 #[test]
 fn where_the_curve_is_lost_another_comes_down() {
     let point = prepared(with(0.9, 20.0), 100.0);
-    let dwells = [240.0, 260.0, 340.0].map(|speed_rpm| Dwell { point: &point, speed_rpm });
-    let found: Vec<_> = all(&dwells).into_iter().map(Result::unwrap).collect();
+    let held_speeds = [240.0, 260.0, 340.0].map(|speed_rpm| HeldSpeed { point: &point, speed_rpm });
+    let found: Vec<_> = all_responses(&held_speeds).into_iter().map(Result::unwrap).collect();
     // A response that a search finds comes first.
-    let [beside, down] = &found[0][..] else { panic!("{found:?}") };
-    assert_eq!((beside.branch, beside.between_rpm), (down.branch + 1, [None; 2]));
+    let [searched, downward] = &found[0][..] else { panic!("{found:?}") };
+    assert_eq!((searched.branch, searched.fold_speeds_rpm), (downward.branch + 1, [None; 2]));
     for responses in &found[1..] {
         let [response] = &responses[..] else { panic!("{found:?}") };
-        assert_eq!((response.branch, response.between_rpm), (down.branch, down.between_rpm));
+        assert_eq!(
+            (response.branch, response.fold_speeds_rpm),
+            (downward.branch, downward.fold_speeds_rpm)
+        );
     }
-    assert!(down.between_rpm[0].is_some() && !found.concat().iter().any(|it| it.is_on_curve));
-    assert_eq!([1, 2].map(|k| found[k][0].kind()), [Kind::PeriodDoubling, Kind::Stable]);
+    assert!(
+        downward.fold_speeds_rpm[0].is_some() && !found.concat().iter().any(|it| it.is_on_curve)
+    );
+    assert_eq!(
+        [1, 2].map(|k| found[k][0].kind()),
+        [StabilityKind::PeriodDoubling, StabilityKind::Stable]
+    );
 }
 
 /// A machine of its own: masses, inertias, stiffnesses, damping and unbalance of the paper's,
@@ -492,16 +532,17 @@ fn add_elements(machine: &mut Machine, random: &mut fastrand::Rng) {
 #[test]
 #[ignore = "minutes of work"]
 fn random_machines_do_what_is_said() {
-    let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
-    let mut numbers = fastrand::Rng::with_seed(given("SEED", 2026));
-    let mut grown = [0, 0];
-    let mut decayed = [0, 0];
+    let number_from_env =
+        |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
+    let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 2026));
+    let mut growing_counts = [0, 0];
+    let mut decaying_counts = [0, 0];
     let mut worst = [0.0_f64; 2];
-    let machines = given("MACHINES", 3);
+    let machines = number_from_env("MACHINES", 3);
     // Few machines may have no growing response: more are drawn until there is one of either kind.
-    let lacks = |counts: &[i32]| counts.contains(&0);
+    let lacks_a_kind = |counts: &[i32]| counts.contains(&0);
     for number in 0..machines + 40 {
-        if number >= machines && !lacks(&grown) && !lacks(&decayed) {
+        if number >= machines && !lacks_a_kind(&growing_counts) && !lacks_a_kind(&decaying_counts) {
             break;
         }
         let kind = (number % 2) as usize;
@@ -511,67 +552,73 @@ fn random_machines_do_what_is_said() {
         }
         let point = prepared(machine.clone(), 100.0);
         let speeds: Vec<f64> = (0..40).map(|_| 60.0 + 300.0 * numbers.f64()).collect();
-        let dwells: Vec<_> =
-            speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-        let found = all(&dwells);
-        let there = || found.iter().flatten().filter_map(|responses| responses.first());
-        for response in there().filter(|it| (0.2..2.0).contains(&it.growth_per_s())).take(2) {
-            let simulated = simulated_growth_per_s(machine.clone(), response);
-            let error = (simulated / response.growth_per_s() - 1.0).abs();
+        let held_speeds: Vec<_> =
+            speeds.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
+        let found = all_responses(&held_speeds);
+        let first_responses = || found.iter().flatten().filter_map(|responses| responses.first());
+        for response in
+            first_responses().filter(|it| (0.2..2.0).contains(&it.growth_per_s())).take(2)
+        {
+            let simulated_moves = simulated_growth_per_s(machine.clone(), response);
+            let error = (simulated_moves / response.growth_per_s() - 1.0).abs();
             println!("machine {number}, {} rpm: {error:e}", response.speed_rpm);
             worst[kind] = worst[kind].max(error);
-            grown[kind] += 1;
+            growing_counts[kind] += 1;
         }
-        for response in there().filter(|it| it.growth_per_s() < -0.3).take(1) {
-            let moved = simulated(machine.clone(), response, 20.0);
+        for response in first_responses().filter(|it| it.growth_per_s() < -0.3).take(1) {
+            let moves = simulated_moves(machine.clone(), response, 20.0);
             let size = |d: &[f64; COORDINATES]| d[4].abs().max(d[5].abs());
-            let largest = |moved: &[[f64; COORDINATES]]| moved.iter().map(size).fold(0.0, f64::max);
+            let largest = |moves: &[[f64; COORDINATES]]| moves.iter().map(size).fold(0.0, f64::max);
             // Against the disturbance itself: what had left for another motion would have moved
             // farthest on its way, and rest in the end.
-            let [begin, end] = [moved.len() / 5, moved.len() * 4 / 5];
-            let disturbance = largest(&moved[..begin]);
-            let left = largest(&moved[end..]) / disturbance;
-            println!("machine {number}, {} rpm: {left:e} left", response.speed_rpm);
+            let [begin, end] = [moves.len() / 5, moves.len() * 4 / 5];
+            let disturbance = largest(&moves[..begin]);
+            let remaining_share = largest(&moves[end..]) / disturbance;
+            println!("machine {number}, {} rpm: {remaining_share:e} left", response.speed_rpm);
             assert!(disturbance < 1e-4, "machine {number}: {response:?}");
-            assert!(left < 0.1, "machine {number}: {response:?}");
-            decayed[kind] += 1;
+            assert!(remaining_share < 0.1, "machine {number}: {response:?}");
+            decaying_counts[kind] += 1;
         }
     }
-    println!("{grown:?} grown, worst {worst:?}; {decayed:?} decayed");
+    println!("{growing_counts:?} grown, worst {worst:?}; {decaying_counts:?} decayed");
     assert!(worst[0] < 0.02 && worst[1] < 0.05, "{worst:?}");
-    assert!(!lacks(&grown) && !lacks(&decayed), "{grown:?} grown, {decayed:?} decayed");
+    assert!(
+        !lacks_a_kind(&growing_counts) && !lacks_a_kind(&decaying_counts),
+        "{growing_counts:?} grown, {decaying_counts:?} decayed"
+    );
 }
 
 /// A curve rises through a speed and falls through it in turn: of random machines with little
 /// damping, neighbouring branches have an even and an odd number. SEED and MACHINES choose others.
 #[test]
 fn no_branch_is_lost_between_two_others() {
-    let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
-    let mut numbers = fastrand::Rng::with_seed(given("SEED", 61));
-    let mut folded = 0;
-    let mut lost = Vec::new();
-    for number in 0..given("MACHINES", 4) {
+    let number_from_env =
+        |name: &str, or: u64| std::env::var(name).map_or(or, |damper| damper.parse().unwrap());
+    let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 61));
+    let mut speeds_with_several = 0;
+    let mut violations = Vec::new();
+    for number in 0..number_from_env("MACHINES", 4) {
         let mut machine = random(&mut numbers);
         let damping_n_s_per_m = 10.0 + 50.0 * numbers.f64();
-        machine.dampers.iter_mut().for_each(|it| it.damping_n_s_per_m = damping_n_s_per_m);
-        machine.springs.iter_mut().for_each(|it| it.cubic_n_per_m3 = 5e6 * numbers.f64());
+        machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = damping_n_s_per_m);
+        machine.springs.iter_mut().for_each(|damper| damper.cubic_n_per_m3 = 5e6 * numbers.f64());
         let point = prepared(machine, 100.0);
         let speeds: Vec<f64> = (0..120).map(|_| 90.0 + 250.0 * numbers.f64()).collect();
-        let dwells: Vec<_> =
-            speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-        for (responses, speed_rpm) in all(&dwells).into_iter().zip(speeds) {
+        let held_speeds: Vec<_> =
+            speeds.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
+        for (responses, speed_rpm) in all_responses(&held_speeds).into_iter().zip(speeds) {
             let Ok(responses) = responses else { continue };
             let on_curve = responses.iter().filter(|response| response.is_on_curve);
             let branches: Vec<u32> = on_curve.map(|response| response.branch).collect();
             let alternates = |pair: &[u32]| pair[0] % 2 != pair[1] % 2;
-            folded += usize::from(branches.len() > 1);
+            speeds_with_several += usize::from(branches.len() > 1);
             if !branches.windows(2).all(alternates) {
-                lost.push((number, speed_rpm, branches));
+                violations.push((number, speed_rpm, branches));
             }
         }
     }
-    println!("{folded} speeds with several responses");
-    assert!(folded > 0 && lost.is_empty(), "{lost:?}");
+    println!("{speeds_with_several} speeds with several responses");
+    assert!(speeds_with_several > 0 && violations.is_empty(), "{violations:?}");
 }
 
 /// Responses of random machines are those that steps of 0.05 rpm lead to, until these are lost; and
@@ -582,60 +629,71 @@ fn followed_responses_are_those_of_short_steps() {
     let count = 30;
     let mut numbers = fastrand::Rng::with_seed(32);
     let points: Vec<Point> = (0..count).map(|_| prepared(random(&mut numbers), 100.0)).collect();
-    let speed = |step: u32| 60.0 + 0.05 * f64::from(step);
+    let speed_rpm_at = |step: u32| 60.0 + 0.05 * f64::from(step);
     let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
-    let mut states: Vec<Option<[f64; STATES]>> =
-        points.iter().map(|point| Some(over_point(point, &[speed(0)])[0].start)).collect();
+    let mut states: Vec<Option<[f64; STATES]>> = points
+        .iter()
+        .map(|point| Some(responses_of_point(point, &[speed_rpm_at(0)])[0].start))
+        .collect();
     // The change of each by the last step: across a resonance steps move a response far, but the
     // next one hardly farther than the last.
-    let mut moved = vec![0.0_f64; count];
-    let mut kept = Vec::new();
+    let mut last_changes = vec![0.0_f64; count];
+    let mut samples = Vec::new();
     let mut worst = 0.0_f64;
     let mut jumps = Vec::new();
     for step in 1..=6000 {
-        let followed = settings.iter_mut().zip(&states);
-        let mut solves: Vec<Solve<'_>> = followed
+        let settings_with_states = settings.iter_mut().zip(&states);
+        let mut searches: Vec<NewtonSearch<'_>> = settings_with_states
             .filter_map(|(settings, state)| {
-                Some(Solve::new(settings.case(speed(step)).unwrap().row, (*state)?, None))
+                Some(NewtonSearch::new(
+                    settings.held_case(speed_rpm_at(step)).unwrap().setup,
+                    (*state)?,
+                    None,
+                ))
             })
             .collect();
-        assert!(finish(&mut solves, Cancel::Never));
-        let mut solves = solves.into_iter();
+        assert!(run_searches(&mut searches, Cancel::Never));
+        let mut searches = searches.into_iter();
         for (k, state) in states.iter_mut().enumerate() {
-            let Some(from) = *state else { continue };
-            let found = solves.next().unwrap().found().map(|(found, _)| found);
-            let by = |to: &[f64; STATES]| {
-                (0..COORDINATES).map(|i| (to[i] - from[i]).abs()).fold(0.0, f64::max)
+            let Some(previous_state) = *state else { continue };
+            let found = searches.next().unwrap().into_response().map(|(found, _)| found);
+            let distance = |to: &[f64; STATES]| {
+                (0..COORDINATES).map(|i| (to[i] - previous_state[i]).abs()).fold(0.0, f64::max)
             };
-            *state = found.filter(|found| by(found) < f64::max(1e-3, 5.0 * moved[k]));
-            moved[k] = state.as_ref().map_or(0.0, by);
+            *state = found.filter(|found| distance(found) < f64::max(1e-3, 5.0 * last_changes[k]));
+            last_changes[k] = state.as_ref().map_or(0.0, distance);
             if state.is_none() {
-                jumps.push((k, speed(step)));
+                jumps.push((k, speed_rpm_at(step)));
             }
         }
         if step % 100 == 0 {
-            let here = states.iter().enumerate();
-            kept.extend(here.filter_map(|(k, state)| Some((k, speed(step), (*state)?))));
+            let current_states = states.iter().enumerate();
+            samples.extend(
+                current_states.filter_map(|(k, state)| Some((k, speed_rpm_at(step), (*state)?))),
+            );
         }
     }
     // The curve of each point is followed once.
-    kept.sort_by_key(|(k, ..)| *k);
-    let dwells: Vec<_> =
-        kept.iter().map(|&(k, speed_rpm, _)| Dwell { point: &points[k], speed_rpm }).collect();
-    for (responses, (k, speed_rpm, state)) in all(&dwells).into_iter().zip(&kept) {
-        let apart = responses.map_or(f64::NAN, |responses| {
-            let apart = (0..COORDINATES).map(|i| (responses[0].start[i] - state[i]).abs());
-            apart.fold(0.0, f64::max)
+    samples.sort_by_key(|(k, ..)| *k);
+    let held_speeds: Vec<_> = samples
+        .iter()
+        .map(|&(k, speed_rpm, _)| HeldSpeed { point: &points[k], speed_rpm })
+        .collect();
+    for (responses, (k, speed_rpm, state)) in all_responses(&held_speeds).into_iter().zip(&samples)
+    {
+        let difference = responses.map_or(f64::NAN, |responses| {
+            let difference = (0..COORDINATES).map(|i| (responses[0].start[i] - state[i]).abs());
+            difference.fold(0.0, f64::max)
         });
-        worst = worst.max(apart);
-        if apart.is_nan() || apart >= 1e-6 {
-            println!("machine {k} at {speed_rpm} rpm: {apart:e}");
+        worst = worst.max(difference);
+        if difference.is_nan() || difference >= 1e-6 {
+            println!("machine {k} at {speed_rpm} rpm: {difference:e}");
         }
-        assert!(!apart.is_nan());
+        assert!(!difference.is_nan());
     }
-    println!("{} compared, at most {worst:e} apart; jumps: {jumps:?}", kept.len());
+    println!("{} compared, at most {worst:e} apart; jumps: {jumps:?}", samples.len());
     for (k, lost_rpm) in jumps {
-        let ends = over_point(&points[k], &[lost_rpm - 0.3])[0].between_rpm;
+        let ends = responses_of_point(&points[k], &[lost_rpm - 0.3])[0].fold_speeds_rpm;
         assert!(ends[1].is_some_and(|fold| (fold - lost_rpm).abs() < 0.3), "{k}: {ends:?}");
     }
     assert!(worst < 1e-6);
@@ -652,22 +710,26 @@ fn near_resonances_of_the_hinge_responses_are_those_of_the_machine_as_it_is() {
     let speeds: Vec<f64> = (0..=20)
         .flat_map(|k| [630.0, 760.0, 830.0, 960.0].map(|from| from + 3.0 * f64::from(k)))
         .collect();
-    let ours = over_point(&point, &speeds);
-    let mut plain: Vec<Solve<'_>> = speeds
+    let ours = responses_of_point(&point, &speeds);
+    let mut uncapped_searches: Vec<NewtonSearch<'_>> = speeds
         .iter()
         .zip(&ours)
         .map(|(&rpm, ours)| {
-            Solve::new(settings.case(rpm).unwrap().without_caps().unwrap().row, ours.start, None)
+            NewtonSearch::new(
+                settings.held_case(rpm).unwrap().without_caps().unwrap().setup,
+                ours.start,
+                None,
+            )
         })
         .collect();
-    assert!(finish(&mut plain, Cancel::Never));
+    assert!(run_searches(&mut uncapped_searches, Cancel::Never));
     let mut worst = 0.0_f64;
-    for (ours, plain) in ours.iter().zip(plain) {
-        let plain = plain.found().unwrap().1.peaks;
+    for (ours, uncapped) in ours.iter().zip(uncapped_searches) {
+        let uncapped_peaks = uncapped.into_response().unwrap().1.peaks;
         for k in 0..CHANNELS {
-            let apart = (ours.nonlinear[k] / plain[k] - 1.0).abs();
-            worst = worst.max(apart);
-            assert!(apart < 6e-5, "{} rpm, channel {k}: {apart:e}", ours.speed_rpm);
+            let difference = (ours.nonlinear_peaks[k] / uncapped_peaks[k] - 1.0).abs();
+            worst = worst.max(difference);
+            assert!(difference < 6e-5, "{} rpm, channel {k}: {difference:e}", ours.speed_rpm);
         }
     }
     println!("{worst:e}");
@@ -679,27 +741,30 @@ fn val_machines_with_elements_match_an_independent_program() {
     let mut compared = 0;
     for case in reference("stability_elements.json").as_array().unwrap() {
         let point = prepared(crate::tests::elements::machine(case), 100.0);
-        let rows = case["points"].as_array().unwrap();
-        let dwells: Vec<Dwell<'_>> = rows
+        let reference_rows = case["points"].as_array().unwrap();
+        let held_speeds: Vec<HeldSpeed<'_>> = reference_rows
             .iter()
-            .map(|row| Dwell { point: &point, speed_rpm: number(row, "speed_rpm") })
+            .map(|reference_row| HeldSpeed {
+                point: &point,
+                speed_rpm: number(reference_row, "speed_rpm"),
+            })
             .collect();
-        for (row, responses) in rows.iter().zip(all(&dwells)) {
-            assert_eq!(row["converged"], true);
-            let place = format!("{} at {} rpm", case["name"], row["speed_rpm"]);
-            let ours = responses.unwrap_or_else(|none| panic!("{place}: {none}")).remove(0);
+        for (reference_row, responses) in reference_rows.iter().zip(all_responses(&held_speeds)) {
+            assert_eq!(reference_row["converged"], true);
+            let description = format!("{} at {} rpm", case["name"], reference_row["speed_rpm"]);
+            let ours = responses.unwrap_or_else(|none| panic!("{description}: {none}")).remove(0);
             for channel in [0, 1, 6, 7] {
                 let name = Channel::ALL[channel].name();
                 let unit = Channel::ALL[channel].unit();
-                let theirs = number(row, &format!("amplitude_{name}_{unit}"));
-                let error = ours.nonlinear[channel] / theirs - 1.0;
-                assert!(error.abs() < 1.2e-5, "{place}: {name} {error:e}");
+                let theirs = number(reference_row, &format!("amplitude_{name}_{unit}"));
+                let error = ours.nonlinear_peaks[channel] / theirs - 1.0;
+                assert!(error.abs() < 1.2e-5, "{description}: {name} {error:e}");
             }
             // If all decays, the hinge decays slowest, which is left out here.
-            let growth = number(row, "growth_per_s");
+            let growth = number(reference_row, "growth_per_s");
             if growth > 0.0 {
-                let apart = ours.growth_per_s() - growth;
-                assert!(apart.abs() < 1e-3, "{place}: {apart:e}");
+                let difference = ours.growth_per_s() - growth;
+                assert!(difference.abs() < 1e-3, "{description}: {difference:e}");
             }
             compared += 1;
         }
@@ -712,28 +777,30 @@ fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
     // Another program has 65.20 against 65.95 per minute in the first mode at 1200 rpm, and a
     // second mode whose damping differs by 8 % at its resonance.
     let point = prepared(with(0.4, 140.0), 100.0);
-    let first = exact_motions(&point, 1200.0).unwrap()[0];
-    println!("{} {}", first.frequency_rpm(), first.frozen.frequency_rpm());
+    let first = floquet_modes(&point, 1200.0).unwrap()[0];
+    println!("{} {}", first.frequency_rpm(), first.frozen_mode.frequency_rpm());
     assert!((first.frequency_rpm() - 65.20).abs() < 0.01);
-    let second = exact_motions(&point, 147.76).unwrap()[1];
-    let apart = second.damping_ratio() / second.frozen.damping_ratio() - 1.0;
-    println!("{apart}");
-    assert!((apart.abs() - 0.08).abs() < 0.03, "{apart}");
+    let second = floquet_modes(&point, 147.76).unwrap()[1];
+    let difference = second.damping_ratio() / second.frozen_mode.damping_ratio() - 1.0;
+    println!("{difference}");
+    assert!((difference.abs() - 0.08).abs() < 0.03, "{difference}");
 }
 
 #[test]
 fn a_linear_response_takes_friction_at_its_own_speed() {
-    let of = |speed_rpm: f64, given_m_per_s: Option<f64>| {
+    let amplitude_at = |speed_rpm: f64, given_m_per_s: Option<f64>| {
         let machine = crate::tests::friction::machine(0.3, [40.0, 60.0], given_m_per_s);
         let point = prepared(machine, speed_rpm);
-        let case = Settings::new(&point).case(150.0).unwrap();
-        let peaks = linear_responses(&[case.row], Cancel::Never).remove(0).peaks;
+        let held_case = Settings::new(&point).held_case(150.0).unwrap();
+        let peaks =
+            linear_responses_with_own_friction(&[held_case.setup], Cancel::Never).remove(0).peaks;
         (point.friction_speeds()[0].speed_m_per_s, peaks[Channel::TubFrontZ.index()])
     };
-    let [(slow_m_per_s, slow_m), (fast_m_per_s, fast_m)] = [of(60.0, None), of(300.0, None)];
+    let [(slow_m_per_s, slow_m), (fast_m_per_s, fast_m)] =
+        [amplitude_at(60.0, None), amplitude_at(300.0, None)];
     assert!((slow_m_per_s / fast_m_per_s - 1.0).abs() > 0.1, "{slow_m_per_s}, {fast_m_per_s}");
     assert!((slow_m / fast_m - 1.0).abs() < 3e-3, "whatever the run: {slow_m}, {fast_m}");
-    let (_, given_m) = of(60.0, Some(fast_m_per_s));
+    let (_, given_m) = amplitude_at(60.0, Some(fast_m_per_s));
     assert!((given_m / slow_m - 1.0).abs() > 0.01, "{given_m}, {slow_m}");
 }
 
@@ -741,9 +808,10 @@ fn a_linear_response_takes_friction_at_its_own_speed() {
 #[ignore = "prints what a response costs"]
 fn cost() {
     let point = prepared(with(0.4, 140.0), 100.0);
-    let dwells: Vec<_> =
-        (0..560).map(|k| Dwell { point: &point, speed_rpm: 210.0 + 0.25 * f64::from(k) }).collect();
+    let held_speeds: Vec<_> = (0..560)
+        .map(|k| HeldSpeed { point: &point, speed_rpm: 210.0 + 0.25 * f64::from(k) })
+        .collect();
     let began = std::time::Instant::now();
-    let count = all(&dwells).iter().filter(|a| a.is_ok()).count();
+    let count = all_responses(&held_speeds).iter().filter(|a| a.is_ok()).count();
     println!("{:.3} ms each, {count} found", 1e3 * began.elapsed().as_secs_f64() / 560.0);
 }

@@ -6,7 +6,9 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::elements::Elements;
 use crate::nonlinear::elements::TubMotion;
-use crate::{Damper, Machine, Method, ModelKind, Point, Spin, Start, Unbalance, history, simulate};
+use crate::{
+    Damper, InitialDeviation, Machine, Method, ModelKind, Point, Spin, Unbalance, history, simulate,
+};
 use lane_ode::{Dual, N, Real, Simd};
 
 /// Computes the position of a drum's point in cabinet axes from its coordinates in drum axes.
@@ -90,12 +92,12 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
 #[test]
 fn quarter_turns_are_exact() {
     let unbalance = |radius_m, angle_deg| Unbalance { radius_m, angle_deg, ..Unbalance::default() };
-    assert_eq!(unbalance(0.2, 0.0).place_m(), [0.2, 0.0]);
-    assert_eq!(unbalance(0.2, 90.0).place_m(), [0.0, 0.2]);
-    assert_eq!(unbalance(0.2, -90.0).place_m(), [0.0, -0.2]);
-    assert_eq!(unbalance(0.2, 180.0).place_m(), unbalance(-0.2, 0.0).place_m());
-    assert_eq!(unbalance(0.2, 270.0).place_m(), [0.0, -0.2]);
-    let [y, z] = unbalance(0.2, 150.0).place_m();
+    assert_eq!(unbalance(0.2, 0.0).position_m(), [0.2, 0.0]);
+    assert_eq!(unbalance(0.2, 90.0).position_m(), [0.0, 0.2]);
+    assert_eq!(unbalance(0.2, -90.0).position_m(), [0.0, -0.2]);
+    assert_eq!(unbalance(0.2, 180.0).position_m(), unbalance(-0.2, 0.0).position_m());
+    assert_eq!(unbalance(0.2, 270.0).position_m(), [0.0, -0.2]);
+    let [y, z] = unbalance(0.2, 150.0).position_m();
     assert!((y + 0.1 * 3.0_f64.sqrt()).abs() < 1e-16 && (z - 0.1).abs() < 1e-16, "{y} {z}");
 }
 
@@ -108,7 +110,8 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
         let spin = Spin::Table { time_s: vec![0.0, 2.0], speed_rpm: vec![0.0, rpm] };
         let point = prepared(machine.clone(), spin, 2.0);
         let method = Method::Rk4 { step_s: 2e-4 };
-        let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), 0.1);
+        let history =
+            history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), 0.1);
         (0..history.len()).map(|k| history.instant(k).unwrap().deviations).collect()
     };
     let [forwards, mirrored] = [run(&machine, 300.0), run(&machine.mirrored(), -300.0)];

@@ -9,7 +9,7 @@ use crate::{
 use core::sync::atomic::{AtomicU32, Ordering};
 use lane_ode::{Cancel, STEPS_AT_ONCE, Simd, Tolerance};
 
-type Scenario = (Machine, Spin);
+type BitsScenario = (Machine, Spin);
 
 const END_S: f64 = 1.0;
 const TIMING: Timing = Timing { end_s: END_S, window_s: [0.4, 0.9], checkpoints: 8 };
@@ -26,19 +26,19 @@ const METHODS: [Method; 5] = [
 /// Returns eleven scenarios, so that some of four or eight lanes stay idle: the corners, the
 /// middles of the edges and the centre of the quick map, and two more points, with a spin of one
 /// second.
-fn quick_map() -> Vec<Scenario> {
+fn quick_map() -> Vec<BitsScenario> {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 0.6 };
     let corners = [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
     corners.chain([(0.4, 90.0), (0.7, 120.0)]).map(|(m, c)| (paper(m, c), spin.clone())).collect()
 }
 
 /// Returns random machines with spins of all kinds.
-fn random_machines() -> Vec<Scenario> {
+fn random_machines() -> Vec<BitsScenario> {
     let mut rng = fastrand::Rng::with_seed(31);
     (0..11).map(|i| (random_machine(&mut rng), random_spin(&mut rng, i, END_S))).collect()
 }
 
-fn points(simd: Simd, scenarios: &[Scenario]) -> Vec<Point> {
+fn points(simd: Simd, scenarios: &[BitsScenario]) -> Vec<Point> {
     prepare(simd, scenarios, &TIMING).into_iter().map(Result::unwrap).collect()
 }
 
@@ -64,7 +64,7 @@ fn bits((record, reading): (&Record, &Reading)) -> Vec<u64> {
 }
 
 /// Returns the bits of every scenario for each model and method, simulated as one batch.
-fn batch(simd: Simd, scenarios: &[Scenario]) -> Vec<Vec<Vec<u64>>> {
+fn batch(simd: Simd, scenarios: &[BitsScenario]) -> Vec<Vec<Vec<u64>>> {
     let points = points(simd, scenarios);
     let points: Vec<_> = points.iter().collect();
     let mut all = Vec::new();
@@ -83,14 +83,14 @@ fn select_scenarios(all: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec<u64
     all.iter().map(|records| indices.iter().map(|&i| records[i].clone()).collect()).collect()
 }
 
-fn same_on_every_instruction_set(scenarios: &[Scenario]) {
+fn same_on_every_instruction_set(scenarios: &[BitsScenario]) {
     let scalar = batch(Simd::Scalar, scenarios);
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         assert!(batch(simd, scenarios) == scalar, "{} gives other bits than scalar", simd.name());
     }
 }
 
-fn same_at_any_position(scenarios: &[Scenario]) {
+fn same_at_any_position(scenarios: &[BitsScenario]) {
     let count = scenarios.len();
     let as_given = batch(Simd::best(), scenarios);
     for turn in [1, 2, 3, 5, 7] {
@@ -106,7 +106,7 @@ fn same_at_any_position(scenarios: &[Scenario]) {
     assert!(batch(Simd::best(), &moved) == select_scenarios(&as_given, &order), "backwards");
 }
 
-fn same_beside_any_points(scenarios: &[Scenario]) {
+fn same_beside_any_points(scenarios: &[BitsScenario]) {
     let together = batch(Simd::best(), scenarios);
     for (i, scenario) in scenarios.iter().enumerate() {
         let alone = batch(Simd::best(), core::slice::from_ref(scenario));
@@ -156,8 +156,8 @@ fn same_bits_beside_any_points_random_machines() {
     same_beside_any_points(&random_machines());
 }
 
-/// Integrates a segment with more steps than the integrator makes between two calls of
-/// `is_stopped`, while segments in other lanes end before.
+/// Integrates a segment with more steps than the integrator makes between two polls of
+/// its cancellation, while segments in other lanes end before.
 #[test]
 fn blocks_of_steps_do_not_change_bits() {
     let timing = Timing { end_s: 1.0, window_s: [0.9, 1.0], checkpoints: 0 };

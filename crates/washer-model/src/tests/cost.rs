@@ -10,7 +10,7 @@ use lane_ode::{Lane, N, Real};
 /// Numbers of arithmetic operations. A fused multiplication and addition counts as both; changes of
 /// sign do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Operations {
+struct OperationCount {
     multiplications: u32,
     additions: u32,
     /// The number of fused multiplications and additions.
@@ -22,7 +22,7 @@ struct Operations {
 }
 
 thread_local! {
-    static COUNT: Cell<Operations> = const { Cell::new(Operations {
+    static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount {
         multiplications: 0,
         additions: 0,
         fused: 0,
@@ -32,7 +32,7 @@ thread_local! {
     }) };
 }
 
-fn count(change: impl FnOnce(&mut Operations)) {
+fn count(change: impl FnOnce(&mut OperationCount)) {
     COUNT.with(|cell| {
         let mut operations = cell.get();
         change(&mut operations);
@@ -41,8 +41,8 @@ fn count(change: impl FnOnce(&mut Operations)) {
 }
 
 /// Returns the result of a function, and the operations that it takes.
-fn counted<R>(work: impl FnOnce() -> R) -> (R, Operations) {
-    COUNT.with(|cell| cell.set(Operations::default()));
+fn counted<R>(work: impl FnOnce() -> R) -> (R, OperationCount) {
+    COUNT.with(|cell| cell.set(OperationCount::default()));
     let result = work();
     (result, COUNT.with(Cell::get))
 }
@@ -138,7 +138,7 @@ impl Lane for Counting {
 /// derivative. Asserts that the derivative has the same bits as with plain numbers.
 fn evaluation_cost<M: LaneModel<Counting>, P: LaneModel<f64>>(
     caps: Option<Caps>,
-) -> [Operations; 2] {
+) -> [OperationCount; 2] {
     let point = prepared(paper(0.4, 140.0), triangular(), 50.0);
     let model = M::splat(N(Counting(0.0)), &point, Coupling::new(N(Counting(0.0)), caps.as_ref()));
     let mut x = P::at_rest(&point);
@@ -156,7 +156,7 @@ fn evaluation_cost<M: LaneModel<Counting>, P: LaneModel<f64>>(
 }
 
 /// Counts the operations of an observation within the window: channels and radial distance.
-fn observation_cost<M: LaneModel<Counting>>() -> Operations {
+fn observation_cost<M: LaneModel<Counting>>() -> OperationCount {
     let point = prepared(paper(0.4, 140.0), triangular(), 50.0);
     let model = M::splat(N(Counting(0.0)), &point, Coupling::Springs);
     let x = core::array::from_fn(|i| N(Counting(1e-4 * i as f64)));
@@ -166,41 +166,41 @@ fn observation_cost<M: LaneModel<Counting>>() -> Operations {
 
 const CAPPED: Option<Caps> = Some(Caps { bearings_rad_per_s: 700.0, hinge_rad_per_s: Some(700.0) });
 
-fn nonlinear_cost(caps: Option<Caps>) -> [Operations; 2] {
+fn nonlinear_cost(caps: Option<Caps>) -> [OperationCount; 2] {
     evaluation_cost::<Nonlinear<Counting>, Nonlinear<f64>>(caps)
 }
 
-fn linear_cost(caps: Option<Caps>) -> [Operations; 2] {
+fn linear_cost(caps: Option<Caps>) -> [OperationCount; 2] {
     evaluation_cost::<Linear<Counting>, Linear<f64>>(caps)
 }
 
 /// Returns the sum of all operations but sines and cosines.
-fn flops(o: Operations) -> u32 {
+fn flops(o: OperationCount) -> u32 {
     o.multiplications + o.additions + o.divisions + o.square_roots
 }
 
 /// Creates operations from their numbers in the order of the fields.
 const fn operations(
     [multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs]: [u32; 6],
-) -> Operations {
-    Operations { multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs }
+) -> OperationCount {
+    OperationCount { multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs }
 }
 
 /// The present cost of forcing and derivative. A change of the model updates these numbers.
-const NONLINEAR: [Operations; 2] =
+const NONLINEAR: [OperationCount; 2] =
     [operations([31, 34, 18, 0, 0, 0]), operations([557, 410, 319, 12, 4, 6])];
-const LINEAR: [Operations; 2] =
+const LINEAR: [OperationCount; 2] =
     [operations([348, 257, 241, 2, 0, 0]), operations([143, 135, 131, 0, 0, 0])];
-const NONLINEAR_MASS_SCALED: Operations = operations([753, 580, 474, 16, 4, 6]);
-const LINEAR_MASS_SCALED: Operations = operations([175, 161, 157, 0, 0, 0]);
-const OBSERVED_NONLINEAR: Operations = operations([410, 278, 209, 0, 0, 6]);
-const OBSERVED_LINEAR: Operations = operations([334, 267, 215, 0, 0, 0]);
+const NONLINEAR_MASS_SCALED: OperationCount = operations([753, 580, 474, 16, 4, 6]);
+const LINEAR_MASS_SCALED: OperationCount = operations([175, 161, 157, 0, 0, 0]);
+const OBSERVED_NONLINEAR: OperationCount = operations([410, 278, 209, 0, 0, 6]);
+const OBSERVED_LINEAR: OperationCount = operations([334, 267, 215, 0, 0, 0]);
 
 #[test]
 fn the_nonlinear_right_hand_side_stays_below_the_naive_formulation() {
     let [forcing, derivative] = nonlinear_cost(None);
     eprintln!("nonlinear: right-hand side {derivative:?}; spin {forcing:?}");
-    let Operations { multiplications, additions, divisions, square_roots, .. } = derivative;
+    let OperationCount { multiplications, additions, divisions, square_roots, .. } = derivative;
     assert!(multiplications < 825 && additions < 605 && divisions <= 14 && square_roots <= 4);
     assert_eq!([forcing, derivative], NONLINEAR);
 }
@@ -232,7 +232,7 @@ fn a_linear_step_costs_less_than_a_nonlinear_one() {
     for caps in [None, CAPPED] {
         // A step of RK4 has four derivatives, and the forcing at two new times.
         let step =
-            |[forcing, derivative]: [Operations; 2]| 4 * flops(derivative) + 2 * flops(forcing);
+            |[forcing, derivative]: [OperationCount; 2]| 4 * flops(derivative) + 2 * flops(forcing);
         let [nonlinear, linear] = [nonlinear_cost(caps), linear_cost(caps)].map(step);
         eprintln!("RK4 step, {caps:?}: {nonlinear} operations nonlinear, {linear} linear");
         assert!(linear < nonlinear);

@@ -5,8 +5,8 @@ use super::instruments::{paper, prepared};
 use super::reference::reference;
 use crate::coordinates::COORDINATES;
 use crate::{
-    BumpStop, Bushing, Channel, Damper, Machine, Method, ModelKind, Point, Profile, Spin, Spring,
-    Start, Unbalance, history, simulate,
+    BumpStop, Bushing, Channel, Damper, InitialDeviation, Machine, Method, ModelKind, Point,
+    Profile, Spin, Spring, Unbalance, history, simulate,
 };
 use core::f64::consts::PI;
 use lane_ode::{Simd, Tolerance};
@@ -105,7 +105,8 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
     let channels: Vec<Channel> = names.iter().filter_map(channel).collect();
     assert_eq!((names[0], channels.len()), ("time_s", 6));
     methods.map(|method| {
-        let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), 0.01);
+        let history =
+            history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), 0.01);
         assert_eq!(history.len(), rows.len());
         let mut worst = 0.0_f64;
         for (column, channel) in channels.iter().enumerate() {
@@ -167,7 +168,7 @@ fn heights_m(machine: Machine, from_m: f64, every_s: f64, count: u32) -> Vec<f64
     let end_s = every_s * f64::from(count) * (1.0 + 1e-9);
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = prepared(machine, still, end_s);
-    let mut start = Start::default();
+    let mut start = InitialDeviation::default();
     start.deviations[0] = from_m;
     start.deviations[2] = from_m;
     let method = Method::Rk4 { step_s: 2e-5 };
@@ -330,7 +331,7 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
         0.1,
     );
     let difference = |size: f64| {
-        let start = Start {
+        let start = InitialDeviation {
             deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
             speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
         };

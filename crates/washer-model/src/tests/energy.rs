@@ -7,23 +7,27 @@ use crate::coordinates::COORDINATES;
 use crate::machine::spin::{Spin, SpinState};
 use crate::machine::{BumpStop, Damper, Machine};
 use crate::nonlinear::coefficients::Coefficients;
-use crate::{Instant, Method, ModelKind, Start, Unbalance, history};
+use crate::{InitialDeviation, InstantOutputs, Method, ModelKind, Unbalance, history};
 use lane_ode::N;
 
-type Vec3 = [f64; 3];
+type PlainVector = [f64; 3];
 
 /// Returns the columns of Ry(yaw) Rz(pitch) (Table 1).
-pub(super) fn axes(yaw: f64, pitch: f64) -> [Vec3; 3] {
+pub(super) fn axes(yaw: f64, pitch: f64) -> [PlainVector; 3] {
     let ((sy, cy), (sp, cp)) = (yaw.sin_cos(), pitch.sin_cos());
     [[cy * cp, sp, -sy * cp], [-cy * sp, cp, sy * sp], [sy, 0.0, cy]]
 }
 
 /// Returns `start` plus the sum of the components times the axes.
-pub(super) fn place(start: Vec3, axes: &[Vec3; 3], components: Vec3) -> Vec3 {
+pub(super) fn place(
+    start: PlainVector,
+    axes: &[PlainVector; 3],
+    components: PlainVector,
+) -> PlainVector {
     std::array::from_fn(|i| start[i] + (0..3).map(|k| components[k] * axes[k][i]).sum::<f64>())
 }
 
-fn length(a: Vec3, b: Vec3) -> f64 {
+fn length(a: PlainVector, b: PlainVector) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -36,7 +40,7 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     let p_s = [0.0, q[2], q[3]];
     // The drum's axes are those of the shaft, turned by q9 about s2, then by q10.
     let turned = axes(q[8], q[9]);
-    let drum: [Vec3; 3] = std::array::from_fn(|k| place([0.0; 3], &shaft, turned[k]));
+    let drum: [PlainVector; 3] = std::array::from_fn(|k| place([0.0; 3], &shaft, turned[k]));
     let hinge = place(p_s, &shaft, [m.drum.hinge_x_m, 0.0, 0.0]);
     let on_drum = |x_m: f64, r_m: f64, angle_deg: f64| {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
@@ -56,7 +60,7 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
         energy += 0.5 * s.stiffness_n_per_m * stretch.powi(2);
         energy += 0.25 * s.cubic_n_per_m3 * stretch.powi(4);
     }
-    let displacement = |at: Vec3| -> Vec3 {
+    let displacement = |at: PlainVector| -> PlainVector {
         let place = place(p_t, &tub, at);
         std::array::from_fn(|i| place[i] - at[i])
     };
@@ -89,12 +93,12 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
 }
 
 /// Returns the depth (m) of a stop's tub point.
-fn depth_m(stop: &BumpStop, displacement: Vec3) -> f64 {
+fn depth_m(stop: &BumpStop, displacement: PlainVector) -> f64 {
     along(displacement, stop.direction) - stop.clearance_m
 }
 
 /// Returns the component along a direction of any length.
-fn along(a: Vec3, direction: Vec3) -> f64 {
+fn along(a: PlainVector, direction: PlainVector) -> f64 {
     (0..3).map(|i| a[i] * direction[i]).sum::<f64>() / length(direction, [0.0; 3])
 }
 
@@ -107,12 +111,12 @@ fn losses_w(
 ) -> f64 {
     let rest = axes(at_rest[4], at_rest[5]);
     let tub = axes(q[4], q[5]);
-    let tub_point = |at: Vec3| place([0.0, q[0], q[1]], &tub, at);
+    let tub_point = |at: PlainVector| place([0.0, q[0], q[1]], &tub, at);
     // The tub's angular velocity: yaw rate about c2, pitch rate about t3.
-    let turn: Vec3 = [u[5] * tub[2][0], u[4], u[5] * tub[2][2]];
-    let velocity = |at: Vec3| -> Vec3 {
+    let turn: PlainVector = [u[5] * tub[2][0], u[4], u[5] * tub[2][2]];
+    let velocity = |at: PlainVector| -> PlainVector {
         let arm = place([0.0; 3], &tub, at);
-        let rotation: Vec3 = std::array::from_fn(|i| {
+        let rotation: PlainVector = std::array::from_fn(|i| {
             let j = (i + 1) % 3;
             let k = (i + 2) % 3;
             turn[j] * arm[k] - turn[k] * arm[j]
@@ -166,11 +170,11 @@ fn history_from_initial_velocity(
     end_s: f64,
     step_s: f64,
     every_s: f64,
-) -> Vec<Instant> {
+) -> Vec<InstantOutputs> {
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = prepared(machine.clone(), still, end_s);
     // Velocities of 0.1 and 0.15 m/s, 0.5 and -0.4 rad/s give motions of some 20 mm and 40 mrad.
-    let mut start = Start::default();
+    let mut start = InitialDeviation::default();
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
         (start.speeds[tub], start.speeds[rotor]) = (speed, speed);
     }
@@ -192,7 +196,7 @@ fn energies_j(step_s: f64) -> Vec<f64> {
     let coefficients = Coefficients::new(&machine);
     let instants = history_from_initial_velocity(&machine, 10.0, step_s, 0.05);
     let at_rest = potential_j(&machine, &equilibrium(&machine));
-    let energy = |Instant { deviations: q, speeds: u, .. }: &Instant| {
+    let energy = |InstantOutputs { deviations: q, speeds: u, .. }: &InstantOutputs| {
         potential_j(&machine, q) - at_rest + kinetic_j(&coefficients, q, u)
     };
     instants.iter().map(energy).collect()
@@ -227,7 +231,7 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
     let coefficients = Coefficients::new(&machine);
     let every_s = 1e-4;
     let instants = history_from_initial_velocity(&machine, 3.0, every_s, every_s);
-    let energy = |at: &Instant| {
+    let energy = |at: &InstantOutputs| {
         potential_j(&machine, &at.deviations) + kinetic_j(&coefficients, &at.deviations, &at.speeds)
     };
     let first = energy(&instants[0]);
@@ -247,7 +251,7 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
     assert!(worst < 1e-6, "{worst:e}");
     // At least one stop closes.
     let closes = |stop: &BumpStop| {
-        let depth = |at: &Instant| {
+        let depth = |at: &InstantOutputs| {
             let q = &at.deviations;
             let place = place([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
             depth_m(stop, std::array::from_fn(|i| place[i] - stop.tub_m[i]))

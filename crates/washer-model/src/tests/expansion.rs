@@ -15,17 +15,17 @@ use lane_ode::{Dual, N, System};
 /// The number of random machines, each at one instant.
 const INSTANTS: usize = 100;
 
-type Vector = [f64; COORDINATES];
+type CoordinateVector = [f64; COORDINATES];
 
 /// The linear model of a machine at a time of its spin.
-struct Instant {
+struct MotionAtInstant {
     point: Point,
     t_s: f64,
     model: Linear<f64>,
     spin: SpinState<f64>,
 }
 
-impl Instant {
+impl MotionAtInstant {
     fn random(rng: &mut fastrand::Rng) -> Self {
         let mut rpm = || 1200.0 * (2.0 * rng.f64() - 1.0);
         let spin = Spin::Table { time_s: vec![0.0, 10.0], speed_rpm: vec![rpm(), rpm()] };
@@ -42,7 +42,12 @@ impl Instant {
 
     /// Computes M a - f at equilibrium, and its derivative along deviations `q`, speeds `u` and
     /// accelerations `a`.
-    fn residual(&self, q: &Vector, u: &Vector, a: &Vector) -> [Vector; 2] {
+    fn residual(
+        &self,
+        q: &CoordinateVector,
+        u: &CoordinateVector,
+        a: &CoordinateVector,
+    ) -> [CoordinateVector; 2] {
         let along = |value: f64, slope: f64| N(Dual { value, slope });
         let at: [_; COORDINATES] = core::array::from_fn(|i| along(self.point.equilibrium[i], q[i]));
         let [u, a] = [u, a].map(|v| v.map(|v| along(0.0, v)));
@@ -54,20 +59,20 @@ impl Instant {
 }
 
 /// Calls `check` at random instants of random machines.
-fn at_random_instants(seed: u64, mut check: impl FnMut(&Instant, &mut fastrand::Rng)) {
+fn at_random_instants(seed: u64, mut check: impl FnMut(&MotionAtInstant, &mut fastrand::Rng)) {
     let mut rng = fastrand::Rng::with_seed(seed);
     for _ in 0..INSTANTS {
-        let instant = Instant::random(&mut rng);
+        let instant = MotionAtInstant::random(&mut rng);
         check(&instant, &mut rng);
     }
 }
 
 /// Returns random numbers between -size and size.
-fn random(rng: &mut fastrand::Rng, size: f64) -> Vector {
+fn random(rng: &mut fastrand::Rng, size: f64) -> CoordinateVector {
     core::array::from_fn(|_| size * (2.0 * rng.f64() - 1.0))
 }
 
-const STILL: Vector = [0.0; COORDINATES];
+const AT_REST: CoordinateVector = [0.0; COORDINATES];
 
 #[test]
 fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
@@ -76,13 +81,13 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
         let SpinState { sin, cos, speed, acceleration, .. } = instant.spin;
         let ours = instant.point.matrices(sin.0.atan2(cos.0), speed.0, acceleration.0);
         let [mut mass, mut damping, mut stiffness] = [[[0.0; COORDINATES]; COORDINATES]; 3];
-        let mut force = STILL;
+        let mut force = AT_REST;
         for j in 0..COORDINATES {
-            let mut unit = STILL;
+            let mut unit = AT_REST;
             unit[j] = 1.0;
-            let [at_rest, by_a] = instant.residual(&STILL, &STILL, &unit);
-            let [_, by_u] = instant.residual(&STILL, &unit, &STILL);
-            let [_, by_q] = instant.residual(&unit, &STILL, &STILL);
+            let [at_rest, by_a] = instant.residual(&AT_REST, &AT_REST, &unit);
+            let [_, by_u] = instant.residual(&AT_REST, &unit, &AT_REST);
+            let [_, by_q] = instant.residual(&unit, &AT_REST, &AT_REST);
             for i in 0..COORDINATES {
                 mass[i][j] = by_a[i];
                 damping[i][j] = by_u[i];
@@ -124,9 +129,9 @@ fn accelerations_solve_the_expanded_equations() {
         let x: [N<f64>; STATES] =
             core::array::from_fn(|i| N(if i < COORDINATES { q[i] } else { u[i - COORDINATES] }));
         let dx = instant.model.derivative(&instant.model.forcing(N(instant.t_s)), &x);
-        let a: Vector = core::array::from_fn(|i| dx[COORDINATES + i].0);
+        let a: CoordinateVector = core::array::from_fn(|i| dx[COORDINATES + i].0);
         let [at_rest, slope] = instant.residual(&q, &u, &a);
-        let scale = instant.residual(&q, &u, &STILL)[1];
+        let scale = instant.residual(&q, &u, &AT_REST)[1];
         let scale = (0..COORDINATES).fold(0.0_f64, |m, i| m.max((at_rest[i] + scale[i]).abs()));
         for i in 0..COORDINATES {
             assert_eq!(dx[i].0, u[i]);
@@ -144,7 +149,7 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
     let mut turning = 0.0_f64;
     at_random_instants(23, |instant, rng| {
         let [q, u, a] = [0.02, 0.5, 20.0].map(|size| random(rng, size));
-        let state = |first: &Vector, second: &Vector| -> [N<f64>; STATES] {
+        let state = |first: &CoordinateVector, second: &CoordinateVector| -> [N<f64>; STATES] {
             core::array::from_fn(|i| N([first, second][i / COORDINATES][i % COORDINATES]))
         };
         let forcing = instant.model.forcing(N(instant.t_s));
@@ -159,7 +164,7 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let spin_squared = instant.spin.speed.0.powi(2) + instant.spin.acceleration.0.abs();
         let scales = [1.0, 1.0 + spin_squared.sqrt(), 1.0 + spin_squared];
         // Channels are deviations from equilibrium; the radial distance is not.
-        let rest = instant.point.rest.into_iter().chain([0.0; RADIAL]);
+        let rest = instant.point.channels_at_rest.into_iter().chain([0.0; RADIAL]);
         let ours = channels.unwrap().into_iter().chain(radial);
         let theirs =
             axes.channels(&bodies, &motion).into_iter().chain(axes.radial(&bodies, &motion));

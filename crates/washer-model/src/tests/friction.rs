@@ -1,7 +1,7 @@
 //! Tests of the speed amplitudes at which the linear model takes friction, if they follow from the
 //! linear motion.
 
-use crate::modes::motions;
+use crate::modes::mode_roots;
 use crate::{
     Damper, Gauge, Machine, Method, ModelKind, Point, Profile, Recorders, Spin, Timing, modes,
     prepare, simulate_with,
@@ -151,7 +151,7 @@ fn the_two_rates_of_an_overdamped_mode_have_one_shape() {
     let frequencies = |frictions_n: [f64; 2]| {
         let point = prepared(&[machine(0.1, frictions_n, None)]).remove(0);
         let modes = modes(&point, 0.0, 0.0).unwrap().modes;
-        let without_shapes = motions(&point, 0.0, None).unwrap();
+        let without_shapes = mode_roots(&point, 0.0, None).unwrap();
         for (mode, motion) in modes.iter().zip(without_shapes) {
             let error = motion.magnitude_rad_per_s / mode.magnitude_rad_per_s - 1.0;
             assert!(error.abs() < 1e-9, "{frictions_n:?}: {error:e}");

@@ -4,8 +4,8 @@ use crate::coordinates::COORDINATES;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
-use crate::nonlinear::floating::Floating;
-use crate::nonlinear::{Half, Halves, halves};
+use crate::nonlinear::floating::FloatingChain;
+use crate::nonlinear::{Half, Halves, coupled_halves};
 use crate::point::Point;
 use crate::{
     Gauge, Machine, Parameter, Profile, Recorders, Spin, Target, Timing, Unbalance, prepare,
@@ -95,7 +95,7 @@ fn inertia_forces<T: Real, const R: usize>(
     midpoint: [N<T>; 2],
     rotation: [N<T>; R],
 ) -> ([N<T>; 2], [N<T>; R]) {
-    let Floating { per_mass, arm, .. } = &half.floating;
+    let FloatingChain { per_mass, arm, .. } = &half.floating;
     let mut centre = midpoint;
     for i in 0..2 {
         for r in 0..R {
@@ -134,7 +134,7 @@ pub(super) fn equations<T: Lane>(
     u: &[N<T>; COORDINATES],
     a: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; 2] {
-    loaded_equations(&halves(machine, spin, q, u), a)
+    loaded_equations(&coupled_halves(machine, spin, q, u), a)
 }
 
 /// Computes the mass matrix of the nonlinear model by columns from unit accelerations.

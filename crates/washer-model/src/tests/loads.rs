@@ -6,8 +6,8 @@ use super::energy::{axes, place};
 use crate::machine::feet::{Feet, LOAD};
 use crate::machine::{Cabinet, Foot, Machine};
 use crate::{
-    Gauge, Method, ModelKind, Point, Profile, Reading, Recorders, Spin, Start, Timing, history,
-    prepare, simulate_with,
+    Gauge, InitialDeviation, Method, ModelKind, Point, Profile, Reading, Recorders, Spin, Timing,
+    history, prepare, simulate_with,
 };
 use lane_ode::Simd;
 
@@ -100,7 +100,8 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     let point = point(machine.clone());
     let feet = Feet::new(&machine).unwrap();
     let method = Method::Rk4 { step_s: 1e-4 };
-    let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), EVERY_S);
+    let history =
+        history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), EVERY_S);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
     let mut feet_n = vec![f64::INFINITY; 4];
     let mut margin_n = f64::INFINITY;
@@ -118,7 +119,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         let loads_n = feet.loads_n(&load);
         all_close("a history's load of foot", &forces.feet_n, &loads_n, 1e-9);
         let horizontal_n = (load[0] * load[0] + load[2] * load[2]).sqrt();
-        let margin_now_n = 0.4 * (feet.spread.weight.0 - load[1]) - horizontal_n;
+        let margin_now_n = 0.4 * (feet.distribution.weight.0 - load[1]) - horizontal_n;
         assert!((forces.slip_margin_n.unwrap() - margin_now_n).abs() < 1e-9);
         margin_n = margin_n.min(margin_now_n);
         // The moment is taken about the centre of the feet's loads; feet that lift have no load.
@@ -186,7 +187,8 @@ fn loads_of_the_linear_model_agree_with_its_history() {
     machine.unbalance.mass_kg = 0.9;
     let point = point(machine.clone());
     let method = Method::Rk4 { step_s: 1e-4 };
-    let history = history(ModelKind::Linear, &method, &point, &Start::default(), EVERY_S);
+    let history =
+        history(ModelKind::Linear, &method, &point, &InitialDeviation::default(), EVERY_S);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
     let forces: Vec<_> = (first..=last).map(|k| history.forces(k).unwrap()).collect();
     let feet_n = least(forces.iter().map(|forces| forces.feet_n.clone()));
@@ -230,7 +232,7 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
         ModelKind::Nonlinear,
         &Method::Rk4 { step_s: 1e-4 },
         &point,
-        &Start::default(),
+        &InitialDeviation::default(),
         0.1,
     );
     let at_rest = load(&machine, &point, &[0.0; 10], &history.forces(0).unwrap());

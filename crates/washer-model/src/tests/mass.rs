@@ -7,7 +7,7 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::forces::Deflection;
 use crate::nonlinear::frame::Tilt;
-use crate::nonlinear::{accelerations, halves};
+use crate::nonlinear::{accelerations, coupled_halves};
 use crate::tests::reference::{machine, numbers, reference, spin};
 use lane_ode::{Dual, N};
 
@@ -34,14 +34,14 @@ fn val_mass_matrix_matches_that_of_an_independent_program() {
 /// Calls `check` with random states of random machines. The deflections of the bearings are small.
 fn in_motion(
     seed: u64,
-    mut check: impl FnMut(&Coefficients<f64>, &SpinState<f64>, &Vector, &Vector),
+    mut check: impl FnMut(&Coefficients<f64>, &SpinState<f64>, &LaneVector, &LaneVector),
 ) {
     let mut rng = fastrand::Rng::with_seed(seed);
     for _ in 0..200 {
         let coefficients = Coefficients::new(&random_machine(&mut rng));
         let mut draw = |size: f64| N(size * (2.0 * rng.f64() - 1.0));
         let spin = SpinState::new(draw(40.0).sin_cos(), draw(130.0), draw(10.0));
-        let mut q: Vector = core::array::from_fn(|_| draw(0.05));
+        let mut q: LaneVector = core::array::from_fn(|_| draw(0.05));
         for (rotor, tub) in [(2, 0), (3, 1), (6, 4), (7, 5)] {
             q[rotor] = q[tub] + draw(1e-5);
         }
@@ -50,10 +50,10 @@ fn in_motion(
     }
 }
 
-type Vector = [N<f64>; COORDINATES];
+type LaneVector = [N<f64>; COORDINATES];
 
 /// Returns the residual M a - f, relative to the largest force.
-fn residual([inertia, force]: &[Vector; 2]) -> f64 {
+fn residual([inertia, force]: &[LaneVector; 2]) -> f64 {
     let scale = force.iter().fold(0.0_f64, |m, f| m.max(f.0.abs()));
     (0..COORDINATES).fold(0.0, |m, i| m.max((inertia[i] - force[i]).0.abs() / scale))
 }
@@ -101,8 +101,8 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
             let Deflection { offset, tilt } = sag.bearings;
             let deflection =
                 Deflection { offset: added(d.offset, offset), tilt: added(d.tilt, tilt) };
-            let load = deflection.load(&machine.bodies);
-            let mut both = halves(machine, spin, q, u);
+            let load = deflection.load_on_shaft(&machine.bodies);
+            let mut both = coupled_halves(machine, spin, q, u);
             both.tub.floating.apply(&load.reaction());
             both.rotor.floating.apply(&load);
             if let Some(cap) = hinge_rad_per_s {

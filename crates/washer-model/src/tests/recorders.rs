@@ -1,10 +1,10 @@
 //! Tests of the optional recorders against densely sampled time histories.
 
 use super::instruments::{ALL_RECORDERS, paper};
-use crate::machine::spin::cuts_s;
+use crate::machine::spin::whole_turn_cuts_s;
 use crate::{
-    Caps, Channel, Gauge, Machine, Method, ModelKind, Point, Profile, Recorders, Spin, Start,
-    Timing, history, prepare, simulate, simulate_with,
+    Caps, Channel, Gauge, InitialDeviation, Machine, Method, ModelKind, Point, Profile, Recorders,
+    Spin, Timing, history, prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
@@ -29,8 +29,8 @@ struct SampledReadings {
 }
 
 fn sampled(point: &Point, model: ModelKind, method: &Method) -> SampledReadings {
-    let history = history(model, method, point, &Start::default(), EVERY_S);
-    let cuts = cuts_s(&point.stretches, TIMING.window_s);
+    let history = history(model, method, point, &InitialDeviation::default(), EVERY_S);
+    let cuts = whole_turn_cuts_s(&point.stretches, TIMING.window_s);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
     let mut found = SampledReadings {
         root_mean_squares: [0.0; 8],

@@ -14,7 +14,7 @@ use crate::{
     simulate,
 };
 use core::f64::consts::TAU;
-use lane_ode::{Aside, N, Simd};
+use lane_ode::{N, OutOfLine, Simd};
 use serde_json::Value;
 
 pub(crate) fn reference(file: &str) -> Value {

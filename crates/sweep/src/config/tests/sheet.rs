@@ -30,7 +30,7 @@ fn a_data_sheet_makes_a_machine_near_the_built_in_one() {
         let source = plan.written.source(&[parameter.name()]);
         assert_eq!(source, Some(format!("assumed: {}", assumption.rule)));
         let [value, paper] = [machine, &built_in].map(|one| parameter.get(one, spin).unwrap());
-        let [least, most] = assumption.ends(value, machine);
+        let [least, most] = assumption.expected_bounds(value, machine);
         let name = parameter.name();
         // The paper's value lies within the range about the assumed value.
         let is_within = least.min(most) - 1e-9 <= paper && paper <= least.max(most) + 1e-9;

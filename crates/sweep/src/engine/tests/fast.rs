@@ -287,7 +287,8 @@ fn a_search_for_the_verdict_alone_gives_the_rows_verdict() {
     let plan = Plan { integrator: rk4_mass_scaled(1e-3), ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
-    let side_engine = ModelEngine { demand: Demand::Side, ..ModelEngine::new(&plan).unwrap() };
+    let side_engine =
+        ModelEngine { demand: OutcomePurpose::Side, ..ModelEngine::new(&plan).unwrap() };
     let sides = side_engine.evaluate_at(&values);
     let rows = engine.evaluate_at(&values);
     let steps =

@@ -26,12 +26,12 @@ pub struct Assumption {
     /// The rule in words, as listings show it.
     pub rule: &'static str,
     /// The range in which real machines are expected.
-    pub spread: Spread,
+    pub expected_range: ExpectedRange,
 }
 
 /// The range about an assumed value in which real machines are expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Spread {
+pub enum ExpectedRange {
     /// A range from the first to the second multiple of the value.
     Factor(f64, f64),
     /// A range from the first to the second share of the drum's depth, added to the value.
@@ -41,11 +41,11 @@ pub enum Spread {
 impl Assumption {
     /// Returns the ends of the expected range about a value. The drum's depth is that of the
     /// machine: from the hinge to the drum's front.
-    pub fn ends(&self, value: f64, machine: &Machine) -> [f64; 2] {
+    pub fn expected_bounds(&self, value: f64, machine: &Machine) -> [f64; 2] {
         let depth_m = machine.drum.front_x_m - machine.drum.hinge_x_m;
-        match self.spread {
-            Spread::Factor(least, most) => [value * least, value * most],
-            Spread::Depth(back, forth) => [value + back * depth_m, value + forth * depth_m],
+        match self.expected_range {
+            ExpectedRange::Factor(least, most) => [value * least, value * most],
+            ExpectedRange::Depth(back, forth) => [value + back * depth_m, value + forth * depth_m],
         }
     }
 }

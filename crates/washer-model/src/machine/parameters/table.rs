@@ -1,9 +1,9 @@
 //! The rows of the table of parameters.
 
 use super::Range::{Any, Negative, NonNegative, Positive, Within};
-use super::assumed::Spread::{Depth, Factor};
+use super::assumed::ExpectedRange::{Depth, Factor};
 use super::assumed::{Assumption, DataSheet, cylinder_kg_m2};
-use super::{ElementList, Get, ParameterRow, Range, Set, Target, common};
+use super::{ElementList, Get, ParameterRow, Range, Set, Target, common_value};
 use crate::{BumpStop, Bushing, Damper, Foot, Machine, Spin, Spring, Unbalance};
 
 /// The target of a row, and the functions that read and write it.
@@ -14,16 +14,20 @@ type Access = (Target, Get, Set);
 /// sheet, the rule in words, and the range in which machines are expected.
 macro_rules! row {
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
-        assume $value:expr, $rule:literal, $spread:expr; $($access:tt)+) => {
+        assume $value:expr, $rule:literal, $expected_range:expr; $($access:tt)+) => {
         ParameterRow {
-            assumption: Some(Assumption { value: $value, rule: $rule, spread: $spread }),
+            assumption: Some(Assumption {
+                value: $value,
+                rule: $rule,
+                expected_range: $expected_range,
+            }),
             ..row!($name, $unit, $range, $source, $description, $($access)+)
         }
     };
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
-        else $left_out:expr, $($access:tt)+) => {
+        else $default_value:expr, $($access:tt)+) => {
         ParameterRow {
-            left_out: Some($left_out),
+            default_value: Some($default_value),
             ..row!($name, $unit, $range, $source, $description, $($access)+)
         }
     };
@@ -35,7 +39,7 @@ macro_rules! row {
             range: $range,
             source: $source,
             description: $description,
-            left_out: None,
+            default_value: None,
             assumption: None,
             target,
             get,
@@ -66,7 +70,7 @@ macro_rules! access {
     (every $list:ident $Target:ident $field:ident) => {
         (
             Target::$Target(stringify!($field)),
-            |m, _, _| common(&m.$list, |item| item.$field),
+            |m, _, _| common_value(&m.$list, |item| item.$field),
             |m, _, _, v| m.$list.iter_mut().for_each(|item| item.$field = v),
         )
     };
@@ -304,7 +308,7 @@ pub(super) static TABLE: &[ParameterRow] = &[
     row!("bearing_stiffness_n_per_m", "N/m", Positive, SECTION_3_1,
         "radial stiffness of both bearings (K_fb, K_rb)", Target::Bearings("stiffness_n_per_m"),
         get |Machine { bearings: b, .. }, _, _| {
-            common(&[b.front_stiffness_n_per_m, b.rear_stiffness_n_per_m], |k| *k)
+            common_value(&[b.front_stiffness_n_per_m, b.rear_stiffness_n_per_m], |k| *k)
         },
         set |Machine { bearings: b, .. }, _, _, v| {
             [b.front_stiffness_n_per_m, b.rear_stiffness_n_per_m] = [v; 2];

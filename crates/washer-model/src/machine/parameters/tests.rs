@@ -39,9 +39,9 @@ fn each_parameter_writes_its_parts_and_nothing_else() {
         let mut spin = spin();
         let before: Vec<_> = everything.iter().map(|p| p.get(&machine, &spin)).collect();
         parameter.set(&mut machine, &mut spin, 0.875);
-        let parts = parameter.parts(&machine);
+        let parts = parameter.single_names(&machine);
         for (other, before) in everything.iter().zip(before) {
-            if other.parts(&machine).iter().all(|part| !parts.contains(part)) {
+            if other.single_names(&machine).iter().all(|part| !parts.contains(part)) {
                 // A default free length follows the ends of its spring.
                 let follows =
                     other.name().ends_with("free_length_m") && other.index == parameter.index;

@@ -10,7 +10,7 @@ const MAX_ITERATIONS: usize = 64;
 
 /// A piece of a segment in which the drum turns in one direction; times are from the segment's
 /// start.
-struct Piece<'a> {
+struct MonotonePiece<'a> {
     stretch: &'a SpinStretch,
     from: f64,
     to: f64,
@@ -20,8 +20,12 @@ impl Spin {
     /// Returns the turns of the drum within a window (s), in either direction.
     pub fn turns_within(&self, window_s: [f64; 2]) -> f64 {
         let stretches = self.stretches();
-        let pieces = pieces(&stretches, window_s);
-        pieces.iter().filter(|piece| piece.start_s() >= window_s[0]).map(Piece::turns).sum()
+        let monotone_pieces = monotone_pieces(&stretches, window_s);
+        monotone_pieces
+            .iter()
+            .filter(|piece| piece.start_s() >= window_s[0])
+            .map(MonotonePiece::turns)
+            .sum()
     }
 
     /// Returns the times from 0 to `end_s` at which the drum has made a whole number of turns; the
@@ -35,61 +39,65 @@ impl Spin {
 /// of the run in either direction (at theta = 2 pi k if the drum never reverses). Partial turns at
 /// the window's ends belong to the whole turn beside them, so that a window with less than two
 /// whole turns is not cut.
-pub(crate) fn cuts_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
-    let mut whole = whole_turns_s(stretches, window_s);
-    whole.pop();
-    if !whole.is_empty() {
-        whole.remove(0);
+pub(crate) fn whole_turn_cuts_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
+    let mut times_s = whole_turns_s(stretches, window_s);
+    times_s.pop();
+    if !times_s.is_empty() {
+        times_s.remove(0);
     }
-    whole
+    times_s
 }
 
 /// Returns the times in the closed window at which the drum has made a whole number of turns.
 fn whole_turns_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
     let mut times = Vec::new();
-    let mut travelled = 0.0_f64;
-    let mut next = 0.0;
-    for piece in pieces(stretches, window_s) {
-        let after = travelled + piece.turns();
+    let mut turns_before = 0.0_f64;
+    let mut next_turn = 0.0;
+    for piece in monotone_pieces(stretches, window_s) {
+        let turns_after = turns_before + piece.turns();
         if piece.start_s() >= window_s[0] {
-            next = travelled.ceil().max(next);
+            next_turn = turns_before.ceil().max(next_turn);
             let mut earliest = piece.from;
-            while next <= after {
-                earliest = piece.when(next - travelled, earliest);
+            while next_turn <= turns_after {
+                earliest = piece.time_of_turns(next_turn - turns_before, earliest);
                 times.push((piece.stretch.start_s.0 + earliest).clamp(window_s[0], window_s[1]));
-                next += 1.0;
+                next_turn += 1.0;
             }
         }
-        travelled = after;
+        turns_before = turns_after;
     }
     times
 }
 
 /// Cuts the run up to the window's end at the window's beginning and where the drum reverses.
-fn pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<Piece<'_>> {
-    let mut pieces = Vec::new();
+fn monotone_pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<MonotonePiece<'_>> {
+    let mut monotone_pieces = Vec::new();
     for (k, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s.0 < to_s)
     {
-        let end_s = stretches.get(k + 1).map_or(to_s, |next| next.start_s.0.min(to_s));
+        let end_s = stretches.get(k + 1).map_or(to_s, |next_turn| next_turn.start_s.0.min(to_s));
         let length = end_s - stretch.start_s.0;
         let mut edges = vec![0.0, length];
-        let mut cut = |at: f64| {
+        let mut add_edge = |at: f64| {
             if 0.0 < at && at < length {
                 edges.push(at);
             }
         };
-        cut(from_s - stretch.start_s.0);
+        add_edge(from_s - stretch.start_s.0);
         // A cycloidal ramp does not reverse.
         if stretch.wave_turns.0 == 0.0 {
-            cut(-stretch.turns_per_s.0 / (2.0 * stretch.turns_per_s2.0));
+            add_edge(-stretch.turns_per_s.0 / (2.0 * stretch.turns_per_s2.0));
         }
         edges.sort_by(f64::total_cmp);
-        pieces.extend(edges.windows(2).map(|edge| Piece { stretch, from: edge[0], to: edge[1] }));
+        monotone_pieces.extend(edges.windows(2).map(|edge| MonotonePiece {
+            stretch,
+            from: edge[0],
+            to: edge[1],
+        }));
     }
-    pieces
+    monotone_pieces
 }
 
-impl Piece<'_> {
+impl MonotonePiece<'_> {
     /// Returns the time at which the piece begins, from the start of the run.
     fn start_s(&self) -> f64 {
         self.stretch.start_s.0 + self.from
@@ -97,42 +105,43 @@ impl Piece<'_> {
 
     /// Returns the turns made in the piece.
     fn turns(&self) -> f64 {
-        self.turns_by(self.to)
+        self.turns_until(self.to)
     }
 
     /// Returns the turns made in the piece up to a time.
-    fn turns_by(&self, t: f64) -> f64 {
+    fn turns_until(&self, t: f64) -> f64 {
         (self.stretch.turns(t) - self.stretch.turns(self.from)).abs()
     }
 
     /// Returns the time at which a number of turns has been made in the piece, not before
     /// `earliest`.
-    fn when(&self, turns: f64, earliest: f64) -> f64 {
+    fn time_of_turns(&self, turns: f64, earliest: f64) -> f64 {
         let stretch = self.stretch;
         if stretch.wave_turns.0 == 0.0 {
             let sign = if stretch.turns(self.to) < stretch.turns(self.from) { -1.0 } else { 1.0 };
             let rate = sign * stretch.rate(self.from);
             // Solves turns = rate t + sign b t^2 by the formula without cancellation.
             let root = (rate * rate + 4.0 * sign * stretch.turns_per_s2.0 * turns).max(0.0).sqrt();
-            let after = if turns > 0.0 { 2.0 * turns / (rate + root) } else { 0.0 };
-            return (self.from + after).clamp(earliest, self.to);
+            let turns_after = if turns > 0.0 { 2.0 * turns / (rate + root) } else { 0.0 };
+            return (self.from + turns_after).clamp(earliest, self.to);
         }
         let mut low = earliest;
         let mut high = self.to;
         let mut t = low;
         for _ in 0..MAX_ITERATIONS {
-            let missing = turns - self.turns_by(t);
-            if missing > 0.0 {
+            let remaining_turns = turns - self.turns_until(t);
+            if remaining_turns > 0.0 {
                 low = t;
             } else {
                 high = t;
             }
-            let newton = t + missing / stretch.rate(t).abs();
-            let better = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
-            if better == t {
+            let newton = t + remaining_turns / stretch.rate(t).abs();
+            let next_estimate =
+                if low < newton && newton < high { newton } else { 0.5 * (low + high) };
+            if next_estimate == t {
                 break;
             }
-            t = better;
+            t = next_estimate;
         }
         t
     }
@@ -198,19 +207,19 @@ mod tests {
     fn partial_turns_belong_to_the_whole_turn_beside_them() {
         // The drum makes one turn per second after the first turn.
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 2.0 };
-        let cuts = |window_s| cuts_s(&spin.stretches(), window_s);
-        let near = |found: Vec<f64>, expected: &[f64]| {
+        let cuts = |window_s| whole_turn_cuts_s(&spin.stretches(), window_s);
+        let assert_near = |found: Vec<f64>, expected: &[f64]| {
             assert_eq!(found.len(), expected.len(), "{found:?}");
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
         };
-        near(cuts([2.5, 6.5]), &[4.0, 5.0]);
+        assert_near(cuts([2.5, 6.5]), &[4.0, 5.0]);
         // A window from whole turn to whole turn has no partial turns.
-        near(cuts([2.0, 5.0]), &[3.0, 4.0]);
-        near(cuts([2.5, 4.5]), &[]);
-        near(cuts([2.5, 3.4]), &[]);
-        near(cuts([3.2, 3.4]), &[]);
+        assert_near(cuts([2.0, 5.0]), &[3.0, 4.0]);
+        assert_near(cuts([2.5, 4.5]), &[]);
+        assert_near(cuts([2.5, 3.4]), &[]);
+        assert_near(cuts([3.2, 3.4]), &[]);
         let still = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 2.0 };
-        near(cuts_s(&still.stretches(), [0.0, 100.0]), &[]);
+        assert_near(whole_turn_cuts_s(&still.stretches(), [0.0, 100.0]), &[]);
     }
 
     #[test]

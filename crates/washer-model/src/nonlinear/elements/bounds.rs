@@ -5,7 +5,7 @@ use crate::coordinates::{COORDINATES, TUB};
 use crate::nonlinear::elements::{
     DamperCoefficients, Elements, SpringCoefficients, StopCoefficients, TubMotion,
 };
-use crate::nonlinear::frame::{difference, dot};
+use crate::nonlinear::frame::{dot, subtract};
 use lane_ode::N;
 
 /// The greatest travel of a tub point from its place at rest (m). Basis: no machine has room for
@@ -20,49 +20,50 @@ const CONTACT_DEPTH: f64 = 20.0;
 impl Elements<f64> {
     /// Returns linear elements with the greatest tangents that the elements have near the
     /// equilibrium `q`; `None` if all elements are linear along their lines.
-    pub(crate) fn steepest(&self, q: &[f64; COORDINATES]) -> Option<Self> {
+    pub(crate) fn with_steepest_tangents(&self, q: &[f64; COORDINATES]) -> Option<Self> {
         if !self.has_optional.holds() {
             return None;
         }
-        let mut steepest = self.clone();
+        let mut linearised = self.clone();
         let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
-        for spring in &mut steepest.springs {
+        for spring in &mut linearised.springs {
             let ends = &spring.ends;
-            let place = tub.point(&ends.tub).displacement;
-            let span = difference(place, &difference(ends.cabinet, &ends.tub));
+            let displacement = tub.point(&ends.tub).displacement;
+            let span = subtract(displacement, &subtract(ends.cabinet, &ends.tub));
             let length = dot(&span, &span).sqrt();
             let elongation = length - spring.free_length;
             let cubic = spring.cubic;
             let tension = spring.stiffness * length - spring.stiffness_times_free_length
                 + cubic * elongation * elongation * elongation;
-            let farthest = elongation.abs() + MAX_TRAVEL_M;
-            spring.stiffness += 3.0 * (cubic * farthest * farthest).v();
+            let max_elongation = elongation.abs() + MAX_TRAVEL_M;
+            spring.stiffness += 3.0 * (cubic * max_elongation * max_elongation).v();
             // The tension at rest is kept, because the stiffness across the line depends on it.
             spring.stiffness_times_free_length = spring.stiffness * length - tension;
             spring.cubic = N(0.0);
         }
-        let mut onsets = Vec::new();
-        for damper in &mut steepest.dampers {
-            onsets.extend(damper.onset());
+        let mut onset_springs = Vec::new();
+        for damper in &mut linearised.dampers {
+            onset_springs.extend(damper.onset_spring());
             damper.damping += damper.friction / damper.speed_squared.sqrt() + damper.outer_damping;
             damper.friction = N(0.0);
             damper.outer_damping = N(0.0);
         }
-        steepest.springs.append(&mut onsets);
-        for stop in &mut steepest.stops {
+        linearised.springs.append(&mut onset_springs);
+        for stop in &mut linearised.stops {
             let depth = stop.depth(&tub.point(&stop.tub));
             let StopCoefficients { clearance, softness_squared, .. } = *stop;
             stop.clearance = clearance + depth - CONTACT_DEPTH * softness_squared.sqrt();
         }
-        for bushing in &mut steepest.bushings {
-            let place = tub.point(&bushing.tub).displacement;
+        for bushing in &mut linearised.bushings {
+            let displacement = tub.point(&bushing.tub).displacement;
             for i in 0..3 {
-                let farthest = place[i].abs() + MAX_TRAVEL_M;
-                bushing.stiffness[i] += 3.0 * (bushing.cubic[i] * farthest * farthest).v();
+                let max_elongation = displacement[i].abs() + MAX_TRAVEL_M;
+                bushing.stiffness[i] +=
+                    3.0 * (bushing.cubic[i] * max_elongation * max_elongation).v();
                 bushing.cubic[i] = N(0.0);
             }
         }
-        Some(steepest)
+        Some(linearised)
     }
 }
 
@@ -70,7 +71,7 @@ impl DamperCoefficients<f64> {
     /// Returns a spring without tension at rest that is as stiff as the onset of friction at the
     /// end of the free stroke, where the acting share of friction grows by up to 1 / (2 sigma) per
     /// unit of length.
-    fn onset(&self) -> Option<SpringCoefficients<f64>> {
+    fn onset_spring(&self) -> Option<SpringCoefficients<f64>> {
         if !self.has_free_stroke() {
             return None;
         }

@@ -2,8 +2,8 @@
 
 use crate::coordinates::COORDINATES;
 use crate::{
-    Channel, History, Machine, Method, ModelKind, Point, Profile, Spin, Start, Timing, history,
-    prepare,
+    Channel, History, InitialDeviation, Machine, Method, ModelKind, Point, Profile, Spin, Timing,
+    history, prepare,
 };
 use lane_ode::Simd;
 
@@ -43,7 +43,7 @@ fn val_a_run_up_matches_that_of_an_independent_program() {
     // step.
     let method = Method::Rk4 { step_s: 0.97e-4 };
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
-        let history = history(model, &method, &point, &Start::default(), 0.01);
+        let history = history(model, &method, &point, &InitialDeviation::default(), 0.01);
         let worst = difference(&format!("cycloidal_600rpm_4s_{file}.csv"), &history);
         assert!(worst < 1e-8, "{file}: {worst:e}");
     }
@@ -61,7 +61,7 @@ fn val_a_run_up_and_down_matches_that_of_an_independent_program() {
     );
     let method = Method::Rk4 { step_s: 1e-4 };
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
-        let history = history(model, &method, &point, &Start::default(), 0.01);
+        let history = history(model, &method, &point, &InitialDeviation::default(), 0.01);
         let worst = difference(&format!("triangular_350rpm_8s_{file}.csv"), &history);
         assert!(worst < 1e-6, "{file}: {worst:e}");
     }
@@ -79,7 +79,7 @@ fn a_trajectory_does_not_depend_on_the_instants() {
         [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive), Method::Additive(adaptive)]
     {
         let sample = |every_s: f64| {
-            history(ModelKind::Nonlinear, &method, &point, &Start::default(), every_s)
+            history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), every_s)
         };
         let coarse = sample(0.25);
         let dense = sample(0.25 / 1024.0);
@@ -97,7 +97,7 @@ fn a_failed_trajectory_ends_before_the_time_of_its_failure() {
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 },
         1.0,
     );
-    let mut start = Start::default();
+    let mut start = InitialDeviation::default();
     start.speeds[4] = 100.0;
     let history =
         history(ModelKind::Nonlinear, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 1e-4);
@@ -120,7 +120,13 @@ fn at_rest_the_cabinet_carries_the_weight() {
     let point =
         point(machine, Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let history = history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &Start::default(), 0.1);
+        let history = history(
+            model,
+            &Method::Rk4 { step_s: 1e-4 },
+            &point,
+            &InitialDeviation::default(),
+            0.1,
+        );
         let forces = history.forces(0).unwrap();
         let [x, y, z] = forces.cabinet_n;
         // The force along c1 may differ from zero, because the model does not move along c1.
@@ -138,7 +144,7 @@ fn linear_forces_equal_the_nonlinear_forces_to_first_order() {
         0.1,
     );
     let difference = |size: f64| {
-        let start = Start {
+        let start = InitialDeviation {
             deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
             speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
         };
@@ -165,7 +171,7 @@ fn both_models_start_at_the_given_state() {
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },
         0.1,
     );
-    let start = Start {
+    let start = InitialDeviation {
         deviations: std::array::from_fn(|i| 1e-3 * i as f64),
         speeds: std::array::from_fn(|i| 0.1 - 0.01 * i as f64),
     };

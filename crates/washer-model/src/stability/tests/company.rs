@@ -1,21 +1,21 @@
 //! Turns do not depend on those that share their lanes.
 
 use super::*;
-use crate::stability::orbit::{Asked, Turned, turns};
+use crate::stability::period_map::{TurnRequest, TurnResult, compute_turns};
 use crate::{Bushing, Unbalance};
 use lane_ode::Cancel;
 
-/// A random machine with the elements of `kinds`' bits: friction, stops, stiffening springs, a
-/// bushing, a second unbalance.
-fn with_elements(kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
+/// A random machine with the elements of `element_kinds`' bits: friction, stops, stiffening
+/// springs, a bushing, a second unbalance.
+fn with_elements(element_kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
     let mut machine = random(numbers);
     let mut between = |low: f64, high: f64| low + (high - low) * numbers.f64();
-    if kinds & 1 != 0 {
+    if element_kinds & 1 != 0 {
         for damper in &mut machine.dampers {
             damper.friction_n = between(5.0, 80.0);
         }
     }
-    if kinds & 2 != 0 {
+    if element_kinds & 2 != 0 {
         for side in [1.0, -1.0] {
             machine.stops.push(BumpStop {
                 tub_m: [0.35, 0.0, 0.28 * side],
@@ -27,10 +27,10 @@ fn with_elements(kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
             });
         }
     }
-    if kinds & 4 != 0 {
+    if element_kinds & 4 != 0 {
         machine.springs.iter_mut().for_each(|spring| spring.cubic_n_per_m3 = between(1e5, 3e6));
     }
-    if kinds & 8 != 0 {
+    if element_kinds & 8 != 0 {
         machine.bushings.push(Bushing {
             tub_m: [0.45, 0.0, 0.0],
             stiffness_n_per_m: [0.0, between(500.0, 2e3), between(500.0, 2e3)],
@@ -38,7 +38,7 @@ fn with_elements(kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
             damping_n_s_per_m: [0.0, 10.0, 15.0],
         });
     }
-    if kinds & 16 != 0 {
+    if element_kinds & 16 != 0 {
         let mass_kg = between(0.05, 0.4);
         let x_m = between(0.1, 0.3);
         machine.further_unbalances.push(Unbalance { mass_kg, x_m, radius_m: 0.18, angle_deg: 0.0 });
@@ -46,12 +46,12 @@ fn with_elements(kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
     machine
 }
 
-fn bits(turned: &Turned) -> Vec<u64> {
-    let mut numbers: Vec<f64> = turned.end.to_vec();
-    if let Some(seen) = &turned.seen {
+fn bits(result: &TurnResult) -> Vec<u64> {
+    let mut numbers: Vec<f64> = result.end.to_vec();
+    if let Some(seen) = &result.record {
         numbers.extend(seen.monodromy.iter().flatten().map(|entry| entry.0));
         numbers.extend(seen.peaks);
-        numbers.push(seen.gap_m);
+        numbers.push(seen.min_gap_m);
         numbers.extend(seen.states.iter().flatten());
     }
     numbers.into_iter().map(f64::to_bits).collect()
@@ -61,23 +61,24 @@ fn bits(turned: &Turned) -> Vec<u64> {
 /// MACHINES choose others.
 #[test]
 fn turns_do_not_depend_on_company() {
-    let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
-    let mut numbers = fastrand::Rng::with_seed(given("SEED", 1));
-    for number in 0..given("MACHINES", 64) {
-        let kinds = number % 32;
+    let number_from_env =
+        |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
+    let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 1));
+    for number in 0..number_from_env("MACHINES", 64) {
+        let element_kinds = number % 32;
         let points: Vec<Point> = (0..1 + numbers.usize(..4))
-            .map(|_| prepared(with_elements(kinds, &mut numbers), 100.0))
+            .map(|_| prepared(with_elements(element_kinds, &mut numbers), 100.0))
             .collect();
         let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
         let speed_rpm = 60.0 + 400.0 * numbers.f64();
-        let mut asked: Vec<Asked<'_>> = Vec::new();
+        let mut requests: Vec<TurnRequest<'_>> = Vec::new();
         for _ in 0..2 + numbers.usize(..12) {
             let settings = numbers.choice(&mut settings).unwrap();
             let speed_rpm = speed_rpm * (1.0 + 0.02 * numbers.f64());
-            let row = match numbers.u8(..3) {
-                0 => settings.case(speed_rpm).unwrap().row,
-                1 => settings.case(speed_rpm).unwrap().without_caps().unwrap().row,
-                _ => settings.followed(speed_rpm).unwrap(),
+            let setup = match numbers.u8(..3) {
+                0 => settings.held_case(speed_rpm).unwrap().setup,
+                1 => settings.held_case(speed_rpm).unwrap().without_caps().unwrap().setup,
+                _ => settings.continuation_setup(speed_rpm).unwrap(),
             };
             let rest = settings.point.equilibrium();
             let size = 0.02 * numbers.f64();
@@ -91,18 +92,18 @@ fn turns_do_not_depend_on_company() {
                     by
                 }
             });
-            asked.push(Asked { row, start, is_seen: numbers.bool() });
+            requests.push(TurnRequest { setup, start, is_recorded: numbers.bool() });
         }
-        let together = turns(&asked, Cancel::Never);
-        for (asked, together) in asked.iter().zip(&together) {
-            let alone = turns(core::slice::from_ref(asked), Cancel::Never).remove(0);
-            let kind = asked.row.kind();
+        let solve_linear_responses = compute_turns(&requests, Cancel::Never);
+        for (requests, solve_linear_responses) in requests.iter().zip(&solve_linear_responses) {
+            let alone = compute_turns(core::slice::from_ref(requests), Cancel::Never).remove(0);
+            let kind = requests.setup.batch_key();
             assert!(
-                bits(&alone) == bits(together),
-                "machine {number}, elements {kinds:b}, {kind:?}, seen {}: {:?} {:?}",
-                asked.is_seen,
+                bits(&alone) == bits(solve_linear_responses),
+                "machine {number}, elements {element_kinds:b}, {kind:?}, seen {}: {:?} {:?}",
+                requests.is_recorded,
                 alone.end,
-                together.end
+                solve_linear_responses.end
             );
         }
     }

@@ -11,15 +11,15 @@ use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{accelerations_under_load, mass_scaled_load};
-use crate::nonlinear::floating::Factors;
+use crate::nonlinear::floating::LdltFactors;
 use crate::nonlinear::forces::Deflection;
-use crate::nonlinear::{rotor, tub};
+use crate::nonlinear::{assemble_rotor_in_lanes, assemble_tub};
 use lane_ode::{Lane, N};
 
 /// Computes the stage's derivative k. The springs are evaluated at r + g k with `g` in s, all other
 /// forces and the inertia at coordinates `q` (m, rad) and speeds `u`.
 #[inline(always)]
-pub(crate) fn derivative_ahead<T: Lane>(
+pub(crate) fn solve_implicit_stage<T: Lane>(
     machine: &Coefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
@@ -28,37 +28,38 @@ pub(crate) fn derivative_ahead<T: Lane>(
     g: N<T>,
 ) -> [N<T>; STATES] {
     let b = &machine.bodies;
-    let mut tub = tub(machine, q, u);
-    let mut rotor = rotor(b, spin, q, u);
+    let mut tub = assemble_tub(machine, q, u);
+    let mut rotor = assemble_rotor_in_lanes(b, spin, q, u);
     // The change of the coordinates from `q` to the end of the stage, without the term g^2 a.
-    let mut ahead = *q;
+    let mut coordinate_change = *q;
     for i in 0..COORDINATES {
-        ahead[i] = r[i] + g * r[COORDINATES + i] - q[i];
+        coordinate_change[i] = r[i] + g * r[COORDINATES + i] - q[i];
     }
     let g_squared = (g * g).v();
-    for (place, i) in [(2, HINGE_YAW), (3, HINGE_PITCH)] {
-        rotor.inertia[place][place] += g_squared * b.flexure_stiffness;
-        rotor.floating.torque[place] -= b.flexure_stiffness * ahead[i];
+    for (index, i) in [(2, HINGE_YAW), (3, HINGE_PITCH)] {
+        rotor.inertia[index][index] += g_squared * b.flexure_stiffness;
+        rotor.floating.torque[index] -= b.flexure_stiffness * coordinate_change[i];
     }
     let mut deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let further = Deflection::linear(&ahead, &tub.floating.axis, &rotor.floating.axis);
+    let change = Deflection::linear(&coordinate_change, &tub.floating.axis, &rotor.floating.axis);
     for i in 0..2 {
-        deflection.offset[i] += further.offset[i];
-        deflection.tilt[i] += further.tilt[i];
+        deflection.offset[i] += change.offset[i];
+        deflection.tilt[i] += change.tilt[i];
     }
     // The deflection depends on the accelerations only, not on terms of constant speed.
     let zero = g.lit(0.0);
     tub.floating.axis_drift = [zero; 2];
     rotor.floating.axis_drift = [zero; 2];
-    let none = Deflection { offset: [zero; 2], tilt: [zero; 2] };
-    let tub_factors = Factors::new(tub.inertia);
-    let rotor_factors = Factors::new(rotor.inertia);
+    let no_sag = Deflection { offset: [zero; 2], tilt: [zero; 2] };
+    let tub_factors = LdltFactors::new(tub.inertia);
+    let rotor_factors = LdltFactors::new(rotor.inertia);
     let tub = &tub.floating;
     let rotor = &rotor.floating;
     let tub_response = tub.response(&tub_factors);
     let rotor_response = rotor.response(&rotor_factors);
     let squares = (g_squared.recip(), zero);
-    let on_shaft = mass_scaled_load(b, squares, &deflection, &none, &tub_response, &rotor_response);
+    let on_shaft =
+        mass_scaled_load(b, squares, &deflection, &no_sag, &tub_response, &rotor_response);
     let a = accelerations_under_load((tub, &tub_factors), (rotor, &rotor_factors), &on_shaft);
     let mut k = *r;
     for i in 0..COORDINATES {

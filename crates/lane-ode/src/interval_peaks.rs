@@ -1,6 +1,6 @@
 //! Finds the peaks in every part of a trajectory that is cut at given instants.
 
-use crate::quintic::{Quintic, within_step};
+use crate::quintic::{Quintic, clamp_to_step};
 use crate::{Lane, MAX_LANES, N, Peaks, Sample};
 
 /// The largest magnitudes of `M` outputs in every part of each lane's trajectory. Each lane has its
@@ -10,25 +10,25 @@ use crate::{Lane, MAX_LANES, N, Peaks, Sample};
 /// 5 through values, slopes and curvatures at both ends of the step. A lane allocates when it
 /// starts a trajectory, not in steps.
 #[derive(Clone, Debug)]
-pub struct PartPeaks<T, const M: usize> {
+pub struct IntervalPeaks<T, const M: usize> {
     peaks: Peaks<T, M>,
     /// The end of each lane's current part; infinity for the last part.
-    part_end_s: N<T>,
+    interval_end_s: N<T>,
     /// The later cuts of each lane, with the next one last in the list.
     cuts_s: [Vec<f64>; MAX_LANES],
     /// The peaks of each lane's completed parts.
-    parts: [Vec<[f64; M]>; MAX_LANES],
+    completed_peaks: [Vec<[f64; M]>; MAX_LANES],
 }
 
-impl<T: Lane, const M: usize> PartPeaks<T, M> {
+impl<T: Lane, const M: usize> IntervalPeaks<T, M> {
     /// Creates the peaks of trajectories without cuts or samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
         Self {
             peaks: Peaks::new(zero),
-            part_end_s: zero.lit(f64::INFINITY),
+            interval_end_s: zero.lit(f64::INFINITY),
             cuts_s: [const { Vec::new() }; MAX_LANES],
-            parts: [const { Vec::new() }; MAX_LANES],
+            completed_peaks: [const { Vec::new() }; MAX_LANES],
         }
     }
 
@@ -37,17 +37,17 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         self.peaks.reset(lane);
         self.cuts_s[lane].clear();
         self.cuts_s[lane].extend(cuts_s.iter().rev());
-        self.parts[lane].clear();
-        self.parts[lane].reserve(cuts_s.len());
+        self.completed_peaks[lane].clear();
+        self.completed_peaks[lane].reserve(cuts_s.len());
         let first = self.cuts_s[lane].pop().unwrap_or(f64::INFINITY);
-        self.part_end_s.0.set(lane, first);
+        self.interval_end_s.0.set(lane, first);
     }
 
     /// Returns the peaks of one lane between its cuts and ends its trajectory. The last stretch may
     /// be incomplete.
     pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
-        self.part_end_s.0.set(lane, f64::INFINITY);
-        let mut parts = core::mem::take(&mut self.parts[lane]);
+        self.interval_end_s.0.set(lane, f64::INFINITY);
+        let mut parts = core::mem::take(&mut self.completed_peaks[lane]);
         parts.push(self.peaks.lane(lane));
         parts
     }
@@ -70,16 +70,16 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
     ) {
         let mut rest_s = length_s;
         loop {
-            let cut = self.part_end_s.0.less(end_s.0);
+            let cut = self.interval_end_s.0.less(end_s.0);
             let lanes_cut = T::bits(cut);
             let mut there = *samples;
             let mut part_s = rest_s;
             if lanes_cut != 0 {
                 // Lanes without a cut in the step advance to its end at once.
-                let to_cut = self.part_end_s - (end_s - rest_s);
-                let share = N(T::select(cut, within_step(to_cut / rest_s).0, rest_s.lit(1.0).0));
+                let to_cut = self.interval_end_s - (end_s - rest_s);
+                let share = N(T::select(cut, clamp_to_step(to_cut / rest_s).0, rest_s.lit(1.0).0));
                 for i in 0..M {
-                    let inside = Quintic::new(rest_s, &self.peaks.last[i], &samples[i])
+                    let inside = Quintic::new(rest_s, &self.peaks.last_samples[i], &samples[i])
                         .sample(share, rest_s);
                     there[i] = Sample {
                         value: N(T::select(cut, inside.value.0, there[i].value.0)),
@@ -95,10 +95,10 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
             }
             rest_s -= part_s;
             for lane in (0..T::LANES).filter(|lane| lanes_cut >> lane & 1 == 1) {
-                self.parts[lane].push(self.peaks.lane(lane));
+                self.completed_peaks[lane].push(self.peaks.lane(lane));
                 self.peaks.reset(lane);
                 let next = self.cuts_s[lane].pop().unwrap_or(f64::INFINITY);
-                self.part_end_s.0.set(lane, next);
+                self.interval_end_s.0.set(lane, next);
             }
             self.peaks.begin(&there, cut);
         }

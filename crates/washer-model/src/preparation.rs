@@ -1,0 +1,291 @@
+//! The speed amplitudes at which the linear model's friction is linearised, for machines that do
+//! not give them: each damper has the amplitude of its own linear motion.
+//!
+//! Speed amplitudes and motion depend on each other, which is a fixed-point problem. At a resonance
+//! that a force drives against the dampings c and 4 F / (pi V), the reciprocal of the speed is
+//! linear in that of V. The unknowns are therefore reciprocals. Broyden's method (Math. Comp. 19,
+//! 1965) mostly finds the fixed point with three or four linear runs.
+//!
+//! Friction at speeds below 4 v_s / pi is viscous by its force law, with F / v_s. That is the least
+//! speed amplitude, which a damper has that the drum cannot move against its friction.
+
+use crate::modes::fastest_rigid_rad_per_s;
+use crate::point::{self, segments};
+use crate::steps::round_down_to_bits;
+use crate::{
+    Caps, FrictionSpeed, Gauge, Machine, Method, ModelKind, NoEquilibrium, Point, Recorders, Spin,
+    Timing, simulate_with,
+};
+use lane_ode::Simd;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+
+/// The relative tolerance of a speed amplitude: of the residual, and of the step to the fixed
+/// point, which near a resonance is many times as long. Basis: the equivalent damping is as
+/// accurate, and its idealisation is coarser. Doubling it saves less than a run.
+const SPEED_TOLERANCE: f64 = 5e-3;
+
+/// The greatest number of linear runs. Basis: three or four are usual, and 38 were needed between
+/// a damper that sticks and one that slides. Doubling it costs time for points without a fixed
+/// point.
+pub(crate) const MAX_RUNS: usize = 48;
+
+/// The phase of the fastest motion in a step of the first runs, rad. Basis: it gives speeds within
+/// a percent. Doubling it gives errors 16 times as large.
+const FIRST_STEP_PHASE_RAD: f64 = 0.4;
+
+/// The step of the last runs, as a share of that of the first. Basis: it gives speeds within a
+/// thousandth, which a resonance with little viscous damping may make a percent of the fixed point,
+/// as in test `own_speeds_near_a_resonance_are_a_fixed_point`. Doubling it makes that four percent.
+const FINE_STEP_SHARE: f64 = 0.25;
+
+/// The factor of the step after an unstable run. Basis: a compromise between failed runs and
+/// short steps, not measured. Doubling it would lengthen steps.
+const STEP_REDUCTION: f64 = 0.7;
+
+/// The shortest step, as a share of the first. Basis: thirteen reductions. Doubling it allows two
+/// fewer.
+const MIN_STEP_SHARE: f64 = 0.01;
+
+/// The bearings' cap times the step, as a share of the stability limit. Basis: a margin of a tenth.
+/// Doubling it is unstable.
+const CAP_STABILITY_SHARE: f64 = 0.9;
+
+/// The number of binary digits of a step after the first. Basis: the last digits of an eigenvalue
+/// depend on the processor. Doubling it would keep more of them.
+const STEP_BITS: u32 = 8;
+
+/// A search for the speed amplitudes of a point.
+pub(crate) struct SpeedAmplitudeSearch {
+    /// The reciprocals of the speeds (s/m).
+    reciprocals: Vec<f64>,
+    /// The greatest reciprocals (s/m).
+    maxima: Vec<f64>,
+    /// The reciprocals of the previous iteration, and their residuals.
+    previous: Option<[Vec<f64>; 2]>,
+    /// The inverse of the residuals' Jacobian, by rows.
+    inverse_jacobian: Vec<Vec<f64>>,
+}
+
+impl SpeedAmplitudeSearch {
+    /// Starts a search at the point's speeds; `None` if all are given.
+    pub(crate) fn new(point: &Point) -> Option<Self> {
+        let own_dampers: Vec<_> = point
+            .friction_speeds
+            .iter()
+            .filter(|friction_speed| friction_speed.is_from_motion)
+            .collect();
+        let damper_count = own_dampers.len();
+        let maxima: Vec<f64> = own_dampers
+            .iter()
+            .map(|friction_speed| 1.0 / friction_speed.viscous_limit_m_per_s)
+            .collect();
+        let first_reciprocal = |(friction_speed, max): (&&FrictionSpeed, &f64)| {
+            max.min(1.0 / friction_speed.speed_m_per_s)
+        };
+        (damper_count > 0).then(|| Self {
+            reciprocals: own_dampers.iter().zip(&maxima).map(first_reciprocal).collect(),
+            previous: None,
+            inverse_jacobian: (0..damper_count)
+                .map(|i| (0..damper_count).map(|j| if i == j { -1.0 } else { 0.0 }).collect())
+                .collect(),
+            maxima,
+        })
+    }
+
+    /// Starts a search at the least speeds, so that it does not depend on the point's own speeds.
+    pub(crate) fn from_min_speeds(point: &Point) -> Option<Self> {
+        Self::new(point).map(|search| Self { reciprocals: search.maxima.clone(), ..search })
+    }
+
+    /// Returns the speed amplitudes at which the friction of the next run is linearised (m/s).
+    pub(crate) fn speeds_m_per_s(&self) -> Vec<f64> {
+        self.reciprocals.iter().map(|reciprocal| 1.0 / reciprocal).collect()
+    }
+
+    /// Updates the speeds by the amplitudes (m/s) of the motion with friction at these speeds.
+    /// Returns true if both agree, and then does not change the speeds.
+    pub(crate) fn update(&mut self, motion_m_per_s: &[f64]) -> bool {
+        let amplitudes = motion_m_per_s.iter().zip(&self.maxima);
+        let residuals: Vec<f64> = amplitudes
+            .zip(&self.reciprocals)
+            .map(|((speed, max), current)| (1.0 / speed).min(*max) - current)
+            .collect();
+        if let Some([previous_reciprocals, previous_residuals]) = &self.previous {
+            // Broyden's update of the inverse B by the step s and the change y of the residuals:
+            // B += (s - B y) (s^T B) / (s^T B y).
+            let s: Vec<f64> = difference(&self.reciprocals, previous_reciprocals);
+            let y = difference(&residuals, previous_residuals);
+            let b_y = self.inverse_jacobian.iter().map(|row| dot(row, &y)).collect::<Vec<_>>();
+            let s_b: Vec<f64> = (0..s.len())
+                .map(|j| self.inverse_jacobian.iter().zip(&s).map(|(row, s)| s * row[j]).sum())
+                .collect();
+            let s_b_y = dot(&s_b, &y);
+            if s_b_y != 0.0 {
+                for (row, (s, b_y)) in self.inverse_jacobian.iter_mut().zip(s.iter().zip(&b_y)) {
+                    let factor = (s - b_y) / s_b_y;
+                    row.iter_mut().zip(&s_b).for_each(|(entry, s_b)| *entry += factor * s_b);
+                }
+            }
+        }
+        let steps: Vec<f64> =
+            self.inverse_jacobian.iter().map(|row| -dot(row, &residuals)).collect();
+        // Dampers that move together may need steps against their own residuals.
+        let relative = |number: f64, k: usize| number / self.reciprocals[k];
+        let agreement = |k: usize| relative(steps[k], k) * relative(residuals[k], k);
+        let follows_residuals = (0..steps.len()).map(agreement).sum::<f64>() > 0.0;
+        let next_reciprocals: Vec<f64> = (0..steps.len())
+            .map(|k| self.next_reciprocal(k, residuals[k], steps[k], follows_residuals))
+            .collect();
+        let changes = difference(&next_reciprocals, &self.reciprocals);
+        let is_small = |differences: &[f64]| {
+            let mut pairs = differences.iter().zip(&self.reciprocals);
+            pairs.all(|(difference, current)| difference.abs() <= SPEED_TOLERANCE * current)
+        };
+        if is_small(&residuals) && is_small(&changes) {
+            return true;
+        }
+        self.previous =
+            Some([core::mem::replace(&mut self.reciprocals, next_reciprocals), residuals]);
+        false
+    }
+
+    /// Returns the next reciprocal of a damper by its residual and the step of Broyden's method.
+    /// `follows_residuals` tells whether the steps of all dampers together have the direction of
+    /// the residuals.
+    fn next_reciprocal(
+        &self,
+        damper: usize,
+        residual: f64,
+        step: f64,
+        follows_residuals: bool,
+    ) -> f64 {
+        let current = self.reciprocals[damper];
+        let max = self.maxima[damper];
+        let next = match (follows_residuals || step * residual > 0.0, residual > 0.0) {
+            // The motion is slower than assumed, and slows down more than the assumed speed does,
+            // and the speed of a fixed point would be negative: the damper sticks.
+            (false, true) if current + step <= 0.0 => max,
+            (false, false) => current + residual,
+            _ => current + step,
+        };
+        if next > 0.0 { next.min(max) } else { 0.5 * current }
+    }
+
+    /// Discards the previous residuals, so that those of finer runs are not compared with them.
+    fn forget_previous(&mut self) {
+        self.previous = None;
+    }
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Selects the speeds of the dampers whose amplitude is that of the motion.
+pub(crate) fn own_speeds(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
+    let own_dampers =
+        point.friction_speeds.iter().filter(|friction_speed| friction_speed.is_from_motion);
+    own_dampers.map(|friction_speed| speeds_m_per_s[friction_speed.damper]).collect()
+}
+
+/// A point whose search is going on.
+struct OpenPoint {
+    /// The index among all points.
+    index: usize,
+    /// The point, with segments up to the window's end.
+    point: Point,
+    search: SpeedAmplitudeSearch,
+    step_s: f64,
+    min_step_s: f64,
+    /// Whether the runs have the fine step.
+    has_fine_step: bool,
+    is_finished: bool,
+}
+
+/// Prepares points on lanes: equilibrium, linear model, and the speed amplitudes of friction that
+/// the machine does not give, by runs up to the window's end. A point does not depend on the
+/// others.
+///
+/// # Errors
+/// [`NoEquilibrium`] for each point without one.
+pub fn prepare(
+    simd: Simd,
+    points: &[(Machine, Spin)],
+    timing: &Timing,
+) -> Vec<Result<Point, NoEquilibrium>> {
+    let mut prepared = point::prepare(points, timing);
+    let timing_to_window = Timing { end_s: timing.window_s[1], checkpoints: 0, ..*timing };
+    let to_open_point = |(index, point): (usize, &Result<Point, NoEquilibrium>)| {
+        let point = point.as_ref().ok()?;
+        let search = SpeedAmplitudeSearch::new(point)?;
+        let segments = segments(&point.stretches, &timing_to_window).into();
+        let point = Point { segments, ..point.with_own_friction_speeds(&search.speeds_m_per_s()) };
+        let fastest_rad_per_s = fastest_rigid_rad_per_s(&point, &point.linear).ok()?;
+        let step_s = round_down_to_bits(
+            FIRST_STEP_PHASE_RAD / fastest_rad_per_s.max(point.segments.last()?.fastest_rad_per_s),
+            STEP_BITS,
+        );
+        let min_step_s = MIN_STEP_SHARE * step_s;
+        Some(OpenPoint {
+            index,
+            point,
+            search,
+            step_s,
+            min_step_s,
+            has_fine_step: false,
+            is_finished: false,
+        })
+    };
+    let mut open_points: Vec<OpenPoint> =
+        prepared.iter().enumerate().filter_map(to_open_point).collect();
+    let recorders = Recorders::gauge(Gauge::DamperSpeed);
+    for _ in 0..MAX_RUNS {
+        let mut unfinished: Vec<&mut OpenPoint> =
+            open_points.iter_mut().filter(|open_point| !open_point.is_finished).collect();
+        unfinished.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));
+        // Points with equal steps run in one batch.
+        for batch in unfinished.chunk_by_mut(|a, b| a.step_s == b.step_s) {
+            let step_s = batch[0].step_s;
+            let cap = CAP_STABILITY_SHARE * RK4_STABILITY_LIMIT / step_s;
+            let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
+            let method = Method::Capped { step_s, caps };
+            let batch_points: Vec<&Point> =
+                batch.iter().map(|open_point| &open_point.point).collect();
+            let simd = simd.narrowed(batch_points.len());
+            let (_, readings) =
+                simulate_with(simd, ModelKind::Linear, &method, &batch_points, recorders);
+            for (open_point, reading) in batch.iter_mut().zip(readings) {
+                open_point.update(reading.gauge(Gauge::DamperSpeed));
+            }
+        }
+    }
+    for OpenPoint { index, search, .. } in open_points {
+        if let Ok(point) = &mut prepared[index] {
+            *point = point.with_own_friction_speeds(&search.speeds_m_per_s());
+        }
+    }
+    prepared
+}
+
+impl OpenPoint {
+    /// Updates the search by the speeds (m/s) of all dampers in a run, which are none if it failed.
+    fn update(&mut self, speeds_m_per_s: &[f64]) {
+        if speeds_m_per_s.is_empty() {
+            // A hinge below its cap, or friction at a low speed, is too stiff for the step.
+            self.step_s = round_down_to_bits(STEP_REDUCTION * self.step_s, STEP_BITS);
+            self.is_finished = self.step_s < self.min_step_s;
+            return;
+        }
+        if self.search.update(&own_speeds(&self.point, speeds_m_per_s)) {
+            self.is_finished = self.has_fine_step;
+            self.has_fine_step = true;
+            self.step_s *= FINE_STEP_SHARE;
+            self.search.forget_previous();
+        }
+        self.point = self.point.with_own_friction_speeds(&self.search.speeds_m_per_s());
+    }
+}

@@ -1,0 +1,331 @@
+//! Searches that evaluate the period map: the driver of many at a time, and Newton's method for a
+//! periodic response at one speed.
+
+use super::monodromy::StateMatrix;
+use super::period_map::{OrbitRecord, TurnRequest, TurnResult, TurnSetup, compute_turns};
+use crate::coordinates::{COORDINATES, STATES};
+use crate::point::Point;
+use core::f64::consts::TAU;
+use lane_ode::{Cancel, Lu, N, OutOfLine, Simd};
+
+/// A search that requests turns until it is over.
+pub(super) trait PeriodMapSearch<'a> {
+    /// Returns the turns that the search needs next; none once it is over.
+    fn next_requests(&mut self) -> Vec<TurnRequest<'a>>;
+
+    /// Receives the results of the requested turns, in the order of the requests.
+    fn receive_results(&mut self, turned: Vec<TurnResult>);
+}
+
+/// Runs searches to their ends, with the turns of all of them together in lanes. Returns false if
+/// `cancel` was requested before.
+pub(super) fn run_searches<'a, S: PeriodMapSearch<'a>>(
+    searches: &mut [S],
+    cancel: Cancel<'_>,
+) -> bool {
+    loop {
+        let requests_by_search: Vec<Vec<TurnRequest<'a>>> =
+            searches.iter_mut().map(PeriodMapSearch::next_requests).collect();
+        let requests: Vec<TurnRequest<'a>> = requests_by_search.concat();
+        if requests.is_empty() {
+            return true;
+        }
+        let mut results = compute_turns(&requests, cancel).into_iter();
+        if cancel.is_requested() {
+            return false;
+        }
+        for (search, search_requests) in searches.iter_mut().zip(requests_by_search) {
+            if !search_requests.is_empty() {
+                search.receive_results(results.by_ref().take(search_requests.len()).collect());
+            }
+        }
+    }
+}
+
+/// The greatest number of turns of a search for a response. Doubling it doubles the time of
+/// searches that fail.
+const MAX_TURNS: usize = 80;
+
+/// The expected relative residual below which the next turn is the last one of a search. Basis: a
+/// hundredth of [`RESPONSE_TOLERANCE`]. Doubling it saves few turns.
+const LAST_TURN_TOLERANCE: f64 = 1e-10;
+
+/// The greatest relative residual of a response. Basis: amplitudes are compared to 1e-5. Doubling
+/// it changes nothing.
+const RESPONSE_TOLERANCE: f64 = 1e-8;
+
+/// The least size of a motion (m, rad) in a relative residual. Basis: without unbalance the motion
+/// is only rounding. Doubling it changes nothing for greater motions.
+const MIN_DEVIATION: f64 = 1e-4;
+
+/// The greatest ratio of successive residuals with which the Jacobian is used again. Doubling it
+/// takes more corrections, with fewer Jacobians.
+const MAX_RESIDUAL_RATIO: f64 = 0.2;
+
+/// The relative residual below which a correction with the Jacobian at the state itself is the last
+/// one. Basis: such a correction squares the residual. Doubling it ends searches a correction
+/// earlier.
+const QUADRATIC_CONVERGENCE_RESIDUAL: f64 = 1e-3;
+
+/// The distance (m, rad; speeds over the drum's speed) within which a known response repels a
+/// search. Basis: neighbours beside a fold are some millimetres apart, as in test
+/// `a_branch_that_was_lost_is_found_again`. Doubling it makes searches pass neighbours that they
+/// are meant to find.
+const REPULSION_RANGE: f64 = 5e-3;
+
+/// The largest difference from 1 of a step's factor with which a search may end. Basis: a search
+/// that has converged takes steps of 1e-7 of a known response's distance, whose factor differs from
+/// 1 by as much. Doubling it changes nothing there.
+const MAX_FINAL_DEFLATION: f64 = 1e-3;
+
+/// Returns the distance of a turn's end from its start, relative to its deviation from equilibrium;
+/// not finite if the motion left the model's range.
+pub(crate) fn relative_residual(
+    point: &Point,
+    speed_rpm: f64,
+    start: &[f64; STATES],
+    end: &[f64; STATES],
+) -> f64 {
+    let equilibrium = point.equilibrium();
+    let speed_rad_per_s = speed_rpm * TAU / 60.0;
+    let mut residual = 0.0_f64;
+    let mut size = MIN_DEVIATION;
+    for i in 0..COORDINATES {
+        size = size.max((start[i] - equilibrium[i]).abs());
+        let speed_gap = end[COORDINATES + i] - start[COORDINATES + i];
+        let gap = (end[i] - start[i]).abs() + speed_gap.abs() / speed_rad_per_s;
+        // NaN stays.
+        residual = if gap > residual || gap.is_nan() { gap } else { residual };
+    }
+    residual / size
+}
+
+/// Factors 1 - Phi, the matrix of Newton's equations for a fixed point of the period map, from the
+/// monodromy matrix Phi. Returns `None` if it is singular.
+pub(super) fn factor_fixed_point_equations(monodromy: &StateMatrix) -> Option<Lu<STATES>> {
+    let mut equations = monodromy.map(|row| row.map(|entry| -entry));
+    for i in 0..STATES {
+        equations[i][i] = equations[i][i] + 1.0;
+    }
+    factor_matrix(&equations)
+}
+
+/// Factors a matrix; returns `None` if it is singular.
+pub(super) fn factor_matrix<const C: usize>(matrix: &[[N<f64>; C]; C]) -> Option<Lu<C>> {
+    Simd::one_lane(MatrixFactorization(matrix))
+}
+
+struct MatrixFactorization<'a, const C: usize>(&'a [[N<f64>; C]; C]);
+
+impl<const C: usize> OutOfLine for MatrixFactorization<'_, C> {
+    type Output = Option<Lu<C>>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Lu<C>> {
+        Lu::new(*self.0)
+    }
+}
+
+/// The search for a periodic response at one speed by Newton's method. The first correction uses
+/// the Jacobian of a nearby response, if there is one, and later ones that of the search's own
+/// states, which is computed again when the residual decreases too slowly.
+pub(super) struct NewtonSearch<'a> {
+    setup: TurnSetup<'a>,
+    state: [f64; STATES],
+    /// The factors of 1 - Phi; `None` if the next turn computes them.
+    factors: Option<Lu<STATES>>,
+    turn_count: usize,
+    /// The number of remaining turns of the transient before the first correction.
+    transient_turns: usize,
+    /// The largest correction of a coordinate (m, rad).
+    max_step: f64,
+    /// The known responses, which the search is not to find again.
+    known_responses: Vec<[f64; STATES]>,
+    residual: f64,
+    is_last_turn: bool,
+    is_over: bool,
+    record: Option<Box<OrbitRecord>>,
+}
+
+impl<'a> NewtonSearch<'a> {
+    /// Creates a search from a nearby state, with the factors of 1 - Phi of a nearby response, if
+    /// they are known.
+    pub(super) fn new(
+        setup: TurnSetup<'a>,
+        state: [f64; STATES],
+        factors: Option<Lu<STATES>>,
+    ) -> Self {
+        Self {
+            setup,
+            state,
+            factors,
+            turn_count: 0,
+            transient_turns: 0,
+            max_step: f64::INFINITY,
+            known_responses: Vec::new(),
+            residual: f64::INFINITY,
+            is_last_turn: false,
+            is_over: false,
+            record: None,
+        }
+    }
+
+    /// Creates a search by damped Newton steps, none of which changes a coordinate by more than
+    /// `max_step` (m, rad). It stays near its start if another response is close.
+    pub(super) fn damped(setup: TurnSetup<'a>, state: [f64; STATES], max_step: f64) -> Self {
+        Self { max_step, ..Self::new(setup, state, None) }
+    }
+
+    /// Creates a damped search by deflated Newton steps (Farrell, Birkisson and Funke 2015): known
+    /// responses repel it, so that it finds another one.
+    pub(super) fn deflated(
+        setup: TurnSetup<'a>,
+        state: [f64; STATES],
+        max_step: f64,
+        known_responses: Vec<[f64; STATES]>,
+    ) -> Self {
+        Self { known_responses, ..Self::damped(setup, state, max_step) }
+    }
+
+    /// Returns the factor that deflation puts on a Newton step: with the residual multiplied by
+    /// m(x) = product over known responses r of 1 + 1 / |x - r|^2, the step d becomes
+    /// d / (1 - d ln m), where d ln m is the derivative of ln m along d.
+    fn deflation_factor(&self, step: &[N<f64>; STATES]) -> f64 {
+        let speed_rad_per_s = self.setup.speed_rpm * TAU / 60.0;
+        let unit = |i: usize| {
+            if i < COORDINATES { REPULSION_RANGE } else { REPULSION_RANGE * speed_rad_per_s }
+        };
+        let mut derivative = 0.0;
+        for known in &self.known_responses {
+            let mut squared = 0.0;
+            let mut product = 0.0;
+            for i in 0..STATES {
+                let offset = (self.state[i] - known[i]) / unit(i);
+                squared += offset * offset;
+                product += offset * step[i].0 / unit(i);
+            }
+            derivative -= 2.0 * product / (squared * (1.0 + squared));
+        }
+        1.0 / (1.0 - derivative)
+    }
+
+    /// Creates a search that integrates the transient over a number of turns before Newton's
+    /// method.
+    pub(super) fn after_transient(
+        setup: TurnSetup<'a>,
+        state: [f64; STATES],
+        turn_count: usize,
+    ) -> Self {
+        Self { transient_turns: turn_count, ..Self::new(setup, state, None) }
+    }
+
+    /// Returns the current state.
+    pub(super) const fn state(&self) -> [f64; STATES] {
+        self.state
+    }
+
+    /// Returns the response, as the state at which the unbalance is up and the record of the turn
+    /// from there; `None` if the search has failed.
+    pub(super) fn into_response(self) -> Option<([f64; STATES], Box<OrbitRecord>)> {
+        Some((self.state, self.record?))
+    }
+}
+
+impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
+    fn next_requests(&mut self) -> Vec<TurnRequest<'a>> {
+        if self.is_over {
+            return Vec::new();
+        }
+        if self.transient_turns > 0 {
+            return vec![TurnRequest { setup: self.setup, start: self.state, is_recorded: false }];
+        }
+        let is_recorded = self.is_last_turn || self.factors.is_none();
+        let mut setup = self.setup;
+        let uses_all_instants = self.is_last_turn || self.max_step.is_finite();
+        if !(uses_all_instants || setup.differentiates_steps()) {
+            // Derivatives at half the instants reduce the residual to some 1e-7 of its value, which
+            // is enough before the last turn. If motions have many harmonics, the iteration may
+            // oscillate about a response, so that a damped search uses all instants.
+            setup.instants /= 2;
+        }
+        vec![TurnRequest { setup, start: self.state, is_recorded }]
+    }
+
+    fn receive_results(&mut self, results: Vec<TurnResult>) {
+        let Some(TurnResult { end, record }) = results.into_iter().next() else { return };
+        if self.transient_turns > 0 {
+            self.transient_turns -= 1;
+            self.state = end;
+            self.is_over = end.iter().any(|x| !x.is_finite());
+            return;
+        }
+        self.turn_count += 1;
+        let residual = relative_residual(self.setup.point, self.setup.speed_rpm, &self.state, &end);
+        if self.is_last_turn && residual < RESPONSE_TOLERANCE {
+            self.is_over = true;
+            self.record = record;
+            return;
+        }
+        let has_own_factors = record.is_some();
+        let has_borrowed_factors = self.turn_count == 1 && record.is_none();
+        match record {
+            Some(record) => {
+                self.factors = factor_fixed_point_equations(&record.monodromy);
+                self.is_over = self.factors.is_none();
+            }
+            None if residual > MAX_RESIDUAL_RATIO * self.residual => self.factors = None,
+            None => {}
+        }
+        self.is_over |= !residual.is_finite() || self.turn_count == MAX_TURNS;
+        if let (false, Some(factors)) = (self.is_over, &self.factors) {
+            let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
+            let correction = factors.solve(&gap);
+            let largest = correction[..COORDINATES].iter().map(|by| by.0.abs()).fold(0.0, f64::max);
+            let factor = self.deflation_factor(&correction);
+            let share = factor * (self.max_step / (factor.abs() * largest)).min(1.0);
+            for i in 0..STATES {
+                self.state[i] += share * correction[i].0;
+            }
+            // The next correction is expected to reduce the residual by the same rate.
+            let rate = if self.residual.is_finite() { residual / self.residual } else { 1.0 };
+            let is_close = residual * rate.min(1.0) < LAST_TURN_TOLERANCE
+                || has_own_factors && residual < QUADRATIC_CONVERGENCE_RESIDUAL;
+            // A search that known responses still deflect has not converged.
+            self.is_last_turn = is_close && (share - 1.0).abs() < MAX_FINAL_DEFLATION;
+            if has_borrowed_factors {
+                self.factors = None;
+            }
+            self.residual = residual;
+        }
+        self.is_over |= self.state.iter().any(|x| !x.is_finite());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stability::settings::Settings;
+    use crate::stability::tests::{prepared, with};
+
+    /// Deflation reverses a step towards a known response, and does not change one far from all.
+    #[test]
+    fn known_responses_repel() {
+        let point = prepared(with(0.4, 140.0), 100.0);
+        let setup = Settings::new(&point).held_case(250.0).unwrap().setup;
+        let known = [0.0; STATES];
+        // The ratio of the deflated step to Newton's, which leads to the known response.
+        let factor = |distance_m: f64| {
+            let mut state = known;
+            state[0] = distance_m;
+            let mut newton_step = [N(0.0); STATES];
+            newton_step[0] = N(-distance_m);
+            NewtonSearch::deflated(setup, state, f64::INFINITY, vec![known])
+                .deflation_factor(&newton_step)
+        };
+        assert!((factor(1e-6) + 1.0).abs() < 1e-3, "{}", factor(1e-6));
+        assert!((factor(1.0) - 1.0).abs() < 1e-3, "{}", factor(1.0));
+        let factor_without_known =
+            NewtonSearch::new(setup, known, None).deflation_factor(&[N(1.0); STATES]);
+        assert_eq!(factor_without_known, 1.0);
+    }
+}

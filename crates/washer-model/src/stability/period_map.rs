@@ -1,0 +1,564 @@
+//! The period map: the state after one turn at a constant speed, for many points in lanes.
+//!
+//! The turn is integrated with capped modes, which do not change motions that turn with the drum
+//! (`coupling.rs`), by classical Runge-Kutta in few steps. `newton.rs` finds fixed points of the
+//! map at one speed, and `continuation.rs` continues them over speed.
+
+use super::monodromy::{INSTANTS, SmoothMonodromy, StateMatrix, interpolation_weights};
+use super::stepwise_monodromy::StepwiseMonodromy;
+use super::turn::{StepGrid, StepObserver, integrate_turn};
+use crate::channel::CHANNELS;
+use crate::coordinates::STATES;
+use crate::machine::spin::SpinStretch;
+use crate::nonlinear::coupling::{Caps, Coupling};
+use crate::nonlinear::elements::corners::CornerForce;
+use crate::nonlinear::outputs::squared_distance;
+use crate::point::Point;
+use crate::preparation::{MAX_RUNS, SpeedAmplitudeSearch, own_speeds};
+use crate::run::active_recorders::{ActiveRecorders, ObservedState};
+use crate::run::all_lanes;
+use crate::run::model::{LaneModel, Linear, Nonlinear};
+use crate::run::suspension::damper_speeds_m_per_s;
+use core::array::from_fn;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+use lane_ode::{Cancel, Kernel, Lane, Lu, N, OutOfLine, Peaks, Simd};
+
+/// The product of step and cap, as a share of the formula's limit of stability. Basis: gyroscopic
+/// effects may make whirls of the capped hinge faster than its cap. Doubling it is unstable.
+const CAP_STABILITY_SHARE: f64 = 0.7;
+
+/// The logarithmic decrement that a turn adds to the hinge's speeds where the steps themselves are
+/// differentiated, as in the continuation of responses with corners. Basis: without it, hits of
+/// stops make a hinge in resonance with a harmonic of the drum's speed swing so far that the
+/// continuation ends there. Doubling it leaves 0.04 % of the hinge's speed after a turn, not 2 %.
+const HINGE_DAMPING_PER_TURN: f64 = 8.0;
+
+/// A point at a constant speed, and the discretisation of its turns.
+#[derive(Clone, Copy)]
+pub(crate) struct TurnSetup<'a> {
+    pub(crate) point: &'a Point,
+    pub(crate) speed_rpm: f64,
+    /// The number of integration steps of a turn.
+    pub(crate) steps: usize,
+    /// The number of equally spaced instants of a turn at which partial derivatives are computed.
+    /// If it equals the number of steps, the steps themselves are differentiated.
+    pub(crate) instants: usize,
+    /// The caps of the modes of bearings and hinge; `None` if the steps resolve these modes.
+    pub(crate) caps: Option<Caps>,
+}
+
+/// The properties that all turns of a batch have in common: steps, instants, whether there are
+/// caps, and whether forces have corners.
+pub(crate) type BatchKey = (usize, usize, bool, bool);
+
+impl TurnSetup<'_> {
+    /// Returns the set-up at a nearby speed, with the same number of steps and with caps that
+    /// change in proportion to the speed.
+    pub(super) fn at_nearby_speed(self, speed_rpm: f64) -> Self {
+        let caps = self.caps.map(|_| caps_for_steps(self.steps, 60.0 / speed_rpm));
+        Self { speed_rpm, caps, ..self }
+    }
+
+    /// Returns the duration of a turn (s).
+    pub(crate) fn turn_s(&self) -> f64 {
+        60.0 / self.speed_rpm
+    }
+
+    /// Returns the length of a step (s).
+    pub(super) fn step_s(&self) -> f64 {
+        self.turn_s() / self.steps as f64
+    }
+
+    /// Returns the unit (1/s) of the speeds of disturbances, with which the speeds of the fastest
+    /// ones are of the same magnitude as their coordinates.
+    pub(crate) fn unit_per_s(&self) -> f64 {
+        1.0 / self.step_s()
+    }
+
+    /// Whether the steps themselves are differentiated, not the motion.
+    pub(super) fn differentiates_steps(&self) -> bool {
+        self.instants == self.steps
+    }
+
+    /// Whether forces have corners.
+    pub(super) fn has_corners(&self) -> bool {
+        self.point.machine.elements.are_nonsmooth()
+    }
+
+    pub(crate) fn batch_key(&self) -> BatchKey {
+        (self.steps, self.instants, self.caps.is_some(), self.has_corners())
+    }
+}
+
+/// A request to integrate a turn.
+#[derive(Clone, Copy)]
+pub(crate) struct TurnRequest<'a> {
+    pub(crate) setup: TurnSetup<'a>,
+    /// The state at which the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    pub(crate) start: [f64; STATES],
+    /// Whether the result has a record, not only the end of the turn.
+    pub(crate) is_recorded: bool,
+}
+
+/// The result of the integration of a turn.
+pub(crate) struct TurnResult {
+    /// The state at the end.
+    pub(crate) end: [f64; STATES],
+    /// The record, if it was requested.
+    pub(crate) record: Option<Box<OrbitRecord>>,
+}
+
+/// The record of a turn.
+pub(crate) struct OrbitRecord {
+    /// The monodromy matrix.
+    pub(crate) monodromy: StateMatrix,
+    /// The largest deviations from equilibrium (m, rad).
+    pub(crate) peaks: [f64; CHANNELS],
+    /// The least gap between drum and tub at the ends of steps (m).
+    pub(crate) min_gap_m: f64,
+    /// The states at equally spaced instants.
+    pub(crate) states: Vec<[f64; STATES]>,
+}
+
+/// Integrates turns in lanes, those with the same [`BatchKey`] together. The result of a turn does
+/// not depend on the others. Once `cancel` is requested, results at the end are missing.
+pub(crate) fn compute_turns(requests: &[TurnRequest<'_>], cancel: Cancel<'_>) -> Vec<TurnResult> {
+    // Recorded turns come first in a batch.
+    let key = |request: &TurnRequest<'_>| (request.setup.batch_key(), !request.is_recorded);
+    map_in_batches(requests, key, |requests| {
+        let kernel = TurnKernel { requests, cancel };
+        // Wide lanes that are mostly empty take longer than narrow ones.
+        let is_narrow_enough = requests.len() <= Simd::narrow().lanes();
+        // The differentiation of steps fills all lanes with disturbances, even for one turn.
+        let fills_lanes = requests
+            .iter()
+            .any(|request| request.is_recorded && request.setup.differentiates_steps());
+        if is_narrow_enough && !fills_lanes {
+            Simd::dispatch_narrow(kernel)
+        } else {
+            Simd::best().dispatch(kernel)
+        }
+    })
+}
+
+/// Applies a function to batches of items with the same [`BatchKey`], and returns the results in
+/// the order of the items. A batch is sorted by the second part of `key`. If the function returns
+/// too few results, those of the last items of the batch are left out.
+pub(crate) fn map_in_batches<A: Copy, R>(
+    items: &[A],
+    key: impl Fn(&A) -> (BatchKey, bool),
+    find: impl Fn(&[A]) -> Vec<R>,
+) -> Vec<R> {
+    let mut order: Vec<usize> = (0..items.len()).collect();
+    order.sort_by_key(|&k| key(&items[k]));
+    let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
+    for batch in order.chunk_by(|&a, &b| key(&items[a]).0 == key(&items[b]).0) {
+        let batch_items: Vec<A> = batch.iter().map(|&k| items[k]).collect();
+        for (&k, result) in batch.iter().zip(find(&batch_items)) {
+            results[k] = Some(result);
+        }
+    }
+    results.into_iter().flatten().collect()
+}
+
+/// The integration of turns with the same [`BatchKey`].
+struct TurnKernel<'a> {
+    requests: &'a [TurnRequest<'a>],
+    cancel: Cancel<'a>,
+}
+
+impl Kernel for TurnKernel<'_> {
+    type Output = Vec<TurnResult>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let mut results = Vec::with_capacity(self.requests.len());
+        let Some(first) = self.requests.first() else { return results };
+        let TurnSetup { steps, instants, .. } = first.setup;
+        let needs_weights = first.is_recorded && !first.setup.differentiates_steps();
+        let weights =
+            if needs_weights { interpolation_weights(steps, instants) } else { Vec::new() };
+        for requests in self.requests.chunks(T::LANES) {
+            if self.cancel.is_requested() {
+                break;
+            }
+            integrate_batch(N(zero), requests, &weights, &mut results);
+        }
+        results
+    }
+}
+
+/// Returns the highest caps that are stable with a number of steps a turn.
+pub(super) fn caps_for_steps(steps: usize, turn_s: f64) -> Caps {
+    let cap = CAP_STABILITY_SHARE * RK4_STABILITY_LIMIT * steps as f64 / turn_s;
+    Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) }
+}
+
+/// Returns a model with a set-up in each lane; surplus lanes repeat the last set-up.
+#[inline(always)]
+pub(crate) fn lane_model<T: Lane, M: LaneModel<T>>(zero: N<T>, setups: &[TurnSetup<'_>]) -> M {
+    let coupling = Coupling::new(zero, setups[0].caps.as_ref());
+    let mut model = M::splat(zero, setups[0].point, coupling);
+    for lane in 0..T::LANES {
+        let setup = &setups[lane.min(setups.len() - 1)];
+        model.set_point(lane, setup.point);
+        model.set_spin(lane, &SpinStretch::steady(setup.speed_rpm));
+        if let Some(caps) = &setup.caps {
+            model.set_caps(lane, caps);
+        }
+    }
+    model
+}
+
+/// Returns the steps of the set-ups in lanes; surplus lanes repeat the last set-up.
+#[inline(always)]
+pub(crate) fn step_grid<T: Lane>(zero: N<T>, setups: &[TurnSetup<'_>]) -> StepGrid<T> {
+    let damping_factor = || libm::exp(-HINGE_DAMPING_PER_TURN / setups[0].steps as f64);
+    let hinge_damping_factor = setups[0].differentiates_steps().then(damping_factor);
+    let mut grid = StepGrid { step_s: zero, steps: setups[0].steps, hinge_damping_factor };
+    for lane in 0..T::LANES {
+        grid.step_s.0.set(lane, setups[lane.min(setups.len() - 1)].step_s());
+    }
+    grid
+}
+
+/// Integrates the turns of one batch of lanes, with the monodromy matrices of the recorded ones.
+#[inline(always)]
+fn integrate_batch<T: Lane>(
+    zero: N<T>,
+    requests: &[TurnRequest<'_>],
+    weights: &[Vec<f64>],
+    results: &mut Vec<TurnResult>,
+) {
+    let setups: Vec<TurnSetup<'_>> = requests.iter().map(|request| request.setup).collect();
+    let grid = step_grid(zero, &setups);
+    let model: Nonlinear<T> = lane_model(zero, &setups);
+    let mut ends = [[zero; STATES]];
+    for lane in 0..T::LANES {
+        for i in 0..STATES {
+            ends[0][i].0.set(lane, requests[lane.min(requests.len() - 1)].start[i]);
+        }
+    }
+    let recorded_count = requests.iter().filter(|request| request.is_recorded).count();
+    let mut recorder = TurnRecorder::new(zero, &model, &grid);
+    if !setups[0].differentiates_steps() {
+        recorder.with_corner_forces = setups[0].has_corners();
+        recorder.instants = setups[0].instants.max(INSTANTS);
+    }
+    integrate_turn(
+        &model,
+        &grid,
+        &mut ends,
+        if recorded_count > 0 { Some(&mut recorder) } else { None },
+    );
+    let mut monodromies: Vec<StateMatrix> = Vec::new();
+    if setups[0].differentiates_steps() {
+        for TurnRequest { setup, start, .. } in &requests[..recorded_count] {
+            let constant = zero.constant();
+            let setups = [*setup];
+            let model = self::lane_model(constant, &setups);
+            let grid = self::step_grid(constant, &setups);
+            monodromies.push(zero.0.run_out_of_line(StepwiseMonodromy {
+                zero,
+                model,
+                grid,
+                start: *start,
+            }));
+        }
+    } else if recorded_count > 0 {
+        let repeated_setups: Vec<TurnSetup<'_>> =
+            setups[..recorded_count].iter().copied().cycle().take(T::LANES).collect();
+        let monodromy = SmoothMonodromy {
+            zero,
+            weights,
+            model: self::lane_model(zero.constant(), &repeated_setups),
+            grid: self::step_grid(zero, &repeated_setups),
+            turn_count: recorded_count,
+            instants: setups[0].instants,
+            states: &recorder.states[..recorder.instants],
+            corner_forces: &recorder.corner_forces,
+        };
+        monodromies = zero.0.run_out_of_line(monodromy);
+    }
+    let in_lane = |state: &[N<T>; STATES], lane: usize| -> [f64; STATES] {
+        from_fn(|i| state[i].0.get(lane))
+    };
+    for (lane, request) in requests.iter().enumerate() {
+        let record = request.is_recorded.then(|| {
+            let clearance_m = request.setup.point.clearance_m();
+            Box::new(OrbitRecord {
+                monodromy: monodromies[lane],
+                peaks: recorder.peaks.lane(lane),
+                min_gap_m: clearance_m - recorder.max_radial_squared.0.get(lane).sqrt(),
+                states: recorder.states.iter().map(|state| in_lane(state, lane)).collect(),
+            })
+        });
+        results.push(TurnResult { end: in_lane(&ends[0], lane), record });
+    }
+}
+
+/// The linear model's response to a constant speed.
+pub(super) struct LinearResponse {
+    /// The deviations and their speeds when the unbalance is up; not finite without a response.
+    pub(super) state: [f64; STATES],
+    /// The largest deviations from equilibrium (m, rad).
+    pub(super) peaks: [f64; CHANNELS],
+    /// The deviations and their speeds at [`INSTANTS`] equally spaced instants of a turn.
+    states: Vec<[f64; STATES]>,
+}
+
+impl LinearResponse {
+    /// Returns the speed amplitudes (m/s) of dampers.
+    fn damper_speeds_m_per_s(&self, point: &Point) -> Vec<f64> {
+        let speeds_at = |state| damper_speeds_m_per_s(point, state);
+        let speeds: Vec<Vec<f64>> = self.states[..INSTANTS].iter().map(speeds_at).collect();
+        let sum_of_squares =
+            |k: usize| speeds.iter().map(|speeds| speeds[k] * speeds[k]).sum::<f64>();
+        (0..speeds[0].len()).map(|k| (2.0 * sum_of_squares(k) / INSTANTS as f64).sqrt()).collect()
+    }
+}
+
+/// Returns the linear model's responses. For dampers without a given speed amplitude, the friction
+/// is linearised at the amplitude of the response itself. Once `cancel` is requested, responses
+/// are missing or not final.
+pub(super) fn linear_responses_with_own_friction(
+    setups: &[TurnSetup<'_>],
+    cancel: Cancel<'_>,
+) -> Vec<LinearResponse> {
+    let mut responses = solve_linear_responses(setups, cancel);
+    let search_of = |(k, setup): (usize, &TurnSetup<'_>)| {
+        Some((k, SpeedAmplitudeSearch::from_min_speeds(setup.point)?))
+    };
+    let mut open_searches: Vec<(usize, SpeedAmplitudeSearch)> =
+        setups.iter().enumerate().filter_map(search_of).collect();
+    for _ in 0..MAX_RUNS {
+        let at_speeds = |(k, search): &(usize, SpeedAmplitudeSearch)| {
+            setups[*k].point.with_own_friction_speeds(&search.speeds_m_per_s())
+        };
+        let points: Vec<Point> = open_searches.iter().map(at_speeds).collect();
+        let requests = open_searches
+            .iter()
+            .zip(&points)
+            .map(|((k, _), point)| TurnSetup { point, ..setups[*k] });
+        let batch_responses = solve_linear_responses(&requests.collect::<Vec<_>>(), cancel);
+        if cancel.is_requested() {
+            break;
+        }
+        let mut unfinished = Vec::new();
+        for (((k, mut search), point), response) in
+            open_searches.into_iter().zip(&points).zip(batch_responses)
+        {
+            if !search.update(&own_speeds(point, &response.damper_speeds_m_per_s(point))) {
+                unfinished.push((k, search));
+            }
+            responses[k] = response;
+        }
+        open_searches = unfinished;
+    }
+    responses
+}
+
+/// Computes the linear model's responses in lanes, with friction linearised at the speed amplitudes
+/// of the points.
+pub(super) fn solve_linear_responses(
+    setups: &[TurnSetup<'_>],
+    cancel: Cancel<'_>,
+) -> Vec<LinearResponse> {
+    let find = |setups: &[TurnSetup<'_>]| Simd::dispatch_narrow(LinearKernel { setups, cancel });
+    map_in_batches(setups, |setup| (setup.batch_key(), false), find)
+}
+
+/// The computation of the linear responses of set-ups with the same [`BatchKey`]. The period map is
+/// affine, so that one linear solve finds its fixed point.
+struct LinearKernel<'a> {
+    setups: &'a [TurnSetup<'a>],
+    cancel: Cancel<'a>,
+}
+
+impl Kernel for LinearKernel<'_> {
+    type Output = Vec<LinearResponse>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let mut found = Vec::with_capacity(self.setups.len());
+        for setups in self.setups.chunks(T::LANES) {
+            if self.cancel.is_requested() {
+                break;
+            }
+            solve_linear_batch(N(zero), setups, &mut found);
+        }
+        found
+    }
+}
+
+/// Computes the linear responses of one batch of lanes.
+#[inline(always)]
+fn solve_linear_batch<T: Lane>(
+    zero: N<T>,
+    setups: &[TurnSetup<'_>],
+    responses: &mut Vec<LinearResponse>,
+) {
+    let grid = step_grid(zero, setups);
+    let model: Linear<T> = lane_model(zero, setups);
+    // From rest, then from a unit of each coordinate and speed.
+    let mut ends = vec![[zero; STATES]; 1 + STATES];
+    for j in 0..STATES {
+        ends[1 + j][j] = zero.lit(1.0);
+    }
+    let mut start = [zero; STATES];
+    // The turn from the fixed point is recorded. A loop, for one copy of the model's code.
+    for has_start in [false, true] {
+        if has_start {
+            ends.truncate(1);
+            ends[0] = start;
+        }
+        let mut recorder = TurnRecorder::new(zero, &model, &grid);
+        integrate_turn(
+            &model,
+            &grid,
+            &mut ends,
+            if has_start { Some(&mut recorder) } else { None },
+        );
+        for lane in 0..setups.len() {
+            if has_start {
+                responses.push(LinearResponse {
+                    state: from_fn(|i| start[i].0.get(lane)),
+                    peaks: recorder.peaks.lane(lane),
+                    states: recorder.states.iter().map(|x| from_fn(|i| x[i].0.get(lane))).collect(),
+                });
+                continue;
+            }
+            let mut matrix = [[N(0.0); STATES]; STATES];
+            let mut end_from_rest = [N(0.0); STATES];
+            for i in 0..STATES {
+                end_from_rest[i] = N(ends[0][i].0.get(lane));
+                for j in 0..STATES {
+                    matrix[i][j] = end_from_rest[i] - N(ends[1 + j][i].0.get(lane));
+                }
+                matrix[i][i] = matrix[i][i] + 1.0;
+            }
+            let fixed_point = Lu::new(matrix).map(|factors| factors.solve(&end_from_rest));
+            for i in 0..STATES {
+                start[i].0.set(lane, fixed_point.as_ref().map_or(f64::NAN, |state| state[i].0));
+            }
+        }
+    }
+}
+
+/// An observer that records a turn.
+pub(crate) struct TurnRecorder<'m, T, M> {
+    model: &'m M,
+    grid: &'m StepGrid<T>,
+    /// The number of equally spaced instants in a turn.
+    instants: usize,
+    /// Whether to record the states at these instants.
+    pub(crate) with_states: bool,
+    pub(crate) peaks: Peaks<T, CHANNELS>,
+    /// The square of the greatest distance of the drum from the tub's axis (m^2).
+    pub(crate) max_radial_squared: N<T>,
+    /// The states at the equally spaced instants, the first at the turn's start.
+    states: Vec<[N<T>; STATES]>,
+    /// The forces with corners at the start, middle and end of all steps, if they are recorded.
+    corner_forces: Vec<CornerForce<T>>,
+    with_corner_forces: bool,
+    /// The last observed state, and its slope.
+    last_sample: [[N<T>; STATES]; 2],
+    /// The further recorders that the caller has requested.
+    pub(crate) further_recorders: Option<ActiveRecorders<T>>,
+}
+
+impl<'m, T: Lane, M: LaneModel<T>> TurnRecorder<'m, T, M> {
+    #[inline(always)]
+    pub(crate) fn new(zero: N<T>, model: &'m M, grid: &'m StepGrid<T>) -> Self {
+        Self {
+            model,
+            grid,
+            instants: INSTANTS,
+            with_states: true,
+            peaks: Peaks::new(zero),
+            max_radial_squared: zero,
+            states: Vec::new(),
+            corner_forces: Vec::new(),
+            with_corner_forces: false,
+            last_sample: [[zero; STATES]; 2],
+            further_recorders: None,
+        }
+    }
+}
+
+/// The evaluation of the forces with corners at a state.
+struct CornerForcesAtState<'a, T, M> {
+    model: &'a M,
+    x: &'a [N<T>; STATES],
+    corner_forces: &'a mut Vec<CornerForce<T>>,
+}
+
+impl<T: Lane, M: LaneModel<T>> OutOfLine for CornerForcesAtState<'_, T, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.model.corner_forces(self.x, self.corner_forces);
+    }
+}
+
+impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M> {
+    #[inline(always)]
+    fn observe(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
+        if self.with_states && k.is_multiple_of(self.grid.steps / self.instants) {
+            self.states.push(*x);
+        }
+        if self.with_corner_forces {
+            if k > 0 {
+                let [start, rate] = &self.last_sample;
+                let eighth = (self.grid.step_s * 0.125).v();
+                let mut middle = *x;
+                for i in 0..STATES {
+                    middle[i] = (0.5 * (start[i] + x[i])).v() + eighth * (rate[i] - dx[i]);
+                }
+                x[0].0.run_out_of_line(CornerForcesAtState {
+                    model: self.model,
+                    x: &middle,
+                    corner_forces: &mut self.corner_forces,
+                });
+            }
+            x[0].0.run_out_of_line(CornerForcesAtState {
+                model: self.model,
+                x,
+                corner_forces: &mut self.corner_forces,
+            });
+            self.last_sample = [*x, *dx];
+        }
+        let all = all_lanes(x[0]);
+        if let (radial, Some(channels)) = self.model.observe(forcing, x, dx, true) {
+            if k == 0 {
+                self.peaks.begin(&channels, all);
+            } else {
+                self.peaks.advance(self.grid.step_s, &channels, all);
+            }
+            if let Some(further_recorders) = &mut self.further_recorders {
+                let radial = &radial;
+                let channels = &channels;
+                let inside = all;
+                let step = if k == 0 {
+                    None
+                } else {
+                    Some((self.grid.time_s(k as f64), self.grid.step_s))
+                };
+                x[0].0.run_out_of_line(ObservedState {
+                    recorders: further_recorders,
+                    step,
+                    x,
+                    dx,
+                    radial,
+                    channels,
+                    lanes_in_window: inside,
+                });
+            }
+            let greatest = self.max_radial_squared.0;
+            let radial_squared = squared_distance(&radial).value.0;
+            self.max_radial_squared =
+                N(T::select(greatest.less(radial_squared), radial_squared, greatest));
+        }
+    }
+}

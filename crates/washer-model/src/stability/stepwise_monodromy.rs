@@ -1,0 +1,95 @@
+//! The derivative of a discrete turn by its start: all steps are integrated with dual numbers.
+//!
+//! If steps are longer than the corners of forces are wide, the effect of the steps on a
+//! disturbance is not that of the motion (`monodromy.rs`). Newton's method for the discrete turn
+//! needs the derivative of the steps.
+
+use super::monodromy::StateMatrix;
+use super::turn::{NoObserver, StepGrid, integrate_turn};
+use crate::coordinates::STATES;
+use crate::run::model::Nonlinear;
+use lane_ode::{Dual, Lane, N, OutOfLine};
+
+/// The computation of the monodromy matrix of a discrete turn. Lanes hold its columns.
+pub(super) struct StepwiseMonodromy<T> {
+    pub(super) zero: N<T>,
+    /// The model and the steps, the same in every lane.
+    pub(super) model: Nonlinear<Dual<T>>,
+    pub(super) grid: StepGrid<Dual<T>>,
+    pub(super) start: [f64; STATES],
+}
+
+impl<T: Lane> OutOfLine for StepwiseMonodromy<T> {
+    type Output = StateMatrix;
+
+    #[inline(always)]
+    fn run(self) -> StateMatrix {
+        let mut lane_groups = vec![[self.zero.constant(); STATES]; STATES.div_ceil(T::LANES)];
+        for j in 0..STATES {
+            let lane_group = &mut lane_groups[j / T::LANES];
+            for i in 0..STATES {
+                lane_group[i].0.value.set(j % T::LANES, self.start[i]);
+            }
+            lane_group[j].0.slope.set(j % T::LANES, 1.0);
+        }
+        integrate_turn(&self.model, &self.grid, &mut lane_groups, None::<&mut NoObserver>);
+        let mut matrix = [[N(0.0); STATES]; STATES];
+        for i in 0..STATES {
+            for j in 0..STATES {
+                matrix[i][j] = N(lane_groups[j / T::LANES][i].0.slope.get(j % T::LANES));
+            }
+        }
+        matrix
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::stability::tests::{idle_stop, prepared, with};
+    use crate::{HeldSpeed, Machine, Point, find_responses};
+
+    /// The paper's machine with 0.3 kg on dampers of 30 N s/m, whose response folds back.
+    fn folding_machine(change: impl Fn(&mut Machine)) -> Point {
+        let mut machine = with(0.3, 30.0);
+        change(&mut machine);
+        prepared(machine, 100.0)
+    }
+
+    #[test]
+    fn an_element_that_does_nothing_leaves_the_curve_where_it_is() {
+        let points = [
+            folding_machine(|_| {}),
+            folding_machine(|machine| machine.stops.push(idle_stop())),
+            folding_machine(|machine| machine.dampers[0].friction_n = 1e-6),
+        ];
+        let [plain_responses, other_responses @ ..] = points.each_ref().map(|point| {
+            let dwells =
+                [60.0, 110.0, 185.0, 255.0].map(|speed_rpm| HeldSpeed { point, speed_rpm });
+            let found: Vec<_> = find_responses(&dwells, lane_ode::Cancel::Never)
+                .into_iter()
+                .map(Result::unwrap)
+                .collect();
+            found.concat().into_iter().filter(|response| response.is_on_curve).collect::<Vec<_>>()
+        });
+        // At 255 rpm it has three.
+        assert_eq!(plain_responses.len(), 6);
+        for responses in other_responses {
+            assert_eq!(responses.len(), plain_responses.len());
+            for (with_element, without_element) in responses.iter().zip(&plain_responses) {
+                let at = with_element.speed_rpm;
+                assert_eq!(with_element.branch, without_element.branch, "{at}");
+                for (a, b) in
+                    with_element.nonlinear_peaks.iter().zip(&without_element.nonlinear_peaks)
+                {
+                    assert!((a / b - 1.0).abs() < 1e-3, "{at}: {a} for {b}");
+                }
+                let folds = with_element
+                    .fold_speeds_rpm
+                    .iter()
+                    .flatten()
+                    .zip(without_element.fold_speeds_rpm.iter().flatten());
+                assert!(folds.into_iter().all(|(a, b)| (a - b).abs() < 0.05), "{at}");
+            }
+        }
+    }
+}
