@@ -66,6 +66,15 @@ code=0
 GATE='ratio_max < 0' sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
 [ "$code" = 4 ] && grep -q FAILS out/summary.md || fails "a grid of one axis: exit code $code"
 
+# Maps without a common row cannot be compared, which the summary says; the gate is checked too.
+sed 's/values = .*/values = [0.3]/' grids/one.toml > grids/other.toml
+mv grids/other.toml grids/one.toml
+code=0
+sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
+[ "$code" = 2 ] || fails "maps without a common row: exit code $code"
+grep -q "they share no row" out/summary.md || fails "the refusal of the comparison is not told"
+grep -q "^holds" out/summary.md || fails "no gate after a refused comparison"
+
 # A pull request that mends the base's grid passes, and one that breaks it says why it does not.
 sed 's/ramp_s = 4.0/ramp_s = -1/' grids/my.toml > grids/broken.toml
 git add grids/broken.toml && git commit -qm "A broken grid"
