@@ -66,6 +66,21 @@ code=0
 GATE='ratio_max < 0' sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
 [ "$code" = 4 ] && grep -q FAILS out/summary.md || fails "a grid of one axis: exit code $code"
 
+# A tolerance moves with the machine's number; the points correspond.
+git checkout -q machines/mine.toml
+{ head -n 3 grids/my.toml; cat << 'GRID'
+design = { method = "monte_carlo", points = 4 }
+[[axis]]
+parameter = "tub_mass_kg"
+tolerance = "5 %"
+GRID
+} > grids/tolerance.toml
+git add grids/tolerance.toml && git commit -qm "A tolerance"
+sed -i 's/23.87/20.0/' machines/mine.toml
+sh "$kit/compare.sh" HEAD grids/tolerance.toml out > log.txt 2>&1 ||
+    { cat log.txt; fails "a tolerance about another number"; }
+grep -q "rows: 4 in both" out/summary.md || fails "points of a tolerance are not matched"
+
 # Maps without a common row cannot be compared, which the summary says; the gate is checked too.
 sed 's/values = .*/values = [0.3]/' grids/one.toml > grids/other.toml
 mv grids/other.toml grids/one.toml

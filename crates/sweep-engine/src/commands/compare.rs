@@ -50,7 +50,8 @@ pub struct Args {
 /// The text that `--help` adds.
 const LONG: &str = "\
 Two rows are compared if their axes have the same values to nine digits; rows of only one file \
-are counted. An axis that only one file has is ignored if it has a single value. Files of \
+are counted. Where axes have the same tolerances about other numbers, rows of the same point are \
+compared. An axis that only one file has is ignored if it has a single value. Files of \
 different kinds, and files without a common row, are refused.
 
 A sensitive row is chaotic: its digits, and perhaps its verdict, are those of one trajectory. Such \
@@ -225,6 +226,11 @@ fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
         _ => format!(", {first} only in A, {second} only in B"),
     };
     facts.push(("rows", format!("{} in both{alone}", found.shared.len())));
+    if found.is_matched_by_point {
+        let told = "rows are matched by point: the axes have tolerances about other numbers; \
+                    tables have the values in A";
+        facts.push(("matched", told.to_owned()));
+    }
     for (place, name, value) in &found.fixed {
         let which = ["A", "B"][*place];
         facts.push(("axis", format!("{name} = {} in {which} alone, left out", short(*value))));
@@ -404,6 +410,7 @@ fn to_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
         "differ": !found.is_empty(),
         "fail_on": broken,
         "plan": found.plan,
+        "matched_by": if found.is_matched_by_point { "point" } else { "axes" },
         "rows": {
             "in_both": found.shared.len(),
             "over_estimated": found.over_estimated,
