@@ -21,7 +21,7 @@ git archive "$commit" | tar -x -C "$before"
 code=0
 # Known again by comment.sh.
 printf '<!-- sweep: %s -->\n# `%s`\n\n' "$grid" "$grid" > "$out/summary.md"
-# Writes what went wrong with a grid into the summary.
+# Writes a title and the last command's messages into the summary.
 refused() {
     cat "$out/refused.txt" >&2
     { printf '%s\n\n```text\n' "$1"; cat "$out/refused.txt"; printf '```\n'; } \
@@ -42,8 +42,12 @@ elif ! "$sweep" run "$before/$grid" --out "$out/before.parquet" --fresh --progre
     refused "The grid of the base does not run, so there is nothing to compare it with:"
 else
     "$sweep" compare "$out/before.parquet" "$out/after.parquet" --markdown \
-        --fail-on "${FAIL_ON:-flips}" --out "$out/differences.parquet" >> "$out/summary.md" ||
-        code=$?
+        --fail-on "${FAIL_ON:-flips}" --out "$out/differences.parquet" >> "$out/summary.md" \
+        2> "$out/refused.txt" || code=$?
+    case $code in
+        0 | 4) cat "$out/refused.txt" >&2 ;;
+        *) refused "The map of the base and the one here cannot be compared:" ;;
+    esac
     # Over one axis and of a design there is no such picture.
     "$sweep" plot "$out/differences.parquet" -o "$out/differences.svg" 2> /dev/null || :
 fi

@@ -66,6 +66,30 @@ code=0
 GATE='ratio_max < 0' sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
 [ "$code" = 4 ] && grep -q FAILS out/summary.md || fails "a grid of one axis: exit code $code"
 
+# A tolerance moves with the machine's number; the points correspond.
+git checkout -q machines/mine.toml
+{ head -n 3 grids/my.toml; cat << 'GRID'
+design = { method = "monte_carlo", points = 4 }
+[[axis]]
+parameter = "tub_mass_kg"
+tolerance = "5 %"
+GRID
+} > grids/tolerance.toml
+git add grids/tolerance.toml && git commit -qm "A tolerance"
+sed -i 's/23.87/20.0/' machines/mine.toml
+sh "$kit/compare.sh" HEAD grids/tolerance.toml out > log.txt 2>&1 ||
+    { cat log.txt; fails "a tolerance about another number"; }
+grep -q "rows: 4 in both" out/summary.md || fails "points of a tolerance are not matched"
+
+# Maps without a common row cannot be compared, which the summary says; the gate is checked too.
+sed 's/values = .*/values = [0.3]/' grids/one.toml > grids/other.toml
+mv grids/other.toml grids/one.toml
+code=0
+sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
+[ "$code" = 2 ] || fails "maps without a common row: exit code $code"
+grep -q "they share no row" out/summary.md || fails "the refusal of the comparison is not told"
+grep -q "^holds" out/summary.md || fails "no gate after a refused comparison"
+
 # A pull request that mends the base's grid passes, and one that breaks it says why it does not.
 sed 's/ramp_s = 4.0/ramp_s = -1/' grids/my.toml > grids/broken.toml
 git add grids/broken.toml && git commit -qm "A broken grid"

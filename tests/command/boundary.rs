@@ -108,6 +108,8 @@ fn quantities_without_a_boundary_are_errors_before_the_search() {
     for (arguments, expected) in [
         (["--tolerance", "1e9"], "--tolerance 1000000000 is out of range"),
         (["--quantity", "ratio_tub"], "expected one of ratio_max"),
+        (["--quantity", "ratio_tub_yw < 2"], "did you mean `ratio_tub_yaw`?"),
+        (["--quantity", "unknown < 2"], "`--quantity` without a name lists the columns"),
         (["--lattice", "0"], "--lattice"),
         (["--out", "notes.parquet"], "is no result of `sweep boundary`"),
     ] {

@@ -267,6 +267,55 @@ fn compare_reports_the_differences_of_two_maps() {
 }
 
 #[test]
+fn compare_matches_points_of_tolerances_about_other_numbers() {
+    let tolerance = |parameter: &str| {
+        format!("[[axis]]\nparameter = \"{parameter}\"\ntolerance = \"5 %\"\ncount = 2\n")
+    };
+    let plain = grid(3, 2);
+    let start = plain.split("[[axis]]").next().expect("the keys before the axes");
+    let axes = tolerance("tub_mass_kg") + &tolerance("damping_n_s_per_m");
+    let test_folder = TestFolder::new(&format!("{start}{axes}"));
+    for (name, mass) in [("a", "20"), ("b", "24")] {
+        let mass = format!("[set]\ntub_mass_kg = {mass}\n");
+        fs::write(test_folder.path("g.toml"), format!("{start}{mass}{axes}")).expect("written");
+        let done = test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
+        assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    }
+    let arguments = ["compare", "results/a.parquet", "results/b.parquet", "--fail-on", "rows"];
+    let compared = test_folder.sweep(&arguments);
+    assert_eq!(exit_code(&compared), Some(0), "{}", all_output(&compared));
+    let text = stdout(&compared);
+    assert!(text.contains("4 in both") && text.contains("rows are matched by point"), "{text}");
+    let found = json_output(&test_folder.sweep(&[&arguments[..], &["--json"]].concat()));
+    assert_eq!((&found["matched_by"], &found["rows"]["in_both"]), (&"point".into(), &4.into()));
+    assert_eq!(found["overridden"].as_array().map(Vec::len), Some(0));
+}
+
+#[test]
+fn compare_names_differences_that_an_axis_overrides() {
+    let axis = "[[axis]]\nparameter = \"spring_1_stiffness_n_per_m\"\nvalues = [7e3, 9e3]\n";
+    let plain = grid(3, 2);
+    let start = plain.split("[[axis]]").next().expect("the keys before the axes");
+    let test_folder = TestFolder::new(&format!("{start}{axis}"));
+    for (name, mass) in [("a", ""), ("b", "[set]\nspring_stiffness_n_per_m = 9e3\n")] {
+        fs::write(test_folder.path("g.toml"), format!("{start}{mass}{axis}")).expect("written");
+        let done = test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
+        assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    }
+    let arguments = ["compare", "results/a.parquet", "results/b.parquet"];
+    let text = stdout(&test_folder.sweep(&arguments));
+    let told = "overridden  machine.springs.1.stiffness_n_per_m: the axis \
+                spring_1_stiffness_n_per_m sets this in both, so that the change does not show";
+    assert!(text.contains(told), "{text}");
+    let found = json_output(&test_folder.sweep(&[&arguments[..], &["--json"]].concat()));
+    // The other springs are another machine's.
+    let paths = &found["overridden"][0]["paths"];
+    assert_eq!(paths.as_array().map(Vec::len), Some(1), "{paths}");
+    let markdown = stdout(&test_folder.sweep(&[&arguments[..], &["--markdown"]].concat()));
+    assert!(markdown.contains("- overridden: machine.springs.1"), "{markdown}");
+}
+
+#[test]
 fn compare_can_limit_the_difference_of_any_column() {
     let test_folder = folder_with_map();
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--out", "light.parquet"];

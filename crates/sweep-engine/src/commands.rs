@@ -128,7 +128,7 @@ fn run<M: Model>(command: &GeneralCommand<Unextended>) -> Result<Exit, Error> {
             report::run::<M>(args, &show::Further::NONE, &|_| Vec::new(), &CommonFigures)
         }
         GeneralCommand::Require(args) => require::run(args),
-        GeneralCommand::Compare(args) => compare::run(args, M::ABOUT.build),
+        GeneralCommand::Compare(args) => compare::run::<M>(args),
         GeneralCommand::Export(args) => export::run(args),
         GeneralCommand::Status(args) => status::run::<M>(args),
         GeneralCommand::Merge(args) => merge::run::<M>(args),

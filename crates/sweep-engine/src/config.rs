@@ -94,12 +94,16 @@ impl<M: Model> GridInput<M> {
     }
 
     /// Returns the grid of a result from the plan in it (`Plan::to_json`), without the points of a
-    /// design.
+    /// design. Axes with tolerances have the values that these gave.
     pub fn from_plan(name: &str, plan: &Value) -> Self {
         let own_key = M::ABOUT.own_file.map(|file| file.key);
         let is_read = |key: &str| {
             !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != own_key
         };
+        let mut plan = plan.clone();
+        for axis in plan.get_mut("axis").and_then(Value::as_array_mut).into_iter().flatten() {
+            axis.as_object_mut().map(|axis| axis.remove("tolerance"));
+        }
         let top = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
         let own = own_key.and_then(|key| plan.get(key)?.as_object());
         Self {

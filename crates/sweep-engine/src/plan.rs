@@ -116,6 +116,28 @@ pub struct Axis<M: Model> {
     pub parameter: ModelParameter<M>,
     /// The values along the axis.
     pub values: AxisValues,
+    /// The tolerance about the model's own number from which the values follow, if the grid file
+    /// gives one.
+    pub tolerance: Option<AxisTolerance>,
+}
+
+/// The tolerance of an axis about the model's own number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisTolerance {
+    /// The distance between the number and the ends, in the parameter's unit.
+    Distance(f64),
+    /// A distance in percent of the number.
+    Percent(f64),
+}
+
+impl AxisTolerance {
+    /// Returns the value in grid files.
+    pub fn to_json(self) -> Value {
+        match self {
+            Self::Distance(distance) => distance.into(),
+            Self::Percent(percent) => format!("{percent} %").into(),
+        }
+    }
 }
 
 /// The values of an axis, computed on demand, so that an axis of a million values takes no memory.

@@ -10,7 +10,7 @@ use serde::Serialize;
 use sweep_files::{Cell, FileKind, ResultTable, ratio_limits};
 
 pub use boundary::{BoundaryCrossing, BoundaryShift};
-pub use plans::PlanChange;
+pub use plans::{PlanChange, plan_changes};
 
 use crate::error::ResultsError;
 use side::ComparedFile;
@@ -37,8 +37,11 @@ named! {
 pub struct SharedRow {
     /// The row's numbers in the first and in the second file, from 0.
     pub rows: [u64; 2],
-    /// The values of the key columns.
+    /// The values of the key columns in the first file.
     pub key: Vec<f64>,
+    /// The values of the key columns in the second file; those of the first where both agree to
+    /// nine digits.
+    pub second_key: Vec<f64>,
     /// The greatest ratio in either file.
     pub ratio: [Option<f64>; 2],
     /// The least ratio in either file.
@@ -134,6 +137,9 @@ pub struct Comparison {
     pub keys: Vec<String>,
     /// The units of the key columns.
     pub key_units: Vec<String>,
+    /// Whether rows are matched by their points, because the axes have the same tolerances about
+    /// other numbers.
+    pub is_matched_by_point: bool,
     /// The axes that only one file has, with a single value there: the file (0 or 1), the axis, the
     /// value.
     pub fixed: Vec<(usize, String, f64)>,
@@ -203,7 +209,8 @@ fn kind(table: &ResultTable) -> &'static str {
 ///
 /// Rows match if their key columns agree to nine digits: a grid's axes, and any further column that
 /// numbers the rows of one point. An axis that only one file has is ignored if it has a single
-/// value.
+/// value. Where the axes have the same tolerances about other numbers, the index of the point takes
+/// the place of their values.
 ///
 /// # Errors
 /// [`ResultsError::Refused`] with the reason, [`ResultsError::File`].
@@ -240,8 +247,18 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
             .filter(|name| other_table.column(name).is_none() && !keys_by_file[file].contains(name))
             .collect::<Vec<_>>()
     });
-    let files =
-        [ComparedFile::read(first, second, &keys)?, ComparedFile::read(second, first, &keys)?];
+    let is_matched_by_point = !is_boundary
+        && tables.iter().all(|table| table.column("point").is_some())
+        && plans::is_about_other_numbers(first.plan.as_ref(), second.plan.as_ref());
+    let mut matched_by = keys.clone();
+    if is_matched_by_point {
+        matched_by.retain(|name| !first.axes().contains(&name.as_str()));
+        matched_by.push("point".to_owned());
+    }
+    let files = [
+        ComparedFile::read(first, second, &keys, &matched_by)?,
+        ComparedFile::read(second, first, &keys, &matched_by)?,
+    ];
     let pairs = match_rows(&files);
     if pairs.is_empty() && files.iter().any(|file| file.rows > 0) {
         let keys = if keys.is_empty() { "rows".to_owned() } else { keys.join(", ") };
@@ -267,6 +284,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
         has_gaps: both_have("min_gap_nonlinear_m"),
         keys,
         key_units,
+        is_matched_by_point,
         fixed,
         unmatched_columns,
         shared,

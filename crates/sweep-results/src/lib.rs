@@ -22,7 +22,7 @@ mod top;
 
 pub use compare::{
     BoundaryCrossing, BoundaryShift, ColumnChange, ColumnRow, Comparison, Flip, MAX_WORST,
-    PlanChange, SharedRow, compare,
+    PlanChange, SharedRow, compare, plan_changes,
 };
 pub use condition::{Condition, ExpressionError};
 pub use error::ResultsError;

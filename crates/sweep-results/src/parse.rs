@@ -431,7 +431,7 @@ impl Parser<'_> {
             return Err(ExpressionError {
                 title: format!("unknown column `{word}`"),
                 span,
-                expected: "expected a column of the file, or a \"text\" in quotes".to_owned(),
+                expected: "expected a column, or a \"text\" in quotes".to_owned(),
                 candidates: Some((word.to_owned(), names)),
             });
         };

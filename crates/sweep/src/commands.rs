@@ -235,7 +235,7 @@ fn run_general(command: &GeneralCommand<WasherArguments>) -> Result<Exit, Error>
             report::run(args, &show::FURTHER, &crate::live::resonance_rows, &figures)
         }
         GeneralCommand::Require(args) => require::run(args),
-        GeneralCommand::Compare(args) => compare::run(args, crate::identity::BUILD),
+        GeneralCommand::Compare(args) => compare::run::<crate::Washer>(args),
         GeneralCommand::Export(args) => export::run(args),
         GeneralCommand::Status(args) => args.status(),
         GeneralCommand::Merge(args) => args.merge(),

@@ -146,7 +146,7 @@ pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
     modes.into_iter().flat_map(rows).collect()
 }
 
-fn slider(Axis { parameter, values }: &Axis, value: Option<f64>) -> Slider {
+fn slider(Axis { parameter, values, .. }: &Axis, value: Option<f64>) -> Slider {
     let [from, to] = values.extremes();
     Slider {
         name: parameter.name.to_string(),

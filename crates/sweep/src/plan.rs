@@ -32,7 +32,7 @@ pub(crate) fn compared_channels(plan: &Plan) -> Vec<Channel> {
 
 /// Returns an axis with two values.
 pub(crate) fn axis_between(parameter: ModelParameter<Washer>, from: f64, to: f64) -> Axis {
-    Axis { parameter, values: AxisValues::Linear { from, to, count: 2 } }
+    Axis { parameter, values: AxisValues::Linear { from, to, count: 2 }, tolerance: None }
 }
 
 /// Prepares a machine with its spin for integration.
@@ -96,6 +96,7 @@ mod tests {
                 &spin,
             ),
             values: values.clone(),
+            tolerance: None,
         };
         Plan {
             name: "test".to_owned(),

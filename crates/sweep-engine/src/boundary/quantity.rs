@@ -144,7 +144,8 @@ pub fn derived<M: Model>(
             let report = Report::default();
             let mistake = if limit.is_some() { number_mistake } else { mistake };
             let at = Location::new(report.add("--quantity", text), mistake.span.clone());
-            report.push(Diagnostic::from_expression(mistake, &at));
+            let mistake = Diagnostic::from_expression(mistake, &at);
+            report.push(mistake.help("`--quantity` without a name lists the columns"));
             report.finish(None::<()>)?;
             return Err(Error::option("--quantity", text, "an expression of columns"));
         }

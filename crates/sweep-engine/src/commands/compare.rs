@@ -2,6 +2,7 @@
 
 mod differences;
 mod fail_on;
+mod overridden;
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -11,8 +12,9 @@ use serde_json::{Value, json};
 use super::{Lines as _, quoted, short, span, table};
 use crate::config::section::{counted, cut};
 use crate::store::refuse_unfinished;
-use crate::{Build, Error, Exit, show, tell};
+use crate::{Error, Exit, Model, show, tell};
 use fail_on::FailOn;
+use overridden::{Overridden, overridden};
 use sweep_files::{FileKind, Output};
 use sweep_plot::capitalise;
 use sweep_results::{
@@ -50,7 +52,8 @@ pub struct Args {
 /// The text that `--help` adds.
 const LONG: &str = "\
 Two rows are compared if their axes have the same values to nine digits; rows of only one file \
-are counted. An axis that only one file has is ignored if it has a single value. Files of \
+are counted. Where axes have the same tolerances about other numbers, rows of the same point are \
+compared. An axis that only one file has is ignored if it has a single value. Files of \
 different kinds, and files without a common row, are refused.
 
 A sensitive row is chaotic: its digits, and perhaps its verdict, are those of one trajectory. Such \
@@ -74,7 +77,7 @@ Values of --fail-on:
 ///
 /// # Errors
 /// Files that cannot be read or compared, and an output that cannot be written.
-pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let files = [&args.first, &args.second];
     files.into_iter().try_for_each(|path| refuse_unfinished(path))?;
     let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
@@ -91,17 +94,19 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
             let expected = "two maps: other files have no differences row by row";
             return Err(Error::option("--out", path.display(), expected));
         }
-        output.finish(&differences::table(args, &found, &tables, build).into_bytes(path)?)?;
+        output
+            .finish(&differences::table(args, &found, &tables, M::ABOUT.build).into_bytes(path)?)?;
     }
     let broken: Vec<String> =
         args.fail_on.iter().filter_map(|fail_on| fail_on.violation(&found)).collect();
+    let overridden = overridden::<M>(&tables, &found);
     if args.json {
-        show(&format!("{:#}\n", to_json(args, &found, &broken)))?;
+        show(&format!("{:#}\n", to_json(args, &found, &overridden, &broken)))?;
     } else if args.markdown {
-        show(&markdown(args, &found, &broken))?;
+        show(&markdown(args, &found, &overridden, &broken))?;
     } else {
         let broken = broken.iter().map(|broken| format!("--fail-on: {broken}\n"));
-        show(&(text(args, &found) + &broken.collect::<String>()))?;
+        show(&(text(args, &found, &overridden) + &broken.collect::<String>()))?;
         if let Some(out) = &args.out {
             let out = out.display();
             tell(&format!("wrote {out}: sweep plot {}", quoted(&out.to_string())));
@@ -215,16 +220,30 @@ fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<List
     (!rows.is_empty()).then_some(Listed { title, headings, rows })
 }
 
-/// Returns the lines of the summary, each with a name: shared rows, columns, verdicts, the
-/// boundary.
-fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
+/// Returns the lines of the summary, each with a name: overridden numbers, shared rows, columns,
+/// verdicts, the boundary.
+fn facts(found: &Comparison, overridden: &[Overridden]) -> Vec<(&'static str, String)> {
     let mut facts = Vec::new();
+    for Overridden { axis, paths } in overridden {
+        let shown = paths.iter().take(PLAN_SHOWN).map(String::as_str).collect::<Vec<_>>();
+        let more = if paths.len() > shown.len() { ", ..." } else { "" };
+        let shown = shown.join(", ");
+        let told = format!(
+            "{shown}{more}: the axis {axis} sets this in both, so that the change does not show"
+        );
+        facts.push(("overridden", told));
+    }
     let [first, second] = found.unmatched_rows;
     let alone = match (first, second) {
         (0, 0) => String::new(),
         _ => format!(", {first} only in A, {second} only in B"),
     };
     facts.push(("rows", format!("{} in both{alone}", found.shared.len())));
+    if found.is_matched_by_point {
+        let told = "rows are matched by point: the axes have tolerances about other numbers; \
+                    tables have the values in A";
+        facts.push(("matched", told.to_owned()));
+    }
     for (place, name, value) in &found.fixed {
         let which = ["A", "B"][*place];
         facts.push(("axis", format!("{name} = {} in {which} alone, left out", short(*value))));
@@ -299,7 +318,7 @@ fn boundary(moved: &BoundaryShift) -> String {
 }
 
 /// Formats the differences as text.
-fn text(args: &Args, found: &Comparison) -> String {
+fn text(args: &Args, found: &Comparison, overridden: &[Overridden]) -> String {
     let mut text = String::new();
     text.line("A", args.first.display());
     text.line("B", args.second.display());
@@ -313,7 +332,7 @@ fn text(args: &Args, found: &Comparison) -> String {
     if found.plan.len() > PLAN_SHOWN {
         text.line("", format!("and {} more (--json)", found.plan.len() - PLAN_SHOWN));
     }
-    for (name, told) in facts(found) {
+    for (name, told) in facts(found, overridden) {
         text.line(name, &told);
     }
     for Listed { title, headings, rows } in lists(args, found) {
@@ -329,7 +348,12 @@ fn text(args: &Args, found: &Comparison) -> String {
 const PLAN_SHOWN: usize = 12;
 
 /// Formats the differences as Markdown.
-fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
+fn markdown(
+    args: &Args,
+    found: &Comparison,
+    overridden: &[Overridden],
+    broken: &[String],
+) -> String {
     let names = [&args.first, &args.second].map(|path| code(&path.display().to_string()));
     let mut text = format!("### {} compared with {}\n\n", names[1], names[0]);
     if found.is_empty() {
@@ -348,7 +372,7 @@ fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
     if found.plan.len() > PLAN_SHOWN {
         let _ = writeln!(text, "- plan: {} more", found.plan.len() - PLAN_SHOWN);
     }
-    for (name, told) in facts(found) {
+    for (name, told) in facts(found, overridden) {
         let _ = writeln!(text, "- {name}: {}", escaped(&told));
     }
     for Listed { title, headings, rows } in lists(args, found) {
@@ -382,7 +406,7 @@ fn escaped(text: &str) -> String {
 }
 
 /// Returns the differences as JSON.
-fn to_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
+fn to_json(args: &Args, found: &Comparison, overridden: &[Overridden], broken: &[String]) -> Value {
     let row = |row: &SharedRow| {
         let place: serde_json::Map<String, Value> =
             found.keys.iter().cloned().zip(row.key.iter().map(|value| json!(value))).collect();
@@ -404,6 +428,10 @@ fn to_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
         "differ": !found.is_empty(),
         "fail_on": broken,
         "plan": found.plan,
+        "overridden": overridden.iter().map(|one| json!({
+            "axis": one.axis, "paths": one.paths,
+        })).collect::<Value>(),
+        "matched_by": if found.is_matched_by_point { "point" } else { "axes" },
         "rows": {
             "in_both": found.shared.len(),
             "over_estimated": found.over_estimated,

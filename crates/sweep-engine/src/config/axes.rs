@@ -12,7 +12,7 @@ use super::{Draft, Field, Located, Location, Section, quoted, refused_number, sh
 use crate::Model;
 use crate::design::{DesignRule, DistributionShape, MOST_AXES, TAIL_DEVIATIONS};
 use crate::plan::MAX_POINTS;
-use crate::{Axis, AxisValues, Design, Distribution, ModelParameter};
+use crate::{Axis, AxisTolerance, AxisValues, Design, Distribution, ModelParameter};
 
 /// Claims the numbers that an axis writes. Returns false, after a report, if another axis writes
 /// them. `is_about` says that the axis is a tolerance about the model's own number.
@@ -88,7 +88,7 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
             continue;
         }
         if design.is_none() {
-            let count = values.as_ref().map_or(1, |values| values.value.len());
+            let count = values.as_ref().map_or(1, |values| values.value.values.len());
             let product = points.and_then(|points| points.checked_mul(count));
             let product = product.filter(|&points| points <= MAX_POINTS);
             if let (Some(points), None, Some(values)) = (points, product, &values) {
@@ -101,9 +101,10 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
         }
         if let (Some(name), Some(parameter)) = (name, parameter)
             && claim(&name, &parameter, &mut swept, is_about, draft)
-            && let (Some(values), Some(_)) = (values, points)
+            && let (Some(Located { value, at }), Some(_)) = (values, points)
         {
-            add(Axis { parameter, values: values.value }, values.at, draft);
+            let SpreadValues { values, tolerance } = value;
+            add(Axis { parameter, values, tolerance }, at, draft);
         }
     }
     // A plan whose axes are all fixed is a single point.
@@ -147,7 +148,8 @@ pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Dra
             });
         }
         if claim(&name, &parameter, &mut swept, false, draft) && sound {
-            let axis = Axis { parameter, values: AxisValues::List(column.values) };
+            let values = AxisValues::List(column.values);
+            let axis = Axis { parameter, values, tolerance: None };
             add(axis, name.at.clone(), draft);
         }
     }
@@ -199,7 +201,7 @@ impl<'p> SweptFacts<'p> {
 
     /// Reads `tolerance`: a range about the model's own number, by a distance in its unit or in
     /// percent of it.
-    fn tolerance(&self, section: &Section<'_>) -> Field<AxisTolerance> {
+    fn tolerance(&self, section: &Section<'_>) -> Field<ToleranceRange> {
         section.text_or_number("tolerance").then(|found| {
             let report = section.report;
             let at = found.at;
@@ -235,14 +237,30 @@ impl<'p> SweptFacts<'p> {
                 let title = format!("`{}` is 0, and so is every percentage of it", self.name);
                 return report.refuse(&at, title, "expected a tolerance in the parameter's unit");
             }
-            Some(Located { value: AxisTolerance { from, middle, to }, at })
+            let tolerance = match percent {
+                Some(_) => AxisTolerance::Percent(number),
+                None => AxisTolerance::Distance(number),
+            };
+            Some(Located { value: ToleranceRange { tolerance, from, middle, to }, at })
         })
     }
 }
 
+/// The values of an axis, with the tolerance from which they follow.
+struct SpreadValues {
+    values: AxisValues,
+    tolerance: Option<AxisTolerance>,
+}
+
+fn without_tolerance(found: Located<AxisValues>) -> Located<SpreadValues> {
+    let value = SpreadValues { values: found.value, tolerance: None };
+    Located { value, at: found.at }
+}
+
 /// A range about the model's own number.
 #[derive(Clone, Copy)]
-struct AxisTolerance {
+struct ToleranceRange {
+    tolerance: AxisTolerance,
     from: f64,
     middle: f64,
     to: f64,
@@ -252,7 +270,13 @@ struct AxisTolerance {
 /// meets it (capability 1) has 99.7 % within. Doubling it halves the spread of parts.
 const DEVIATIONS: f64 = 3.0;
 
-impl AxisTolerance {
+impl ToleranceRange {
+    /// Returns evenly spaced values with both ends.
+    const fn values(self, count: u64) -> SpreadValues {
+        let values = AxisValues::Linear { from: self.from, to: self.to, count };
+        SpreadValues { values, tolerance: Some(self.tolerance) }
+    }
+
     /// Returns the shape of a distribution within the tolerance, by its index in [`DISTRIBUTIONS`];
     /// `None` for a uniform one.
     fn shape(self, kind: usize) -> Option<DistributionShape> {
@@ -275,7 +299,7 @@ fn distribution(
     section: Section<'_>,
     own: &SweptFacts<'_>,
     points: u64,
-) -> Option<Located<AxisValues>> {
+) -> Option<Located<SpreadValues>> {
     let at = section.at().clone();
     let report = section.report;
     let range = own.range;
@@ -287,8 +311,9 @@ fn distribution(
         let field = section.expect(field, key, needed.then_some("a number"));
         field.given().map(|number| number.value)
     };
-    let tolerance = own.tolerance(&section);
-    let (shape, bounds) = if let Field::Absent = tolerance {
+    let field = own.tolerance(&section);
+    let mut tolerance = None;
+    let (shape, bounds) = if let Field::Absent = field {
         // An unknown kind has no list of keys, but each key has a range.
         let keys = kind.map_or(&DISTRIBUTIONS[..], |kind| &DISTRIBUTIONS[kind..=kind]);
         let keys = keys.iter().flat_map(|(_, numbers)| *numbers);
@@ -315,12 +340,13 @@ fn distribution(
         let reason = "`tolerance` gives it, about the machine's own number";
         section.misplace(&["mean", "sd", "median", "sigma", "from", "to"], reason);
         section.finish();
-        let tolerance = tolerance.given()?.value;
-        if kind? == 1 && tolerance.from <= 0.0 {
-            let title = format!("a tolerance down to {} has no logarithm", decimal(tolerance.from));
+        let range = field.given()?.value;
+        if kind? == 1 && range.from <= 0.0 {
+            let title = format!("a tolerance down to {} has no logarithm", decimal(range.from));
             return report.refuse(&at, title, "expected a positive range, or kind = \"normal\"");
         }
-        (tolerance.shape(kind?), [tolerance.from, tolerance.to])
+        tolerance = Some(range.tolerance);
+        (range.shape(kind?), [range.from, range.to])
     };
     let [from, to] = bounds;
     let [from_said, to_said] = bounds.map(decimal);
@@ -342,7 +368,7 @@ fn distribution(
         let expected = "expected a wider one, or fewer `points` in [design]";
         return report.refuse(&at, title, expected);
     }
-    let value = match shape {
+    let values = match shape {
         None => AxisValues::Linear { from, to, count: 2 },
         Some(shape) => {
             let [low, high] = [shape.at(-TAIL_DEVIATIONS), shape.at(TAIL_DEVIATIONS)];
@@ -356,19 +382,23 @@ fn distribution(
             AxisValues::Distributed(Distribution { shape, from, to })
         }
     };
-    Some(Located { value, at })
+    Some(Located { value: SpreadValues { values, tolerance }, at })
 }
 
 /// Reads the range or distribution over which a design spreads `points` points.
-fn extent(section: &Section<'_>, own: &SweptFacts<'_>, points: u64) -> Option<Located<AxisValues>> {
+fn extent(
+    section: &Section<'_>,
+    own: &SweptFacts<'_>,
+    points: u64,
+) -> Option<Located<SpreadValues>> {
     let reason = "a design spreads its points over `range = { from = ..., to = ... }`";
     section.misplace(&["values"], reason);
     let tolerance = own.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
         section.misplace(&["range", "distribution"], BESIDE_TOLERANCE);
         section.misplace(&["count"], "the number of points belongs in [design], as `points`");
-        let Located { value: AxisTolerance { from, to, .. }, at } = tolerance.given()?;
-        return Some(Located { value: AxisValues::Linear { from, to, count: 2 }, at });
+        let Located { value: range, at } = tolerance.given()?;
+        return Some(Located { value: range.values(2), at });
     }
     match section.table("distribution", "distribution = { kind, ... }").given() {
         Some(distributed) => {
@@ -378,7 +408,7 @@ fn extent(section: &Section<'_>, own: &SweptFacts<'_>, points: u64) -> Option<Lo
         None => {
             let field = section.table("range", "range = { from, to }");
             let spaced = section.require(field, "range", "`range = { from = ..., to = ... }`")?;
-            spacing(spaced.value, own.range, Some(points))
+            spacing(spaced.value, own.range, Some(points)).map(without_tolerance)
         }
     }
 }
@@ -398,7 +428,7 @@ fn most_distinct(from: f64, to: f64) -> Option<u64> {
 }
 
 /// Reads the values of an axis: listed, or as a range.
-fn values(section: &Section<'_>, own: &SweptFacts<'_>) -> Option<Located<AxisValues>> {
+fn values(section: &Section<'_>, own: &SweptFacts<'_>) -> Option<Located<SpreadValues>> {
     let range = own.range;
     let tolerance = own.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
@@ -406,13 +436,13 @@ fn values(section: &Section<'_>, own: &SweptFacts<'_>) -> Option<Located<AxisVal
         let expected = "the number of values, both ends included";
         let count = section.whole("count", &(2..=MAX_POINTS));
         let count = section.require(count, "count", expected);
-        let Located { value: AxisTolerance { from, to, .. }, at } = tolerance.given()?;
+        let Located { value: range, at } = tolerance.given()?;
         let count = count?.value;
-        if let Some(most) = most_distinct(from, to).filter(|&most| most < count) {
+        if let Some(most) = most_distinct(range.from, range.to).filter(|&most| most < count) {
             let title = format!("a tolerance has no {count} different values");
             return section.report.refuse(&at, title, format!("expected at most {most}"));
         }
-        return Some(Located { value: AxisValues::Linear { from, to, count }, at });
+        return Some(Located { value: range.values(count), at });
     }
     let listed = section.right_numbers("values", range);
     let spaced = section.table("range", "range = { from, to, count }");
@@ -424,8 +454,12 @@ fn values(section: &Section<'_>, own: &SweptFacts<'_>) -> Option<Located<AxisVal
             );
             None
         }
-        (Field::Given(listed), Field::Absent) => list(listed, section.report),
-        (Field::Absent, Field::Given(spaced)) => spacing(spaced.value, range, None),
+        (Field::Given(listed), Field::Absent) => {
+            list(listed, section.report).map(without_tolerance)
+        }
+        (Field::Absent, Field::Given(spaced)) => {
+            spacing(spaced.value, range, None).map(without_tolerance)
+        }
         (Field::Given(listed), Field::Given(spaced)) => {
             let diagnostic = Diagnostic::new("an axis has both `values` and `range`");
             section.report.push(

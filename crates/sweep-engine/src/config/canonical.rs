@@ -11,6 +11,9 @@ impl<M: Model> Plan<M> {
     /// `integrator`, `axis`, `reliability`, the model's own keys, and under `set` the changes by
     /// `--set`, if there are any.
     ///
+    /// An axis with a tolerance has its values as a range or a distribution, and the tolerance
+    /// beside them.
+    ///
     /// The text is canonical: keys are sorted, and numbers are the shortest decimals that read back
     /// to the same bits, so that two plans are equal if and only if their texts are.
     pub fn to_json(&self) -> Value {
@@ -50,7 +53,7 @@ fn axis<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> Value {
         }
         json!({ "parameter": parameter, "range": range })
     };
-    match axis.values {
+    let mut json = match axis.values {
         AxisValues::List(ref values) => json!({ "parameter": parameter, "values": values }),
         AxisValues::Distributed(ref distribution) => {
             let Distribution { shape, from, to } = *distribution;
@@ -62,5 +65,9 @@ fn axis<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> Value {
         }
         AxisValues::Linear { from, to, count } => range(from, to, count, "linear"),
         AxisValues::Log { from, to, count } => range(from, to, count, "log"),
+    };
+    if let Some(tolerance) = axis.tolerance {
+        json["tolerance"] = tolerance.to_json();
     }
+    json
 }

@@ -273,7 +273,8 @@ fn parameters<M: Model>(
             report.push(written_twice(&name, &first));
             continue;
         }
-        let mut axis = crate::plan::Axis { parameter, values: bounds.value.clone() };
+        let mut axis =
+            crate::plan::Axis { parameter, values: bounds.value.clone(), tolerance: None };
         if let AxisValues::Linear { from, to, .. } | AxisValues::Log { from, to, .. } =
             &mut axis.values
         {

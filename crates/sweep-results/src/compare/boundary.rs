@@ -231,7 +231,7 @@ fn find_crossing(
     if (low < limit) == (high < limit) {
         return None;
     }
-    let bracket = [below.key[1], above.key[1]];
+    let bracket = [below, above].map(|row| [&row.key, &row.second_key][file][1]);
     let share = (limit / low).ln() / (high / low).ln();
     Some(BracketedCrossing { position: bracket[0] + share * (bracket[1] - bracket[0]), bracket })
 }

@@ -37,20 +37,50 @@ fn provenance(file: &ParquetFile) -> Value {
     Value::Object(provenance)
 }
 
-/// Returns every value that differs between the plans of two files. Lists of different lengths, and
-/// lists of numbers, are one value each.
+/// Returns every value that differs between the plans of two files.
 pub(super) fn compare_plans(first: &ParquetFile, second: &ParquetFile) -> Vec<PlanChange> {
-    let first = provenance(first);
-    let second = provenance(second);
+    plan_changes(&provenance(first), &provenance(second))
+}
+
+/// Returns every value that differs between two plans. Lists of different lengths, and lists of
+/// numbers, are one value each.
+pub fn plan_changes(first: &Value, second: &Value) -> Vec<PlanChange> {
     let descends = |first: &[Value], second: &[Value]| {
         first.len() == second.len() && first.iter().any(Value::is_object)
     };
     let mut changes = Vec::new();
-    leaves([Some(&first), Some(&second)], descends, &mut Vec::new(), &mut |path, values| {
+    leaves([Some(first), Some(second)], descends, &mut Vec::new(), &mut |path, values| {
         let [first, second] = values.map(|value| value.cloned().unwrap_or_default());
         if first != second {
             changes.push(PlanChange { path: dotted(path), first, second });
         }
     });
     changes
+}
+
+/// Returns whether two plans have the same points but for the numbers about which their axes'
+/// tolerances lie.
+pub(super) fn is_about_other_numbers(first: Option<&Value>, second: Option<&Value>) -> bool {
+    let Some((first, second)) = first.zip(second) else { return false };
+    first["axis"] != second["axis"]
+        && first["design"] == second["design"]
+        && without_tolerated_numbers(&first["axis"]) == without_tolerated_numbers(&second["axis"])
+}
+
+/// Returns the axes of a plan without the numbers that follow from a tolerance and the number in
+/// its middle.
+fn without_tolerated_numbers(axes: &Value) -> Value {
+    let mut axes = axes.clone();
+    for axis in axes.as_array_mut().into_iter().flatten() {
+        if axis.get("tolerance").is_none() {
+            continue;
+        }
+        for key in ["range", "distribution"] {
+            if let Some(values) = axis.get_mut(key).and_then(Value::as_object_mut) {
+                let follows = ["from", "to", "mean", "sd", "median", "sigma"];
+                values.retain(|key, _| !follows.contains(&key.as_str()));
+            }
+        }
+    }
+    axes
 }

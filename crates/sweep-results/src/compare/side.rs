@@ -11,13 +11,18 @@ const MAX_CELLS: u64 = 100_000_000;
 /// The columns of a file that take part in a comparison.
 #[derive(Debug)]
 pub(super) struct ComparedFile {
-    /// The row groups, with the key columns first.
+    /// The row groups: the key columns, further columns by which rows are matched, and the compared
+    /// columns.
     row_groups: Vec<Rows>,
     /// The number of rows.
     pub(super) rows: usize,
     /// The number of key columns.
     key_count: usize,
-    /// The columns after the key columns.
+    /// The positions of the columns by which rows are matched.
+    matched_by: Vec<usize>,
+    /// The position of the first compared column.
+    first_column: usize,
+    /// The compared columns.
     columns: Vec<Column>,
 }
 
@@ -61,6 +66,7 @@ impl ComparedFile {
         table: &ResultTable,
         other_table: &ResultTable,
         keys: &[String],
+        matched_by: &[String],
     ) -> Result<Self, ResultsError> {
         let is_in_both = |column: &Column| {
             let counterpart = other_table.column(&column.name);
@@ -70,23 +76,28 @@ impl ComparedFile {
         };
         let mut columns = table.columns.clone();
         columns.retain(is_in_both);
-        let cell_count = table.rows().saturating_mul((columns.len() + keys.len()) as u64);
+        let mut names: Vec<&str> = keys.iter().map(String::as_str).collect();
+        let further = matched_by.iter().filter(|name| !keys.contains(name));
+        names.extend(further.map(String::as_str));
+        let first_column = names.len();
+        let position = |name: &String| names.iter().position(|known| known == name);
+        let matched_by = matched_by.iter().filter_map(position).collect();
+        names.extend(columns.iter().map(|column| column.name.as_str()));
+        let cell_count = table.rows().saturating_mul(names.len() as u64);
         if cell_count > MAX_CELLS {
             return Err(ResultsError::Refused(format!(
                 "{} has {cell_count} cells, more than the {MAX_CELLS} that are kept in memory",
                 table.path().display()
             )));
         }
-        let names = keys.iter().chain(columns.iter().map(|column| &column.name));
-        let names: Vec<&str> = names.map(String::as_str).collect();
         let row_groups = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
         let rows = row_groups.iter().map(|group| group.count).sum();
-        Ok(Self { row_groups, rows, key_count: keys.len(), columns })
+        Ok(Self { row_groups, rows, key_count: keys.len(), matched_by, first_column, columns })
     }
 
     /// Iterates over the columns, each with its position in [`ComparedFile::cell`].
     pub(super) fn columns(&self) -> impl Iterator<Item = (usize, &Column)> {
-        (self.key_count..).zip(&self.columns)
+        (self.first_column..).zip(&self.columns)
     }
 
     /// Returns the position of the column of a name.
@@ -103,13 +114,18 @@ impl ComparedFile {
 
     /// Returns the values of a row's key columns.
     fn key_values(&self, row: usize) -> Vec<f64> {
-        (0..self.key_count).map(|key| self.cell(key, row).number().unwrap_or(f64::NAN)).collect()
+        (0..self.key_count).map(|key| self.number(key, row)).collect()
     }
 
-    /// Returns a row's key values rounded to nine digits, because grids with different numbers of
-    /// values have common points whose values differ by rounding.
+    /// Returns the number of a row in the column at a position, NaN where there is none.
+    fn number(&self, position: usize, row: usize) -> f64 {
+        self.cell(position, row).number().unwrap_or(f64::NAN)
+    }
+
+    /// Returns the values by which a row is matched, rounded to nine digits, because grids with
+    /// different numbers of values have common points whose values differ by rounding.
     pub(super) fn key(&self, row: usize) -> Vec<u64> {
-        self.key_values(row).into_iter().map(rounded_bits).collect()
+        self.matched_by.iter().map(|&position| rounded_bits(self.number(position, row))).collect()
     }
 
     fn least_ratio(&self, row: usize) -> Option<f64> {
@@ -133,9 +149,15 @@ impl ComparedFile {
             [Some(false), Some(true)] => Flip::Gained,
             _ => Flip::Defined,
         };
+        let key = self.key_values(pair[0]);
+        let second_key = key.iter().zip(other.key_values(pair[1]));
+        let second_key = second_key.map(|(&first, second)| {
+            if rounded_bits(first) == rounded_bits(second) { first } else { second }
+        });
         SharedRow {
             rows: pair.map(|row| row as u64),
-            key: self.key_values(pair[0]),
+            second_key: second_key.collect(),
+            key,
             ratio: numbers("ratio_max"),
             least_ratio: [self.least_ratio(pair[0]), other.least_ratio(pair[1])],
             gap_m: numbers("min_gap_nonlinear_m"),

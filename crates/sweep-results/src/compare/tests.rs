@@ -115,6 +115,50 @@ fn maps_of_different_grids_are_compared_at_common_points() {
     assert!(comparison.columns.is_empty(), "{:?}", comparison.columns);
 }
 
+/// Returns the sample's map with dampings that follow from a tolerance about their middle.
+fn map_about(middle: f64, tolerance: &str, ratios: &[Option<f64>]) -> ResultTable {
+    let mut plan = sample::plan();
+    let [from, to] = [middle - 10.0, middle + 10.0];
+    plan["axis"][1] = json!({
+        "parameter": "damping_n_s_per_m",
+        "range": { "from": from, "to": to, "count": 3, "spacing": "linear" },
+        "tolerance": tolerance,
+    });
+    let mut columns = sample::map(ratios);
+    let dampings: Vec<_> = (0..6).map(|i| Some(from + 10.0 * f64::from(i % 3))).collect();
+    columns[2] = ("damping_n_s_per_m", "N s/m", numbers(&dampings));
+    file(columns, &[(key::PLAN, plan)])
+}
+
+#[test]
+fn rows_of_tolerances_about_other_numbers_are_matched_by_point() {
+    let mut ratios = RATIOS;
+    ratios[0] = Some(2.5); // reliable before
+    let first = map_about(100.0, "10 %", &RATIOS);
+    let found = compare(&first, &map_about(200.0, "10 %", &ratios)).unwrap();
+    assert!(found.is_matched_by_point);
+    assert_eq!((found.shared.len(), found.unmatched_rows), (6, [0, 0]));
+    assert!(found.shared.iter().all(|row| row.rows[0] == row.rows[1]));
+    assert_eq!(
+        (&*found.shared[5].key, &*found.shared[5].second_key),
+        (&[0.2, 110.0][..], &[0.2, 210.0][..])
+    );
+    let flips: Vec<u64> = found.flips(false).map(|row| row.rows[0]).collect();
+    assert_eq!(flips, [0]);
+    let columns: Vec<&str> = found.columns.iter().map(|column| column.name.as_str()).collect();
+    assert!(!columns.contains(&"damping_n_s_per_m") && columns.contains(&"ratio_max"));
+    // Each file's crossings lie between its own values.
+    let found = compare(&first, &map_about(200.0, "10 %", &RATIOS)).unwrap();
+    assert!(found.columns.is_empty() && !found.is_empty());
+    let brackets = found.boundary.unwrap().crossings.remove(0).bracket;
+    assert_eq!(brackets, [[100.0, 110.0], [200.0, 210.0]]);
+
+    // Values that are the same are matched as ever, and other tolerances are other grids.
+    assert!(!compare(&first, &map_about(100.0, "10 %", &RATIOS)).unwrap().is_matched_by_point);
+    let refused = compare(&first, &map_about(200.0, "5 %", &RATIOS)).unwrap_err();
+    assert!(refused.to_string().contains("they share no row"), "{refused}");
+}
+
 #[test]
 fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
     let with_spin = |values: &[f64]| {

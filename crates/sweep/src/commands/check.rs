@@ -158,6 +158,7 @@ impl Trial {
             trial.axes.push(sweep_engine::Axis {
                 parameter: plan.model.parameter(number.parameter.clone()),
                 values,
+                tolerance: None,
             });
         }
         let rows = (stride * points.len()) as u64;

@@ -108,7 +108,7 @@ impl OnMap<'_> {
             let parameter = plan.model.parameter(problem.free[k].parameter.clone());
             plan.axes.push(match from < to {
                 true => axis_between(parameter, from, to),
-                false => Axis { parameter, values: AxisValues::List(vec![from]) },
+                false => Axis { parameter, values: AxisValues::List(vec![from]), tolerance: None },
             });
         }
         let points: Vec<Vec<f64>> =

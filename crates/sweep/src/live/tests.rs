@@ -147,7 +147,7 @@ fn sliders_that_cannot_be_are_refused() {
     for text in ["tub_mass_kg", "tub_mass_kg=1", "tub_mass_kg=2:1", "tub_mass_kg=a:b"] {
         assert!(parse_slider_range(text).is_err(), "{text}");
     }
-    assert!(usual_sliders(&plan).iter().all(|Axis { parameter, values }| {
+    assert!(usual_sliders(&plan).iter().all(|Axis { parameter, values, .. }| {
         let names = ["unbalance_mass_kg", "damping_n_s_per_m"];
         values.value(0) < values.value(1) && !names.contains(&&*parameter.name)
     }));

@@ -25,6 +25,12 @@ fn an_axis_with_a_tolerance_is_about_the_machines_number() {
     let mass = axis("drum_mass_kg", "0.5") + "[set]\ndrum_mass_kg = 8\n";
     let plan = load(&mass, &[]).unwrap();
     assert_eq!(values(&plan), [7.5, 8.0, 8.5]);
+    // The plan has the tolerance beside the values, from which it is read back.
+    let json = plan.to_json();
+    assert_eq!(json["axis"][0]["tolerance"], 0.5);
+    assert_eq!(load(&damping, &[]).unwrap().to_json()["axis"][0]["tolerance"], "5 %");
+    let again = WasherGridInput::from_plan("plan", &json).load().unwrap();
+    assert_eq!(values(&again), [7.5, 8.0, 8.5]);
     // An option with the axis' name fixes it.
     assert_eq!(load(&mass, &["drum_mass_kg=9"]).unwrap().axes.len(), 0);
 }
@@ -39,6 +45,7 @@ fn a_distribution_with_a_tolerance_is_about_the_machines_number() {
     };
     for (kind, keys) in [("normal", ["mean", "sd"]), ("lognormal", ["median", "sigma"])] {
         let plan = load(&design(kind), &[]).unwrap().to_json();
+        assert_eq!(plan["axis"][0]["tolerance"], "30 %");
         let told = &plan["axis"][0]["distribution"];
         let numbers = keys.map(|key| told[key].as_f64().unwrap());
         assert!((numbers[0] - 0.4).abs() < 1e-12, "{told}");
@@ -52,6 +59,7 @@ fn a_distribution_with_a_tolerance_is_about_the_machines_number() {
     let axis = "[design]\nmethod = \"sobol\"\npoints = 8\n[[axis]]\nparameter = \
                 \"unbalance_mass_kg\"\ntolerance = \"25%\"\n";
     let plan = load(axis, &[]).unwrap();
+    assert_eq!(plan.to_json()["axis"][0]["tolerance"], "25 %");
     assert!((0..8).all(|point| (0.3..=0.5).contains(&plan.axis_values(point)[0])));
 }
 

@@ -1,0 +1,65 @@
+//! The numbers that differ between two plans and that an axis of both overrides.
+
+use serde_json::Value;
+
+use crate::{GridInput, Model, Plan};
+use sweep_results::{Comparison, PlanChange, ResultTable, plan_changes};
+
+/// The differences of two plans that do not show, because an axis of both sets these numbers.
+pub(super) struct Overridden {
+    /// The name of the axis.
+    pub(super) axis: String,
+    /// The dotted paths of the differences: `machine.body.mass_kg`.
+    pub(super) paths: Vec<String>,
+}
+
+/// Returns the differences of the plans that an axis of both files overrides. A tolerance overrides
+/// nothing, because it lies about the plan's number.
+pub(super) fn overridden<M: Model>(
+    tables: &[ResultTable; 2],
+    found: &Comparison,
+) -> Vec<Overridden> {
+    let plans = tables.each_ref().map(|table| table.plan.as_ref());
+    let [Some(first), Some(second)] = plans else { return Vec::new() };
+    let [Some(first_model), Some(second_model)] = [first, second].map(without_axes::<M>) else {
+        return Vec::new();
+    };
+    let before = plan_changes(&first_model.to_json(), &second_model.to_json());
+    let second_axes = overriding_axes(second);
+    let shared = overriding_axes(first).into_iter().filter(|name| second_axes.contains(name));
+    let by_axis = shared.filter_map(|name| {
+        // The axis gives both plans the same numbers; any number serves.
+        let value = first_model.model.find(name).ok()?.value.unwrap_or(1.0);
+        let [first, second] =
+            [&first_model, &second_model].map(|plan| with_number(plan, name, value));
+        let after = plan_changes(&first?.to_json(), &second?.to_json());
+        let has = |changes: &[PlanChange], path: &str| changes.iter().any(|one| one.path == path);
+        let told = found.plan.iter().map(|change| &change.path);
+        let paths: Vec<String> =
+            told.filter(|path| has(&before, path) && !has(&after, path)).cloned().collect();
+        (!paths.is_empty()).then(|| Overridden { axis: name.to_owned(), paths })
+    });
+    by_axis.collect()
+}
+
+/// Reads the plan of a result, without its axes; `None` if this version does not read it.
+fn without_axes<M: Model>(plan: &Value) -> Option<Plan<M>> {
+    let mut plan = plan.clone();
+    plan.as_object_mut()?.remove("axis");
+    GridInput::from_plan("plan", &plan).load().ok()
+}
+
+/// Returns the names of a plan's axes without a tolerance.
+fn overriding_axes(plan: &Value) -> Vec<&str> {
+    let axes = plan["axis"].as_array().into_iter().flatten();
+    let axes = axes.filter(|axis| axis.get("tolerance").is_none());
+    axes.filter_map(|axis| axis["parameter"].as_str()).collect()
+}
+
+/// Returns a plan with another value of a parameter.
+fn with_number<M: Model>(plan: &Plan<M>, name: &str, value: f64) -> Option<Plan<M>> {
+    let parameter = plan.model.find(name).ok()?;
+    let mut scenario = plan.scenario_at(&[]);
+    scenario.write(&parameter, value);
+    Some(Plan { model: scenario.model, window_s: scenario.window_s, ..plan.clone() })
+}
