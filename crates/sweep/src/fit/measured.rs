@@ -6,6 +6,7 @@ use super::algebra::{centred, quantile};
 use sweep_engine::Diagnostics;
 use sweep_engine::config::list::{ListColumn, Names, NumberTable};
 use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::section::counted;
 use sweep_results::nearest;
 use washer_model::Channel;
 
@@ -23,6 +24,14 @@ pub(super) const LONGEST_RUN_S: f64 = 3600.0;
 /// an unbalance grow with the square of the speed, so those at a tenth are a hundredth of the
 /// greatest. Doubling it lets a run begin with four times that.
 pub(super) const REST_SPEED_RATIO: f64 = 0.1;
+
+/// The greatest acceleration of a drum (rpm/s). Basis: a direct drive of 40 N m on a drum of
+/// 0.4 kg m^2. Doubling it leaves drop-outs of a tachometer at twice the speed in the record.
+const GREATEST_ACCELERATION_RPM_PER_S: f64 = 1000.0;
+/// The number of a tachometer's usual steps between samples beyond which speeds about a zero are no
+/// noise. Basis: the sizes of two samples of white noise add up to as much once in a million.
+/// Doubling it leaves drop-outs at the slowest speeds of a coarse tachometer in the record.
+const NOISE_STEPS: f64 = 10.0;
 
 /// The quantity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -287,8 +296,42 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
             report.push(naming.into_iter().fold(refusal, Diagnostic::help));
         }
     }
+    leave_out_drop_outs(&mut measured);
     measured.gaps_s = gaps(&measured.time_s);
     measured
+}
+
+/// Removes drop-outs from the speeds, with a note.
+fn leave_out_drop_outs(measured: &mut Measurement) {
+    let Some(speed_rpm) = &mut measured.speed_rpm else { return };
+    let rows = drop_outs(&measured.time_s, speed_rpm);
+    let Some(first) = rows.first() else { return };
+    let first_s = measured.time_s[*first];
+    let samples = counted(rows.len(), "sample");
+    let [drop, first] = if rows.len() == 1 { ["drops", ""] } else { ["drop", "the first "] };
+    let note = format!("{samples} of speed_rpm {drop} to zero, {first}at {first_s} s: left out");
+    measured.notes.push(note);
+    rows.into_iter().for_each(|row| speed_rpm[row] = f64::NAN);
+}
+
+/// Returns the rows of a tachometer's drop-outs: zeros between two speeds between which no drum
+/// could have stopped and started again in time. At a standstill speeds approach zero instead.
+fn drop_outs(time_s: &[f64], speed_rpm: &[f64]) -> Vec<usize> {
+    let is_running = |row: &usize| !speed_rpm[*row].is_nan() && speed_rpm[*row] != 0.0;
+    let rows = 0..time_s.len().min(speed_rpm.len());
+    let running: Vec<usize> = rows.filter(is_running).collect();
+    let steps = running.windows(2).map(|pair| (speed_rpm[pair[1]] - speed_rpm[pair[0]]).abs());
+    let step_rpm = quantile(steps.filter(|step| *step > 0.0), 0.5).unwrap_or_default();
+    let mut found = Vec::new();
+    for pair in running.windows(2) {
+        let [before, after] = [pair[0], pair[1]];
+        let change_rpm = speed_rpm[before].abs() + speed_rpm[after].abs();
+        let possible_rpm = GREATEST_ACCELERATION_RPM_PER_S * (time_s[after] - time_s[before]);
+        if change_rpm > possible_rpm + NOISE_STEPS * step_rpm {
+            found.extend((before + 1..after).filter(|row| speed_rpm[*row] == 0.0));
+        }
+    }
+    found
 }
 
 /// Whether all samples are one number.
@@ -508,6 +551,43 @@ mod tests {
         // Without the user's names nothing is measured, and what to do is said.
         let refused = Measurement::read(&path, &[]).unwrap_err().to_string();
         assert!(refused.contains("--column 'Acc front=tub_front_y_m_per_s2'"), "{refused}");
+    }
+
+    #[test]
+    fn drop_outs_of_the_tachometer_are_left_out_and_a_standstill_is_not() {
+        // A wash in both directions with a wait, then a spin.
+        let course = |t: f64| match t {
+            t if t < 1.0 => 50.0 * t,
+            t if t < 2.0 => 50.0 * (2.0 - t),
+            t if t < 4.0 => 0.0,
+            t if t < 5.0 => -50.0 * (t - 4.0),
+            t if t < 6.0 => -50.0 * (6.0 - t),
+            t => 30.0 * (t - 6.0),
+        };
+        let measured = |step_s: f64, digit_rpm: f64, zeros: &[usize]| {
+            let times: Vec<f64> =
+                (0..(12.0 / step_s) as u32).map(|k| step_s * f64::from(k)).collect();
+            let mut speeds: Vec<f64> =
+                times.iter().map(|t| (course(*t) / digit_rpm).round() * digit_rpm).collect();
+            zeros.iter().for_each(|row| speeds[*row] = 0.0);
+            let yaw = times.iter().map(|t| t.sin()).collect();
+            let columns = [("time_s", times), ("speed_rpm", speeds), ("tub_yaw", yaw)];
+            let columns = columns.map(|(name, values)| (name.to_owned(), values));
+            Measurement::from_columns(columns.to_vec(), &[]).unwrap()
+        };
+        for (step_s, digit_rpm) in [(0.001, 1e-3), (0.001, 5.0), (0.02, 1.0), (0.1, 1e-3)] {
+            let whole = measured(step_s, digit_rpm, &[]);
+            assert!(whole.notes.is_empty(), "{step_s} {digit_rpm}: {:?}", whole.notes);
+            assert!(whole.speed_rpm.unwrap().iter().all(|speed| !speed.is_nan()));
+        }
+        let with_zeros = measured(0.02, 1.0, &[40, 520, 550, 551]);
+        let note = "4 samples of speed_rpm drop to zero, the first at 0.8 s: left out";
+        assert_eq!(with_zeros.notes, [note]);
+        let speeds = with_zeros.speed_rpm.unwrap();
+        let missing: Vec<usize> = (0..speeds.len()).filter(|row| speeds[*row].is_nan()).collect();
+        assert_eq!(missing, [40, 520, 550, 551]);
+        let one = measured(0.02, 1.0, &[520]).notes;
+        assert_eq!(one, ["1 sample of speed_rpm drops to zero, at 10.4 s: left out"]);
     }
 
     #[test]
