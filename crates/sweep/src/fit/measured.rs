@@ -25,6 +25,8 @@ pub(super) const LONGEST_RUN_S: f64 = 3600.0;
 /// greatest. Doubling it lets a run begin with four times that.
 pub(super) const REST_SPEED_RATIO: f64 = 0.1;
 
+/// The length of a day (s).
+const DAY_S: f64 = 86_400.0;
 /// The greatest acceleration of a drum (rpm/s). Basis: a direct drive of 40 N m on a drum of
 /// 0.4 kg m^2. Doubling it leaves drop-outs of a tachometer at twice the speed in the record.
 const GREATEST_ACCELERATION_RPM_PER_S: f64 = 1000.0;
@@ -224,12 +226,18 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
 }
 
 /// Reads the table as a measurement and reports what is wrong with it.
-fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
+fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement {
+    let clock = table.columns.iter_mut().find(|column| column.name.value == "time_s");
+    let passes_midnight = clock.is_some_and(|clock| continue_past_midnight(&mut clock.values));
     let clock = table.columns.iter().find(|column| column.name.value == "time_s");
     let early = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
     // A file of `sweep trace` counts as a measurement of its nonlinear motion.
     let is_trace = table.columns.iter().any(|column| column.header.starts_with(TRACED));
-    let notes = if is_trace { Vec::new() } else { table.notes() };
+    let mut notes = if is_trace { Vec::new() } else { table.notes() };
+    if passes_midnight {
+        notes
+            .push("its clock passes midnight: times after it are those of the next day".to_owned());
+    }
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();
     let mut measured = Measurement { name, early, notes, headers, ..Measurement::default() };
     let mut seen: Vec<&str> = Vec::new();
@@ -299,6 +307,22 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
     leave_out_drop_outs(&mut measured);
     measured.gaps_s = gaps(&measured.time_s);
     measured
+}
+
+/// Adds a day to the times after each midnight, where a clock falls by a day less at most a run.
+/// Returns whether there is one.
+fn continue_past_midnight(times: &mut [f64]) -> bool {
+    let mut midnights_s = 0.0;
+    let mut last_s = f64::NEG_INFINITY;
+    for time_s in times {
+        let fall_s = last_s - (*time_s + midnights_s);
+        if fall_s > DAY_S - LONGEST_RUN_S && fall_s <= DAY_S {
+            midnights_s += DAY_S;
+        }
+        *time_s += midnights_s;
+        last_s = last_s.max(*time_s);
+    }
+    midnights_s > 0.0
 }
 
 /// Removes drop-outs from the speeds, with a note.
@@ -551,6 +575,33 @@ mod tests {
         // Without the user's names nothing is measured, and what to do is said.
         let refused = Measurement::read(&path, &[]).unwrap_err().to_string();
         assert!(refused.contains("--column 'Acc front=tub_front_y_m_per_s2'"), "{refused}");
+    }
+
+    #[test]
+    fn a_clock_that_passes_midnight_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let clock = |k: u32| match k {
+            0..10 => format!("23:59:59.{k}"),
+            _ => format!("00:00:0{}.{}", k / 10 - 1, k % 10),
+        };
+        let seconds = |k: u32| format!("{}", (863_990 + k) % 864_000 / 10);
+        let day_seconds = |k: u32| format!("{}.{}", seconds(k), k % 10);
+        for time in [&clock as &dyn Fn(u32) -> String, &day_seconds] {
+            let rows: String = (0..40).map(|k| format!("{},{k}\n", time(k))).collect();
+            std::fs::write(&path, format!("Time,tub_yaw\n{rows}")).unwrap();
+            let mut measured = Measurement::read(&path, &[]).unwrap();
+            assert!(measured.notes.join(";").contains("passes midnight"), "{:?}", measured.notes);
+            measured.count_from_first_row(24.0);
+            for (k, time_s) in measured.time_s.iter().enumerate() {
+                assert!((time_s - 0.1 * k as f64).abs() < 1e-9, "{k}: {time_s}");
+            }
+        }
+        // A fall by less, and one by more than a day, are mistakes.
+        for first_s in [80_000, 100_000] {
+            let text = refused(&format!("time_s,tub_yaw\n{first_s},1\n0,2\n"));
+            assert!(text.contains(&format!("time goes back: 0 s after {first_s} s")), "{text}");
+        }
     }
 
     #[test]
