@@ -369,12 +369,13 @@ fn is_still(values: &[f64]) -> bool {
 fn times(table: &NumberTable, column: &ListColumn, report: &Report) {
     let values = &column.values;
     let mut last = f64::NEG_INFINITY;
-    let mut seen = [false; 3];
+    let mut seen = [false; 4];
     let usual = usual_step(values).unwrap_or_default();
     for (row, &time_s) in values.iter().enumerate() {
         let (mistake, said) = match time_s {
             _ if time_s.is_nan() => (0, "a row without its time".to_owned()),
-            _ if time_s <= last => (1, format!("time goes back: {time_s} s after {last} s")),
+            _ if time_s == last => (3, format!("two rows have the same time, {time_s} s")),
+            _ if time_s < last => (1, format!("time goes back: {time_s} s after {last} s")),
             _ if usual > SLOWEST_S => (2, format!("rows are {usual} s apart: are these ms?")),
             _ => {
                 last = time_s;
@@ -390,7 +391,7 @@ fn times(table: &NumberTable, column: &ListColumn, report: &Report) {
             Diagnostic::new(said).at(&table.place(sources, column.place, row), expected)
         });
     }
-    if seen == [false; 3] {
+    if seen == [false; 4] {
         refuse_long_run(table, column, report);
     }
 }
@@ -470,11 +471,12 @@ mod tests {
 
     #[test]
     fn mistakes_have_their_places() {
-        let text = refused("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n");
+        let text = refused("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n0.05,5\n");
         for said in [
             "does not name a channel",
             "did you mean `tub_front_y_m",
-            "time goes back",
+            "two rows have the same time, 0.1 s",
+            "time goes back: 0.05 s after 0.1 s",
             "without its time",
         ] {
             assert!(text.contains(said), "{said}: {text}");
