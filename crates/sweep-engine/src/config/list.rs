@@ -122,6 +122,14 @@ impl NumberTable {
         }
     }
 
+    /// Returns a value as it stands in a file of text; indices as those of [`Self::place`].
+    pub fn cell(&self, report: &Report, column: usize, row: usize) -> Option<String> {
+        let RowLocations::Lines { source, .. } = &self.rows else { return None };
+        let sources = report.sources();
+        let cell = sources.text(*source).get(self.place(&sources, column, row).span)?;
+        Some(cell.trim_matches('"').to_owned())
+    }
+
     /// Returns notes on ignored lines and columns and on renamed columns, a line each.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();

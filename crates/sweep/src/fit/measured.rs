@@ -124,6 +124,8 @@ pub(crate) struct Measurement {
     /// The reading of a clock that does not start with the run (s), at the first row. Times are
     /// counted from it.
     pub(crate) clock_start_s: Option<f64>,
+    /// The clock time of the first row as it stands in the file, if times are not numbers.
+    first_clock_time: Option<String>,
     /// Stretches of time without any row (s).
     pub(crate) gaps_s: Vec<[f64; 2]>,
     /// Notes on the parts of the file that were read otherwise than they stand, or not at all.
@@ -173,6 +175,12 @@ impl Measurement {
             self.gaps_s = gaps(&self.time_s);
             self.clock_start_s = Some(first_s);
         }
+    }
+
+    /// Returns the reading of a clock that does not start with the run, as messages show it.
+    pub(crate) fn clock_start(&self) -> Option<String> {
+        let start_s = self.clock_start_s?;
+        Some(self.first_clock_time.clone().unwrap_or_else(|| format!("{start_s} s")))
     }
 
     /// Whether the tachometer, if there is one, begins at rest.
@@ -267,6 +275,7 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
         match (name, SignalQuantity::named(name)) {
             ("time_s", _) => {
                 measured.time_s = values.to_vec();
+                measured.first_clock_time = clock_time(&table, column, early, report);
                 times(&table, column, report);
             }
             ("speed_rpm", _) => measured.speed_rpm = Some(values.to_vec()),
@@ -304,7 +313,10 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
             report.push(naming.into_iter().fold(refusal, Diagnostic::help));
         }
     }
-    leave_out_drop_outs(&mut measured);
+    leave_out_drop_outs(&mut measured, |row| {
+        let clock = table.columns.iter().find(|column| column.name.value == "time_s");
+        clock.and_then(|clock| clock_time(&table, clock, early + row, report))
+    });
     measured.gaps_s = gaps(&measured.time_s);
     measured
 }
@@ -325,15 +337,25 @@ fn continue_past_midnight(times: &mut [f64]) -> bool {
     midnights_s > 0.0
 }
 
-/// Removes drop-outs from the speeds, with a note.
-fn leave_out_drop_outs(measured: &mut Measurement) {
+/// Returns a time as it stands in the file, if that is a clock time.
+fn clock_time(
+    table: &NumberTable,
+    column: &ListColumn,
+    row: usize,
+    report: &Report,
+) -> Option<String> {
+    table.cell(report, column.place, row).filter(|cell| cell.contains(':'))
+}
+
+/// Removes drop-outs from the speeds, with a note. `clock_time` returns the clock time of a row.
+fn leave_out_drop_outs(measured: &mut Measurement, clock_time: impl Fn(usize) -> Option<String>) {
     let Some(speed_rpm) = &mut measured.speed_rpm else { return };
     let rows = drop_outs(&measured.time_s, speed_rpm);
     let Some(first) = rows.first() else { return };
-    let first_s = measured.time_s[*first];
+    let at = clock_time(*first).unwrap_or_else(|| format!("{} s", measured.time_s[*first]));
     let samples = counted(rows.len(), "sample");
     let [drop, first] = if rows.len() == 1 { ["drops", ""] } else { ["drop", "the first "] };
-    let note = format!("{samples} of speed_rpm {drop} to zero, {first}at {first_s} s: left out");
+    let note = format!("{samples} of speed_rpm {drop} to zero, {first}at {at}: left out");
     measured.notes.push(note);
     rows.into_iter().for_each(|row| speed_rpm[row] = f64::NAN);
 }
@@ -573,6 +595,15 @@ mod tests {
         std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
         let clock = Measurement::read(&path, &[]).unwrap();
         assert_eq!((clock.time_s[0], clock.time_s[19]), (43_200.0, 43_201.9));
+        let start = |mut measured: Measurement| {
+            measured.count_from_first_row(24.0);
+            measured.clock_start()
+        };
+        assert_eq!(start(clock).as_deref(), Some("12:00:00.0"));
+        let rows: String =
+            (0..20).map(|k| format!("{}.{},{k}\n", 43_200 + k / 10, k % 10)).collect();
+        std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
+        assert_eq!(start(Measurement::read(&path, &[]).unwrap()).as_deref(), Some("43200 s"));
         std::fs::write(&path, &text).unwrap();
         // Without the user's names nothing is measured, and what to do is said.
         let refused = Measurement::read(&path, &[]).unwrap_err().to_string();
