@@ -22,7 +22,7 @@ use crate::design::Design;
 use layout::TextLine;
 use sweep_files::regular;
 
-pub use names::Names;
+pub use names::{ANY_UNIT, Names};
 
 /// Maximum size of a list, and of a Parquet file's decompressed pages, bytes. Basis: it holds the
 /// maximum number of values. Doubling it doubles the memory of a list.

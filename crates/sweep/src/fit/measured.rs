@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use super::algebra::{centred, quantile};
+use super::pulses::{PulseError, Pulses};
+use super::speed::{self, Smoothed};
 use sweep_engine::Diagnostics;
-use sweep_engine::config::list::{ListColumn, Names, NumberTable};
+use sweep_engine::config::list::{ANY_UNIT, ListColumn, Names, NumberTable};
 use sweep_engine::config::report::{Diagnostic, Report};
 use sweep_engine::config::section::counted;
 use sweep_results::nearest;
@@ -118,6 +120,8 @@ pub(crate) struct Measurement {
     pub(crate) time_s: Vec<f64>,
     /// The tachometer, if there is one (rpm); NaN where it has no sample.
     pub(crate) speed_rpm: Option<Vec<f64>>,
+    /// The pulses of the tachometer, if it gives those instead of speeds.
+    pub(super) pulses: Option<Pulses>,
     pub(crate) signals: Vec<Signal>,
     /// Rows before time 0, when the drum is at rest yet: they are left out.
     pub(crate) early: usize,
@@ -172,6 +176,8 @@ impl Measurement {
         let is_after_run = first_s > grid_end_s.max(last_s - first_s) && self.begins_at_rest();
         if first_s > 0.0 && (last_s > LONGEST_RUN_S || is_after_run) {
             self.time_s.iter_mut().for_each(|time_s| *time_s -= first_s);
+            let edges = self.pulses.iter_mut().flat_map(|pulses| &mut pulses.edges_s);
+            edges.for_each(|edge_s| *edge_s -= first_s);
             self.gaps_s = gaps(&self.time_s);
             self.clock_start_s = Some(first_s);
         }
@@ -185,9 +191,21 @@ impl Measurement {
 
     /// Whether the tachometer, if there is one, begins at rest.
     fn begins_at_rest(&self) -> bool {
+        if let (Some(pulses), Some(first_s)) = (&self.pulses, self.time_s.first()) {
+            let [first_rpm, greatest_rpm] = pulses.first_and_greatest_rpm(*first_s);
+            return first_rpm <= REST_SPEED_RATIO * greatest_rpm;
+        }
         let speeds = || self.speed_rpm.iter().flatten().filter(|speed| !speed.is_nan());
         let greatest_rpm = speeds().fold(0.0_f64, |greatest, speed| greatest.max(speed.abs()));
         speeds().next().is_none_or(|first| first.abs() <= REST_SPEED_RATIO * greatest_rpm)
+    }
+
+    /// Fits the spin to the tachometer, if there is one.
+    pub(super) fn smoothed_spin(&self) -> Option<Smoothed> {
+        match &self.pulses {
+            Some(pulses) => pulses.smoothed(),
+            None => speed::smoothed(&self.time_s, self.speed_rpm.as_ref()?),
+        }
     }
 
     /// Whether a column may have this name.
@@ -209,15 +227,25 @@ fn known(header: &str) -> Option<(String, String)> {
             ["time_s", "s"].map(str::to_owned)
         }
         "speed_rpm" | "rpm" | "drehzahl_rpm" => ["speed_rpm", "rpm"].map(str::to_owned),
+        _ if pulses_per_turn(name).is_some() => [name, ANY_UNIT].map(str::to_owned),
         _ => [name.to_owned(), SignalQuantity::named(name)?.units().0],
     };
     Some((name, unit))
 }
 
+/// Returns the number of pulses of a turn that a name such as `tacho_60_pulses` gives; it is 1 for
+/// `tacho_pulses`.
+fn pulses_per_turn(name: &str) -> Option<u32> {
+    match name.strip_prefix("tacho_")?.strip_suffix("pulses")? {
+        "" => Some(1),
+        count => count.strip_suffix('_')?.parse().ok().filter(|count| *count > 0),
+    }
+}
+
 /// Returns every name that a column may have.
 fn all_names() -> Vec<String> {
     let names = SignalQuantity::all().map(SignalQuantity::column);
-    names.chain(["time_s", "speed_rpm"].map(str::to_owned)).collect()
+    names.chain(["time_s", "speed_rpm", "tacho_pulses"].map(str::to_owned)).collect()
 }
 
 /// Returns the mistake of a column whose name is near that of a channel: it is meant to be read.
@@ -249,6 +277,7 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();
     let mut measured = Measurement { name, early, notes, headers, ..Measurement::default() };
     let mut seen: Vec<&str> = Vec::new();
+    let mut pulse_columns: Vec<(&ListColumn, u32)> = Vec::new();
     for column in &table.columns {
         if !column.is_known {
             let mistake = if is_trace { None } else { misspelt(column) };
@@ -290,7 +319,7 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
                 let title = format!("the column `{name}` has {samples} samples");
                 report.push(Diagnostic::new(title).at(at, format!("expected {FEWEST} at least")));
             }
-            (_, None) => {}
+            (_, None) => pulse_columns.extend(pulses_per_turn(name).map(|count| (column, count))),
         }
     }
     let whole = report.is_clean();
@@ -311,6 +340,11 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
                 )
             });
             report.push(naming.into_iter().fold(refusal, Diagnostic::help));
+        }
+    }
+    for (column, per_turn) in pulse_columns {
+        if report.is_clean() {
+            read_pulses(&mut measured, &table, column, per_turn, report);
         }
     }
     leave_out_drop_outs(&mut measured, |row| {
@@ -378,6 +412,39 @@ fn drop_outs(time_s: &[f64], speed_rpm: &[f64]) -> Vec<usize> {
         }
     }
     found
+}
+
+/// Reads a column of pulses as the tachometer and reports what is wrong with it.
+fn read_pulses(
+    measured: &mut Measurement,
+    table: &NumberTable,
+    column: &ListColumn,
+    per_turn: u32,
+    report: &Report,
+) {
+    let name = &column.name.value;
+    if measured.speed_rpm.is_some() || measured.pulses.is_some() {
+        let title = format!("the column `{name}` is a second tachometer");
+        let expected = "expected speed_rpm or one column of pulses";
+        report.push(Diagnostic::new(title).at(&column.name.at, expected));
+        return;
+    }
+    match Pulses::read(&measured.time_s, &column.values[measured.early..], per_turn) {
+        Ok(pulses) => measured.pulses = Some(pulses),
+        Err(PulseError::Few(count)) => {
+            let title = format!("the column `{name}` has {}", counted(count, "pulse"));
+            let expected = "expected three at least: a signal, no count, that rises through half \
+                            of its range once a pulse";
+            report.push(Diagnostic::new(title).at(&column.name.at, expected));
+        }
+        Err(PulseError::Fast(row)) => report.push_with(|sources| {
+            let title = format!("pulses of `{name}` are as fast as half of the sampling rate");
+            let expected = "expected three rows a pulse at least: faster pulses look slower than \
+                            they are";
+            let place = table.place(sources, column.place, measured.early + row);
+            Diagnostic::new(title).at(&place, expected)
+        }),
+    }
 }
 
 /// Whether all samples are one number.
@@ -608,6 +675,42 @@ mod tests {
         // Without the user's names nothing is measured, and what to do is said.
         let refused = Measurement::read(&path, &[]).unwrap_err().to_string();
         assert!(refused.contains("--column 'Acc front=tub_front_y_m_per_s2'"), "{refused}");
+    }
+
+    #[test]
+    fn a_tachometer_by_pulses_is_read() {
+        for (name, per_turn) in [
+            ("tacho_pulses", Some(1)),
+            ("tacho_60_pulses", Some(60)),
+            ("tacho_0_pulses", None),
+            ("tacho_60pulses", None),
+        ] {
+            assert_eq!(pulses_per_turn(name), per_turn, "{name}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let read = |columns: &str, period: u32, further: &str| {
+            let volts = |k: u32| if k % period < period / 2 { 0.1 } else { 4.9 };
+            let rows: String = (0..80)
+                .map(|k| format!("{},{k},{}{further}\n", 0.01 * f64::from(k), volts(k)))
+                .collect();
+            std::fs::write(&path, format!("{columns}\n{rows}")).unwrap();
+            let renamed = [("Tacho".to_owned(), "tacho_12_pulses".to_owned())];
+            Measurement::read(&path, &renamed)
+        };
+        let measured = read("Time,tub_yaw,Tacho [V]", 10, "").unwrap();
+        let spin = measured.smoothed_spin().unwrap().spin;
+        let speeds: Vec<f64> = spin.speeds_rpm([0.0, 0.3, 0.7]).collect();
+        assert!(speeds.iter().all(|speed| (speed - 50.0).abs() < 1e-6), "{speeds:?}");
+        assert!(!measured.begins_at_rest());
+        let wrong =
+            |columns, period, further| read(columns, period, further).unwrap_err().to_string();
+        let text = wrong("Time,tub_yaw,Tacho,rpm", 10, ",50");
+        assert!(text.contains("`tacho_12_pulses` is a second tachometer"), "{text}");
+        let text = wrong("Time,tub_yaw,tacho_pulses", 40, "");
+        assert!(text.contains("has 2 pulses") && text.contains("three at least"), "{text}");
+        let text = wrong("Time,tub_yaw,tacho_pulses", 2, "");
+        assert!(text.contains("half of the sampling rate") && text.contains(":5:"), "{text}");
     }
 
     #[test]
