@@ -1,7 +1,7 @@
 //! `sweep fit`: the numbers that make the model follow a measurement, how well they are known, and
 //! what the map says of that machine.
 //!
-//! `measured` and `speed` read a measurement. `model` compares it with the model and its
+//! `measured`, `pulses` and `speed` read a measurement. `model` compares it with the model and its
 //! derivatives, `search` finds the least cost, `statistics` says how well the numbers are known,
 //! and `report` holds all of it. `evaluations` keeps what a fit has found out.
 
@@ -11,6 +11,7 @@ mod evaluations;
 mod known;
 mod measured;
 mod model;
+mod pulses;
 mod report;
 mod search;
 mod spectrum;
@@ -144,8 +145,7 @@ pub(crate) fn case(
 ) -> Result<FitCase, Error> {
     let (plan, _) = grid.load_point(&[&middle(grid, constants)?, constants].concat())?;
     measured.count_from_first_row(plan.end_s);
-    let smoothed = measured.speed_rpm.as_ref();
-    let smoothed = smoothed.and_then(|speed| speed::smoothed(&measured.time_s, speed));
+    let smoothed = measured.smoothed_spin();
     Ok(FitCase { plan, measured, smoothed })
 }
 

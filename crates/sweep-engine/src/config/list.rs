@@ -22,7 +22,7 @@ use crate::design::Design;
 use layout::TextLine;
 use sweep_files::regular;
 
-pub use names::Names;
+pub use names::{ANY_UNIT, Names};
 
 /// Maximum size of a list, bytes. Basis: it holds the maximum number of values. Doubling it doubles
 /// the memory of a list.
@@ -120,6 +120,14 @@ impl NumberTable {
                 Location::new(*source, span.unwrap_or(start..start))
             }
         }
+    }
+
+    /// Returns a value as it stands in a file of text; indices as those of [`Self::place`].
+    pub fn cell(&self, report: &Report, column: usize, row: usize) -> Option<String> {
+        let RowLocations::Lines { source, .. } = &self.rows else { return None };
+        let sources = report.sources();
+        let cell = sources.text(*source).get(self.place(&sources, column, row).span)?;
+        Some(cell.trim_matches('"').to_owned())
     }
 
     /// Returns notes on ignored lines and columns and on renamed columns, a line each.

@@ -1,6 +1,6 @@
 //! The report of mistakes, which are collected so that one pass shows them all.
 
-use std::cell::RefCell;
+use std::cell::{Ref, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::source::{Location, SourceId, Sources};
@@ -114,6 +114,11 @@ impl Report {
     /// Sets the text of a source that was added without one.
     pub fn fill(&self, id: SourceId, text: String) {
         self.sources.borrow_mut().fill(id, text);
+    }
+
+    /// Returns the texts that are read.
+    pub(super) fn sources(&self) -> Ref<'_, Sources> {
+        self.sources.borrow()
     }
 
     /// Keeps the location of a number by its key: a parameter's name, `time.end_s` and the like for

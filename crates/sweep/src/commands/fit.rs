@@ -48,7 +48,8 @@ const LONG: &str = "\
 Columns are channels of `sweep trace` with their units: tub_front_y_m, tub_yaw_rad, rates \
 (tub_yaw_rad_per_s), accelerations (tub_front_y_m_per_s2), cabinet_force_y_n. Other units are \
 converted: 'Tub yaw [deg]', time_ms. Further columns are left out. A missing sample is empty. The \
-run begins at time 0, at rest; with speed_rpm the spin is the measured one, else the grid's. An \
+run begins at time 0, at rest; with speed_rpm, or pulses of a tachometer (tacho_pulses, or \
+tacho_60_pulses for 60 a turn), the spin is the measured one, else the grid's. An \
 offset of every column is fitted beside the parameters.
 
 With --out, what an interrupted fit has found out stays in FILE.partial, and the same command goes \
@@ -124,7 +125,9 @@ fn header_and_name(text: &str) -> Result<(String, String), String> {
         Some((header, name)) if Measurement::is_name(name) => {
             Ok((header.to_owned(), name.to_owned()))
         }
-        Some((_, name)) => Err(format!("`{name}` is not a channel with its unit")),
+        Some((_, name)) => Err(format!(
+            "`{name}` is not a channel with its unit, time_s, speed_rpm or tacho_pulses"
+        )),
         None => Err("expected HEADER=NAME".to_owned()),
     }
 }

@@ -3,9 +3,12 @@
 use std::path::Path;
 
 use super::algebra::{centred, quantile};
+use super::pulses::{PulseError, Pulses};
+use super::speed::{self, Smoothed};
 use sweep_engine::Diagnostics;
-use sweep_engine::config::list::{ListColumn, Names, NumberTable};
+use sweep_engine::config::list::{ANY_UNIT, ListColumn, Names, NumberTable};
 use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::section::counted;
 use sweep_results::nearest;
 use washer_model::Channel;
 
@@ -23,6 +26,16 @@ pub(super) const LONGEST_RUN_S: f64 = 3600.0;
 /// an unbalance grow with the square of the speed, so those at a tenth are a hundredth of the
 /// greatest. Doubling it lets a run begin with four times that.
 pub(super) const REST_SPEED_RATIO: f64 = 0.1;
+
+/// The length of a day (s).
+const DAY_S: f64 = 86_400.0;
+/// The greatest acceleration of a drum (rpm/s). Basis: a direct drive of 40 N m on a drum of
+/// 0.4 kg m^2. Doubling it leaves drop-outs of a tachometer at twice the speed in the record.
+const GREATEST_ACCELERATION_RPM_PER_S: f64 = 1000.0;
+/// The number of a tachometer's usual steps between samples beyond which speeds about a zero are no
+/// noise. Basis: the sizes of two samples of white noise add up to as much once in a million.
+/// Doubling it leaves drop-outs at the slowest speeds of a coarse tachometer in the record.
+const NOISE_STEPS: f64 = 10.0;
 
 /// The quantity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,12 +120,16 @@ pub(crate) struct Measurement {
     pub(crate) time_s: Vec<f64>,
     /// The tachometer, if there is one (rpm); NaN where it has no sample.
     pub(crate) speed_rpm: Option<Vec<f64>>,
+    /// The pulses of the tachometer, if it gives those instead of speeds.
+    pub(super) pulses: Option<Pulses>,
     pub(crate) signals: Vec<Signal>,
     /// Rows before time 0, when the drum is at rest yet: they are left out.
     pub(crate) early: usize,
     /// The reading of a clock that does not start with the run (s), at the first row. Times are
     /// counted from it.
     pub(crate) clock_start_s: Option<f64>,
+    /// The clock time of the first row as it stands in the file, if times are not numbers.
+    first_clock_time: Option<String>,
     /// Stretches of time without any row (s).
     pub(crate) gaps_s: Vec<[f64; 2]>,
     /// Notes on the parts of the file that were read otherwise than they stand, or not at all.
@@ -159,16 +176,36 @@ impl Measurement {
         let is_after_run = first_s > grid_end_s.max(last_s - first_s) && self.begins_at_rest();
         if first_s > 0.0 && (last_s > LONGEST_RUN_S || is_after_run) {
             self.time_s.iter_mut().for_each(|time_s| *time_s -= first_s);
+            let edges = self.pulses.iter_mut().flat_map(|pulses| &mut pulses.edges_s);
+            edges.for_each(|edge_s| *edge_s -= first_s);
             self.gaps_s = gaps(&self.time_s);
             self.clock_start_s = Some(first_s);
         }
     }
 
+    /// Returns the reading of a clock that does not start with the run, as messages show it.
+    pub(crate) fn clock_start(&self) -> Option<String> {
+        let start_s = self.clock_start_s?;
+        Some(self.first_clock_time.clone().unwrap_or_else(|| format!("{start_s} s")))
+    }
+
     /// Whether the tachometer, if there is one, begins at rest.
     fn begins_at_rest(&self) -> bool {
+        if let (Some(pulses), Some(first_s)) = (&self.pulses, self.time_s.first()) {
+            let [first_rpm, greatest_rpm] = pulses.first_and_greatest_rpm(*first_s);
+            return first_rpm <= REST_SPEED_RATIO * greatest_rpm;
+        }
         let speeds = || self.speed_rpm.iter().flatten().filter(|speed| !speed.is_nan());
         let greatest_rpm = speeds().fold(0.0_f64, |greatest, speed| greatest.max(speed.abs()));
         speeds().next().is_none_or(|first| first.abs() <= REST_SPEED_RATIO * greatest_rpm)
+    }
+
+    /// Fits the spin to the tachometer, if there is one.
+    pub(super) fn smoothed_spin(&self) -> Option<Smoothed> {
+        match &self.pulses {
+            Some(pulses) => pulses.smoothed(),
+            None => speed::smoothed(&self.time_s, self.speed_rpm.as_ref()?),
+        }
     }
 
     /// Whether a column may have this name.
@@ -190,15 +227,25 @@ fn known(header: &str) -> Option<(String, String)> {
             ["time_s", "s"].map(str::to_owned)
         }
         "speed_rpm" | "rpm" | "drehzahl_rpm" => ["speed_rpm", "rpm"].map(str::to_owned),
+        _ if pulses_per_turn(name).is_some() => [name, ANY_UNIT].map(str::to_owned),
         _ => [name.to_owned(), SignalQuantity::named(name)?.units().0],
     };
     Some((name, unit))
 }
 
+/// Returns the number of pulses of a turn that a name such as `tacho_60_pulses` gives; it is 1 for
+/// `tacho_pulses`.
+fn pulses_per_turn(name: &str) -> Option<u32> {
+    match name.strip_prefix("tacho_")?.strip_suffix("pulses")? {
+        "" => Some(1),
+        count => count.strip_suffix('_')?.parse().ok().filter(|count| *count > 0),
+    }
+}
+
 /// Returns every name that a column may have.
 fn all_names() -> Vec<String> {
     let names = SignalQuantity::all().map(SignalQuantity::column);
-    names.chain(["time_s", "speed_rpm"].map(str::to_owned)).collect()
+    names.chain(["time_s", "speed_rpm", "tacho_pulses"].map(str::to_owned)).collect()
 }
 
 /// Returns the mistake of a column whose name is near that of a channel: it is meant to be read.
@@ -215,15 +262,22 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
 }
 
 /// Reads the table as a measurement and reports what is wrong with it.
-fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
+fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement {
+    let clock = table.columns.iter_mut().find(|column| column.name.value == "time_s");
+    let passes_midnight = clock.is_some_and(|clock| continue_past_midnight(&mut clock.values));
     let clock = table.columns.iter().find(|column| column.name.value == "time_s");
     let early = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
     // A file of `sweep trace` counts as a measurement of its nonlinear motion.
     let is_trace = table.columns.iter().any(|column| column.header.starts_with(TRACED));
-    let notes = if is_trace { Vec::new() } else { table.notes() };
+    let mut notes = if is_trace { Vec::new() } else { table.notes() };
+    if passes_midnight {
+        notes
+            .push("its clock passes midnight: times after it are those of the next day".to_owned());
+    }
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();
     let mut measured = Measurement { name, early, notes, headers, ..Measurement::default() };
     let mut seen: Vec<&str> = Vec::new();
+    let mut pulse_columns: Vec<(&ListColumn, u32)> = Vec::new();
     for column in &table.columns {
         if !column.is_known {
             let mistake = if is_trace { None } else { misspelt(column) };
@@ -250,6 +304,7 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
         match (name, SignalQuantity::named(name)) {
             ("time_s", _) => {
                 measured.time_s = values.to_vec();
+                measured.first_clock_time = clock_time(&table, column, early, report);
                 times(&table, column, report);
             }
             ("speed_rpm", _) => measured.speed_rpm = Some(values.to_vec()),
@@ -264,7 +319,7 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
                 let title = format!("the column `{name}` has {samples} samples");
                 report.push(Diagnostic::new(title).at(at, format!("expected {FEWEST} at least")));
             }
-            (_, None) => {}
+            (_, None) => pulse_columns.extend(pulses_per_turn(name).map(|count| (column, count))),
         }
     }
     let whole = report.is_clean();
@@ -287,8 +342,109 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
             report.push(naming.into_iter().fold(refusal, Diagnostic::help));
         }
     }
+    for (column, per_turn) in pulse_columns {
+        if report.is_clean() {
+            read_pulses(&mut measured, &table, column, per_turn, report);
+        }
+    }
+    leave_out_drop_outs(&mut measured, |row| {
+        let clock = table.columns.iter().find(|column| column.name.value == "time_s");
+        clock.and_then(|clock| clock_time(&table, clock, early + row, report))
+    });
     measured.gaps_s = gaps(&measured.time_s);
     measured
+}
+
+/// Adds a day to the times after each midnight, where a clock falls by a day less at most a run.
+/// Returns whether there is one.
+fn continue_past_midnight(times: &mut [f64]) -> bool {
+    let mut midnights_s = 0.0;
+    let mut last_s = f64::NEG_INFINITY;
+    for time_s in times {
+        let fall_s = last_s - (*time_s + midnights_s);
+        if fall_s > DAY_S - LONGEST_RUN_S && fall_s <= DAY_S {
+            midnights_s += DAY_S;
+        }
+        *time_s += midnights_s;
+        last_s = last_s.max(*time_s);
+    }
+    midnights_s > 0.0
+}
+
+/// Returns a time as it stands in the file, if that is a clock time.
+fn clock_time(
+    table: &NumberTable,
+    column: &ListColumn,
+    row: usize,
+    report: &Report,
+) -> Option<String> {
+    table.cell(report, column.place, row).filter(|cell| cell.contains(':'))
+}
+
+/// Removes drop-outs from the speeds, with a note. `clock_time` returns the clock time of a row.
+fn leave_out_drop_outs(measured: &mut Measurement, clock_time: impl Fn(usize) -> Option<String>) {
+    let Some(speed_rpm) = &mut measured.speed_rpm else { return };
+    let rows = drop_outs(&measured.time_s, speed_rpm);
+    let Some(first) = rows.first() else { return };
+    let at = clock_time(*first).unwrap_or_else(|| format!("{} s", measured.time_s[*first]));
+    let samples = counted(rows.len(), "sample");
+    let [drop, first] = if rows.len() == 1 { ["drops", ""] } else { ["drop", "the first "] };
+    let note = format!("{samples} of speed_rpm {drop} to zero, {first}at {at}: left out");
+    measured.notes.push(note);
+    rows.into_iter().for_each(|row| speed_rpm[row] = f64::NAN);
+}
+
+/// Returns the rows of a tachometer's drop-outs: zeros between two speeds between which no drum
+/// could have stopped and started again in time. At a standstill speeds approach zero instead.
+fn drop_outs(time_s: &[f64], speed_rpm: &[f64]) -> Vec<usize> {
+    let is_running = |row: &usize| !speed_rpm[*row].is_nan() && speed_rpm[*row] != 0.0;
+    let rows = 0..time_s.len().min(speed_rpm.len());
+    let running: Vec<usize> = rows.filter(is_running).collect();
+    let steps = running.windows(2).map(|pair| (speed_rpm[pair[1]] - speed_rpm[pair[0]]).abs());
+    let step_rpm = quantile(steps.filter(|step| *step > 0.0), 0.5).unwrap_or_default();
+    let mut found = Vec::new();
+    for pair in running.windows(2) {
+        let [before, after] = [pair[0], pair[1]];
+        let change_rpm = speed_rpm[before].abs() + speed_rpm[after].abs();
+        let possible_rpm = GREATEST_ACCELERATION_RPM_PER_S * (time_s[after] - time_s[before]);
+        if change_rpm > possible_rpm + NOISE_STEPS * step_rpm {
+            found.extend((before + 1..after).filter(|row| speed_rpm[*row] == 0.0));
+        }
+    }
+    found
+}
+
+/// Reads a column of pulses as the tachometer and reports what is wrong with it.
+fn read_pulses(
+    measured: &mut Measurement,
+    table: &NumberTable,
+    column: &ListColumn,
+    per_turn: u32,
+    report: &Report,
+) {
+    let name = &column.name.value;
+    if measured.speed_rpm.is_some() || measured.pulses.is_some() {
+        let title = format!("the column `{name}` is a second tachometer");
+        let expected = "expected speed_rpm or one column of pulses";
+        report.push(Diagnostic::new(title).at(&column.name.at, expected));
+        return;
+    }
+    match Pulses::read(&measured.time_s, &column.values[measured.early..], per_turn) {
+        Ok(pulses) => measured.pulses = Some(pulses),
+        Err(PulseError::Few(count)) => {
+            let title = format!("the column `{name}` has {}", counted(count, "pulse"));
+            let expected = "expected three at least: a signal, no count, that rises through half \
+                            of its range once a pulse";
+            report.push(Diagnostic::new(title).at(&column.name.at, expected));
+        }
+        Err(PulseError::Fast(row)) => report.push_with(|sources| {
+            let title = format!("pulses of `{name}` are as fast as half of the sampling rate");
+            let expected = "expected three rows a pulse at least: faster pulses look slower than \
+                            they are";
+            let place = table.place(sources, column.place, measured.early + row);
+            Diagnostic::new(title).at(&place, expected)
+        }),
+    }
 }
 
 /// Whether all samples are one number.
@@ -302,12 +458,13 @@ fn is_still(values: &[f64]) -> bool {
 fn times(table: &NumberTable, column: &ListColumn, report: &Report) {
     let values = &column.values;
     let mut last = f64::NEG_INFINITY;
-    let mut seen = [false; 3];
+    let mut seen = [false; 4];
     let usual = usual_step(values).unwrap_or_default();
     for (row, &time_s) in values.iter().enumerate() {
         let (mistake, said) = match time_s {
             _ if time_s.is_nan() => (0, "a row without its time".to_owned()),
-            _ if time_s <= last => (1, format!("time goes back: {time_s} s after {last} s")),
+            _ if time_s == last => (3, format!("two rows have the same time, {time_s} s")),
+            _ if time_s < last => (1, format!("time goes back: {time_s} s after {last} s")),
             _ if usual > SLOWEST_S => (2, format!("rows are {usual} s apart: are these ms?")),
             _ => {
                 last = time_s;
@@ -323,7 +480,7 @@ fn times(table: &NumberTable, column: &ListColumn, report: &Report) {
             Diagnostic::new(said).at(&table.place(sources, column.place, row), expected)
         });
     }
-    if seen == [false; 3] {
+    if seen == [false; 4] {
         refuse_long_run(table, column, report);
     }
 }
@@ -403,11 +560,12 @@ mod tests {
 
     #[test]
     fn mistakes_have_their_places() {
-        let text = refused("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n");
+        let text = refused("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n0.05,5\n");
         for said in [
             "does not name a channel",
             "did you mean `tub_front_y_m",
-            "time goes back",
+            "two rows have the same time, 0.1 s",
+            "time goes back: 0.05 s after 0.1 s",
             "without its time",
         ] {
             assert!(text.contains(said), "{said}: {text}");
@@ -504,10 +662,119 @@ mod tests {
         std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
         let clock = Measurement::read(&path, &[]).unwrap();
         assert_eq!((clock.time_s[0], clock.time_s[19]), (43_200.0, 43_201.9));
+        let start = |mut measured: Measurement| {
+            measured.count_from_first_row(24.0);
+            measured.clock_start()
+        };
+        assert_eq!(start(clock).as_deref(), Some("12:00:00.0"));
+        let rows: String =
+            (0..20).map(|k| format!("{}.{},{k}\n", 43_200 + k / 10, k % 10)).collect();
+        std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
+        assert_eq!(start(Measurement::read(&path, &[]).unwrap()).as_deref(), Some("43200 s"));
         std::fs::write(&path, &text).unwrap();
         // Without the user's names nothing is measured, and what to do is said.
         let refused = Measurement::read(&path, &[]).unwrap_err().to_string();
         assert!(refused.contains("--column 'Acc front=tub_front_y_m_per_s2'"), "{refused}");
+    }
+
+    #[test]
+    fn a_tachometer_by_pulses_is_read() {
+        for (name, per_turn) in [
+            ("tacho_pulses", Some(1)),
+            ("tacho_60_pulses", Some(60)),
+            ("tacho_0_pulses", None),
+            ("tacho_60pulses", None),
+        ] {
+            assert_eq!(pulses_per_turn(name), per_turn, "{name}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let read = |columns: &str, period: u32, further: &str| {
+            let volts = |k: u32| if k % period < period / 2 { 0.1 } else { 4.9 };
+            let rows: String = (0..80)
+                .map(|k| format!("{},{k},{}{further}\n", 0.01 * f64::from(k), volts(k)))
+                .collect();
+            std::fs::write(&path, format!("{columns}\n{rows}")).unwrap();
+            let renamed = [("Tacho".to_owned(), "tacho_12_pulses".to_owned())];
+            Measurement::read(&path, &renamed)
+        };
+        let measured = read("Time,tub_yaw,Tacho [V]", 10, "").unwrap();
+        let spin = measured.smoothed_spin().unwrap().spin;
+        let speeds: Vec<f64> = spin.speeds_rpm([0.0, 0.3, 0.7]).collect();
+        assert!(speeds.iter().all(|speed| (speed - 50.0).abs() < 1e-6), "{speeds:?}");
+        assert!(!measured.begins_at_rest());
+        let wrong =
+            |columns, period, further| read(columns, period, further).unwrap_err().to_string();
+        let text = wrong("Time,tub_yaw,Tacho,rpm", 10, ",50");
+        assert!(text.contains("`tacho_12_pulses` is a second tachometer"), "{text}");
+        let text = wrong("Time,tub_yaw,tacho_pulses", 40, "");
+        assert!(text.contains("has 2 pulses") && text.contains("three at least"), "{text}");
+        let text = wrong("Time,tub_yaw,tacho_pulses", 2, "");
+        assert!(text.contains("half of the sampling rate") && text.contains(":5:"), "{text}");
+    }
+
+    #[test]
+    fn a_clock_that_passes_midnight_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let clock = |k: u32| match k {
+            0..10 => format!("23:59:59.{k}"),
+            _ => format!("00:00:0{}.{}", k / 10 - 1, k % 10),
+        };
+        let seconds = |k: u32| format!("{}", (863_990 + k) % 864_000 / 10);
+        let day_seconds = |k: u32| format!("{}.{}", seconds(k), k % 10);
+        for time in [&clock as &dyn Fn(u32) -> String, &day_seconds] {
+            let rows: String = (0..40).map(|k| format!("{},{k}\n", time(k))).collect();
+            std::fs::write(&path, format!("Time,tub_yaw\n{rows}")).unwrap();
+            let mut measured = Measurement::read(&path, &[]).unwrap();
+            assert!(measured.notes.join(";").contains("passes midnight"), "{:?}", measured.notes);
+            measured.count_from_first_row(24.0);
+            for (k, time_s) in measured.time_s.iter().enumerate() {
+                assert!((time_s - 0.1 * k as f64).abs() < 1e-9, "{k}: {time_s}");
+            }
+        }
+        // A fall by less, and one by more than a day, are mistakes.
+        for first_s in [80_000, 100_000] {
+            let text = refused(&format!("time_s,tub_yaw\n{first_s},1\n0,2\n"));
+            assert!(text.contains(&format!("time goes back: 0 s after {first_s} s")), "{text}");
+        }
+    }
+
+    #[test]
+    fn drop_outs_of_the_tachometer_are_left_out_and_a_standstill_is_not() {
+        // A wash in both directions with a wait, then a spin.
+        let course = |t: f64| match t {
+            t if t < 1.0 => 50.0 * t,
+            t if t < 2.0 => 50.0 * (2.0 - t),
+            t if t < 4.0 => 0.0,
+            t if t < 5.0 => -50.0 * (t - 4.0),
+            t if t < 6.0 => -50.0 * (6.0 - t),
+            t => 30.0 * (t - 6.0),
+        };
+        let measured = |step_s: f64, digit_rpm: f64, zeros: &[usize]| {
+            let times: Vec<f64> =
+                (0..(12.0 / step_s) as u32).map(|k| step_s * f64::from(k)).collect();
+            let mut speeds: Vec<f64> =
+                times.iter().map(|t| (course(*t) / digit_rpm).round() * digit_rpm).collect();
+            zeros.iter().for_each(|row| speeds[*row] = 0.0);
+            let yaw = times.iter().map(|t| t.sin()).collect();
+            let columns = [("time_s", times), ("speed_rpm", speeds), ("tub_yaw", yaw)];
+            let columns = columns.map(|(name, values)| (name.to_owned(), values));
+            Measurement::from_columns(columns.to_vec(), &[]).unwrap()
+        };
+        for (step_s, digit_rpm) in [(0.001, 1e-3), (0.001, 5.0), (0.02, 1.0), (0.1, 1e-3)] {
+            let whole = measured(step_s, digit_rpm, &[]);
+            assert!(whole.notes.is_empty(), "{step_s} {digit_rpm}: {:?}", whole.notes);
+            assert!(whole.speed_rpm.unwrap().iter().all(|speed| !speed.is_nan()));
+        }
+        let with_zeros = measured(0.02, 1.0, &[40, 520, 550, 551]);
+        let note = "4 samples of speed_rpm drop to zero, the first at 0.8 s: left out";
+        assert_eq!(with_zeros.notes, [note]);
+        let speeds = with_zeros.speed_rpm.unwrap();
+        let missing: Vec<usize> = (0..speeds.len()).filter(|row| speeds[*row].is_nan()).collect();
+        assert_eq!(missing, [40, 520, 550, 551]);
+        let one = measured(0.02, 1.0, &[520]).notes;
+        assert_eq!(one, ["1 sample of speed_rpm drops to zero, at 10.4 s: left out"]);
     }
 
     #[test]

@@ -315,9 +315,9 @@ impl ReportData<'_> {
         }
         for case in &self.problem.cases {
             let measured = &case.measured;
-            if let Some(start_s) = measured.clock_start_s {
+            if let Some(start) = measured.clock_start() {
                 notes.push(format!(
-                    "{}: its clock reads {start_s} s at the first row; the run is taken to begin \
+                    "{}: its clock reads {start} at the first row; the run is taken to begin \
                      there",
                     measured.name
                 ));

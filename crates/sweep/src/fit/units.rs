@@ -10,7 +10,6 @@ use super::algebra::{Symmetric, centred, dot, scaled};
 use super::measured::{LONGEST_RUN_S, SLOWEST_S, Signal, usual_step};
 use super::model::{FitCase, Free, Problem};
 use super::search::{Descent, DescentEnd, descend};
-use super::speed;
 use super::statistics::EXPLAINED_RATIO;
 
 /// Turns of the drum over which a record's amplitude and phase are taken as constant. Basis: a
@@ -117,12 +116,14 @@ fn converted(case: &FitCase, unit: ClockUnit) -> Option<FitCase> {
         ClockColumn::Time => &mut measured.time_s,
     };
     column.iter_mut().for_each(|value| *value *= unit.factor);
+    if let (ClockColumn::Time, Some(pulses)) = (unit.column, &mut measured.pulses) {
+        pulses.edges_s.iter_mut().for_each(|edge_s| *edge_s *= unit.factor);
+    }
     let end_s = *measured.time_s.last()?;
     if end_s > LONGEST_RUN_S || usual_step(&measured.time_s)? > SLOWEST_S {
         return None;
     }
-    let speed = measured.speed_rpm.as_ref();
-    let smoothed = speed.and_then(|speed| speed::smoothed(&measured.time_s, speed));
+    let smoothed = measured.smoothed_spin();
     Some(FitCase { plan: case.plan.clone(), measured, smoothed })
 }
 

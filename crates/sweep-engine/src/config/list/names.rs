@@ -4,6 +4,10 @@
 use super::super::section::short;
 use super::units::{UnitScale, endings, is_unit, scale, unit_from_suffix};
 
+/// The unit of a quantity whose size does not matter, such as a signal of pulses: columns may be in
+/// any unit, and are not converted.
+pub const ANY_UNIT: &str = "any unit";
+
 /// The names that a reader of a table knows.
 pub struct Names<'a> {
     /// Returns the name of the quantity that a text names, and its unit.
@@ -98,7 +102,7 @@ fn converted(
     own: &str,
 ) -> Result<Match, Contradiction> {
     let Some(unit) = unit else { return Ok(Match { name, scale: UnitScale::ONE }) };
-    if unit == own {
+    if unit == own || own == ANY_UNIT {
         return Ok(Match { name, scale: UnitScale::ONE });
     }
     match scale(unit, own) {
