@@ -140,7 +140,7 @@ def layers():
 
 
 def main():
-    """Check every folder; exit with 1 if files of any import each other, or a generic crate knows a machine."""
+    """Check every folder; exit with 1 if files import each other, or layers are not kept."""
     arguments = sys.argv[1:]
     sources = [word for word in arguments if word != "--draw"] or CHECKED
     sound = [check((ROOT / source).resolve(), "--draw" in arguments) for source in sources]

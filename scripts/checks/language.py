@@ -32,8 +32,9 @@ IMPERATIVES = set("""
     Accept Add Allow Answer Apply Ask Avoid Bound Build Call Change Check Clean Close Collect
     Compare Compute Copy Correct Count Cut Decide Declare Delete Derive Describe Document Draw
     Drop End Exclude Expect Explain Export Extend Fail Find Fix Follow Format Give Guard Handle
-    Hold Implement Import Improve Include Install Integrate Join Keep Let Limit List Load Lock
-    Make Map Mark Measure Merge Move Name Note Order Parse Plot Prefer Print Promise Protect
+    Hold Implement Import Improve Include Install Integrate Join Keep Leave Let Limit List Load Lock
+    Make Map Mark Match Measure Merge Move Name Note Order Parse Plot Point Prefer Print Promise
+    Protect
     Prove Put Raise Read Record Reduce Refuse Release Remove Rename Renew Repair Replace Report
     Require Reset Respect Restore Return Review Rewrite Round Run Save Say Search Separate Set
     Share Shorten Show Simplify Skip Solve Sort Speed Split Start State Stop Store Support Take

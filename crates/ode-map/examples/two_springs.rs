@@ -66,9 +66,11 @@ impl Oscillator<2, 4, 6> for TwoSprings {
     fn accelerations<T: Real>(p: &[N<T>; 6], x: &[N<T>; 2], u: &[N<T>; 2]) -> [N<T>; 2] {
         let [omega_1, omega_2, zeta_1, zeta_2, ..] = *p;
         let ([x1, x2], [u1, u2]) = (*x, *u);
-        let (k1, k2) = ((omega_1 * omega_1).v(), (omega_2 * omega_2).v());
+        let k1 = (omega_1 * omega_1).v();
+        let k2 = (omega_2 * omega_2).v();
         let c = (0.5 * (k1 + k2)).v();
-        let (square_1, square_2) = ((x1 * x1).v(), (x2 * x2).v());
+        let square_1 = (x1 * x1).v();
+        let square_2 = (x2 * x2).v();
         let both = (c * (square_1 + square_2)).v();
         let product = (x1 * x2).v();
         let quadratic_1 = 0.5 * (k1 * (3.0 * square_1 + square_2)).v() + (k2 * product).v();

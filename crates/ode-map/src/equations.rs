@@ -41,7 +41,8 @@ impl<const C: usize, const P: usize> PreparedPoint<C, P> {
         window_s: [f64; 2],
     ) -> Option<Self> {
         let still = [0.0; C];
-        let (mut equilibrium, mut tangent) = (still, tangent::<O, C, D, P>(&p, &still, &still));
+        let mut equilibrium = still;
+        let mut tangent = tangent::<O, C, D, P>(&p, &still, &still);
         // Because of rounding, the iteration may not end before the limit of steps.
         for _ in 0..MAX_NEWTON_STEPS {
             let rest = O::accelerations(&p.map(N), &equilibrium.map(N), &still.map(N));

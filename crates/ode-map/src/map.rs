@@ -72,6 +72,7 @@ const STATUSES: [&str; 8] = [
     "linear_step_too_small",
     "linear_step_limit",
 ];
+/// The index of `no_equilibrium` in [`STATUSES`].
 const NO_EQUILIBRIUM: usize = 4;
 
 /// The model that a grid file describes: an oscillator with a value for every parameter.
@@ -175,7 +176,8 @@ fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
     let amplitude = "largest deviation from equilibrium in the window";
     let ratio = "nonlinear over linear amplitude; null where the linear one is zero or a model \
                  failed";
-    let (limits, methods) = (reliability.limits, METHODS.to_vec());
+    let limits = reliability.limits;
+    let methods = METHODS.to_vec();
     let mut columns = amplitude_columns(&reliability.channels, limits, amplitude, ratio);
     let method_description = "the method that the row's numbers come from";
     columns.extend(verdict_columns(&reliability.channels, limits, methods, method_description));
@@ -330,7 +332,8 @@ fn error_of_finer<const C: usize>(
         }
         let largest = fine.peaks.iter().copied().fold(0.0, f64::max);
         for &channel in channels {
-            let (a, b) = (coarse.peaks[channel], fine.peaks[channel]);
+            let a = coarse.peaks[channel];
+            let b = fine.peaks[channel];
             if a != b {
                 greatest = greatest.max((a - b).abs() / b.max(FLOOR * largest));
             }

@@ -194,13 +194,15 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
 
     #[inline(always)]
     fn begin(&mut self, _: &Forcing<Self, T, D>, x: &[N<T>; D], dx: &[N<T>; D]) {
-        let (samples, counts) = (self.samples(x, dx), self.counts());
+        let samples = self.samples(x, dx);
+        let counts = self.counts();
         self.peaks.begin(&samples, counts);
     }
 
     #[inline(always)]
     fn observe(&mut self, _: &Forcing<Self, T, D>, step: &ObservedStep<'_, T, D>) {
-        let (samples, counts) = (self.samples(step.after, step.slope_after), self.counts());
+        let samples = self.samples(step.after, step.slope_after);
+        let counts = self.counts();
         self.peaks.advance(step.length_s, &samples, counts);
     }
 

@@ -175,7 +175,7 @@ pub(crate) fn assemble_tub<T: Lane>(
     let arm_yaw_x = (centre * tilt.axis_c[2]).v();
     let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
     let arm_pitch = scale(centre, tilt.second_c);
-    let axis_drift = tilt.to_cabinet_axes(&motion.axis_acceleration);
+    let axis_drift = tilt.in_cabinet_axes(&motion.axis_acceleration);
     let drift = scale(centre, axis_drift);
 
     let axial = (b.tub_mass * drift[0]).v();
@@ -336,27 +336,27 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         rho_s[2] += c9 * b.rho_3;
     }
     let rho_a = from_shaft_axes(spin, &rho_s);
-    let w = tilt.to_cabinet_axes(&[
+    let w = tilt.in_cabinet_axes(&[
         b.along_shaft + b.drum_share * rho_a[0],
         (b.drum_share * rho_a[1]).v(),
         (b.drum_share * rho_a[2]).v(),
     ]);
     let drift =
         linear_combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a);
-    let drift = tilt.to_cabinet_axes(&drift);
+    let drift = tilt.in_cabinet_axes(&drift);
     let mut arm_9 = {
         let offset = -(b.drum_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
-        scale(offset, tilt.to_cabinet_axes(&d3_a))
+        scale(offset, tilt.in_cabinet_axes(&d3_a))
     };
     if SKEWED {
         let offset = (b.drum_share * b.rho_3).v();
         let e1_a = [c9, (spin.sin * s9).v(), -(spin.cos * s9).v()];
-        arm_9 = add(arm_9, &scale(offset, tilt.to_cabinet_axes(&e1_a)));
+        arm_9 = add(arm_9, &scale(offset, tilt.in_cabinet_axes(&e1_a)));
     }
     let arm_10 = {
         let [x, y] = [-(b.drum_share * rho[1]).v(), (b.drum_share * rho[0]).v()];
-        tilt.to_cabinet_axes(&from_shaft_axes(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
+        tilt.in_cabinet_axes(&from_shaft_axes(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
     };
     let zero = s9.lit(0.0);
     let arm_7_z = -w[0];
@@ -373,7 +373,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         -(about_10 + drum_moment_e[2]),
     ];
     let axial = (b.rotor_mass * drift[0]).v();
-    let axis_drift = tilt.to_cabinet_axes(axis_acceleration);
+    let axis_drift = tilt.in_cabinet_axes(axis_acceleration);
 
     let mut inertia = rotor_inertia::<T, SKEWED>(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {

@@ -133,8 +133,8 @@ fn describe<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> String {
     }
 }
 
-/// Formats a number with at most 12 significant digits, so that computed ends of a range are without
-/// rounding errors.
+/// Formats a number with at most 12 significant digits, so that computed ends of a range are
+/// without rounding errors.
 fn plain(value: f64) -> String {
     format!("{value:.11e}").parse().unwrap_or(value).to_string()
 }

@@ -246,6 +246,7 @@ impl Layout {
     /// Iterates over all columns of the result: the point's index, the axes, and the model's
     /// columns.
     pub(super) fn all(&self) -> impl Iterator<Item = &Column> + Clone {
+        /// The column of point indices.
         static POINTS: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
             Column::new(POINT, "1", "index in grid order", Holds::Count)
         });

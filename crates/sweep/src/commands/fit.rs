@@ -82,8 +82,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     }
     let out = args.out.as_deref().map(|path| Output::begin(path, FileKind::Own)).transpose()?;
     let count = cases.len();
-    let of_path = |path: &PathBuf| (0..count).map(|k| numbered(path, k)).collect::<Vec<_>>();
-    let curves: Vec<PathBuf> = args.curves.iter().flat_map(of_path).collect();
+    let paths = |path: &PathBuf| (0..count).map(|k| numbered(path, k)).collect::<Vec<_>>();
+    let curves: Vec<PathBuf> = args.curves.iter().flat_map(paths).collect();
     let begun = curves.iter().map(|path| Output::begin(path, FileKind::Fit));
     let begun = begun.collect::<Result<Vec<_>, _>>()?;
     let interrupt = Interrupt::install().map_err(Error::signals)?;

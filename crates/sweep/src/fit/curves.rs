@@ -10,17 +10,19 @@ use super::model::Against;
 use super::spectrum::spectrum;
 use super::{Fitted, Problem};
 
-/// Half standard errors to which profiles reach on both sides.
-const REACH: i32 = 6;
+/// The greatest distance of a profile's points from the best value, in half standard errors. Basis:
+/// three standard errors include every interval of 95 %. Doubling it doubles the evaluations.
+const PROFILE_REACH: i32 = 6;
 
 impl Fitted<'_> {
-    /// The cost's rise beside each free number, the others fitted again as far as they go along
-    /// straight lines.
+    /// Computes the rise of the cost about the best value of each free number, with the others
+    /// fitted again to first order.
     fn profiles(&self) -> Value {
         let Problem { free, .. } = &self.problem;
         let summary = self.problem.summary(&self.against);
         let bread = inverse(&summary.normal);
-        let deviations: Vec<f64> = (-REACH..=REACH).map(|k| 0.5 * f64::from(k)).collect();
+        let deviations: Vec<f64> =
+            (-PROFILE_REACH..=PROFILE_REACH).map(|k| 0.5 * f64::from(k)).collect();
         let set = |k: usize, deviation: f64| -> Vec<f64> {
             let along = deviation / bread[k][k].max(f64::MIN_POSITIVE).sqrt();
             (0..self.x.len())
@@ -35,7 +37,7 @@ impl Fitted<'_> {
             .map(|(k, deviation)| set(k, deviation))
             .collect();
         let costs = self.problem.costs(&sets);
-        let of = |k: usize| {
+        let profile = |k: usize| {
             let own = k * deviations.len()..(k + 1) * deviations.len();
             json!({
                 "name": free[k].parameter.name(),
@@ -44,18 +46,18 @@ impl Fitted<'_> {
                 "cost_above": costs[own].iter().map(|cost| cost - summary.cost).collect::<Vec<_>>(),
             })
         };
-        (0..free.len()).map(of).collect()
+        (0..free.len()).map(profile).collect()
     }
 
-    /// The spectra of a case's measurement and of what is left over; a missing sample is as
-    /// good as none.
+    /// Computes the spectra of a case's measurement and of its residual; missing samples count as
+    /// zero.
     fn spectra(&self, case: usize) -> Value {
         let measured = &self.problem.cases[case].measured;
         let step_s = usual_step(&measured.time_s).unwrap_or(1.0);
         let mut hz = Vec::new();
         let mut column = |one: &Against| {
             let signal = &measured.signals[one.signal];
-            let mut of = |values: &[f64]| {
+            let mut spectral_density = |values: &[f64]| {
                 let mut all = vec![0.0; measured.time_s.len()];
                 signal.samples().zip(values).for_each(|((row, _), value)| all[row] = *value);
                 let density;
@@ -65,8 +67,8 @@ impl Fitted<'_> {
             json!({
                 "name": signal.quantity.column(),
                 "unit": signal.quantity.units().0,
-                "measured": of(&signal.swing()),
-                "residual": of(&one.residual),
+                "measured": spectral_density(&signal.swing()),
+                "residual": spectral_density(&one.residual),
             })
         };
         let own = self.against.iter().filter(|one| one.case == case);

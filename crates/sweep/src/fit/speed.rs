@@ -121,8 +121,9 @@ struct Normal {
 impl Normal {
     /// Computes the normal equations of splines with these knots, and their right side.
     fn of(samples: &[[f64; 2]], knots: &[f64]) -> (Self, Vec<f64>) {
-        let (mut diagonal, mut beside, mut right) =
-            (vec![0.0; knots.len()], vec![0.0; knots.len()], vec![0.0; knots.len()]);
+        let mut diagonal = vec![0.0; knots.len()];
+        let mut beside = vec![0.0; knots.len()];
+        let mut right = vec![0.0; knots.len()];
         for &[time, speed] in samples {
             let (k, share) = place(knots, time);
             let rest = 1.0 - share;

@@ -95,7 +95,9 @@ fn suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, Desce
             ClockColumn::Speed => ("speed_rpm", "rpm"),
             ClockColumn::Time => ("time_s", "s"),
         };
-        let (name, factor, file) = (unit.name, unit.factor, &as_given.measured.name);
+        let name = unit.name;
+        let factor = unit.factor;
+        let file = &as_given.measured.name;
         let gain = if ratio > EXPLAINED_RATIO {
             format!("converted, a short fit explains {:.0} % of the record", 100.0 * ratio)
         } else {

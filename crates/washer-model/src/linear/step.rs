@@ -108,7 +108,7 @@ impl<T: Lane> StepConstants<T> {
     /// derivatives from accelerations.
     #[inline(always)]
     fn deflection(&self, q: &[N<T>; COORDINATES]) -> [N<T>; 4] {
-        Deflection::linear(q, &self.tub_axis, &self.rotor_axis).to_vector()
+        Deflection::linear(q, &self.tub_axis, &self.rotor_axis).as_vector()
     }
 
     /// Computes the load of the bearings' springs on the shaft.

@@ -46,7 +46,7 @@ impl<T: Real> Deflection<T> {
 
     /// Returns offset and tilt as one vector.
     #[inline(always)]
-    pub(crate) fn to_vector(&self) -> [N<T>; 4] {
+    pub(crate) fn as_vector(&self) -> [N<T>; 4] {
         [self.offset[0], self.offset[1], self.tilt[0], self.tilt[1]]
     }
 }
@@ -238,8 +238,8 @@ pub(crate) fn mass_scaled_load<T: Real>(
     let system =
         mass_scaled_system(cap_squared, b.bearing_compliance(), &tub.compliance, &rotor.compliance);
     let both_squared = cap_squared + speed_squared;
-    let d = deflection.to_vector();
-    let sag = sag.to_vector();
+    let d = deflection.as_vector();
+    let sag = sag.as_vector();
     let mut load = d;
     for i in 0..4 {
         load[i] = tub.free[i] - (both_squared * d[i] + rotor.free[i]) + speed_squared * sag[i];

@@ -159,11 +159,11 @@ impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
         for stop in &elements.stops {
             let point = tub.point(&stop.tub);
             let force = scale(-stop.force(&point), stop.direction);
-            add_force(load, &stop.tub, &tub.tilt.to_frame_axes(&force));
+            add_force(load, &stop.tub, &tub.tilt.in_frame_axes(&force));
         }
         for bushing in &elements.bushings {
             let force = bushing.force(&tub.point(&bushing.tub));
-            add_force(load, &bushing.tub, &tub.tilt.to_frame_axes(&force));
+            add_force(load, &bushing.tub, &tub.tilt.in_frame_axes(&force));
         }
     }
 }
@@ -512,17 +512,17 @@ impl<T: Real> TubMotion<T> {
     /// Transforms a vector from tub axes to cabinet axes.
     #[inline(always)]
     pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
-        self.tilt.to_cabinet_axes(v)
+        self.tilt.in_cabinet_axes(v)
     }
 
     /// Computes the motion of a tub point, given in tub axes from P_T.
     #[inline(always)]
     fn point(&self, tub: &Vec3<T>) -> PointMotion<T> {
-        let mut displacement = subtract(self.tilt.to_cabinet_axes(tub), tub);
+        let mut displacement = subtract(self.tilt.in_cabinet_axes(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
         let velocity =
-            self.tilt.to_cabinet_axes(&add_cross_product(&self.velocity, &self.rate, tub));
+            self.tilt.in_cabinet_axes(&add_cross_product(&self.velocity, &self.rate, tub));
         PointMotion { displacement, velocity }
     }
 }

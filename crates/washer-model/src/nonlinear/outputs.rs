@@ -147,9 +147,9 @@ impl<T: Real> Axes<T> {
         let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let drum_front = self.drum_front(b, motion);
         let [omega, alpha] = &self.tub_turn;
-        let apart = self.tub.to_frame_axes(&subtract(drum_front.value, &tub_front.value));
-        let velocity = self.tub.to_frame_axes(&subtract(drum_front.rate, &tub_front.rate));
-        let acceleration = self.tub.to_frame_axes(&subtract(drum_front.second, &tub_front.second));
+        let apart = self.tub.in_frame_axes(&subtract(drum_front.value, &tub_front.value));
+        let velocity = self.tub.in_frame_axes(&subtract(drum_front.rate, &tub_front.rate));
+        let acceleration = self.tub.in_frame_axes(&subtract(drum_front.second, &tub_front.second));
         // Derivatives in the rotating frame of the tub.
         let rate = add_cross_product(&velocity, &apart, omega);
         let second = add_cross_product(
@@ -247,7 +247,7 @@ fn moving_axis<T: Real>(
     let zero = rates[0].lit(0.0);
     let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
     let by_pitch = &tilt.second_c;
-    let at_constant_speeds = tilt.to_cabinet_axes(&at.axis_acceleration);
+    let at_constant_speeds = tilt.in_cabinet_axes(&at.axis_acceleration);
     let by_accelerations = linear_combination(seconds[0], &by_yaw, seconds[1], by_pitch);
     MovingVector {
         value: tilt.axis_c,
@@ -296,7 +296,7 @@ fn drum_to_cabinet_axes<T: Real>(
     (s9, c9): (N<T>, N<T>),
     v: &Vec3<T>,
 ) -> Vec3<T> {
-    shaft.to_cabinet_axes(&from_shaft_axes(spin, &hinge_to_shaft_axes(s9, c9, v)))
+    shaft.in_cabinet_axes(&from_shaft_axes(spin, &hinge_to_shaft_axes(s9, c9, v)))
 }
 
 /// Computes the motion of the point at `distance` along an axis from a bearing midpoint. Coordinate

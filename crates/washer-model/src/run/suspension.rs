@@ -257,7 +257,7 @@ fn tub_from_cabinet(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> 
 
 /// Computes the vector from the cabinet end to the tub end of a tilted tub, in cabinet axes.
 fn from_cabinet<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &Ends<T>) -> Vec3<T> {
-    let tub = tilt.to_cabinet_axes(&ends.tub);
+    let tub = tilt.in_cabinet_axes(&ends.tub);
     [
         tub[0] - ends.cabinet[0],
         tub[1] + q[TUB_Y] - ends.cabinet[1],

@@ -13,8 +13,8 @@ pub(super) const MOVING_MASS: &str = "moving_mass_kg";
 /// follow.
 #[derive(Default)]
 pub(super) struct SheetKeys {
-    /// Whether the file gives a number of a data sheet, so that it may omit numbers that follow from
-    /// a whole one.
+    /// Whether the file gives a number of a data sheet, so that it may omit numbers that follow
+    /// from a whole one.
     pub(super) is_given: bool,
     moving_mass_kg: Option<f64>,
     drum_radius_m: Option<f64>,

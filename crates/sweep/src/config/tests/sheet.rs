@@ -62,7 +62,7 @@ fn missing_and_contradicting_numbers_of_a_data_sheet_are_reported() {
     assert!(found.contains("`moving_mass_kg` beside the tub's mass"), "{found}");
     let found = with("[drum]\n", "[drum]\nmass_kg = 40\n");
     assert!(found.contains("the rule for the left-out `tub_mass_kg` gives"), "{found}");
-    // One mistake, instead of every number that would follow from the depth.
+    // This is one mistake, not one for every number that would follow from the depth.
     let found = with("depth_m = 0.30", "");
     assert!(found.contains("`depth_m` is missing"), "{found}");
     assert!(!found.contains("[tub]") && !found.contains("gravity"), "{found}");
