@@ -53,12 +53,12 @@ pub trait Arguments {
 pub enum Unextended {}
 
 impl Arguments for Unextended {
-    type Run = run::Args;
-    type Check = check::Args;
-    type Plot = plot::Args;
-    type Status = status::Args;
-    type Merge = merge::Args;
-    type Schema = schema::Args;
+    type Run = run::RunArgs;
+    type Check = check::CheckArgs;
+    type Plot = plot::PlotArgs;
+    type Status = status::StatusArgs;
+    type Merge = merge::MergeArgs;
+    type Schema = schema::SchemaArgs;
 }
 
 /// A general subcommand, which the program of every model has.
@@ -69,27 +69,27 @@ pub enum GeneralCommand<A: Arguments> {
     /// Check a grid file and describe its run, without running it
     Check(A::Check),
     /// Trace the curve where a ratio, or any number, is at its limit
-    Boundary(boundary::Args),
+    Boundary(boundary::BoundaryArgs),
     /// Find the parameters that minimise numbers under conditions
-    Optimise(optimise::Args),
+    Optimise(optimise::OptimiseArgs),
     /// Summarise a result file: verdicts, extremes, metrics
-    Show(show::Args),
+    Show(show::ShowArgs),
     /// Draw a result file
     Plot(A::Plot),
     /// Write one page to print: verdict, worst values, pictures
-    Report(report::Args),
+    Report(report::ReportArgs),
     /// Check expressions on a result, and show rows that violate them
-    Require(require::Args),
+    Require(require::RequireArgs),
     /// Show the differences between two results
-    Compare(compare::Args),
+    Compare(compare::CompareArgs),
     /// Write a result as CSV or as an Excel workbook, with units
-    Export(export::Args),
+    Export(export::ExportArgs),
     /// Show the progress of a run: done, missing, failed, running
     Status(A::Status),
     /// Join the finished shards of a run into its one result file
     Merge(A::Merge),
     /// List every parameter that can be set or swept
-    Parameters(parameters::Args),
+    Parameters(parameters::ParametersArgs),
     /// Print the JSON Schema of input files, for editors
     Schema(A::Schema),
 }

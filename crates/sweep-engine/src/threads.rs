@@ -5,9 +5,6 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 /// A lookup of environment variables.
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
-/// A check by which any thread learns whether to end early.
-pub type Cancel<'a> = &'a (dyn Fn() -> bool + Sync);
-
 /// Looks up an environment variable of this process.
 pub fn process(name: &str) -> Option<String> {
     std::env::var(name).ok()

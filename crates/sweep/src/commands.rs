@@ -63,12 +63,12 @@ pub struct Cli {
 pub enum WasherArguments {}
 
 impl Arguments for WasherArguments {
-    type Run = run::Args;
-    type Check = check::Args;
-    type Plot = plot::Args;
-    type Status = held::JobArgs<status::Args>;
-    type Merge = held::JobArgs<merge::Args>;
-    type Schema = schema::Args;
+    type Run = run::WasherRunArgs;
+    type Check = check::WasherCheckArgs;
+    type Plot = plot::WasherPlotArgs;
+    type Status = held::JobArgs<status::StatusArgs>;
+    type Merge = held::JobArgs<merge::MergeArgs>;
+    type Schema = schema::WasherSchemaArgs;
 }
 
 /// A subcommand.
@@ -78,29 +78,29 @@ pub enum Command {
     #[command(flatten)]
     General(GeneralCommand<WasherArguments>),
     /// Write time histories of both models at one point
-    Trace(trace::Args),
+    Trace(trace::TraceArgs),
     /// Find resonance speeds, mode shapes and frequencies over speed
-    Modes(modes::Args),
+    Modes(modes::ModesArgs),
     /// Find periodic responses at held speeds, and their stability
     #[command(after_long_help = held::STABILITY_LONG_HELP)]
     #[command(mut_arg("out", |out| out.help(out_help("stability"))))]
-    Stability(held::Args<held::ResponseOptions>),
+    Stability(held::HeldSpeedArgs<held::ResponseOptions>),
     /// Find the motions in which the machine ends at held speeds
     #[command(after_long_help = held::DWELL_LONG_HELP)]
     #[command(mut_arg("out", |out| out.help(out_help("dwell"))))]
-    Dwell(held::Args<AttractorSearch>),
+    Dwell(held::HeldSpeedArgs<AttractorSearch>),
     /// Explain why the linear model fails at one point
-    Explain(explain::Args),
+    Explain(explain::ExplainArgs),
     /// Estimate the parameters of a machine from measured run-ups
-    Fit(fit::Args),
+    Fit(fit::FitArgs),
     /// Print the script that submits a run to a Slurm cluster
-    Slurm(slurm::Args),
+    Slurm(slurm::SlurmArgs),
     /// Write a commented grid file, or a machine file, to start from
-    Init(init::Args),
+    Init(init::InitArgs),
     /// Write manual pages
-    Man(man::Args),
+    Man(man::ManArgs),
     /// Print shell completions
-    Completions(completions::Args),
+    Completions(completions::CompletionsArgs),
 }
 
 /// Returns the help of `--out` for a command about held speeds, whose default is not that of a run.

@@ -18,7 +18,7 @@ use sweep_parameter::Worse;
 /// Arguments of `sweep boundary`.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = LONG)]
-pub struct Args {
+pub struct BoundaryArgs {
     /// The grid: its first axis gives the rows, its second the range that is searched
     #[command(flatten)]
     pub grid: GridArgs,
@@ -52,7 +52,7 @@ there.";
 /// # Errors
 /// Mistakes in the grid file, a plan without a range to search, and errors of evaluating points or
 /// writing the file.
-pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.grid.load()?;
     if args.options.quantity.is_empty() {
         return show(&listing(&plan));

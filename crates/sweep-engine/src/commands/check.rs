@@ -15,7 +15,7 @@ use sweep_parameter::RatioLimits;
 
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct CheckArgs {
     /// The grid file.
     #[command(flatten)]
     pub grid: GridArgs,
@@ -28,7 +28,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Mistakes in the grid file, no engine for it, or standard output that cannot be written.
-pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &CheckArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.grid.load()?;
     if args.json {
         return show(&format!("{:#}\n", plan.to_json()));

@@ -24,7 +24,7 @@ use sweep_results::{
 /// Arguments of `sweep compare`.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = LONG)]
-pub struct Args {
+pub struct CompareArgs {
     /// The result to compare with: a map, a boundary, or any other Parquet file of this program
     #[arg(value_name = "A")]
     first: PathBuf,
@@ -77,7 +77,7 @@ Values of --fail-on:
 ///
 /// # Errors
 /// Files that cannot be read or compared, and an output that cannot be written.
-pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
     let files = [&args.first, &args.second];
     files.into_iter().try_for_each(|path| refuse_unfinished(path))?;
     let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
@@ -149,7 +149,7 @@ struct Listed {
 }
 
 /// Returns the tables of rows that differ, without empty ones.
-fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
+fn lists(args: &CompareArgs, found: &Comparison) -> Vec<Listed> {
     let most = usize::from(args.rows);
     let mut lists = Vec::new();
     let mut list = |title: String, rows: Vec<&SharedRow>, cells: &dyn Fn(&SharedRow) -> Cells| {
@@ -318,7 +318,7 @@ fn boundary(moved: &BoundaryShift) -> String {
 }
 
 /// Formats the differences as text.
-fn text(args: &Args, found: &Comparison, overridden: &[Overridden]) -> String {
+fn text(args: &CompareArgs, found: &Comparison, overridden: &[Overridden]) -> String {
     let mut text = String::new();
     text.line("A", args.first.display());
     text.line("B", args.second.display());
@@ -349,7 +349,7 @@ const PLAN_SHOWN: usize = 12;
 
 /// Formats the differences as Markdown.
 fn markdown(
-    args: &Args,
+    args: &CompareArgs,
     found: &Comparison,
     overridden: &[Overridden],
     broken: &[String],
@@ -406,7 +406,12 @@ fn escaped(text: &str) -> String {
 }
 
 /// Returns the differences as JSON.
-fn to_json(args: &Args, found: &Comparison, overridden: &[Overridden], broken: &[String]) -> Value {
+fn to_json(
+    args: &CompareArgs,
+    found: &Comparison,
+    overridden: &[Overridden],
+    broken: &[String],
+) -> Value {
     let row = |row: &SharedRow| {
         let place: serde_json::Map<String, Value> =
             found.keys.iter().cloned().zip(row.key.iter().map(|value| json!(value))).collect();

@@ -9,7 +9,7 @@ use sweep_results::{ExportFormat, ResultTable, export};
 
 /// Arguments of `sweep export`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ExportArgs {
     /// A result, trace, modes or boundary file, or any other Parquet file of this program
     #[arg(value_name = "FILE")]
     file: PathBuf,
@@ -23,7 +23,7 @@ pub struct Args {
     output: Option<PathBuf>,
 }
 
-impl Args {
+impl ExportArgs {
     /// Returns the file to write, which is either an argument or an option.
     fn to_write(&self) -> &Path {
         self.out.as_ref().or(self.output.as_ref()).expect("required")
@@ -35,7 +35,7 @@ impl Args {
 /// # Errors
 /// An ending of no format, a file that cannot be read or is too large for the format, an output
 /// that cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub fn run(args: &ExportArgs) -> Result<Exit, Error> {
     let out = args.to_write();
     let Some(format) = ExportFormat::from_path(out) else {
         let expected = format!("a name that ends in {}", endings());

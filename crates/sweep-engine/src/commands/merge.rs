@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// Arguments of `sweep merge`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct MergeArgs {
     #[command(flatten)]
     /// The grid file and the output of the run.
     pub target: ResultArgs,
@@ -23,7 +23,7 @@ pub struct Args {
 /// # Errors
 /// Mistakes in the grid file, [`crate::store::StoreError::Incomplete`] if chunks are missing, and
 /// other errors of the store.
-pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &MergeArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let job = Job::new(&plan);
     let content = |tally: &Tally| Ok(rows(tally, &job));
@@ -35,7 +35,7 @@ pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
 /// # Errors
 /// The errors of [`run`], and those of `content`.
 pub fn merge_job(
-    args: &Args,
+    args: &MergeArgs,
     name: &str,
     job: &Job<'_>,
     output: &Path,

@@ -18,7 +18,7 @@ use sweep_results::{Cell, ResultTable, Slack};
 /// Arguments of `sweep optimise`.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = LONG)]
-pub struct Args {
+pub struct OptimiseArgs {
     /// Study file
     #[arg(value_name = "STUDY.toml")]
     study: PathBuf,
@@ -63,7 +63,7 @@ const LISTED: usize = 12;
 ///
 /// # Errors
 /// Mistakes in the study and its grid file, and errors of evaluating candidates or writing a file.
-pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
     let study = Study::<M>::load(&args.study, &args.sets)?;
     let default = || PathBuf::from(format!("results/{}.parquet", study.name));
     let output = args.out.clone().unwrap_or_else(default);
@@ -161,7 +161,7 @@ fn nearest<M: Model>(study: &Study<M>, file: &ResultTable) -> Result<Option<(u64
 /// Claims the path of the model's own file, if one is asked for, before the search.
 fn own_output<'a, M: Model>(
     study: &Study<M>,
-    args: &'a Args,
+    args: &'a OptimiseArgs,
     output: &Path,
 ) -> Result<Option<(&'a Path, Output<'a>)>, Error> {
     let Some(path) = args.best.as_deref() else { return Ok(None) };

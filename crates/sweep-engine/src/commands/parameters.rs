@@ -9,7 +9,7 @@ use crate::{Error, Exit, GridInput, Model, ModelParameter, Plan, show};
 
 /// Arguments of `sweep parameters`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ParametersArgs {
     /// Grid file whose values are listed; without it only values that need no grid have one
     #[arg(value_name = "GRID.toml")]
     grid: Option<PathBuf>,
@@ -22,7 +22,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Mistakes in the grid file, or standard output that cannot be written.
-pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &ParametersArgs) -> Result<Exit, Error> {
     let plan =
         args.grid.clone().map(|grid| GridInput::<M>::file(grid, Vec::new()).load()).transpose()?;
     let rows = listed(plan.as_ref());

@@ -13,7 +13,7 @@ use sweep_results::nearest;
 
 /// The arguments of `plot` for a model with these views.
 #[derive(Debug, clap::Args)]
-pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
+pub struct PlotArgs<V: ValueEnum + Send + Sync + 'static = DesignView> {
     /// A result file
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
@@ -46,7 +46,7 @@ pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
 ///
 /// # Errors
 /// The errors of [`render`], and a result that is not finished.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub fn run(args: &PlotArgs) -> Result<Exit, Error> {
     draw(args, PlotOptions { view: args.view, ..PlotOptions::default() }, &CommonFigures)
 }
 
@@ -55,7 +55,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 /// # Errors
 /// The errors of [`render`], and a result that is not finished.
 pub fn draw<V: ValueEnum + Send + Sync>(
-    args: &Args<V>,
+    args: &PlotArgs<V>,
     further: PlotOptions,
     model: &dyn Figures,
 ) -> Result<Exit, Error> {

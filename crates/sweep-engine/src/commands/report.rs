@@ -18,7 +18,7 @@ use sweep_results::{Cell, ResultTable, check, ratio_limits, top};
 
 /// Arguments of `sweep report`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ReportArgs {
     /// A result of `sweep run`
     #[arg(value_name = "RESULT")]
     result: PathBuf,
@@ -46,7 +46,7 @@ pub type Resonances<M> = dyn Fn(&Plan<M>) -> Vec<[String; 3]>;
 /// Files that cannot be read or drawn, mistakes in the requirements, and a page that cannot be
 /// written.
 pub fn run<M: Model>(
-    args: &Args,
+    args: &ReportArgs,
     further: &Further<'_>,
     resonances: &Resonances<M>,
     model: &dyn Figures,

@@ -15,7 +15,7 @@ use sweep_results::{Cell, Checked, Condition, ResultTable, check};
 /// Arguments of `sweep require`.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = LONG)]
-pub struct Args {
+pub struct RequireArgs {
     /// A result of `sweep run`, or any other Parquet file of this program
     #[arg(value_name = "FILE")]
     file: PathBuf,
@@ -61,7 +61,7 @@ The exit code is 0 where every expression holds, else 4.";
 ///
 /// # Errors
 /// A file that cannot be read, and every mistake in the expressions.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
     refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
     let conditions = conditions::parse("EXPRESSION", &args.expressions, &file)?;
@@ -139,7 +139,7 @@ fn parts(
 }
 
 /// Formats the result of an expression and of its parts.
-fn format_gate(args: &Args, gate: &Gate, is_random: bool) -> String {
+fn format_gate(args: &RequireArgs, gate: &Gate, is_random: bool) -> String {
     let mut text = format_checked(args, &gate.whole, &gate.intervals);
     for part in &gate.parts {
         let own = format_checked(args, part, &intervals(part, is_random));
@@ -160,7 +160,7 @@ fn with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> String {
 }
 
 /// Formats the result of an expression: a line, and a table of the rows that violate it.
-fn format_checked(args: &Args, checked: &Checked, intervals: &[Option<[f64; 2]>]) -> String {
+fn format_checked(args: &RequireArgs, checked: &Checked, intervals: &[Option<[f64; 2]>]) -> String {
     let verdict = if checked.holds { "holds" } else { "FAILS" };
     let mut text = format!("{verdict}  {}", checked.expression);
     // Writing to a String cannot fail.

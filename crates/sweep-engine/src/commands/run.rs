@@ -16,7 +16,7 @@ use sweep_plot::Share;
 
 /// The arguments of `sweep run`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct RunArgs {
     /// The grid file and the output of the run.
     #[command(flatten)]
     pub target: ResultArgs,
@@ -63,7 +63,7 @@ impl WorkArgs {
 ///
 /// # Errors
 /// Mistakes in the grid file, and the errors of [`execute`].
-pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &RunArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let engine = M::engine(&plan, None)?;
     let report = execute(args, &plan, &engine, &installed()?, "")?;
@@ -84,7 +84,7 @@ pub fn installed() -> Result<Interrupt, Error> {
 /// # Errors
 /// Any [`crate::store::StoreError`]. Finished chunks are stored before.
 pub fn execute<M: Model>(
-    args: &Args,
+    args: &RunArgs,
     plan: &Plan<M>,
     engine: &Engine<'_>,
     interrupt: &Interrupt,

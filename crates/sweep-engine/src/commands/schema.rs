@@ -5,12 +5,12 @@ use crate::{Error, Exit, Model, print};
 
 /// Arguments of `schema`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct SchemaArgs {}
 
 /// Prints the schema of a model's grid files.
 ///
 /// # Errors
 /// When standard output cannot be written.
-pub fn run<M: Model>(_: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(_: &SchemaArgs) -> Result<Exit, Error> {
     print(&format!("{:#}\n", grid::<M>()))
 }

@@ -23,7 +23,7 @@ const MOST_LISTED: usize = 12;
 
 /// Arguments of `sweep show`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ShowArgs {
     /// A result, trace, modes, stability or boundary file; of an unfinished one the progress is
     /// shown
     #[arg(value_name = "FILE")]
@@ -91,7 +91,7 @@ impl Further<'_> {
 /// # Errors
 /// A file that cannot be read, or is not Parquet; a column that it does not have; rows of a result
 /// that is not finished.
-pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
+pub fn run(args: &ShowArgs, further: &Further<'_>) -> Result<Exit, Error> {
     let asks_for_rows = args.top.is_some() || args.by.is_some() || args.keep.is_some();
     if asks_for_rows || !args.columns.is_empty() {
         refuse_unfinished(&args.file)?;
@@ -165,7 +165,7 @@ fn progress(found: &Unfinished) -> String {
 }
 
 /// Shows some rows of the file.
-fn rows(args: &Args) -> Result<Exit, Error> {
+fn rows(args: &ShowArgs) -> Result<Exit, Error> {
     let file = ResultTable::open(&args.file)?;
     let keep = conditions::parse_filter(args.keep.as_ref(), &file)?;
     let columns = shown_columns(args, &file, keep.as_ref());
@@ -193,7 +193,7 @@ fn rows(args: &Args) -> Result<Exit, Error> {
 
 /// Returns the columns of the rows to show: those of `--columns`, or else the axes, the verdict
 /// with its ratio, and the columns of `--by` and `--where`.
-fn shown_columns(args: &Args, file: &ResultTable, keep: Option<&Condition>) -> Vec<String> {
+fn shown_columns(args: &ShowArgs, file: &ResultTable, keep: Option<&Condition>) -> Vec<String> {
     if !args.columns.is_empty() {
         return args.columns.clone();
     }
@@ -216,7 +216,7 @@ fn shown_columns(args: &Args, file: &ResultTable, keep: Option<&Condition>) -> V
 }
 
 /// Returns the content of the text as JSON, with the whole plan.
-fn to_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
+fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
     let column = |column: &ColumnRange| {
         let counts = || column.names.iter().cloned().collect::<Value>();
         json!({

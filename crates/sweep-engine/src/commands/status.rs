@@ -10,7 +10,7 @@ use crate::{Error, Exit, Job, Model, Plan, show};
 
 /// Arguments of `sweep status`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct StatusArgs {
     #[command(flatten)]
     /// The grid file and the output of the run.
     pub target: ResultArgs,
@@ -23,7 +23,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
-pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &StatusArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     show_job(args, &Job::new(&plan), &args.target.output(&plan), ["run", "", ""])
 }
@@ -34,7 +34,7 @@ pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
 /// # Errors
 /// The errors of [`run`].
 pub fn show_job(
-    args: &Args,
+    args: &StatusArgs,
     job: &Job<'_>,
     output: &Path,
     again: [&str; 3],
@@ -43,7 +43,11 @@ pub fn show_job(
     show(&if args.json { format!("{:#}\n", json!(found)) } else { summary(args, &found, again) })
 }
 
-fn summary(args: &Args, found: &FolderStatus, [verb, own, merge_options]: [&str; 3]) -> String {
+fn summary(
+    args: &StatusArgs,
+    found: &FolderStatus,
+    [verb, own, merge_options]: [&str; 3],
+) -> String {
     let mut text = String::new();
     let state = match found.state {
         State::NotStarted => "not started",

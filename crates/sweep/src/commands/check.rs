@@ -14,9 +14,9 @@ use crate::plan::Plan;
 
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct WasherCheckArgs {
     #[command(flatten)]
-    check: engine_check::Args,
+    check: engine_check::CheckArgs,
     /// Vary each number that the machine file leaves out within its expected range, and list these
     /// numbers by their effect, first those that change the verdict
     #[arg(long, conflicts_with = "json")]
@@ -32,7 +32,7 @@ const MAX_TRIAL_POINTS: u64 = 9;
 /// # Errors
 /// Returns an error for mistakes in the grid file, if there is no engine for it, and if standard
 /// output cannot be written.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &WasherCheckArgs) -> Result<Exit, Error> {
     if !args.assumed {
         return engine_check::run::<Washer>(&args.check);
     }

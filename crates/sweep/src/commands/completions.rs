@@ -6,7 +6,7 @@ use sweep_engine::{Error, Exit, print};
 
 /// Arguments of `sweep completions`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct CompletionsArgs {
     /// Shell to complete for
     shell: Shell,
 }
@@ -15,7 +15,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Returns an error if standard output cannot be written.
-pub(crate) fn run(args: &Args, program: clap::Command) -> Result<Exit, Error> {
+pub(crate) fn run(args: &CompletionsArgs, program: clap::Command) -> Result<Exit, Error> {
     print(&script(args.shell, program))
 }
 

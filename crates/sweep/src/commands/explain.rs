@@ -8,7 +8,7 @@ use sweep_engine::{EffortArgs, Error, Exit, Interrupt, show};
 /// Arguments of `sweep explain`.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = LONG_HELP)]
-pub struct Args {
+pub struct ExplainArgs {
     #[command(flatten)]
     grid: GridArgs,
     /// Speeds to look at, in rpm, above 0 [default: from half of the slowest mode's frequency to
@@ -34,7 +34,7 @@ disturbance is measured by its energy. docs/stability.md explains every line.";
 /// # Errors
 /// Returns an error for mistakes in the grid file or the options, for a profile that cannot be
 /// explained, and for a machine without equilibrium or modes.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &ExplainArgs) -> Result<Exit, Error> {
     let (plan, at) = args.grid.load_point(&args.grid.at)?;
     // A signal ends the process, because there are no partial results to keep.
     let interrupt = Interrupt::new();

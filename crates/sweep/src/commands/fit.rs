@@ -13,7 +13,7 @@ use sweep_files::{FileKind, OWN_FILE, Output};
 /// Arguments of `sweep fit`.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = LONG)]
-pub struct Args {
+pub struct FitArgs {
     #[command(flatten)]
     grid: GridArgs,
     /// Measured run: a CSV or Parquet file of time_s, perhaps speed_rpm, and channels with their
@@ -60,7 +60,7 @@ on from there. docs/fit.md explains every line.";
 /// # Errors
 /// Mistakes in the grid file, the measurements or the options; data that cannot tell; and a machine
 /// file that cannot be written.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let grid: WasherGridInput = args.grid.input().with_fixed(&args.grid.at);
     let mut cases = Vec::new();
     let columns = [args.columns.clone(), grid.load()?.aside.columns].concat();

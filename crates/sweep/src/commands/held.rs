@@ -18,7 +18,7 @@ use sweep_files::ParquetFile;
 
 /// Arguments of a command about held speeds. `Options` are those of the command alone.
 #[derive(Debug, clap::Args)]
-pub struct Args<Options: clap::Args> {
+pub struct HeldSpeedArgs<Options: clap::Args> {
     #[command(flatten)]
     target: ResultArgs,
     /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
@@ -65,7 +65,7 @@ The result is written to results/NAME-dwell.parquet unless --out names a file. T
 function of its input, whatever the number of threads, shards and interruptions. An interrupted \
 command leaves its finished rows in FILE.partial, and the same command continues from there.";
 
-impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> Args<Options> {
+impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<Options> {
     /// Finds the attractors or the periodic responses at the speeds, and prints a summary.
     ///
     /// # Errors
@@ -129,7 +129,7 @@ pub struct JobArgs<CommandArgs: clap::Args> {
     held: HeldArgs,
 }
 
-impl JobArgs<status::Args> {
+impl JobArgs<status::StatusArgs> {
     /// Shows the progress of the job, which may be running.
     ///
     /// # Errors
@@ -143,7 +143,7 @@ impl JobArgs<status::Args> {
     }
 }
 
-impl JobArgs<merge::Args> {
+impl JobArgs<merge::MergeArgs> {
     /// Merges the results of the shards.
     ///
     /// # Errors

@@ -17,7 +17,7 @@ const SHORT_MACHINE: &str = include_str!("starter_machine.toml");
 
 /// Arguments of `sweep init`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct InitArgs {
     /// File to write; `-` for standard output [default: grid.toml, or machine.toml with --machine]
     file: Option<PathBuf>,
     /// Write the built-in machine as a machine file instead, to be changed and named by a grid file
@@ -32,7 +32,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Returns an error if the file exists or cannot be written.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &InitArgs) -> Result<Exit, Error> {
     let text = match (args.machine, args.short) {
         (true, true) => SHORT_MACHINE.to_owned(),
         // Scripts read the complete file, in which no number is left to the rules of assumption.

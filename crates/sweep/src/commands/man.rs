@@ -12,7 +12,7 @@ use sweep_files::{self as files, FileKind};
 
 /// Arguments of `sweep man`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ManArgs {
     /// Folder to write them to; made if it is not there
     folder: PathBuf,
 }
@@ -22,7 +22,7 @@ pub struct Args {
 /// # Errors
 /// Returns an error if the folder cannot be written to.
 pub(crate) fn run(
-    args: &Args,
+    args: &ManArgs,
     mut program: clap::Command,
     examples: &dyn Fn(&str) -> Examples,
 ) -> Result<Exit, Error> {

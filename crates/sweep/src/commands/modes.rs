@@ -19,7 +19,7 @@ const COMPARED_MODES: usize = 4;
 
 /// Arguments of `sweep modes`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ModesArgs {
     /// Grid file whose machine is analysed, without its axes [default: the built-in machine]
     #[arg(value_name = "GRID.toml")]
     grid: Option<PathBuf>,
@@ -50,7 +50,7 @@ pub struct Args {
 /// # Errors
 /// Returns an error for mistakes in the grid file or the options, for a machine without equilibrium
 /// or modes, and if output cannot be written.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &ModesArgs) -> Result<Exit, Error> {
     let grid = args.grid.clone().map(|grid| WasherGridInput::file(grid, args.sets.clone()));
     let input = ModesInput::new(grid.as_ref(), &args.at, args.speed.to)?;
     let output =

@@ -11,9 +11,9 @@ use washer_plot::{FigureView, WasherFigures};
 
 /// Arguments of `sweep plot`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct WasherPlotArgs {
     #[command(flatten)]
-    plot: plot::Args<FigureView>,
+    plot: plot::PlotArgs<FigureView>,
 
     /// Channel to show of a trace, of dwells or of responses, as in the column names; may be
     /// repeated
@@ -57,7 +57,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Returns the errors of the engine's command, and an error for a map that no page can compute.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &WasherPlotArgs) -> Result<Exit, Error> {
     let live = args.live.then(|| live(&args.plot.file, &args.sliders)).transpose()?;
     let figures = WasherFigures {
         view: args.plot.view,
@@ -89,10 +89,10 @@ mod tests {
     #[derive(Parser)]
     struct Cli {
         #[command(flatten)]
-        plot: Args,
+        plot: WasherPlotArgs,
     }
 
-    fn parse(line: &str) -> Result<Args, String> {
+    fn parse(line: &str) -> Result<WasherPlotArgs, String> {
         let words = std::iter::once("plot").chain(line.split(' '));
         Cli::try_parse_from(words).map(|cli| cli.plot).map_err(|error| error.to_string())
     }

@@ -14,9 +14,9 @@ use sweep_files::{self as files, ParquetFile};
 
 /// Arguments of `sweep run`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct WasherRunArgs {
     #[command(flatten)]
-    run: engine_run::Args,
+    run: engine_run::RunArgs,
     /// Keep the decimated time histories of every point, too, in NAME.traces beside NAME.parquet:
     /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They are
     /// computed after the map and take some three times as long
@@ -28,7 +28,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Returns an error for mistakes in the grid file, and if the run fails.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &WasherRunArgs) -> Result<Exit, Error> {
     let plan: Plan = args.run.target.grid.load()?;
     let engine = ModelEngine::new(&plan)?;
     if args.keep_traces && plan.points() > MAX_POINT_TRACES {

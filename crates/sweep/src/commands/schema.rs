@@ -5,7 +5,7 @@ use sweep_engine::{Error, Exit, print};
 
 /// Arguments of `sweep schema`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct WasherSchemaArgs {
     /// The schema of machine files instead of grid files
     #[arg(long)]
     machine: bool,
@@ -15,7 +15,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Returns an error if standard output cannot be written.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &WasherSchemaArgs) -> Result<Exit, Error> {
     let schema = if args.machine {
         machine::schema()
     } else {

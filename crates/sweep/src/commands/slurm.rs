@@ -14,7 +14,7 @@ const MAX_ARRAY_TASKS: u64 = 1000;
 
 /// Arguments of `sweep slurm`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct SlurmArgs {
     #[command(flatten)]
     target: ResultArgs,
     /// Number of parts that are computed side by side, each a task of the array
@@ -61,7 +61,7 @@ fn parse_word(text: &str) -> Result<String, String> {
 /// # Errors
 /// Returns an error for mistakes in the grid file, if the working folder or the program has no
 /// path, and if standard output cannot be written.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &SlurmArgs) -> Result<Exit, Error> {
     let plan: Plan = args.target.grid.load()?;
     let no_path = |what: &'static str| {
         move |source| Error::File { action: "find the path of", path: what.into(), source }
@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 ///
 /// # Errors
 /// Returns an error for a name with control characters or not in UTF-8.
-fn check_names(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
+fn check_names(args: &SlurmArgs, folder: &Path, program: &Path) -> Result<(), Error> {
     let ResultArgs { grid, out } = &args.target;
     let paths = [
         ("GRID.toml", Some(grid.grid.as_path())),
@@ -105,7 +105,7 @@ fn check_names(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> 
 }
 
 /// Returns the script, which submits the array and the merge that waits for it.
-fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
+fn script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -> String {
     let output = args.target.output(plan);
     let results = match output.parent() {
         Some(parent) if parent != Path::new("") => parent.to_path_buf(),
@@ -119,7 +119,7 @@ fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
     // `command` begins with the program's bare name; on a node only its path is sure to be found.
     let program = quoted(&program.display().to_string());
     let command = |verb: &str| args.target.command(verb).replacen("sweep", &program, 1);
-    let Args { time, partition, account, mem, .. } = args;
+    let SlurmArgs { time, partition, account, mem, .. } = args;
     let named = [("time", time), ("partition", partition), ("account", account), ("mem", mem)];
     let named = named.into_iter().filter_map(|(option, value)| Some((option, value.as_ref()?)));
     let named = named.map(|(option, value)| format!(" --{option}={}", quoted(value)));
@@ -157,10 +157,10 @@ mod tests {
     #[derive(clap::Parser)]
     struct Line {
         #[command(flatten)]
-        args: Args,
+        args: SlurmArgs,
     }
 
-    fn parse(words: &[&str]) -> Result<Args, clap::Error> {
+    fn parse(words: &[&str]) -> Result<SlurmArgs, clap::Error> {
         Line::try_parse_from([&["slurm"], words].concat()).map(|line| line.args)
     }
 

@@ -21,7 +21,7 @@ use washer_row::{Level, Trajectory, Verdict};
 
 /// Arguments of `sweep trace`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct TraceArgs {
     #[command(flatten)]
     grid: sweep_engine::commands::grid::GridArgs,
     /// Trace the point with this number, which is in a result's column `point`
@@ -73,14 +73,14 @@ pub struct Args {
 /// # Errors
 /// Returns an error for mistakes in the grid file or the options, for a machine without
 /// equilibrium, and if the file cannot be written.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &TraceArgs) -> Result<Exit, Error> {
     let chosen = if args.all { Vec::new() } else { choose_point(args)? };
     let (plan, at) = match args.all {
         true => (args.grid.load()?, None),
         false => args.grid.load_point(&chosen).map(|(plan, at)| (plan, Some(at)))?,
     };
     let every_s = check_spacing((!args.turns).then_some(args.every), &plan)?;
-    let Args { rates, states, forces, angle, model: models, .. } = *args;
+    let TraceArgs { rates, states, forces, angle, model: models, .. } = *args;
     let extras = TraceExtras { rates, states, forces, angle };
     let start = start_from(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
@@ -101,7 +101,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 }
 
 /// Returns the point to trace as texts `NAME=VALUE`, as in `--at`.
-fn choose_point(args: &Args) -> Result<Vec<String>, Error> {
+fn choose_point(args: &TraceArgs) -> Result<Vec<String>, Error> {
     if args.point.is_none() && args.worst.is_none() {
         return Ok(args.grid.at.clone());
     }
@@ -122,7 +122,7 @@ fn choose_point(args: &Args) -> Result<Vec<String>, Error> {
 
 /// Returns the point of the grid's result at which a column is worst, and the bad direction of that
 /// column.
-fn find_worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> {
+fn find_worst(args: &TraceArgs, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", plan.name));
     let path = args.result.clone().unwrap_or_else(default);
     let refused = |expected: String| Error::option("--worst", column, expected);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::Args;
+use super::CompareArgs;
 use crate::{Build, Table};
 use sweep_files::key;
 use sweep_parameter::Worse;
@@ -12,7 +12,7 @@ use sweep_results::{Comparison, ResultTable, SharedRow};
 
 /// Returns the table of differences, with one row for each row that both results have.
 pub(super) fn table(
-    args: &Args,
+    args: &CompareArgs,
     found: &Comparison,
     tables: &[ResultTable; 2],
     build: Build,
