@@ -10,7 +10,7 @@
 use std::process::ExitCode;
 
 use lane_ode::{N, Real};
-use ode_map::{Coordinate, Oscillator, Parameter, Range};
+use ode_map::{Coordinate, Oscillator, OscillatorParameter, Range};
 
 #[derive(Clone, Debug, PartialEq)]
 struct Duffing;
@@ -20,15 +20,15 @@ const fn parameter(
     description: &'static str,
     range: Range,
     default: f64,
-) -> Parameter {
+) -> OscillatorParameter {
     let source = "assumed: Krack and Gross, Harmonic Balance (2019), chapter 5, exercise 1";
-    Parameter { name, unit: "1", description, range, default, source }
+    OscillatorParameter { name, unit: "1", description, range, default, source }
 }
 
 impl Oscillator<1, 2, 4> for Duffing {
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
 
-    const PARAMETERS: [Parameter; 4] = [
+    const PARAMETERS: [OscillatorParameter; 4] = [
         parameter("damping", "coefficient of the speed", Range::NonNegative, 0.05),
         parameter("cubic", "coefficient of the cubed displacement", Range::Any, 0.1),
         parameter("forcing", "amplitude of the forcing", Range::Any, 0.18),

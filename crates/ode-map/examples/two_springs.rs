@@ -11,7 +11,7 @@
 use std::process::ExitCode;
 
 use lane_ode::{N, Real};
-use ode_map::{Coordinate, Oscillator, Parameter, Range};
+use ode_map::{Coordinate, Oscillator, OscillatorParameter, Range};
 
 #[derive(Clone, Debug, PartialEq)]
 struct TwoSprings;
@@ -22,15 +22,15 @@ const fn parameter(
     description: &'static str,
     range: Range,
     default: f64,
-) -> Parameter {
+) -> OscillatorParameter {
     let source = "assumed: example 06 of NLvib has the same oscillator";
-    Parameter { name, unit, description, range, default, source }
+    OscillatorParameter { name, unit, description, range, default, source }
 }
 
 impl Oscillator<2, 4, 6> for TwoSprings {
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
 
-    const PARAMETERS: [Parameter; 6] = [
+    const PARAMETERS: [OscillatorParameter; 6] = [
         parameter(
             "omega_1_rad_per_s",
             "rad/s",

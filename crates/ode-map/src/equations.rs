@@ -17,7 +17,7 @@ const DIVERGENCE_LIMIT: f64 = 1e12;
 
 /// The two models, in the order of columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Model {
+pub(crate) enum OscillatorModel {
     /// The nonlinear equations.
     Nonlinear,
     /// The linearisation about the equilibrium.
@@ -103,7 +103,7 @@ fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
 /// A model as a first-order system over lanes, with one point in each lane. States are deviations
 /// from equilibrium.
 pub(crate) struct Equations<O, T, const C: usize, const D: usize, const P: usize> {
-    model: Model,
+    model: OscillatorModel,
     p: [N<T>; P],
     equilibrium: [N<T>; C],
     by_coordinate: [[N<T>; C]; C],
@@ -116,7 +116,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
     Equations<O, T, C, D, P>
 {
     /// Creates the system without points in its lanes.
-    pub(crate) fn new(model: Model, zero: N<T>) -> Self {
+    pub(crate) fn new(model: OscillatorModel, zero: N<T>) -> Self {
         Self {
             model,
             p: [zero; P],
@@ -153,14 +153,14 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
         let (q, u): ([N<T>; C], [N<T>; C]) = halves(x);
         let mut free = q;
         match self.model {
-            Model::Nonlinear => {
+            OscillatorModel::Nonlinear => {
                 let mut place = q;
                 for i in 0..C {
                     place[i] = q[i] + self.equilibrium[i];
                 }
                 free = O::accelerations(&self.p, &place, &u);
             }
-            Model::Linear => {
+            OscillatorModel::Linear => {
                 for i in 0..C {
                     let mut sum = q[i].lit(0.0);
                     for j in 0..C {

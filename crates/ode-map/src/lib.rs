@@ -18,7 +18,7 @@ use lane_ode::{N, Real};
 
 /// A parameter of an oscillator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameter {
+pub struct OscillatorParameter {
     /// The name in grid files and of the result's column, which ends with the unit.
     pub name: &'static str,
     /// The unit; "1" for none.
@@ -39,7 +39,7 @@ pub trait Oscillator<const C: usize, const D: usize, const P: usize>:
     Clone + std::fmt::Debug + PartialEq + Send + Sync + 'static
 {
     /// The parameters.
-    const PARAMETERS: [Parameter; P];
+    const PARAMETERS: [OscillatorParameter; P];
     /// The coordinates.
     const COORDINATES: [Coordinate; C];
     /// The version of the equations: results of different versions are never mixed.

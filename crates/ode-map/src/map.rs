@@ -9,17 +9,17 @@ use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
 use sweep_engine::config::Keys;
-use sweep_engine::method::{ACCURACY, ATOL, IntegrationMethod, RTOL, STEP_S, StepControl, Steps};
+use sweep_engine::method::{ACCURACY, ATOL, IntegrationMethod, RTOL, STEP_S, StepRule, Steps};
 use sweep_engine::store::{Done, Layout, axis_columns};
 use sweep_engine::{
-    About, Build, Engine, Error, Evaluator, GridInput, GridTable, Model as EngineModel,
-    ModelParameter, Plan, RowSink, RowSource, RunContext, Scenario,
+    About, Build, Engine, Error, Evaluator, GridInput, GridTable, Model, ModelParameter, Plan,
+    RowSink, RowSource, RunContext, Scenario,
 };
 use sweep_parameter::Range;
 
-use crate::equations::{Model, PreparedPoint};
-use crate::run::{Integration, Method, ModelRun};
-use crate::{Coordinate, Oscillator, Parameter};
+use crate::equations::{OscillatorModel, PreparedPoint};
+use crate::run::{Integration, ModelRun, OscillatorMethod};
+use crate::{Coordinate, Oscillator, OscillatorParameter};
 
 /// The methods of integration.
 static INTEGRATION_METHODS: [IntegrationMethod; 3] = [
@@ -27,19 +27,19 @@ static INTEGRATION_METHODS: [IntegrationMethod; 3] = [
         name: "rk4",
         description: "classical Runge-Kutta of order 4, in fixed steps",
         settings: &[STEP_S],
-        steps: StepControl::Fixed,
+        steps: StepRule::Fixed,
     },
     IntegrationMethod {
         name: "dopri5",
         description: "Dormand-Prince 5(4), adaptive",
         settings: &[RTOL, ATOL],
-        steps: StepControl::ByError,
+        steps: StepRule::ByError,
     },
     IntegrationMethod {
         name: "rk4-halved",
         description: "rk4 in steps that are halved until two runs agree",
         settings: &[ACCURACY],
-        steps: StepControl::Checked,
+        steps: StepRule::Checked,
     },
 ];
 
@@ -86,7 +86,7 @@ pub struct Map<O, const C: usize, const D: usize, const P: usize> {
 const EDGES: [(&str, &str); 2] =
     [("window_from_s", "where the window begins"), ("window_to_s", "where the window ends")];
 
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> EngineModel
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Model
     for Map<O, C, D, P>
 {
     /// The position among the oscillator's parameters, behind which the window's edges are.
@@ -104,7 +104,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
 
     fn parameters(&self) -> Vec<ModelParameter<Self>> {
         let own = O::PARAMETERS.into_iter().zip(self.values).map(|(one, value)| {
-            let Parameter { name, unit, description, range, source, .. } = one;
+            let OscillatorParameter { name, unit, description, range, source, .. } = one;
             (name, unit, description, range, source, Some(value))
         });
         let source = "the grid file's [time]";
@@ -136,7 +136,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
     fn walk(&mut self, table: GridTable, keys: &mut Keys<'_>, _: Option<&GridInput<Self>>) {
         if table == GridTable::Top {
             let named = O::PARAMETERS.iter().zip(self.values);
-            let pair = |(one, value): (&Parameter, f64)| (one.name.to_owned(), Value::from(value));
+            let pair = |(one, value): (&OscillatorParameter, f64)| {
+                (one.name.to_owned(), Value::from(value))
+            };
             keys.write("parameters", named.map(pair).collect());
         }
     }
@@ -239,11 +241,13 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     }
 
     /// Returns the method if it is the same for all rows, and the index of its name.
-    fn common_method(&self) -> (Option<Method>, usize) {
+    fn common_method(&self) -> (Option<OscillatorMethod>, usize) {
         let settings = self.plan.integrator.settings();
         match (self.plan.integrator.steps(), &settings[..]) {
-            (Steps::Fixed(step_s), _) => (Some(Method::Rk4(step_s)), 0),
-            (Steps::ByError, &[(_, rtol), (_, atol)]) => (Some(Method::Dopri5(rtol, atol)), 1),
+            (Steps::Fixed(step_s), _) => (Some(OscillatorMethod::Rk4(step_s)), 0),
+            (Steps::ByError, &[(_, rtol), (_, atol)]) => {
+                (Some(OscillatorMethod::Dopri5(rtol, atol)), 1)
+            }
             _ => (None, 0),
         }
     }
@@ -280,7 +284,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     /// Integrates both models at some points by one method.
     fn run_both_models(
         &self,
-        method: Method,
+        method: OscillatorMethod,
         cases: &[&PreparedPoint<C, P>],
         cancel: Cancel<'_>,
     ) -> Vec<[ModelRun<C>; 2]> {
@@ -296,7 +300,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             }
             .runs()
         };
-        let pairs = runs(Model::Nonlinear).into_iter().zip(runs(Model::Linear));
+        let pairs = runs(OscillatorModel::Nonlinear).into_iter().zip(runs(OscillatorModel::Linear));
         pairs.map(|(nonlinear, linear)| [nonlinear, linear]).collect()
     }
 
@@ -306,7 +310,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         let channels = self.channels();
         let mut step_s = (FIRST_STEP_RAD / case.fastest_rad_per_s()).min(self.plan.end_s / 8.0);
         for run_index in 0..MAX_HALVING_RUNS {
-            let now = self.run_both_models(Method::Rk4(step_s), &[case], cancel)[0];
+            let now = self.run_both_models(OscillatorMethod::Rk4(step_s), &[case], cancel)[0];
             row.error =
                 if run_index > 0 { error_of_finer(&row.runs, &now, &channels) } else { None };
             row.converged = Some(row.error.is_some_and(|error| error <= accuracy));

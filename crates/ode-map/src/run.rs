@@ -8,7 +8,7 @@ use lane_ode::{
 };
 
 use crate::Oscillator;
-use crate::equations::{Equations, Model, PreparedPoint};
+use crate::equations::{Equations, OscillatorModel, PreparedPoint};
 
 /// Greatest number of steps of a trajectory, accepted and rejected ones together. Basis: it takes
 /// hours. Doubling it doubles the time until such a trajectory fails.
@@ -23,7 +23,7 @@ const SEGMENTS: usize = 3;
 
 /// A method of integration with its parameters.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Method {
+pub(crate) enum OscillatorMethod {
     /// RK4 with this fixed step (s).
     Rk4(f64),
     /// Dormand-Prince 5(4) with these relative and absolute tolerances.
@@ -49,8 +49,8 @@ impl<const C: usize> ModelRun<C> {
 
 /// The integration of one model at every point, from rest to `end_s`, by one method.
 pub(crate) struct Integration<'a, O, const C: usize, const D: usize, const P: usize> {
-    pub(crate) model: Model,
-    pub(crate) method: Method,
+    pub(crate) model: OscillatorModel,
+    pub(crate) method: OscillatorMethod,
     pub(crate) cases: &'a [&'a PreparedPoint<C, P>],
     pub(crate) end_s: f64,
     /// The request to stop; the results are then meaningless.
@@ -76,12 +76,12 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Ker
     fn run<T: Lane>(self, zero: T) -> Vec<ModelRun<C>> {
         let tolerance = |relative, absolute| Tolerance { relative, absolute, max_steps: MAX_STEPS };
         match self.method {
-            Method::Rk4(step_s) => {
+            OscillatorMethod::Rk4(step_s) => {
                 let mut task = Trajectories::new(zero, &self, step_s);
                 rk4::integrate(zero, &mut task);
                 task.runs
             }
-            Method::Dopri5(relative, absolute) => {
+            OscillatorMethod::Dopri5(relative, absolute) => {
                 let mut task = Trajectories::new(zero, &self, FIRST_STEP * self.end_s);
                 dopri5::integrate(zero, &mut task, &tolerance(relative, absolute));
                 task.runs

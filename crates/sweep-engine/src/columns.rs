@@ -3,7 +3,7 @@
 
 use sweep_parameter::{Channel, Limit, RatioLimits, Worse};
 
-use crate::store::{Column, Holds, Row};
+use crate::store::{DeclaredColumn, Holds, RowCells};
 
 /// The names of the two models.
 pub const MODELS: [&str; 2] = ["nonlinear", "linear"];
@@ -49,7 +49,7 @@ impl AsRef<Self> for Compared {
 /// A column of a result, as a function of a row.
 pub struct ResultColumn<R> {
     /// The column's declaration in the file.
-    pub declared: Column,
+    pub declared: DeclaredColumn,
     /// The function that returns a row's cell.
     pub cell: Box<dyn Fn(&R) -> Option<u64> + Send + Sync>,
 }
@@ -63,7 +63,7 @@ impl<R> ResultColumn<R> {
         kind: Holds,
         cell: impl Fn(&R) -> Option<u64> + Send + Sync + 'static,
     ) -> Self {
-        Self { declared: Column::new(name, unit, description, kind), cell: Box::new(cell) }
+        Self { declared: DeclaredColumn::new(name, unit, description, kind), cell: Box::new(cell) }
     }
 
     /// Creates a column of measured numbers, which hardly ever repeat; null where there is none.
@@ -117,12 +117,12 @@ impl<R> ResultColumn<R> {
 }
 
 /// Returns the cells of a row.
-pub fn row<R>(columns: &[ResultColumn<R>], row: &R) -> Row {
+pub fn row<R>(columns: &[ResultColumn<R>], row: &R) -> RowCells {
     columns.iter().map(|column| (column.cell)(row)).collect()
 }
 
 /// Returns the declarations of columns.
-pub fn declared<R>(columns: Vec<ResultColumn<R>>) -> Vec<Column> {
+pub fn declared<R>(columns: Vec<ResultColumn<R>>) -> Vec<DeclaredColumn> {
     columns.into_iter().map(|column| column.declared).collect()
 }
 

@@ -8,7 +8,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use rayon::ThreadPool;
 
 use crate::engine::IncompleteGroups;
-use crate::store::{Done, Key, Trials, WRITE_INTERVAL};
+use crate::store::{Done, TrialKey, Trials, WRITE_INTERVAL};
 use crate::{Engine, Interrupt, RunContext, StoreError, ThreadsError, threads};
 use sweep_files::panics::{lock, unlocked};
 
@@ -86,7 +86,7 @@ impl<'a> CachedEvaluator<'a> {
     /// Any [`Stopped`].
     pub fn evaluate(
         &self,
-        keys: &[Key],
+        keys: &[TrialKey],
         rows: u64,
         axis_values: &(dyn Fn(usize, u64) -> Vec<f64> + Sync),
         respond: &(dyn Fn(usize, Vec<Done>) -> Result<RequestValues, StoreError> + Sync),
@@ -149,14 +149,14 @@ impl<'a> CachedEvaluator<'a> {
         responses.into_iter().collect::<Option<_>>().ok_or(Stopped::Interrupted)
     }
 
-    fn look_up(&self, key: &Key) -> Option<RequestValues> {
+    fn look_up(&self, key: &TrialKey) -> Option<RequestValues> {
         let cache = lock(&self.cache);
         let cells = cache.as_ref()?.recall(key)?;
         Some(cells.iter().map(|cell| cell.map(f64::from_bits)).collect())
     }
 
     /// Adds a response to the cache, and writes the cache if that is due.
-    fn store(&self, key: &Key, response: &RequestValues) -> Result<(), StoreError> {
+    fn store(&self, key: &TrialKey, response: &RequestValues) -> Result<(), StoreError> {
         if let Some(cache) = lock(&self.cache).as_mut() {
             let cells = response.iter().map(|number| number.map(f64::to_bits)).collect();
             cache.add(key.clone(), cells)?;

@@ -55,7 +55,7 @@ pub const ACCURACY: Setting = Setting {
 
 /// The step control of a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StepControl {
+pub enum StepRule {
     /// Fixed steps of the first setting's length (s), except those that end at an edge of the
     /// window.
     Fixed,
@@ -74,7 +74,7 @@ pub struct IntegrationMethod {
     /// The settings.
     pub settings: &'static [Setting],
     /// The step control.
-    pub steps: StepControl,
+    pub steps: StepRule,
 }
 
 /// The steps of a method with its settings.
@@ -129,9 +129,9 @@ impl Integrator {
     pub fn steps(&self) -> Steps {
         let first = self.values.first().copied().unwrap_or_default();
         match self.method.steps {
-            StepControl::Fixed => Steps::Fixed(first),
-            StepControl::ByError => Steps::ByError,
-            StepControl::Checked => Steps::Checked(first),
+            StepRule::Fixed => Steps::Fixed(first),
+            StepRule::ByError => Steps::ByError,
+            StepRule::Checked => Steps::Checked(first),
         }
     }
 

@@ -48,10 +48,10 @@ pub use merge::write_map;
 pub use open::{OpenOptions, OpenRun, Opened};
 pub use provenance::Session;
 pub use read::{ResultFile, Tally};
-pub use schema::{BATCH_ROWS, Column, Done, Holds, Layout, ResultRows, Row};
+pub use schema::{BATCH_ROWS, DeclaredColumn, Done, Holds, Layout, ResultRows, RowCells};
 pub use shard::{Shard, ShardRequest, list as shard_list};
 pub use status::{FolderStatus, State, status};
-pub use trials::{Key, TrialColumns, Trials, WRITE_INTERVAL};
+pub use trials::{TrialColumns, TrialKey, Trials, WRITE_INTERVAL};
 pub use unfinished::{Unfinished, refuse_unfinished, unfinished};
 
 use sweep_parameter::RatioLimits;
@@ -105,10 +105,10 @@ impl<'a> Job<'a> {
 }
 
 /// Returns the columns of a plan's axes.
-pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
+pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<DeclaredColumn> {
     let column = |axis: &Axis<M>| {
         let parameter = &axis.parameter;
-        Column::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
+        DeclaredColumn::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
     };
     plan.axes.iter().map(column).collect()
 }

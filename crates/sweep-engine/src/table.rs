@@ -14,7 +14,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use serde_json::Value;
 
-use crate::store::schema::{Column, Holds, writer};
+use crate::store::schema::{DeclaredColumn, Holds, writer};
 use crate::{Build, StoreError};
 use sweep_files::batches::from_arrow;
 use sweep_files::{Writer, key, panics, seal};
@@ -23,7 +23,7 @@ use sweep_parameter::{Parameter, Worse};
 /// A result file under construction.
 pub struct Table {
     build: Build,
-    columns: Vec<(Column, ArrayRef)>,
+    columns: Vec<(DeclaredColumn, ArrayRef)>,
     metadata: Vec<KeyValue>,
 }
 
@@ -85,7 +85,7 @@ impl Table {
     }
 
     fn add(&mut self, name: &str, unit: &str, description: &str, kind: Holds, array: ArrayRef) {
-        self.columns.push((Column::new(name, unit, description, kind), array));
+        self.columns.push((DeclaredColumn::new(name, unit, description, kind), array));
     }
 
     /// Adds a JSON value to the file's key-value metadata.
@@ -122,7 +122,7 @@ impl Table {
         self.text(key::VERSION, version.to_owned());
         self.text(key::NUMERICS, numerics.to_string());
         let properties = writer(version, self.metadata).set_dictionary_enabled(false).build();
-        let field = |(column, array): (Column, ArrayRef)| {
+        let field = |(column, array): (DeclaredColumn, ArrayRef)| {
             let data_type = array.data_type().clone();
             let nullable = data_type == DataType::Float64;
             (column.declared(data_type, nullable), array)

@@ -5,7 +5,7 @@ use std::mem::take;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
-use sweep_engine::store::{Column, Done, Holds};
+use sweep_engine::store::{DeclaredColumn, Done, Holds};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Attractor, Channel, Disturbance, GeometryLimit, ModeMotion, StabilityKind};
 use washer_row::{
@@ -84,7 +84,7 @@ impl Columns {
     }
 
     /// Returns the names, units and descriptions of the columns, as a file declares them.
-    pub(crate) fn declared(self) -> Vec<Column> {
+    pub(crate) fn declared(self) -> Vec<DeclaredColumn> {
         declared(self.columns)
     }
 

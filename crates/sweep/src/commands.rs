@@ -52,7 +52,7 @@ const EXAMPLES: &str = include_str!("commands/examples.txt");
     arg_required_else_help = true,
     disable_help_subcommand = true,
 )]
-pub struct Cli {
+pub struct WasherCli {
     /// The subcommand.
     #[command(subcommand)]
     pub command: Command,
@@ -122,7 +122,7 @@ pub(crate) fn command() -> clap::Command {
         Some(examples) => command.before_help(examples),
         None => command,
     };
-    let program = with(Cli::command(), find_examples("sweep"));
+    let program = with(WasherCli::command(), find_examples("sweep"));
     let names: Vec<String> =
         program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
     let program = names.into_iter().fold(program, |program, name| {
@@ -190,7 +190,7 @@ fn suggest(mut error: clap::Error) -> clap::Error {
     error
 }
 
-impl Cli {
+impl WasherCli {
     /// Parses this process's command line. On a mistake or a request for help it prints a message
     /// and ends the process.
     pub fn read() -> Self {

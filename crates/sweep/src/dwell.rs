@@ -18,7 +18,7 @@ use crate::engine::{Carried, find_motions};
 use crate::plan::{Plan, compared_channels};
 use columns::{DwellColumn, DwellRow};
 use sweep_engine::columns::{declared, row};
-use sweep_engine::store::{Column, Done};
+use sweep_engine::store::{DeclaredColumn, Done};
 use sweep_engine::{Error, RunContext};
 
 /// Maximum number of rows that a thread computes together. Basis: their starts fill the lanes.
@@ -151,7 +151,7 @@ impl AttractorSearch {
     }
 
     /// Returns the declared columns of a result.
-    pub(crate) fn columns(&self, plan: &Plan) -> Vec<Column> {
+    pub(crate) fn columns(&self, plan: &Plan) -> Vec<DeclaredColumn> {
         declared(self.row_columns(plan))
     }
 

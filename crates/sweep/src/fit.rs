@@ -26,7 +26,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
-use washer_model::{Method, ModelKind, Parameter, Target};
+use washer_model::{MachineParameter, Method, ModelKind, Target};
 
 use crate::config::WasherGridInput;
 use crate::engine::simd_from_environment;
@@ -194,13 +194,13 @@ fn free_number(
     };
     let machine = &case.plan.model.machine;
     let spin = case.spin();
-    let parameter = match Parameter::find(name, machine, spin) {
+    let parameter = match MachineParameter::find(name, machine, spin) {
         Ok(parameter) if !matches!(parameter.target(), Target::Window(_)) => parameter,
         Ok(_) => {
             return refuse(format!("`{name}` is no number of the machine"), "expected another");
         }
         Err(error) => {
-            let known = Parameter::all(machine, spin);
+            let known = MachineParameter::all(machine, spin);
             let title = format!("`{name}` cannot be fitted: {error}");
             let refusal = Diagnostic::new(title).at(at, "expected a parameter");
             mistakes.push(refusal.nearest(name, known.iter().map(|known| known.name())));

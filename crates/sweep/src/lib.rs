@@ -60,7 +60,7 @@ mod tests;
 mod trace;
 mod washer;
 
-pub use commands::Cli;
+pub use commands::WasherCli;
 pub use config::{Diagnostics, Mistake, WasherGridInput, load};
 pub use dwell::{AttractorSearch, Carry};
 pub use engine::ModelEngine;

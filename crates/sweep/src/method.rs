@@ -3,7 +3,7 @@
 
 use lane_ode::Tolerance;
 pub use sweep_engine::method::Integrator;
-use sweep_engine::method::{ACCURACY, ATOL, IntegrationMethod, RTOL, STEP_S, Setting, StepControl};
+use sweep_engine::method::{ACCURACY, ATOL, IntegrationMethod, RTOL, STEP_S, Setting, StepRule};
 use sweep_parameter::Range;
 use washer_model::{Method, MethodNumbers};
 use washer_row::{Level, MAX_ADAPTIVE_STEPS};
@@ -25,27 +25,27 @@ pub(crate) static METHODS: [IntegrationMethod; 4] = [
         name: "rk4",
         description: "classical Runge-Kutta of order 4, in fixed steps",
         settings: &[STEP_S],
-        steps: StepControl::Fixed,
+        steps: StepRule::Fixed,
     },
     IntegrationMethod {
         name: "dopri5",
         description: "Dormand-Prince 5(4), adaptive",
         settings: &[RTOL, ATOL],
-        steps: StepControl::ByError,
+        steps: StepRule::ByError,
     },
     IntegrationMethod {
         name: "additive",
         description: "ARK5(4)8L[2]SA, adaptive, the springs of bearings and hinge implicit: for \
                       bearings too stiff for the others",
         settings: &[RTOL, ATOL],
-        steps: StepControl::ByError,
+        steps: StepRule::ByError,
     },
     IntegrationMethod {
         name: "rk4-mass-scaled",
         description: "the fast method: capped modes of the bearings, at finer and finer levels \
                       until two agree",
         settings: &[LEVELS_ACCURACY],
-        steps: StepControl::Checked,
+        steps: StepRule::Checked,
     },
 ];
 

@@ -1,7 +1,7 @@
 //! The washing machine's part of a plan, and what the engine knows of its parameters and channels.
 
 use sweep_engine::ModelParameter;
-use washer_model::{Channel, Machine, Parameter, Spin, Target};
+use washer_model::{Channel, Machine, MachineParameter, Spin, Target};
 use washer_row::Measures;
 
 use crate::speeds::SpeedList;
@@ -17,7 +17,7 @@ pub(crate) const fn described(channel: Channel) -> sweep_parameter::Channel {
 
 /// Returns what the engine knows of a parameter of a machine and a spin.
 pub(crate) fn engine_parameter(
-    parameter: Parameter,
+    parameter: MachineParameter,
     machine: &Machine,
     spin: &Spin,
 ) -> ModelParameter<Washer> {
@@ -53,7 +53,7 @@ pub struct Washer {
 
 impl Washer {
     /// Returns what the engine knows of a parameter, with its value.
-    pub(crate) fn parameter(&self, parameter: Parameter) -> ModelParameter<Self> {
+    pub(crate) fn parameter(&self, parameter: MachineParameter) -> ModelParameter<Self> {
         engine_parameter(parameter, &self.machine, &self.spin)
     }
 }

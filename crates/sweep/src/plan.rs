@@ -83,7 +83,7 @@ mod tests {
     use crate::method::rk4_mass_scaled;
     use sweep_engine::design::{Design, DesignRule};
     use sweep_engine::{AxisValues, Model as _, Reliability};
-    use washer_model::{Machine, Parameter, Profile, Spin};
+    use washer_model::{Machine, MachineParameter, Profile, Spin};
     use washer_row::Measures;
 
     fn plan(axes: &[(&str, AxisValues)]) -> Plan {
@@ -91,7 +91,7 @@ mod tests {
         let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
         let axis = |(name, values): &(&str, AxisValues)| Axis {
             parameter: crate::model::engine_parameter(
-                Parameter::find(name, &machine, &spin).unwrap(),
+                MachineParameter::find(name, &machine, &spin).unwrap(),
                 &machine,
                 &spin,
             ),

@@ -19,7 +19,7 @@ use crate::engine::{
     Engine, Evaluator, RunContext, find_responses, map_isolating_panics, simd_from_environment,
 };
 use crate::plan::{Plan, compared_channels, failure_reason, timing};
-use sweep_engine::store::{Column, Holds, Layout, axis_columns};
+use sweep_engine::store::{DeclaredColumn, Holds, Layout, axis_columns};
 use sweep_engine::{Error, Job, RowSink, RowSource};
 use sweep_files::{FileKind, key};
 
@@ -109,7 +109,12 @@ impl<'a> HeldPlan<'a> {
             }
         };
         let mut axes = axis_columns(plan);
-        axes.push(Column::new("speed_rpm", "rpm", "constant spin of the shaft", Holds::Axis));
+        axes.push(DeclaredColumn::new(
+            "speed_rpm",
+            "rpm",
+            "constant spin of the shaft",
+            Holds::Axis,
+        ));
         let speeds = speeds_rpm.len() as u64;
         let layout = Layout {
             axes,

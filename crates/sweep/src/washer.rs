@@ -4,7 +4,7 @@ use serde_json::Value;
 use sweep_engine::config::{Draft, Keys};
 use sweep_engine::store::{Layout, axis_columns};
 use sweep_engine::{About, Engine, Error, Estimate, GridTable, Model, ModelParameter, OwnFile};
-use washer_model::{Channel, Machine, Parameter, UnknownParameter};
+use washer_model::{Channel, Machine, MachineParameter, UnknownParameter};
 use washer_row::{Measures, Metric};
 
 use crate::columns::Columns;
@@ -38,7 +38,7 @@ const CHANNELS: [sweep_parameter::Channel; Channel::ALL.len()] = {
 };
 
 impl Model for Washer {
-    type Handle = Parameter;
+    type Handle = MachineParameter;
 
     const ABOUT: About = About {
         default_channels: &DEFAULT_CHANNELS,
@@ -67,15 +67,15 @@ impl Model for Washer {
     }
 
     fn parameters(&self) -> Vec<ModelParameter<Self>> {
-        let all = Parameter::all(&self.machine, &self.spin).into_iter();
+        let all = MachineParameter::all(&self.machine, &self.spin).into_iter();
         all.map(|parameter| self.parameter(parameter)).collect()
     }
 
     fn find(&self, name: &str) -> Result<ModelParameter<Self>, UnknownParameter> {
-        Parameter::find(name, &self.machine, &self.spin).map(|found| self.parameter(found))
+        MachineParameter::find(name, &self.machine, &self.spin).map(|found| self.parameter(found))
     }
 
-    fn write(&mut self, parameter: &Parameter, value: f64) {
+    fn write(&mut self, parameter: &MachineParameter, value: f64) {
         parameter.set(&mut self.machine, &mut self.spin, value);
     }
 
@@ -143,7 +143,7 @@ mod tests {
         let json: Value = serde_json::from_str(&as_json(&listed::<Washer>(None))).unwrap();
         assert_eq!(
             json.as_array().map(Vec::len),
-            Some(Parameter::all(&Machine::paper(), &spin).len())
+            Some(MachineParameter::all(&Machine::paper(), &spin).len())
         );
         assert_eq!(json[0]["name"], "gravity_m_per_s2");
     }

@@ -11,8 +11,8 @@ use core::ptr;
 use core::slice;
 use lane_ode::Simd;
 use washer_model::{
-    Channel, Machine, ModelKind, Parameter, PointEquations, Profile, STATE_LEN, Spin, Timing,
-    prepare,
+    Channel, Machine, MachineParameter, ModelKind, PointEquations, Profile, STATE_LEN, Spin,
+    Timing, prepare,
 };
 
 /// The equations of one machine and its spin.
@@ -111,7 +111,7 @@ unsafe fn make_equations(setup: &WasherSetup) -> Result<WasherEquations, WasherS
         // SAFETY: the caller's promise.
         let name = unsafe { read_text(name)? };
         let parameter =
-            Parameter::find(name, &machine, &spin).map_err(|_| WasherStatus::UnknownName)?;
+            MachineParameter::find(name, &machine, &spin).map_err(|_| WasherStatus::UnknownName)?;
         parameter.set(&mut machine, &mut spin, value);
     }
     if !machine.violations().is_empty() || !spin.violations().is_empty() {

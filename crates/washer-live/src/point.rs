@@ -117,7 +117,7 @@ impl PointScenario {
 /// Returns the refinement levels of both models at these values.
 fn refinement_levels<'a>(setup: &'a Setup, values: &[f64]) -> &'a [RefinementLevels; 2] {
     let other_sliders = setup.sliders.parameters.iter().zip(values).skip(setup.sliders.axes);
-    let has_moved = |(parameter, value): (&washer_model::Parameter, &f64)| {
+    let has_moved = |(parameter, value): (&washer_model::MachineParameter, &f64)| {
         parameter.get(&setup.machine, &setup.spin) != Some(*value)
     };
     if other_sliders.into_iter().any(has_moved) { &setup.wide_levels } else { &setup.levels }

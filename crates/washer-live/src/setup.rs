@@ -3,7 +3,7 @@
 use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, ElementList, Machine, Method, MethodNumbers, Parameter, Profile, Spin,
+    Channel, ElementList, Machine, MachineParameter, Method, MethodNumbers, Profile, Spin,
 };
 use washer_row::{Criterion, Level, Measures, Metric, RefinementLevel, RefinementLevels, RowRule};
 
@@ -33,7 +33,7 @@ pub struct Setup {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sliders {
     /// The parameters, axes of the map first.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<MachineParameter>,
     /// The number of axes among them.
     pub axes: usize,
 }
@@ -84,7 +84,7 @@ impl Setup {
         let cabinets = walk.count(usize::from(machine.cabinet.is_some()))?;
         machine.cabinet = (cabinets > 0).then(|| machine.cabinet.unwrap_or_default());
         walk_profile(walk, spin)?;
-        let parameters = Parameter::all(machine, spin);
+        let parameters = MachineParameter::all(machine, spin);
         // Numbers of single elements come after those that set all elements.
         for parameter in &parameters {
             let mut value = parameter.get(machine, spin);

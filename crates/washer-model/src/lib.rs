@@ -2,9 +2,10 @@
 //! spin.
 //!
 //! A [`Machine`] is plain numbers in SI units; [`Machine::paper`] is the one of Park, Jeong and Yoo
-//! (2021). Every number also has a flat name ([`Parameter`]) by which it is read, set and swept. A
-//! check reports every [`Violation`] of a machine at once. With a [`Spin`] a machine becomes a
-//! [`Point`]: [`prepare`] finds the static equilibrium and the linear model there. A point leads to
+//! (2021). Every number also has a flat name ([`MachineParameter`]) by which it is read, set and
+//! swept. A check reports every [`Violation`] of a machine at once. With a [`Spin`] a machine
+//! becomes a [`Point`]: [`prepare`] finds the static equilibrium and the linear model there. A
+//! point leads to
 //!
 //! * [`simulate`]: time histories of the nonlinear or the linear model through the lanes of an
 //!   integrator, and their [`Record`];
@@ -86,8 +87,8 @@ pub use dwell::{
 pub use kind::ModelKind;
 pub use linear::Matrices;
 pub use machine::parameters::{
-    Assumption, DataSheet, ElementList, ExpectedRange, Parameter, Range, Target, UnknownParameter,
-    decimal, unit_suffix,
+    Assumption, DataSheet, ElementList, ExpectedRange, MachineParameter, Range, Target,
+    UnknownParameter, decimal, unit_suffix,
 };
 pub use machine::spin::{Profile, Spin};
 pub use machine::violations::Violation;

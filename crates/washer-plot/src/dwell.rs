@@ -42,7 +42,7 @@ const YAW_COLUMN: &str = "q5_rad";
 const PITCH_COLUMN: &str = "q6_rad";
 
 /// An attractor: its speed, the index of its kind, and its deviation by channel.
-type Attractor = (f64, usize, Vec<f64>);
+type DrawnAttractor = (f64, usize, Vec<f64>);
 
 /// Draws the deviations at one point of a dwell file over speed.
 ///
@@ -120,7 +120,7 @@ fn attractors(
     source: &FigureFile,
     held_points: &HeldPoints<'_>,
     channels: &[(&str, &ColumnFacts)],
-) -> Result<Vec<Attractor>, PlotError> {
+) -> Result<Vec<DrawnAttractor>, PlotError> {
     let mut columns = channel_columns(channels, ["nonlinear"]);
     columns.push(TURN_COLUMN.to_owned());
     let has_turns = source.column(TURN_COLUMN).is_some();

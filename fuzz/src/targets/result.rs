@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::Parser as _;
-use sweep::{Cli, Job, OpenRun, Plan, State, status};
+use sweep::{Job, OpenRun, Plan, State, WasherCli, status};
 use tempfile::TempDir;
 
 /// Runs the target with an input; a panic is a finding.
@@ -52,7 +52,7 @@ fn with_digest(bytes: &[u8]) -> Vec<u8> {
 
 /// Runs a command with the words of its command line.
 fn run_command(words: &[&str]) {
-    let cli = Cli::try_parse_from(words).expect("the line is right");
+    let cli = WasherCli::try_parse_from(words).expect("the line is right");
     if let Err(error) = cli.command.run() {
         assert!(!error.to_string().is_empty());
     }

@@ -7,7 +7,7 @@ use sweep_parameter::{Channel, Worse};
 use sweep_results::{Column as KnownColumn, Goal, columns};
 
 use crate::config::{Diagnostic, Location, Report};
-use crate::store::{Column, Holds};
+use crate::store::{DeclaredColumn, Holds};
 use crate::{Error, Model, Plan, nearest};
 
 /// The prefix of the columns of ratios.
@@ -66,7 +66,7 @@ impl TracedQuantity {
 
 /// Returns every column whose limit can be traced, each with a plan that computes it. This includes
 /// channels and metrics that the grid file leaves out.
-pub fn offered<M: Model>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
+pub fn offered<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<M>)> {
     // The plan of a channel's columns compares this channel alone.
     let channel_plan = |channel: &Channel| {
         let mut plan = plan.clone();
@@ -77,7 +77,7 @@ pub fn offered<M: Model>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     least.reliability.limits.least = Some(plan.reliability.limits.over_estimate());
     let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
     let plans = M::ABOUT.channels.iter().map(channel_plan).chain(further.map(|plan| (plan, None)));
-    let mut offered: Vec<(Column, Plan<M>)> = Vec::new();
+    let mut offered: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
     for (plan, only) in plans {
         for column in M::layout(&plan).columns {
             let is_number = matches!(column.kind, Holds::Measured | Holds::Time | Holds::Count);

@@ -6,7 +6,9 @@ use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::written::finite;
 use crate::evaluator::{CachedEvaluator, RequestValues, Stopped};
 use crate::optimise::search::defect;
-use crate::store::{Column, Done, Holds, Key, Layout, ResultRows, TrialColumns, axis_columns};
+use crate::store::{
+    DeclaredColumn, Done, Holds, Layout, ResultRows, TrialColumns, TrialKey, axis_columns,
+};
 use crate::{AxisValues, Error, Model, Plan, StoreError};
 use sweep_results::Goal;
 
@@ -184,7 +186,7 @@ impl<M: Model> BoundaryTask<M> {
             let values: Vec<Vec<f64>> =
                 trials.iter().map(|trial| self.axis_values(trial)).collect();
             let key = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
-            let keys: Vec<Key> = values.iter().map(key).collect();
+            let keys: Vec<TrialKey> = values.iter().map(key).collect();
             let values = |k: usize, _: u64| values[k].clone();
             let answer = |k: usize, points: Vec<Done>| -> Result<RequestValues, StoreError> {
                 let distance = |done: Done| -> Result<Option<f64>, StoreError> {
@@ -212,7 +214,7 @@ impl<M: Model> BoundaryTask<M> {
             "signed distance of {name} from {limit}, negative on the good side; null where {name} \
              is not defined"
         );
-        let distance = Column::new("distance", "1", about, Holds::Measured);
+        let distance = DeclaredColumn::new("distance", "1", about, Holds::Measured);
         TrialColumns { keys: axis_columns(&self.plan), answers: vec![distance] }
     }
 }

@@ -10,7 +10,7 @@ use crate::boundary::quantity::offered;
 use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow, trace};
 use crate::config::section::counted;
 use crate::evaluator::{CachedEvaluator, Stopped};
-use crate::store::{Column, Opened, Trials};
+use crate::store::{DeclaredColumn, Opened, Trials};
 use crate::{Effort, EffortArgs, Error, Exit, Model, Plan, Progress, duration, show, tell};
 use sweep_files::{FileKind, Output};
 use sweep_parameter::Worse;
@@ -97,11 +97,11 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
 fn listing<M: Model>(plan: &Plan<M>) -> String {
     let columns = offered(plan);
     let width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
-    let row = |(column, _): &(Column, Plan<M>)| {
+    let row = |(column, _): &(DeclaredColumn, Plan<M>)| {
         let side = column.worse.map_or("", Worse::name);
         let limit = column.limit.map_or_else(|| "--limit".to_owned(), |of| short(of.value));
         let meaning = column.description.split(';').next().unwrap_or_default();
-        let Column { name, unit, .. } = column;
+        let DeclaredColumn { name, unit, .. } = column;
         format!("{name:width$}  {unit:>4}  worse the {side:7}  limit {limit:7}  {meaning}\n")
     };
     columns.iter().map(row).collect()

@@ -139,32 +139,33 @@ fn verdict(row: &SharedRow, limit_side: usize) -> &'static str {
 }
 
 /// The cells of both files, and the change between them if it is shown.
-type Cells = ([String; 2], Option<String>);
+type ComparedCells = ([String; 2], Option<String>);
 
 /// A table with a title, which every output format shows.
-struct Listed {
+struct TitledTable {
     title: String,
     headings: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
 /// Returns the tables of rows that differ, without empty ones.
-fn lists(args: &CompareArgs, found: &Comparison) -> Vec<Listed> {
+fn lists(args: &CompareArgs, found: &Comparison) -> Vec<TitledTable> {
     let most = usize::from(args.rows);
     let mut lists = Vec::new();
-    let mut list = |title: String, rows: Vec<&SharedRow>, cells: &dyn Fn(&SharedRow) -> Cells| {
-        if rows.is_empty() {
-            return;
-        }
-        let whole = |row: &SharedRow| -> Vec<String> {
-            let (sides, change) = cells(row);
-            row.key.iter().map(|value| short(*value)).chain(sides).chain(change).collect()
+    let mut list =
+        |title: String, rows: Vec<&SharedRow>, cells: &dyn Fn(&SharedRow) -> ComparedCells| {
+            if rows.is_empty() {
+                return;
+            }
+            let whole = |row: &SharedRow| -> Vec<String> {
+                let (sides, change) = cells(row);
+                row.key.iter().map(|value| short(*value)).chain(sides).chain(change).collect()
+            };
+            let rows: Vec<_> = rows.into_iter().map(whole).collect();
+            let headings = found.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
+            let headings = headings.take(rows[0].len()).map(str::to_owned).collect();
+            lists.push(TitledTable { title, headings, rows });
         };
-        let rows: Vec<_> = rows.into_iter().map(whole).collect();
-        let headings = found.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
-        let headings = headings.take(rows[0].len()).map(str::to_owned).collect();
-        lists.push(Listed { title, headings, rows });
-    };
     // If results have a lower limit of ratios, the least ratio decides on the verdict too.
     let two_sided = found.columns.iter().any(|column| column.name == "ratio_min");
     let verdict_cell = |row: &SharedRow, side: usize| {
@@ -201,8 +202,8 @@ fn lists(args: &CompareArgs, found: &Comparison) -> Vec<Listed> {
 }
 
 /// Returns the table of the greatest changes of a column that `--fail-on` names.
-fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<Listed> {
-    let FailOn::Column(name, _) = fail_on else { return None };
+fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<TitledTable> {
+    let FailOn::DeclaredColumn(name, _) = fail_on else { return None };
     let column = found.columns.iter().find(|column| column.name == *name)?;
     let rows = column.worst.iter().take(most).map(|worst| {
         let [first, second] = worst.values;
@@ -217,7 +218,7 @@ fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<List
     let title = format!("greatest changes of {name}{unit}{}", column.unit);
     let headings = found.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
     let headings = headings.map(str::to_owned).collect();
-    (!rows.is_empty()).then_some(Listed { title, headings, rows })
+    (!rows.is_empty()).then_some(TitledTable { title, headings, rows })
 }
 
 /// Returns the lines of the summary, each with a name: overridden numbers, shared rows, columns,
@@ -335,7 +336,7 @@ fn text(args: &CompareArgs, found: &Comparison, overridden: &[Overridden]) -> St
     for (name, told) in facts(found, overridden) {
         text.line(name, &told);
     }
-    for Listed { title, headings, rows } in lists(args, found) {
+    for TitledTable { title, headings, rows } in lists(args, found) {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{title}");
         text.push_str(&table(&headings, &rows, "  "));
@@ -375,7 +376,7 @@ fn markdown(
     for (name, told) in facts(found, overridden) {
         let _ = writeln!(text, "- {name}: {}", escaped(&told));
     }
-    for Listed { title, headings, rows } in lists(args, found) {
+    for TitledTable { title, headings, rows } in lists(args, found) {
         let row = |cells: &[String]| {
             let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
             format!("| {} |\n", cells.join(" | "))

@@ -30,7 +30,7 @@ pub fn run<M: Model>(args: &ParametersArgs) -> Result<Exit, Error> {
 }
 
 /// A line of the listing of parameters.
-pub struct Listed<M: Model> {
+pub struct ListedParameter<M: Model> {
     /// The parameter.
     pub parameter: ModelParameter<M>,
     /// The value, if there is one.
@@ -40,7 +40,7 @@ pub struct Listed<M: Model> {
 }
 
 /// Returns the lines of the listing; without a plan, those of the model's default values.
-pub fn listed<M: Model>(plan: Option<&Plan<M>>) -> Vec<Listed<M>> {
+pub fn listed<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<M>> {
     let line = |parameter: ModelParameter<M>| {
         let value = match parameter.window_edge {
             Some(edge) => plan.map(|plan| plan.window_s[edge]),
@@ -50,7 +50,7 @@ pub fn listed<M: Model>(plan: Option<&Plan<M>>) -> Vec<Listed<M>> {
         let written = plan.filter(|_| !parameter.is_in_grid);
         let written = written.and_then(|plan| plan.written.source(&parameter.parts));
         let source = written.unwrap_or_else(|| parameter.source.to_owned());
-        Listed { parameter, value, source }
+        ListedParameter { parameter, value, source }
     };
     let parameters = match plan {
         Some(plan) => plan.model.parameters(),
@@ -59,14 +59,16 @@ pub fn listed<M: Model>(plan: Option<&Plan<M>>) -> Vec<Listed<M>> {
     parameters.into_iter().map(line).collect()
 }
 
-fn as_text<M: Model>(rows: &[Listed<M>]) -> String {
-    let value =
-        |row: &Listed<M>| row.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
-    let width = |length: &dyn Fn(&Listed<M>) -> usize| rows.iter().map(length).max().unwrap_or(0);
+fn as_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
+    let value = |row: &ListedParameter<M>| {
+        row.value.map_or_else(|| "-".to_owned(), |value| value.to_string())
+    };
+    let width =
+        |length: &dyn Fn(&ListedParameter<M>) -> usize| rows.iter().map(length).max().unwrap_or(0);
     let name_width = width(&|row| row.parameter.name.len());
     let value_width = width(&|row| value(row).len());
     let unit_width = width(&|row| row.parameter.unit.len());
-    let line = |row: &Listed<M>| {
+    let line = |row: &ListedParameter<M>| {
         let name = &row.parameter.name;
         let value = value(row);
         let unit = row.parameter.unit;
@@ -80,8 +82,8 @@ fn as_text<M: Model>(rows: &[Listed<M>]) -> String {
 }
 
 /// Formats the table as JSON.
-pub fn as_json<M: Model>(rows: &[Listed<M>]) -> String {
-    let row = |row: &Listed<M>| {
+pub fn as_json<M: Model>(rows: &[ListedParameter<M>]) -> String {
+    let row = |row: &ListedParameter<M>| {
         json!({
             "name": row.parameter.name,
             "value": row.value,

@@ -188,7 +188,7 @@ enum RowLocations {
 }
 
 /// The reason why a file is no list.
-type Unreadable = String;
+type ListError = String;
 
 /// Returns a path as messages show it.
 fn shown(path: &Path) -> String {
@@ -203,7 +203,7 @@ fn table(
     gaps: bool,
     names: &Names<'_>,
     report: &Report,
-) -> Result<(NumberTable, String), Unreadable> {
+) -> Result<(NumberTable, String), ListError> {
     let bytes = bytes(path)?;
     let hash = blake3::hash(&bytes).to_hex().to_string();
     if bytes.starts_with(b"PAR1") {
@@ -267,7 +267,7 @@ pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) 
     Some(List { design, table })
 }
 
-fn bytes(path: &Path) -> Result<Vec<u8>, Unreadable> {
+fn bytes(path: &Path) -> Result<Vec<u8>, ListError> {
     let mut bytes = Vec::new();
     let read = regular::open(path)
         .and_then(|file| file.take(MAX_LIST_BYTES + 1).read_to_end(&mut bytes))
@@ -279,7 +279,7 @@ fn bytes(path: &Path) -> Result<Vec<u8>, Unreadable> {
 }
 
 /// Checks that a table of this size is accepted.
-fn check_size(rows: u64, columns: usize) -> Result<(), Unreadable> {
+fn check_size(rows: u64, columns: usize) -> Result<(), ListError> {
     if columns > MAX_COLUMNS {
         return Err(format!("it has {columns} columns, more than {MAX_COLUMNS}"));
     }

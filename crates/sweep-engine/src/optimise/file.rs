@@ -5,7 +5,7 @@ use sweep_results::Goal;
 
 use super::study::Objective;
 use super::{Candidate, Study, front};
-use crate::store::{Column, Holds, TrialColumns};
+use crate::store::{DeclaredColumn, Holds, TrialColumns};
 use crate::{Axis, GridInput, Model, Table};
 
 /// Returns the table of a study's candidates.
@@ -50,17 +50,18 @@ pub fn table<M: Model>(study: &Study<M>, tried: &[Candidate]) -> Table {
 /// Returns the columns of trials: the candidate and its parameters, then its objectives and its
 /// excesses over the conditions.
 pub fn trial_columns<M: Model>(study: &Study<M>) -> TrialColumns {
-    let number = Column::new("candidate", "1", "index, in the order of trial", Holds::Count);
+    let number =
+        DeclaredColumn::new("candidate", "1", "index, in the order of trial", Holds::Count);
     let mut keys = vec![number];
     keys.extend(parameters(study).iter().map(|Axis { parameter, .. }| {
-        Column::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
+        DeclaredColumn::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
     }));
     let mut answers = Vec::with_capacity(study.answers());
     for Objective { name, goal, .. } in &study.objectives {
-        answers.push(Column::new(name, objective_unit(goal), goal.text(), Holds::Measured));
+        answers.push(DeclaredColumn::new(name, objective_unit(goal), goal.text(), Holds::Measured));
     }
     for (k, goal) in study.conditions.iter().enumerate() {
-        answers.push(Column::new(excess_name(k), "1", goal.text(), Holds::Measured));
+        answers.push(DeclaredColumn::new(excess_name(k), "1", goal.text(), Holds::Measured));
     }
     TrialColumns { keys, answers }
 }

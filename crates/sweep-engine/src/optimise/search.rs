@@ -7,7 +7,7 @@ use arrow_schema::ArrowError;
 
 use super::{Candidate, Study, evolve};
 use crate::evaluator::{CachedEvaluator, RequestValues, Stopped};
-use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
+use crate::store::{Done, Layout, ResultRows, RowCells, TrialKey, Trials};
 use crate::{Effort, Error, Model, Progress, StoreError};
 use sweep_files::panics::{lock, unlocked};
 use sweep_results::{Goal, Slack};
@@ -32,7 +32,7 @@ pub fn search<M: Model>(
     let mut count = 0;
     let found = evolve(&study.evolution, &mut |places| {
         let candidates: Vec<Vec<f64>> = places.iter().map(|place| study.values(place)).collect();
-        let keys: Vec<Key> =
+        let keys: Vec<TrialKey> =
             (count..).zip(&candidates).map(|(number, values)| key(number, values)).collect();
         count += places.len() as u64;
         let values = |k: usize, row| study.axis_values(&candidates[k], row);
@@ -109,7 +109,7 @@ fn batch<M: Model>(
     let mut rows = ResultRows::new(layout);
     let keyed_rows = |done: Done| {
         let row = done.point % study.rows();
-        done.rows.into_iter().map(move |cells: Row| (row, cells))
+        done.rows.into_iter().map(move |cells: RowCells| (row, cells))
     };
     for (row, cells) in points.into_iter().flat_map(keyed_rows) {
         rows.push(row, study.axis_values(values, row), cells);
@@ -118,6 +118,6 @@ fn batch<M: Model>(
 }
 
 /// Returns the key of a candidate: its number, and its parameters.
-fn key(number: u64, values: &[f64]) -> Key {
+fn key(number: u64, values: &[f64]) -> TrialKey {
     std::iter::once(number).chain(values.iter().map(|value| value.to_bits())).collect()
 }

@@ -15,7 +15,7 @@ use serde_json::json;
 use super::differences::PlanDifference;
 use super::lock::Lock;
 use super::own;
-use super::part::{Damage, Unreadable};
+use super::part::{Damage, PartError};
 use super::plan_file::{FoundPlan, PlanFile, pretty, set_aside};
 use super::point_parts::{PointPart, PointParts};
 use super::provenance::Session;
@@ -167,7 +167,7 @@ impl OpenRun {
     pub(super) fn read_whole<T>(
         &mut self,
         chunk: u64,
-        read: impl FnOnce(&PointPart<'_>) -> Result<T, Unreadable>,
+        read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
     ) -> Result<Option<T>, StoreError> {
         let length = self.chunk_length(chunk);
         let found = self.read(chunk, |part| {
@@ -190,7 +190,7 @@ impl OpenRun {
     fn read<T>(
         &mut self,
         chunk: u64,
-        read: impl FnOnce(&PointPart<'_>) -> Result<T, Unreadable>,
+        read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
     ) -> Result<Option<T>, StoreError> {
         match read_part(&self.parts, &self.folder, chunk, read)? {
             Ok(found) => Ok(found),
@@ -346,10 +346,10 @@ pub(super) fn read_part<T>(
     parts: &PointParts,
     folder: &Folder,
     chunk: u64,
-    read: impl FnOnce(&PointPart<'_>) -> Result<T, Unreadable>,
+    read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
 ) -> Result<Result<Option<T>, Damage>, StoreError> {
     let found = parts.open(folder, chunk).and_then(|part| part.as_ref().map(read).transpose());
-    Unreadable::damage(found)
+    PartError::damage(found)
 }
 
 /// Renames a damaged part to `*.damaged`, and returns a note about it.

@@ -25,7 +25,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPrope
 use parquet::schema::types::ColumnPath;
 
 use super::schema::{self, Holds};
-use super::{Column, Job, Row, StoreError};
+use super::{DeclaredColumn, Job, RowCells, StoreError};
 use sweep_files::batches::from_arrow;
 use sweep_files::{CREATED_BY, FileError, ParquetFile, Writer, key, panics, seal};
 
@@ -42,20 +42,20 @@ pub(super) enum Damage {
 
 /// A reason why a part's rows cannot be read.
 #[derive(Debug)]
-pub(super) enum Unreadable {
+pub(super) enum PartError {
     /// The file is not the expected part.
     Damaged(Damage),
     /// Reading the file failed.
     Failed(StoreError),
 }
 
-impl From<Damage> for Unreadable {
+impl From<Damage> for PartError {
     fn from(damage: Damage) -> Self {
         Self::Damaged(damage)
     }
 }
 
-impl From<FileError> for Unreadable {
+impl From<FileError> for PartError {
     fn from(error: FileError) -> Self {
         match error {
             FileError::Io { .. } => Self::Failed(error.into()),
@@ -64,7 +64,7 @@ impl From<FileError> for Unreadable {
     }
 }
 
-impl Unreadable {
+impl PartError {
     /// Separates damage, which the inner result has, from failures of reading.
     ///
     /// # Errors
@@ -82,14 +82,14 @@ impl Unreadable {
 #[derive(Clone, Debug)]
 pub(super) struct PartSchema {
     plan: String,
-    columns: Vec<Column>,
+    columns: Vec<DeclaredColumn>,
     schema: SchemaRef,
     properties: WriterProperties,
 }
 
 impl PartSchema {
     /// Returns the schema of a job's parts.
-    pub(super) fn new(job: &Job<'_>, columns: Vec<Column>) -> Self {
+    pub(super) fn new(job: &Job<'_>, columns: Vec<DeclaredColumn>) -> Self {
         let plan = job.hash().to_hex().to_string();
         let metadata = vec![KeyValue::new(key::PLAN_HASH.to_owned(), plan.clone())];
         // A part is read once or twice, so compression and statistics would take more time than
@@ -102,11 +102,11 @@ impl PartSchema {
             .set_max_row_group_bytes(None)
             .set_dictionary_enabled(false);
         let names = columns.iter().filter(|column| matches!(column.kind, Holds::Name(_)));
-        let coded = |builder: WriterPropertiesBuilder, column: &Column| {
+        let coded = |builder: WriterPropertiesBuilder, column: &DeclaredColumn| {
             builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), true)
         };
         let properties = names.fold(builder, coded).build();
-        let fields: Vec<_> = columns.iter().map(Column::field).collect();
+        let fields: Vec<_> = columns.iter().map(DeclaredColumn::field).collect();
         Self { plan, schema: Arc::new(Schema::new(fields)), columns, properties }
     }
 
@@ -114,7 +114,7 @@ impl PartSchema {
     ///
     /// # Errors
     /// Returns the errors of the library, which are a defect of this program.
-    pub(super) fn encode(&self, entry: &str, rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
+    pub(super) fn encode(&self, entry: &str, rows: &[RowCells]) -> Result<Vec<u8>, ParquetError> {
         let arrays =
             self.columns.iter().enumerate().map(|(k, column)| {
                 column.array(rows.iter().map(|row| row.get(k).copied().flatten()))
@@ -135,7 +135,7 @@ impl PartSchema {
     }
 
     /// Opens the part at a path; `None` if there is no file. A part with another `entry` is damage.
-    pub(super) fn open(&self, path: &Path, entry: &str) -> Result<Option<Part<'_>>, Unreadable> {
+    pub(super) fn open(&self, path: &Path, entry: &str) -> Result<Option<Part<'_>>, PartError> {
         let Some(file) = open_sealed(path)? else { return Ok(None) };
         let is_ours = file.value(key::PLAN_HASH) == Some(&self.plan)
             && file.value(key::PART) == Some(entry)
@@ -163,16 +163,16 @@ impl Part<'_> {
     }
 
     /// Reads the columns at these positions, in batches.
-    pub(super) fn batches(&self, columns: Vec<usize>) -> Result<Vec<RecordBatch>, Unreadable> {
+    pub(super) fn batches(&self, columns: Vec<usize>) -> Result<Vec<RecordBatch>, PartError> {
         Ok(self.file.batches(columns)?.collect::<Result<_, FileError>>()?)
     }
 
     /// Reads the cells of the columns at these positions, row by row.
-    pub(super) fn cells(&self, columns: &[usize]) -> Result<Vec<Row>, Unreadable> {
+    pub(super) fn cells(&self, columns: &[usize]) -> Result<Vec<RowCells>, PartError> {
         let mut rows = Vec::new();
         for batch in self.batches(columns.to_vec())? {
             let first = rows.len();
-            rows.resize_with(first + batch.num_rows(), || Row::with_capacity(columns.len()));
+            rows.resize_with(first + batch.num_rows(), || RowCells::with_capacity(columns.len()));
             for (column, array) in columns.iter().zip(batch.columns()) {
                 let column = &self.schema.columns[*column];
                 let cells = column.cells(array).ok_or(Damage::Rows)?;
@@ -183,13 +183,13 @@ impl Part<'_> {
     }
 
     /// Reads the cells of all columns, row by row.
-    pub(super) fn all_cells(&self) -> Result<Vec<Row>, Unreadable> {
+    pub(super) fn all_cells(&self) -> Result<Vec<RowCells>, PartError> {
         self.cells(&(0..self.schema.columns.len()).collect::<Vec<_>>())
     }
 }
 
 /// Opens a file that has a digest; `None` if there is no file.
-fn open_sealed(path: &Path) -> Result<Option<ParquetFile>, Unreadable> {
+fn open_sealed(path: &Path) -> Result<Option<ParquetFile>, PartError> {
     match ParquetFile::open(path) {
         Err(FileError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => Ok(None),
         Ok(file) if file.is_sealed() => Ok(Some(file)),
@@ -216,7 +216,7 @@ pub(super) fn open_any(
     path: &Path,
     plan: &blake3::Hash,
 ) -> Result<Option<(ParquetFile, String)>, StoreError> {
-    let Ok(Some(file)) = Unreadable::damage(open_sealed(path))? else { return Ok(None) };
+    let Ok(Some(file)) = PartError::damage(open_sealed(path))? else { return Ok(None) };
     let has_same_plan = file.value(key::PLAN_HASH) == Some(plan.to_hex().as_str());
     let entry = file.value(key::PART).map(str::to_owned);
     Ok(entry.filter(|_| has_same_plan).map(|entry| (file, entry)))

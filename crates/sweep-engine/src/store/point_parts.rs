@@ -9,10 +9,12 @@ use std::ops::Range;
 use arrow_array::RecordBatch;
 use serde_json::{Value, json};
 
-use super::part::{Damage, Part, PartSchema, Unreadable};
+use super::part::{Damage, Part, PartError, PartSchema};
 use super::read::{NameCounts, add};
 use super::schema::{Holds, POINT};
-use super::{Column, Done, Folder, Job, Layout, Row, StoreError, chunk_points, part_name};
+use super::{
+    DeclaredColumn, Done, Folder, Job, Layout, RowCells, StoreError, chunk_points, part_name,
+};
 
 /// The name of the column of the numbers by which the engine identifies rows.
 const ROW_INDEX: &str = "row_index";
@@ -36,8 +38,8 @@ impl PointParts {
     /// Returns the schema and the chunks of a job.
     pub(super) fn new(job: &Job<'_>) -> Self {
         let layout = job.layout.clone();
-        let is_kept = |column: &&Column| column.kind == Holds::Kept;
-        let mut columns: Vec<Column> = layout.all().cloned().collect();
+        let is_kept = |column: &&DeclaredColumn| column.kind == Holds::Kept;
+        let mut columns: Vec<DeclaredColumn> = layout.all().cloned().collect();
         let mut in_result = 1 + layout.axes.len();
         let mut kept = columns.len();
         let mut positions = Vec::with_capacity(layout.columns.len());
@@ -49,7 +51,7 @@ impl PointParts {
         columns.extend(layout.columns.iter().filter(is_kept).cloned());
         if layout.rows_a_point > 1 {
             let description = "number that an unfinished run knows the row by";
-            columns.push(Column::new(ROW_INDEX, "1", description, Holds::Count));
+            columns.push(DeclaredColumn::new(ROW_INDEX, "1", description, Holds::Count));
         }
         let parts = PartSchema::new(job, columns);
         let chunk_points = chunk_points(job.points);
@@ -119,8 +121,8 @@ impl PointParts {
     }
 
     /// Returns a row with a cell for each column of a part.
-    fn part_row(&self, point: u64, axes: &[f64], cells: &Row) -> Row {
-        let mut row: Row = vec![None; self.parts.width()];
+    fn part_row(&self, point: u64, axes: &[f64], cells: &RowCells) -> RowCells {
+        let mut row: RowCells = vec![None; self.parts.width()];
         row[0] = Some(point / self.layout.rows_a_point);
         for (cell, value) in row[1..].iter_mut().zip(axes).take(self.layout.axes.len()) {
             *cell = Some(value.to_bits());
@@ -139,7 +141,7 @@ impl PointParts {
         &self,
         folder: &Folder,
         chunk: u64,
-    ) -> Result<Option<PointPart<'_>>, Unreadable> {
+    ) -> Result<Option<PointPart<'_>>, PartError> {
         let path = folder.file(part_name(chunk));
         let Some(part) = self.parts.open(&path, &self.part_entry(chunk))? else { return Ok(None) };
         let range = self.range(chunk);
@@ -185,7 +187,7 @@ impl PointPart<'_> {
     }
 
     /// Reads the points with their rows.
-    pub(super) fn outcomes(&self) -> Result<Vec<Done>, Unreadable> {
+    pub(super) fn outcomes(&self) -> Result<Vec<Done>, PartError> {
         let positions = [&[self.parts.number_position()], &self.parts.positions[..]].concat();
         let mut outcomes: Vec<Done> = Vec::with_capacity(self.points.len());
         for mut row in self.part.cells(&positions)? {
@@ -200,7 +202,7 @@ impl PointPart<'_> {
     }
 
     /// Counts rows by status.
-    pub(super) fn add_statuses(&self, counts: &mut NameCounts) -> Result<(), Unreadable> {
+    pub(super) fn add_statuses(&self, counts: &mut NameCounts) -> Result<(), PartError> {
         let PointParts { layout, positions, .. } = self.parts;
         let Some(status) = layout.position("status") else { return Ok(()) };
         let Holds::Name(names) = &layout.columns[status].kind else { return Ok(()) };
@@ -212,7 +214,7 @@ impl PointPart<'_> {
     }
 
     /// Reads the rows in the columns of the result.
-    pub(super) fn result_batches(&self) -> Result<Vec<RecordBatch>, Unreadable> {
+    pub(super) fn result_batches(&self) -> Result<Vec<RecordBatch>, PartError> {
         self.part.batches((0..self.parts.layout.all().count()).collect())
     }
 }

@@ -58,7 +58,7 @@ pub enum Holds {
 
 /// A column of a file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Column {
+pub struct DeclaredColumn {
     /// The name.
     pub name: String,
     /// The unit.
@@ -79,9 +79,9 @@ pub struct Column {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     /// The axes, first to last.
-    pub axes: Vec<Column>,
+    pub axes: Vec<DeclaredColumn>,
     /// The model's columns, in order.
-    pub columns: Vec<Column>,
+    pub columns: Vec<DeclaredColumn>,
     /// The kind of the result file.
     pub kind: FileKind<'static>,
     /// The number of tasks that the engine computes for each point of the grid: more than 1 if, for
@@ -95,7 +95,7 @@ pub struct Layout {
 
 /// The cells of a row, without point and axis values: bits of numbers, indices of names, 0 or 1 for
 /// false or true, `None` for null.
-pub type Row = Vec<Option<u64>>;
+pub type RowCells = Vec<Option<u64>>;
 
 /// A point with its rows: one, or several if the model finds several.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -103,18 +103,18 @@ pub struct Done {
     /// The number by which the engine identifies the point.
     pub point: u64,
     /// The rows, at least one.
-    pub rows: Vec<Row>,
+    pub rows: Vec<RowCells>,
 }
 
 impl Layout {
     /// Returns the layout of a map, which has one row for each point.
-    pub fn map(axes: Vec<Column>, columns: Vec<Column>) -> Self {
+    pub fn map(axes: Vec<DeclaredColumn>, columns: Vec<DeclaredColumn>) -> Self {
         let kind = FileKind::Map;
         Self { axes, columns, kind, rows_a_point: 1, has_several: false, metadata: Vec::new() }
     }
 }
 
-impl Column {
+impl DeclaredColumn {
     /// Creates a column.
     pub fn new(
         name: impl Into<String>,
@@ -198,8 +198,8 @@ impl Column {
         })
     }
 
-    /// Returns the cells of an array, as the inverse of [`Column::array`]; `None` for an array of
-    /// another type.
+    /// Returns the cells of an array, as the inverse of [`DeclaredColumn::array`]; `None` for an
+    /// array of another type.
     pub(super) fn cells(&self, array: &dyn Array) -> Option<Vec<Option<u64>>> {
         let cells: Vec<Option<u64>> = match &self.kind {
             Holds::Count | Holds::KnownCount => {
@@ -245,10 +245,10 @@ impl Layout {
 
     /// Iterates over all columns of the result: the point's index, the axes, and the model's
     /// columns.
-    pub(super) fn all(&self) -> impl Iterator<Item = &Column> + Clone {
+    pub(super) fn all(&self) -> impl Iterator<Item = &DeclaredColumn> + Clone {
         /// The column of point indices.
-        static POINTS: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
-            Column::new(POINT, "1", "index in grid order", Holds::Count)
+        static POINTS: std::sync::LazyLock<DeclaredColumn> = std::sync::LazyLock::new(|| {
+            DeclaredColumn::new(POINT, "1", "index in grid order", Holds::Count)
         });
         let columns = self.columns.iter().filter(|column| column.kind != Holds::Kept);
         std::iter::once(&*POINTS).chain(&self.axes).chain(columns)
@@ -256,7 +256,7 @@ impl Layout {
 
     /// Returns the Arrow schema.
     pub fn schema(&self) -> SchemaRef {
-        Arc::new(Schema::new(self.all().map(Column::field).collect::<Vec<_>>()))
+        Arc::new(Schema::new(self.all().map(DeclaredColumn::field).collect::<Vec<_>>()))
     }
 
     /// Returns the position of a column among those of the model.
@@ -281,7 +281,7 @@ pub fn properties(job: &Job<'_>) -> WriterProperties {
         .set_max_row_group_bytes(None);
     // A dictionary of numbers that hardly repeat would be built and then discarded.
     let measured = job.layout.all().filter(|column| column.kind == Holds::Measured);
-    let plain = |builder: WriterPropertiesBuilder, column: &Column| {
+    let plain = |builder: WriterPropertiesBuilder, column: &DeclaredColumn| {
         builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), false)
     };
     measured.fold(builder, plain).build()
@@ -301,7 +301,7 @@ pub struct ResultRows<'a> {
     layout: &'a Layout,
     schema: SchemaRef,
     /// The rows, each with the number of its point and the values of the axes.
-    rows: Vec<(u64, Vec<f64>, Row)>,
+    rows: Vec<(u64, Vec<f64>, RowCells)>,
 }
 
 impl<'a> ResultRows<'a> {
@@ -322,7 +322,7 @@ impl<'a> ResultRows<'a> {
     }
 
     /// Adds a row of a point with the values of the axes.
-    pub fn push(&mut self, point: u64, axis_values: Vec<f64>, row: Row) {
+    pub fn push(&mut self, point: u64, axis_values: Vec<f64>, row: RowCells) {
         self.rows.push((point, axis_values, row));
     }
 
@@ -334,7 +334,7 @@ impl<'a> ResultRows<'a> {
         let rows = &self.rows;
         let rows_a_point = self.layout.rows_a_point;
         let axes = self.layout.axes.len();
-        let array = |(k, column): (usize, &Column)| match k.checked_sub(1) {
+        let array = |(k, column): (usize, &DeclaredColumn)| match k.checked_sub(1) {
             None => column.array(rows.iter().map(|(point, ..)| Some(point / rows_a_point))),
             Some(axis) if axis < axes => column.array(
                 rows.iter().map(|(_, values, _)| values.get(axis).map(|value| value.to_bits())),

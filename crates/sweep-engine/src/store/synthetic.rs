@@ -3,7 +3,7 @@
 use serde_json::json;
 use sweep_files::FileKind;
 
-use super::{Column, Done, Holds, Job, Layout, Row};
+use super::{DeclaredColumn, Done, Holds, Job, Layout, RowCells};
 
 /// The statuses of rows.
 pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverged"];
@@ -11,7 +11,7 @@ pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverge
 /// Returns a layout with two axes and the columns of one channel.
 pub fn layout() -> Layout {
     let column =
-        |name: &str, unit: &str, kind| Column::new(name, unit, format!("the {name}"), kind);
+        |name: &str, unit: &str, kind| DeclaredColumn::new(name, unit, format!("the {name}"), kind);
     let measured = |name: &str| column(name, "m", Holds::Measured);
     Layout {
         axes: vec![column("mass_kg", "kg", Holds::Axis), column("damping", "N s/m", Holds::Axis)],
@@ -52,7 +52,7 @@ pub fn job(points: u64) -> Job<'static> {
 
 /// Returns the row of a point. The first 60 points have every kind of row: reliable, unreliable,
 /// undefined, and failed in each way.
-pub fn row(point: u64) -> Row {
+pub fn row(point: u64) -> RowCells {
     let index = point as f64;
     let status = if [4, 7].contains(&(point % 20)) { 1 + point / 20 % 3 } else { 0 };
     let linear = if point % 30 == 11 { 0.0 } else { 1.0 + (0.37 * index).sin().abs() };

@@ -95,8 +95,8 @@ fn bytes_of_undisturbed_run(points: u64) -> Vec<u8> {
 
 /// Returns the columns of a search's trials.
 fn trial_columns() -> TrialColumns {
-    let axis = |name: &str| Column::new(name, "1", "a parameter", Holds::Axis);
-    let answers = vec![Column::new("distance", "1", "an answer", Holds::Measured)];
+    let axis = |name: &str| DeclaredColumn::new(name, "1", "a parameter", Holds::Axis);
+    let answers = vec![DeclaredColumn::new("distance", "1", "an answer", Holds::Measured)];
     TrialColumns { keys: ["x", "y"].map(axis).to_vec(), answers }
 }
 

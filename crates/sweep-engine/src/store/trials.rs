@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 
 use super::open::{self, Opened};
-use super::part::{Damage, PartSchema, Unreadable};
-use super::{Column, Folder, Job, Lock, Row, StoreError, part_name};
+use super::part::{Damage, PartError, PartSchema};
+use super::{DeclaredColumn, Folder, Job, Lock, RowCells, StoreError, part_name};
 use sweep_files::{FileKind, atomic};
 
 /// The number of rows of a full part. Basis: a part is rewritten at most once per
@@ -29,15 +29,15 @@ const PART_ROWS: usize = 1024;
 pub const WRITE_INTERVAL: Duration = Duration::from_secs(1);
 
 /// The identity of a trial: the cells of its first columns, none of which is null.
-pub type Key = Vec<u64>;
+pub type TrialKey = Vec<u64>;
 
 /// The columns of a search's trials.
 #[derive(Clone, Debug)]
 pub struct TrialColumns {
     /// The columns that identify a trial.
-    pub keys: Vec<Column>,
+    pub keys: Vec<DeclaredColumn>,
     /// The columns of its answer.
-    pub answers: Vec<Column>,
+    pub answers: Vec<DeclaredColumn>,
 }
 
 /// The stored trials of a search whose folder this process has locked.
@@ -47,11 +47,11 @@ pub struct Trials {
     lock: Lock,
     parts: PartSchema,
     /// The answers of all trials.
-    answers: BTreeMap<Key, Row>,
+    answers: BTreeMap<TrialKey, RowCells>,
     /// The index of the last part.
     last_part: u64,
     /// The rows of the last part.
-    rows: Vec<Row>,
+    rows: Vec<RowCells>,
     /// Whether the last part has rows that are not written.
     is_dirty: bool,
     last_write: Instant,
@@ -105,7 +105,7 @@ impl Trials {
     /// Reads the parts, and renames damaged ones. The first `key_count` columns identify a trial.
     fn read(&mut self, key_count: usize) -> Result<(), StoreError> {
         for index in open::part_indices(&self.folder)? {
-            match Unreadable::damage(read_rows(&self.parts, &self.folder, index))? {
+            match PartError::damage(read_rows(&self.parts, &self.folder, index))? {
                 Ok(rows) => {
                     for row in &rows {
                         let (key, answer) = row.split_at(key_count);
@@ -130,7 +130,7 @@ impl Trials {
     }
 
     /// Returns the answer of an earlier trial.
-    pub fn recall(&self, key: &[u64]) -> Option<&Row> {
+    pub fn recall(&self, key: &[u64]) -> Option<&RowCells> {
         self.answers.get(key)
     }
 
@@ -138,7 +138,7 @@ impl Trials {
     ///
     /// # Errors
     /// [`StoreError::File`], if the last part is full and has to be written.
-    pub fn add(&mut self, key: Key, answer: Row) -> Result<(), StoreError> {
+    pub fn add(&mut self, key: TrialKey, answer: RowCells) -> Result<(), StoreError> {
         if self.rows.len() >= PART_ROWS {
             self.write()?;
             self.last_part += 1;
@@ -191,7 +191,7 @@ fn part_entry(index: u64) -> String {
 }
 
 /// Reads the rows of the part with this index; none if there is no file.
-fn read_rows(parts: &PartSchema, folder: &Folder, index: u64) -> Result<Vec<Row>, Unreadable> {
+fn read_rows(parts: &PartSchema, folder: &Folder, index: u64) -> Result<Vec<RowCells>, PartError> {
     let part = parts.open(&folder.file(part_name(index)), &part_entry(index))?;
     let Some(part) = part else { return Ok(Vec::new()) };
     if part.rows() > PART_ROWS as u64 {

@@ -13,8 +13,9 @@ fn columns(measures: &Measures) -> Columns {
 }
 
 fn layout(measures: Measures) -> sweep_engine::store::Layout {
-    let axis =
-        |name: &str, unit: &str| Column::new(name, unit, format!("swept {name}"), Holds::Axis);
+    let axis = |name: &str, unit: &str| {
+        DeclaredColumn::new(name, unit, format!("swept {name}"), Holds::Axis)
+    };
     let axes = vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")];
     sweep_engine::store::Layout::map(axes, columns(&measures).declared())
 }

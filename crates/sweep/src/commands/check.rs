@@ -5,7 +5,7 @@ use arrow_array::Array;
 use sweep_engine::commands::check as engine_check;
 use sweep_engine::{AxisValues, Design, Effort, Error, Exit, Interrupt, ProgressMode, show, tell};
 use sweep_files::cells;
-use washer_model::{Parameter, Range, decimal};
+use washer_model::{MachineParameter, Range, decimal};
 use washer_row::Metric;
 
 use crate::library::PlanEvaluator;
@@ -53,7 +53,7 @@ pub(crate) fn run(args: &WasherCheckArgs) -> Result<Exit, Error> {
 
 /// A number that the machine file leaves out.
 struct Assumed {
-    parameter: Parameter,
+    parameter: MachineParameter,
     value: f64,
     /// The ends of its expected range, without those at which no machine exists, such as moments of
     /// inertia of no rigid body.
@@ -65,7 +65,7 @@ impl Assumed {
     fn all(plan: &Plan) -> Vec<Self> {
         let Washer { machine, spin, .. } = &plan.model;
         let mut all = Vec::new();
-        for parameter in Parameter::all(machine, spin) {
+        for parameter in MachineParameter::all(machine, spin) {
             let is_swept = plan
                 .axes
                 .iter()

@@ -87,14 +87,14 @@ mod tests {
     use clap::Parser;
 
     #[derive(Parser)]
-    struct Cli {
+    struct WasherCli {
         #[command(flatten)]
         plot: WasherPlotArgs,
     }
 
     fn parse(line: &str) -> Result<WasherPlotArgs, String> {
         let words = std::iter::once("plot").chain(line.split(' '));
-        Cli::try_parse_from(words).map(|cli| cli.plot).map_err(|error| error.to_string())
+        WasherCli::try_parse_from(words).map(|cli| cli.plot).map_err(|error| error.to_string())
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::{env, fs, iter};
 
-use washer_model::{Channel, Machine, Parameter, Profile, Range, Spin, Target};
+use washer_model::{Channel, Machine, MachineParameter, Profile, Range, Spin, Target};
 use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 
 use super::command;
@@ -16,7 +16,7 @@ use crate::method::METHODS;
 use arrow_schema::Schema;
 use sweep_engine::Model as _;
 use sweep_engine::columns::declared;
-use sweep_engine::store::{Column, Holds, Layout};
+use sweep_engine::store::{DeclaredColumn, Holds, Layout};
 use sweep_files::key;
 
 /// Returns the head of a page, with a comment that it is generated.
@@ -34,7 +34,7 @@ fn push_row(text: &mut String, cells: &[&str]) {
 fn parameters() -> String {
     let mut text = head("Parameters");
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
-    let all = Parameter::all(&with_one_of_each(), &spin);
+    let all = MachineParameter::all(&with_one_of_each(), &spin);
     // The common source of derived parameters stands once, before the table.
     let derivation = all.iter().find_map(|parameter| parameter.source().strip_prefix("derived: "));
     let derivation = derivation.unwrap_or_default();
@@ -127,11 +127,16 @@ fn columns() -> String {
     text.push_str(include_str!("reference/columns.txt"));
     let machine = Machine::paper();
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
-    let axes = Parameter::all(&machine, &spin)
+    let axes = MachineParameter::all(&machine, &spin)
         .into_iter()
         .filter(|parameter| ["unbalance_mass_kg", "damping_n_s_per_m"].contains(&parameter.name()))
         .map(|parameter| {
-            Column::new(parameter.name(), parameter.unit(), parameter.description(), Holds::Axis)
+            DeclaredColumn::new(
+                parameter.name(),
+                parameter.unit(),
+                parameter.description(),
+                Holds::Axis,
+            )
         })
         .collect();
     let metrics = Metric::ALL.to_vec();

@@ -8,7 +8,7 @@ use std::slice;
 use std::sync::LazyLock;
 
 use serde_json::{Value, json};
-use washer_model::{Cabinet, ElementList, Machine, Parameter, Spin, Target};
+use washer_model::{Cabinet, ElementList, Machine, MachineParameter, Spin, Target};
 
 use sweep_engine::config::form::{Numbers, describe_parameter};
 use sweep_engine::config::keys;
@@ -69,8 +69,9 @@ const AUTO: &str = "auto";
 static KEYS: LazyLock<Vec<Vec<MachineKey>>> = LazyLock::new(|| {
     let mut machine = Machine::paper();
     SECTIONS.iter().for_each(|section| (section.fill)(&mut machine, 1));
-    let all = Parameter::all(&machine, &no_spin());
-    let is_single = |one: &&Parameter| matches!(one.target(), Target::Machine | Target::Cabinet);
+    let all = MachineParameter::all(&machine, &no_spin());
+    let is_single =
+        |one: &&MachineParameter| matches!(one.target(), Target::Machine | Target::Cabinet);
     let mut names = vec![Vec::new(); SECTIONS.len()];
     for one in all.iter().filter(is_single) {
         let name = one.name();
@@ -453,8 +454,8 @@ fn mark_doubtful(names: Vec<String>, report: &Report) {
 }
 
 /// Returns the parameter of a name, if the machine has it.
-fn find_parameter(name: &str, machine: &Machine) -> Option<Parameter> {
-    Parameter::find(name, machine, &no_spin()).ok()
+fn find_parameter(name: &str, machine: &Machine) -> Option<MachineParameter> {
+    MachineParameter::find(name, machine, &no_spin()).ok()
 }
 
 /// Returns the value of the parameter of a name, if the machine has it.

@@ -2,7 +2,7 @@
 //! accepted.
 
 use sweep_engine::config::Draft;
-use washer_model::{Parameter, Target, decimal};
+use washer_model::{MachineParameter, Target, decimal};
 
 use crate::model::Washer;
 
@@ -24,7 +24,7 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
     let Washer { machine, spin, .. } = &plan.model;
     let written = draft.report.written();
     let mut notes = Vec::new();
-    for parameter in Parameter::all(machine, spin) {
+    for parameter in MachineParameter::all(machine, spin) {
         let is_typed =
             written.contains_key(parameter.name()) && !parameter.target().has_several_numbers();
         if let Some(value) = parameter.get(machine, spin).filter(|_| is_typed) {
@@ -52,7 +52,7 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
 }
 
 /// Returns a note if a parameter's value is unusual.
-fn unusual_note(parameter: &Parameter, value: f64) -> Option<String> {
+fn unusual_note(parameter: &MachineParameter, value: f64) -> Option<String> {
     let usual = usual_range(parameter)?;
     let [least, most] = usual.bounds;
     let is_usual = |value: f64| value == 0.0 || (least..=most).contains(&value.abs());
@@ -93,7 +93,7 @@ const TIMES: &[(&str, f64)] = &[("ms", 1e-3)];
 /// Returns the usual range of a parameter, if it has one: from the smallest toy to the largest
 /// washer-extractor (some 400 kg of laundry), with a factor of about three on both sides. With a
 /// greater factor grams would pass for kilograms.
-fn usual_range(parameter: &Parameter) -> Option<UsualRange> {
+fn usual_range(parameter: &MachineParameter) -> Option<UsualRange> {
     let name = parameter.name();
     let has = |word: &str| name.contains(word);
     let (bounds, mistaken_units) = match parameter.unit() {

@@ -3,7 +3,7 @@
 use crate::model::engine_parameter;
 use serde_json::{Map, Value};
 use sweep_engine::config::schema::{parameter_schema, set as set_schema};
-use washer_model::{ElementList, Parameter, Profile, Spin};
+use washer_model::{ElementList, MachineParameter, Profile, Spin};
 
 use super::machine::with_one_of_each;
 
@@ -14,7 +14,7 @@ pub(crate) fn schema_of_set() -> Value {
     let machine = with_one_of_each();
     let table = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let all = [spin, table].map(|spin| {
-        let all = Parameter::all(&machine, &spin).into_iter();
+        let all = MachineParameter::all(&machine, &spin).into_iter();
         all.map(|parameter| engine_parameter(parameter, &machine, &spin)).collect::<Vec<_>>()
     });
     let mut single = Vec::new();

@@ -9,7 +9,7 @@ use sweep_engine::config::form::{Numbers, describe_parameter};
 use sweep_engine::config::keys::Variants;
 use sweep_engine::config::source::beside;
 use sweep_engine::config::{Field, Form, Key, Keys};
-use washer_model::{Machine, Parameter, Profile, Range, Spin};
+use washer_model::{Machine, MachineParameter, Profile, Range, Spin};
 
 use cycle::Joints;
 
@@ -128,7 +128,7 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
         ("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm", &mut *peak_rpm),
         ("ramp_s", "spin_ramp_s", "the duration of the run-up in s", &mut *ramp_s),
     ] {
-        if let Ok(parameter) = Parameter::find(parameter, &Machine::paper(), &BLANK) {
+        if let Ok(parameter) = MachineParameter::find(parameter, &Machine::paper(), &BLANK) {
             let range = parameter.range();
             let about = describe_parameter(&engine_parameter(parameter, &Machine::paper(), &BLANK));
             let key = Key::new(key, &about).needed(expected);

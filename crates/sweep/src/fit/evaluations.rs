@@ -6,7 +6,9 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use sweep_engine::store::{Column, Holds, Job, Key, Opened, Row, StoreError, TrialColumns, Trials};
+use sweep_engine::store::{
+    DeclaredColumn, Holds, Job, Opened, RowCells, StoreError, TrialColumns, TrialKey, Trials,
+};
 use sweep_engine::tell;
 use sweep_files::FileKind;
 use sweep_files::panics::lock;
@@ -59,7 +61,7 @@ impl Evaluations {
         x: &[f64],
         find: impl FnOnce() -> Result<Option<Summary>, E>,
     ) -> Result<Option<Summary>, E> {
-        let key: Key = x.iter().map(|x| x.to_bits()).collect();
+        let key: TrialKey = x.iter().map(|x| x.to_bits()).collect();
         if let Some(cells) = lock(&self.trials).recall(&key) {
             return Ok(self.summary(cells));
         }
@@ -90,7 +92,7 @@ impl Evaluations {
     }
 
     /// Returns a summary's cells, in the order of [`columns`].
-    fn cells(&self, summary: Option<&Summary>) -> Row {
+    fn cells(&self, summary: Option<&Summary>) -> RowCells {
         let Some(Summary { cost, sigma, normal, pull }) = summary else {
             return vec![None; 1 + self.signals + (self.unknowns + 1) * self.unknowns];
         };
@@ -99,7 +101,7 @@ impl Evaluations {
     }
 
     /// Returns the summary that some cells hold, if there is one.
-    fn summary(&self, cells: &Row) -> Option<Summary> {
+    fn summary(&self, cells: &RowCells) -> Option<Summary> {
         let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
         let numbers = numbers?;
         let (cost, rest) = numbers.split_first()?;
@@ -124,15 +126,16 @@ fn columns(problem: &Problem<'_>) -> TrialColumns {
             Some(case) => format!("file_{}_{}", case + 1, parameter.name()),
         };
         let about = parameter.description();
-        keys.push(Column::new(name, parameter.unit(), about, Holds::Axis));
+        keys.push(DeclaredColumn::new(name, parameter.unit(), about, Holds::Axis));
     }
     if problem.with_shift {
         let about = "shift of the file's clock";
-        let shift = |case| Column::new(format!("file_{case}_shift_s"), "s", about, Holds::Axis);
+        let shift =
+            |case| DeclaredColumn::new(format!("file_{case}_shift_s"), "s", about, Holds::Axis);
         keys.extend((1..=problem.cases.len()).map(shift));
     }
     let unknowns = 1..=problem.unknowns();
-    let number = |name: String, about: &str| Column::new(name, "1", about, Holds::Measured);
+    let number = |name: String, about: &str| DeclaredColumn::new(name, "1", about, Holds::Measured);
     let mut answers = vec![number("cost".to_owned(), "twice the negative log-likelihood")];
     for signal in 1..=problem.signals().count() {
         answers.push(number(format!("noise_{signal}"), "noise of a signal, in its unit"));

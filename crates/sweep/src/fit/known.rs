@@ -17,7 +17,7 @@
 //! A. Tarantola, Inverse Problem Theory and Methods for Model Parameter Estimation (2005), chapter
 //! 3: the least-squares criterion.
 
-use washer_model::{Machine, Parameter, Spin, Target};
+use washer_model::{Machine, MachineParameter, Spin, Target};
 
 use super::algebra::{Symmetric, add_outer, centred, dot, inverse};
 use super::measured::Signal;
@@ -97,7 +97,7 @@ impl FixedTolerance {
 /// The fixed numbers of a fit with their tolerances.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Known {
-    numbers: Vec<(Parameter, f64)>,
+    numbers: Vec<(MachineParameter, f64)>,
     gain_ratio: f64,
 }
 
@@ -111,7 +111,7 @@ pub(crate) struct FixedInfluence {
     /// The standard deviation after the record.
     pub(crate) error: f64,
     /// The number of the machine; none of a sensor's gain.
-    pub(crate) parameter: Option<Parameter>,
+    pub(crate) parameter: Option<MachineParameter>,
     /// The mean change of each unknown by that error, with the errors of other fixed numbers that
     /// the record leaves open together with it: what knowing the number would take off the
     /// unknowns' errors.
@@ -123,7 +123,7 @@ pub(crate) struct FixedInfluence {
 #[derive(Clone, Debug)]
 pub(crate) struct Direction {
     /// The changes of numbers of the machine.
-    pub(crate) changes: Vec<(Parameter, f64)>,
+    pub(crate) changes: Vec<(MachineParameter, f64)>,
     /// The change of each unknown.
     pub(crate) moves: Vec<f64>,
 }
@@ -158,7 +158,7 @@ impl Known {
         free: &[Free],
     ) -> Result<Self, Diagnostics> {
         let mistakes = Mistakes::default();
-        let mut parameters: Vec<(Parameter, FixedTolerance)> = Vec::new();
+        let mut parameters: Vec<(MachineParameter, FixedTolerance)> = Vec::new();
         let mut gain: Option<FixedTolerance> = None;
         let is_none = |text: &&String| text.trim() == NONE;
         for text in given.iter().filter(|text| !is_none(text)) {
@@ -289,7 +289,7 @@ impl Known {
         summary: &Summary,
         stride: usize,
     ) -> Vec<FixedError> {
-        let error = |(parameter, tolerance): &(Parameter, f64)| FixedError {
+        let error = |(parameter, tolerance): &(MachineParameter, f64)| FixedError {
             influence: FixedInfluence {
                 name: parameter.name().to_owned(),
                 unit: parameter.unit(),
@@ -426,7 +426,7 @@ fn posterior(
 
 /// Changes a number by so many tolerances.
 fn change(
-    (parameter, tolerance): &(Parameter, f64),
+    (parameter, tolerance): &(MachineParameter, f64),
     count: f64,
     machine: &mut Machine,
     spin: &mut Spin,
@@ -442,10 +442,10 @@ fn single_numbers(
     name: &str,
     case: &FitCase,
     free: &[Free],
-) -> Result<Vec<(Parameter, f64)>, String> {
+) -> Result<Vec<(MachineParameter, f64)>, String> {
     let machine = &case.plan.model.machine;
     let spin = case.spin();
-    let found = Parameter::find(name, machine, spin)
+    let found = MachineParameter::find(name, machine, spin)
         .map_err(|error| format!("`{name}` has no tolerance: {error}"))?;
     if !is_fixed_kind(&found) {
         return Err(format!("`{name}` is no number of the machine"));
@@ -460,7 +460,7 @@ fn single_numbers(
         return Ok(vec![(found, value)]);
     }
     let part = |part: &std::borrow::Cow<'static, str>| {
-        let parameter = Parameter::find(part, machine, spin).ok()?;
+        let parameter = MachineParameter::find(part, machine, spin).ok()?;
         let value = parameter.get(machine, spin)?;
         Some((parameter, value))
     };
@@ -472,7 +472,7 @@ fn single_numbers(
 }
 
 /// Whether a parameter is a number of the machine.
-fn is_fixed_kind(parameter: &Parameter) -> bool {
+fn is_fixed_kind(parameter: &MachineParameter) -> bool {
     !matches!(parameter.target(), Target::Spin | Target::Window(_))
 }
 
@@ -481,24 +481,24 @@ fn is_fixed_kind(parameter: &Parameter) -> bool {
 fn fixed_numbers(
     case: &FitCase,
     free: &[Free],
-    given: &[(Parameter, FixedTolerance)],
+    given: &[(MachineParameter, FixedTolerance)],
     with_defaults: bool,
-) -> Vec<(Parameter, f64)> {
+) -> Vec<(MachineParameter, f64)> {
     let machine = &case.plan.model.machine;
     let spin = case.spin();
-    let parts = |parameter: &Parameter| parameter.single_names(machine);
+    let parts = |parameter: &MachineParameter| parameter.single_names(machine);
     let mut taken: Vec<_> = free.iter().flat_map(|free| parts(&free.parameter)).collect();
     let mut found = Vec::new();
     // The last that is given of a number holds.
     let given = given.iter().rev().map(|(parameter, tolerance)| (parameter.clone(), *tolerance));
-    let all = || Parameter::all(machine, spin).into_iter().filter(is_fixed_kind);
+    let all = || MachineParameter::all(machine, spin).into_iter().filter(is_fixed_kind);
     let shared = all().filter(|parameter| parameter.target().has_several_numbers());
     let single = all().filter(|parameter| !parameter.target().has_several_numbers());
     // A number that a machine file may leave out and does belongs to a part that is not there.
-    let is_there = |parameter: &Parameter| {
+    let is_there = |parameter: &MachineParameter| {
         parameter.default_value().is_none_or(|value| parameter.get(machine, spin) != Some(value))
     };
-    let by_kind = |parameter: Parameter| {
+    let by_kind = |parameter: MachineParameter| {
         let tolerance = FixedTolerance::by_kind(parameter.name(), parameter.unit());
         (parameter, tolerance)
     };

@@ -57,6 +57,7 @@ impl SignalQuantity {
 
     /// Returns the unit, and the one in which it is measured by mistake, with that one's size.
     pub(crate) fn units(self) -> (String, Option<(&'static str, f64)>) {
+        /// Standard gravity, m/s^2 (CGPM 1901): the unit g of loggers.
         const G: f64 = 9.806_65;
         let Self::Motion(channel, order) = self else { return ("N".to_owned(), None) };
         let unit = channel.unit();

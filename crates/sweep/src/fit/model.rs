@@ -8,8 +8,8 @@ use lane_ode::Simd;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use rayon::slice::ParallelSlice as _;
 use washer_model::{
-    Machine, Method, ModelKind, Parameter, Point, Recorders, Snapshot, Spin, StepSelector, Timing,
-    prepare, simulate_until,
+    Machine, MachineParameter, Method, ModelKind, Point, Recorders, Snapshot, Spin, StepSelector,
+    Timing, prepare, simulate_until,
 };
 
 use super::algebra::{centred, dot};
@@ -69,7 +69,7 @@ impl FitCase {
 /// A number that is fitted.
 #[derive(Clone, Debug)]
 pub(crate) struct Free {
-    pub(crate) parameter: Parameter,
+    pub(crate) parameter: MachineParameter,
     /// Between which values.
     pub(crate) range: [f64; 2],
     pub(crate) start: f64,

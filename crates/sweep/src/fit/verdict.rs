@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use serde::Serialize;
-use washer_model::{HeldSpeed, Parameter, Response};
+use washer_model::{HeldSpeed, MachineParameter, Response};
 use washer_row::{Growth, Outcome, Status, Verdict as RowVerdict};
 
 use super::algebra::{dot, middle_95};
@@ -169,7 +169,7 @@ impl OnMap<'_> {
         &self,
         case: usize,
         plan: &Plan,
-        (x, fixed): (&[f64], &[(Parameter, f64)]),
+        (x, fixed): (&[f64], &[(MachineParameter, f64)]),
         speeds: &[f64],
     ) -> Option<Vec<Result<Vec<Response>, Status>>> {
         let (mut machine, mut spin) = self.problem.machine(case, x);
@@ -201,7 +201,7 @@ impl OnMap<'_> {
         let x = self.x;
         let middle_rpm = growth.fastest.speed_rpm;
         let speeds = [middle_rpm - step_rpm, middle_rpm, middle_rpm + step_rpm];
-        let growths = |x: &[f64], fixed: &[(Parameter, f64)]| -> Option<Vec<f64>> {
+        let growths = |x: &[f64], fixed: &[(MachineParameter, f64)]| -> Option<Vec<f64>> {
             let found = self.responses_at(case, plan, (x, fixed), &speeds)?;
             found.iter().map(|found| Some(found.as_ref().ok()?.first()?.growth_per_s())).collect()
         };
@@ -233,7 +233,7 @@ impl OnMap<'_> {
                 let moves = x.iter().zip(&direction.moves).enumerate();
                 let beside: Vec<f64> = moves.map(moved).collect();
                 let changes = direction.changes.iter();
-                let changes: Vec<(Parameter, f64)> =
+                let changes: Vec<(MachineParameter, f64)> =
                     changes.map(|(parameter, by)| (parameter.clone(), sign * by)).collect();
                 growths(&beside, &changes)
             });

@@ -17,9 +17,9 @@ use table::{LISTS, TABLE};
 /// A number of the machine, the spin or the window that a user can name, set and sweep.
 ///
 /// Most parameters write one number. Some write several: `spring_stiffness_n_per_m` writes the
-/// stiffness of all springs; see [`Parameter::parts`].
+/// stiffness of all springs; see [`MachineParameter::parts`].
 #[derive(Clone)]
-pub struct Parameter {
+pub struct MachineParameter {
     name: Cow<'static, str>,
     row: &'static ParameterRow,
     /// The index of the element, from 0; 0 for a number that is not of a list.
@@ -47,7 +47,7 @@ pub enum Target {
     /// A number of the spin's profile, or of a point of the spin's table.
     Spin,
     /// An edge of the window (0: the beginning, 1: the end), which neither machine nor spin holds:
-    /// [`Parameter::get`] finds nothing and [`Parameter::set`] writes nothing.
+    /// [`MachineParameter::get`] finds nothing and [`MachineParameter::set`] writes nothing.
     Window(usize),
 }
 
@@ -106,9 +106,9 @@ impl ElementList {
         self.rows.iter().copied().flatten()
     }
 
-    fn parameter(&self, row: &'static ParameterRow, index: usize) -> Parameter {
+    fn parameter(&self, row: &'static ParameterRow, index: usize) -> MachineParameter {
         let name = Cow::Owned(format!("{}_{}_{}", self.element, index + self.first, row.name));
-        Parameter { name, row, index }
+        MachineParameter { name, row, index }
     }
 }
 
@@ -132,21 +132,21 @@ impl Target {
     }
 }
 
-impl PartialEq for Parameter {
+impl PartialEq for MachineParameter {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
     }
 }
 
-impl Eq for Parameter {}
+impl Eq for MachineParameter {}
 
-impl fmt::Debug for Parameter {
+impl fmt::Debug for MachineParameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Parameter").field(&self.name).finish()
+        f.debug_tuple("MachineParameter").field(&self.name).finish()
     }
 }
 
-impl Parameter {
+impl MachineParameter {
     /// Returns every parameter of a machine and a spin in the table's order, those of lists element
     /// by element.
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
@@ -246,7 +246,7 @@ impl Parameter {
     }
 
     /// Writes the value without a check: [`Machine::violations`] checks the machine as a whole. A
-    /// number that the machine does not have is ignored; [`Parameter::find`] refuses it.
+    /// number that the machine does not have is ignored; [`MachineParameter::find`] refuses it.
     pub fn set(&self, machine: &mut Machine, spin: &mut Spin, value: f64) {
         (self.row.set)(machine, spin, self.index, value);
     }

@@ -2,7 +2,7 @@
 //! report can point at the places where the numbers were written.
 
 use crate::machine::feet::{FEET, Feet};
-use crate::{Machine, Parameter, Range, Spin, decimal};
+use crate::{Machine, MachineParameter, Range, Spin, decimal};
 
 /// The least distance between the ends of a spring or damper, and between the bearings, m. Basis:
 /// far below any machine's, far above rounding of directions. Doubling it changes nothing.
@@ -214,7 +214,7 @@ impl Machine {
 /// Returns the violations of single numbers. Parameters of several numbers are checked part by
 /// part.
 fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
-    let check = |parameter: Parameter| {
+    let check = |parameter: MachineParameter| {
         let name = parameter.name();
         let value = parameter.get(machine, spin)?;
         let range = parameter.range();
@@ -224,7 +224,7 @@ fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
         let title = format!("{name} = {} is out of range", decimal(value));
         Some(Violation::new(title, [name.to_owned()], range.instead_of(value)))
     };
-    Parameter::all(machine, spin).into_iter().filter_map(check).collect()
+    MachineParameter::all(machine, spin).into_iter().filter_map(check).collect()
 }
 
 impl Spin {
@@ -367,7 +367,7 @@ mod tests {
         let violations = machine.violations();
         assert_eq!(violations.len(), 3, "{violations:?}");
         for name in violations.iter().flat_map(|violation| &violation.concerns) {
-            assert!(Parameter::find(name, &machine, &spin).is_ok(), "{name}");
+            assert!(MachineParameter::find(name, &machine, &spin).is_ok(), "{name}");
         }
     }
 

@@ -8,7 +8,7 @@ use crate::nonlinear::floating::FloatingChain;
 use crate::nonlinear::{Half, Halves, coupled_halves};
 use crate::point::Point;
 use crate::{
-    Gauge, Machine, Parameter, Profile, Recorders, Spin, Target, Timing, Unbalance, prepare,
+    Gauge, Machine, MachineParameter, Profile, Recorders, Spin, Target, Timing, Unbalance, prepare,
 };
 use lane_ode::{Lane, N, Real, Simd};
 
@@ -40,7 +40,7 @@ pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
     loop {
         let mut machine = Machine::paper();
         let mut spin = triangular();
-        for parameter in Parameter::all(&machine, &spin) {
+        for parameter in MachineParameter::all(&machine, &spin) {
             if parameter.target() == Target::Machine
                 && let Some(value) = parameter.get(&machine, &spin)
             {

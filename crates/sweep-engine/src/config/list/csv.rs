@@ -10,7 +10,7 @@ use super::layout::{TableLayout, TextLine, lines, separator_words};
 use super::names::Names;
 use super::notation::{Evidence, Notation, NotationEvidence, Unclear};
 use super::units::UnitScale;
-use super::{ID, ListColumn, Unreadable, check_size, is_index};
+use super::{ID, ListColumn, ListError, check_size, is_index};
 
 /// A table that is read from text.
 #[derive(Default)]
@@ -38,7 +38,7 @@ pub(super) fn read(
     gaps: bool,
     names: &Names<'_>,
     report: &Report,
-) -> Result<TextTable, Unreadable> {
+) -> Result<TextTable, ListError> {
     let Some(layout) = TableLayout::find(text, names)? else {
         return Ok(TextTable { separator: ',', ..TextTable::default() });
     };
@@ -114,7 +114,7 @@ pub(super) fn read(
 /// Returns the names in the line of names with their positions; empty names at its end are dropped.
 fn headers<'t>(
     layout: &TableLayout<'t>,
-) -> Result<Vec<(&'t str, std::ops::Range<usize>)>, Unreadable> {
+) -> Result<Vec<(&'t str, std::ops::Range<usize>)>, ListError> {
     let cells = layout.header.cells(layout.separator);
     check_size(0, cells.clone().count())?;
     let mut headers: Vec<_> = cells.collect();

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::names::Names;
 use super::notation::Notation;
 use super::units::is_unit;
-use super::{MAX_COLUMNS, Unreadable};
+use super::{ListError, MAX_COLUMNS};
 
 /// Number of lines among which the line of names is searched. Basis: no logger writes as long a
 /// preamble.
@@ -140,7 +140,7 @@ impl<'t> TableLayout<'t> {
     ///
     /// # Errors
     /// A kind of LabVIEW file that is not supported.
-    pub(super) fn find(text: &'t str, names: &Names<'_>) -> Result<Option<Self>, Unreadable> {
+    pub(super) fn find(text: &'t str, names: &Names<'_>) -> Result<Option<Self>, ListError> {
         let mut first: Vec<TextLine<'_>> = lines(text, 0).take(MAX_HEADER_LINE).collect();
         let Some(opening) = first.first().copied() else { return Ok(None) };
         if opening.text.starts_with("LabVIEW Measurement") {
@@ -200,7 +200,7 @@ impl<'t> TableLayout<'t> {
     }
 
     /// Finds the layout of a LabVIEW measurement file (.lvm).
-    fn labview(text: &'t str, first: &[TextLine<'t>]) -> Result<Self, Unreadable> {
+    fn labview(text: &'t str, first: &[TextLine<'t>]) -> Result<Self, ListError> {
         /// The line at the end of a header.
         const END: &str = "***End_of_Header***";
         let ends = |line: &TextLine<'_>| line.text.starts_with(END);

@@ -14,7 +14,7 @@ use sweep_files::{cells, footer, panics};
 use super::super::section::short;
 use super::names::{Match, Names};
 use super::units::UnitScale;
-use super::{Unreadable, check_size, is_index};
+use super::{ListError, check_size, is_index};
 
 /// The compressions that are read, for a message.
 const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
@@ -35,12 +35,12 @@ pub(super) fn columns(
     bytes: Vec<u8>,
     gaps: bool,
     names: &Names<'_>,
-) -> Result<Vec<ParquetColumn>, Unreadable> {
+) -> Result<Vec<ParquetColumn>, ListError> {
     let panicked = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
     panics::caught(|| read(bytes.into(), gaps, names)).unwrap_or_else(panicked)
 }
 
-fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn>, Unreadable> {
+fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn>, ListError> {
     let metadata = footer::metadata(&bytes).map_err(damaged)?;
     let schema = batches::schema(&metadata);
     let fields = schema.fields();
@@ -88,7 +88,7 @@ fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn
 }
 
 /// Returns the mistake of a column without numbers.
-fn no_numbers(header: &str, data_type: &DataType) -> Unreadable {
+fn no_numbers(header: &str, data_type: &DataType) -> ListError {
     let found = match data_type {
         DataType::Boolean => "true and false",
         text if cells::is_text(text) => "text",
@@ -98,7 +98,7 @@ fn no_numbers(header: &str, data_type: &DataType) -> Unreadable {
 }
 
 /// Rejects a file of too many rows, or of an unknown compression, before its pages are read.
-fn check_row_groups(metadata: &ParquetMetaData, columns: usize) -> Result<(), Unreadable> {
+fn check_row_groups(metadata: &ParquetMetaData, columns: usize) -> Result<(), ListError> {
     let mut rows = 0_u64;
     for group in metadata.row_groups() {
         rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
@@ -121,7 +121,7 @@ fn check_row_groups(metadata: &ParquetMetaData, columns: usize) -> Result<(), Un
     Ok(())
 }
 
-fn damaged(error: ParquetError) -> Unreadable {
+fn damaged(error: ParquetError) -> ListError {
     let text = error.to_string();
     let reason = text.strip_prefix("Parquet error: ").unwrap_or(&text);
     format!("it is damaged: {}", reason.trim())

@@ -17,7 +17,7 @@ const ANY: Names<'_> =
     Names { known: &|name: &str| Some((name.to_owned(), String::new())), renamed: &[] };
 
 /// Returns the known columns of a Parquet file.
-fn parquet_of(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
+fn parquet_of(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, ListError> {
     let columns = parquet::columns(bytes, false, &ANY)?;
     Ok(columns.into_iter().map(|it| (it.name, it.values.unwrap_or_default())).collect())
 }
@@ -133,7 +133,7 @@ fn cell_span(text: &str, start: usize, by: char, column: usize) -> std::ops::Ran
     TextLine::at(text, start).cells(by).nth(column).expect("it is there").1
 }
 
-fn csv_of(text: &str) -> Result<csv::TextTable, Unreadable> {
+fn csv_of(text: &str) -> Result<csv::TextTable, ListError> {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
     csv::read(text, source, false, &ANY, &report)

@@ -1,7 +1,7 @@
 //! The text of a file from loggers and spreadsheets: UTF-8, UTF-16 or Windows code page 1252, with
 //! the line ends of any system.
 
-use super::Unreadable;
+use super::ListError;
 
 /// Kinds of files that are no text, by their first bytes, with advice.
 const OTHER_KINDS: [(&[u8], &str); 7] = [
@@ -22,7 +22,7 @@ const DETECTION_BYTES: usize = 512;
 ///
 /// # Errors
 /// The kind of the file, if it is no text.
-pub(super) fn text(bytes: Vec<u8>) -> Result<String, Unreadable> {
+pub(super) fn text(bytes: Vec<u8>) -> Result<String, ListError> {
     if let Some((_, kind)) = OTHER_KINDS.iter().find(|(first, _)| bytes.starts_with(first)) {
         return Err((*kind).to_owned());
     }
@@ -58,7 +58,7 @@ fn utf16_decoder(bytes: &[u8]) -> Option<fn([u8; 2]) -> u16> {
 }
 
 /// Decodes single bytes: UTF-8, or else code page 1252.
-fn decode_bytes(bytes: Vec<u8>) -> Result<String, Unreadable> {
+fn decode_bytes(bytes: Vec<u8>) -> Result<String, ListError> {
     let bytes = match String::from_utf8(bytes) {
         Ok(text) => return Ok(text),
         Err(error) => error.into_bytes(),

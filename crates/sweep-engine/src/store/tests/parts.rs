@@ -377,8 +377,8 @@ fn rows_that_do_not_fit_their_part_are_refused() {
 }
 
 /// Returns a strategy for rows of cells that fit the columns.
-fn any_row(columns: &[Column]) -> impl Strategy<Value = Row> + use<> {
-    let cell = |column: &Column| match &column.kind {
+fn any_row(columns: &[DeclaredColumn]) -> impl Strategy<Value = RowCells> + use<> {
+    let cell = |column: &DeclaredColumn| match &column.kind {
         Holds::Count | Holds::Axis => any::<u64>().prop_map(Some).boxed(),
         Holds::Flag => prop::option::of(0..2_u64).boxed(),
         Holds::Name(names) => prop::option::of(0..names.len() as u64).boxed(),
@@ -391,8 +391,8 @@ fn any_row(columns: &[Column]) -> impl Strategy<Value = Row> + use<> {
 /// each task.
 fn wide_layout() -> Layout {
     let mut layout = synthetic::layout();
-    layout.columns.insert(2, Column::new("kept", "", "", Holds::Kept));
-    layout.columns.push(Column::new("known", "1", "a count", Holds::KnownCount));
+    layout.columns.insert(2, DeclaredColumn::new("kept", "", "", Holds::Kept));
+    layout.columns.push(DeclaredColumn::new("known", "1", "a count", Holds::KnownCount));
     Layout { rows_a_point: 3, has_several: true, ..layout }
 }
 

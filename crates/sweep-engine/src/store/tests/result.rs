@@ -123,7 +123,12 @@ fn a_finished_result_is_not_computed_again() {
 
     // A build with further columns for the same plan refuses the result.
     let mut wider = synthetic::job(POINTS);
-    wider.layout.columns.push(Column::new("further_n", "N", "a further one", Holds::Measured));
+    wider.layout.columns.push(DeclaredColumn::new(
+        "further_n",
+        "N",
+        "a further one",
+        Holds::Measured,
+    ));
     let error = OpenRun::open(&home.output(), &wider, options()).unwrap_err();
     assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.is_refusal(), "{error}");
     assert!(error.to_string().contains("further_n"), "{error}");

@@ -14,7 +14,7 @@ use sweep_files::{ParquetFile, key};
 const BUILD: Build = Build { version: "0.0.0-test", numerics: 1 };
 
 fn columns() -> TrialColumns {
-    let column = |name: &str, kind| Column::new(name, "1", format!("the {name}"), kind);
+    let column = |name: &str, kind| DeclaredColumn::new(name, "1", format!("the {name}"), kind);
     TrialColumns {
         keys: vec![column("candidate", Holds::Count), column("x", Holds::Axis)],
         answers: vec![column("cost", Holds::Measured), column("excess", Holds::Measured)],
@@ -29,7 +29,7 @@ fn open(output: &Path, job: &Job<'_>) -> Trials {
 }
 
 /// Returns the key and the answer of trial `k`. The cost is null for every third trial.
-fn trial(k: u64) -> (Key, Row) {
+fn trial(k: u64) -> (TrialKey, RowCells) {
     let x = 0.1 * k as f64;
     let cost = (!k.is_multiple_of(3)).then_some(x.sin().to_bits());
     (vec![k, x.to_bits()], vec![cost, Some(x.to_bits())])

@@ -2,7 +2,7 @@
 
 use sweep_engine::config::{Field, Form, Keys, Section, keys};
 use sweep_parameter::Range;
-use washer_model::{DataSheet, Machine, Parameter};
+use washer_model::{DataSheet, Machine, MachineParameter};
 
 use super::{MachineSection, find_parameter, no_spin};
 
@@ -20,9 +20,9 @@ pub(super) struct SheetKeys {
     drum_radius_m: Option<f64>,
     drum_depth_m: Option<f64>,
     /// The parameters that the file omits.
-    pub(super) omitted: Vec<Parameter>,
+    pub(super) omitted: Vec<MachineParameter>,
     /// The positions along the axis that the file gives by the name of a plane.
-    pub(super) planes: Vec<(Parameter, DrumPlane)>,
+    pub(super) planes: Vec<(MachineParameter, DrumPlane)>,
 }
 
 /// A plane of the drum in which an unbalance lies.

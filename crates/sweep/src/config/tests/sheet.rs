@@ -21,7 +21,7 @@ fn a_data_sheet_makes_a_machine_near_the_built_in_one() {
     assert_eq!(machine.violations(), []);
     let built_in = Machine::paper();
     let mut assumed = 0;
-    for parameter in washer_model::Parameter::all(machine, spin) {
+    for parameter in washer_model::MachineParameter::all(machine, spin) {
         let Some(assumption) = parameter.assumption() else { continue };
         if !plan.written.is_assumed(parameter.name()) {
             continue;

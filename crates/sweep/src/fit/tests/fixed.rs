@@ -174,7 +174,7 @@ fn intervals_hold_the_truth_as_often_as_the_fixed_numbers_are_known() {
         let mut spin = case.plan.model.spin.clone();
         for ((name, ratio), error) in FIXED.iter().zip(&errors) {
             let machine = &mut case.plan.model.machine;
-            let parameter = Parameter::find(name, machine, &spin).unwrap();
+            let parameter = MachineParameter::find(name, machine, &spin).unwrap();
             let value = parameter.get(machine, &spin).unwrap();
             parameter.set(machine, &mut spin, value * (1.0 + ratio * error));
         }

@@ -4,7 +4,7 @@
 //! follow by geometric similarity with the built-in machine, masses as shares of the moving mass,
 //! moments of inertia from thin-walled cylinders.
 
-use super::Parameter;
+use super::MachineParameter;
 use crate::{Machine, Spin};
 
 /// The numbers of a data sheet from which left-out numbers follow.
@@ -53,7 +53,7 @@ impl Assumption {
 impl DataSheet {
     /// Sets the parameters that a file leaves out to their assumed values. Rules read results of
     /// other rules, without cycles, so that the iteration ends.
-    pub fn fill(&self, left_out: &[Parameter], machine: &mut Machine) {
+    pub fn fill(&self, left_out: &[MachineParameter], machine: &mut Machine) {
         let mut no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
         for _ in left_out {
             let before = machine.clone();

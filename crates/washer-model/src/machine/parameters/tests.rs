@@ -10,10 +10,13 @@ fn spin() -> Spin {
 
 #[test]
 fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
-    for parameter in Parameter::all(&Machine::paper(), &spin()) {
+    for parameter in MachineParameter::all(&Machine::paper(), &spin()) {
         let mut machine = Machine::paper();
         let mut spin = spin();
-        assert_eq!(Parameter::find(parameter.name(), &machine, &spin).as_ref(), Ok(&parameter));
+        assert_eq!(
+            MachineParameter::find(parameter.name(), &machine, &spin).as_ref(),
+            Ok(&parameter)
+        );
         if matches!(parameter.target(), Target::Window(_)) {
             assert_eq!(parameter.get(&machine, &spin), None);
             continue;
@@ -33,7 +36,7 @@ fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
 
 #[test]
 fn each_parameter_writes_its_parts_and_nothing_else() {
-    let everything = Parameter::all(&Machine::paper(), &spin());
+    let everything = MachineParameter::all(&Machine::paper(), &spin());
     for parameter in &everything {
         let mut machine = Machine::paper();
         let mut spin = spin();
@@ -56,8 +59,8 @@ fn each_parameter_writes_its_parts_and_nothing_else() {
 
 #[test]
 fn names_end_with_their_unit_and_are_unique() {
-    let everything = Parameter::all(&Machine::paper(), &spin());
-    let mut names: Vec<_> = everything.iter().map(Parameter::name).collect();
+    let everything = MachineParameter::all(&Machine::paper(), &spin());
+    let mut names: Vec<_> = everything.iter().map(MachineParameter::name).collect();
     names.sort_unstable();
     names.dedup();
     assert_eq!(names.len(), everything.len());
@@ -81,7 +84,7 @@ fn sources_cite_the_paper() {
     let absent = ["friction", "cubic", "free_stroke", "outer_damping"];
     let is_absent = |name: &str| absent.iter().any(|part| name.contains(part));
     let mut counts = [0; 5];
-    for parameter in Parameter::all(&Machine::paper(), &spin()) {
+    for parameter in MachineParameter::all(&Machine::paper(), &spin()) {
         let name = parameter.name();
         if is_absent(name) {
             assert!(parameter.source().starts_with("assumed: "), "{parameter:?}");
@@ -116,7 +119,7 @@ fn sources_cite_the_paper() {
 fn numbers_that_a_machine_lacks_differ_from_misspellings() {
     let machine = Machine::paper();
     let spin = spin();
-    let find = |name: &str| Parameter::find(name, &machine, &spin).map(|p| p.index);
+    let find = |name: &str| MachineParameter::find(name, &machine, &spin).map(|p| p.index);
     let not_here = |reason: &str| Err(UnknownParameter::not_here(reason));
     assert_eq!(find("spring_4_tub_z_m"), Ok(3));
     assert_eq!(find("spring_5_tub_z_m"), not_here("the machine has 4 springs, numbered from 1"));
@@ -127,7 +130,7 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
     let mut further = machine.clone();
     further.further_unbalances = vec![crate::Unbalance::default(); 2];
     further.stops = vec![crate::BumpStop::default()];
-    let find_further = |name: &str| Parameter::find(name, &further, &spin).map(|p| p.index);
+    let find_further = |name: &str| MachineParameter::find(name, &further, &spin).map(|p| p.index);
     assert_eq!(find_further("unbalance_2_mass_kg"), Ok(0));
     assert_eq!(find_further("unbalance_3_mass_kg"), Ok(1));
     assert_eq!(find_further("stop_1_direction_y"), Ok(0));
@@ -149,13 +152,13 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
         assert!(find(name).is_err_and(|none| none.is_strange), "{name}");
     }
     let table = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 100.0] };
-    let find = |name: &str| Parameter::find(name, &machine, &table).map(|p| p.index);
+    let find = |name: &str| MachineParameter::find(name, &machine, &table).map(|p| p.index);
     assert_eq!(find("spin_ramp_s"), not_here("a spin given as a table has no such number"));
-    let points: Vec<_> = Parameter::all(&machine, &table)
+    let points: Vec<_> = MachineParameter::all(&machine, &table)
         .into_iter()
         .filter(|p| p.source() == "the grid file's [spin]")
         .collect();
-    let names: Vec<_> = points.iter().map(Parameter::name).collect();
+    let names: Vec<_> = points.iter().map(MachineParameter::name).collect();
     assert_eq!(
         names,
         [
@@ -173,7 +176,7 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
         not_here("the spin's table has 2 points, numbered from 1")
     );
     let edges = ["window_from_s", "window_to_s", "tub_mass_kg"];
-    let edges = edges.map(|name| Parameter::find(name, &machine, &table).unwrap().target());
+    let edges = edges.map(|name| MachineParameter::find(name, &machine, &table).unwrap().target());
     assert_eq!(edges, [Target::Window(0), Target::Window(1), Target::Machine]);
 }
 
@@ -181,7 +184,7 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
 fn a_parameter_of_several_numbers_has_no_value_when_they_differ() {
     let mut machine = Machine::paper();
     let spin = spin();
-    let all = Parameter::find("damping_n_s_per_m", &machine, &spin).unwrap();
+    let all = MachineParameter::find("damping_n_s_per_m", &machine, &spin).unwrap();
     assert_eq!(all.get(&machine, &spin), Some(140.0));
     machine.dampers[1].damping_n_s_per_m = 100.0;
     assert_eq!(all.get(&machine, &spin), None);
