@@ -27,7 +27,7 @@
 //!
 //! ```
 //! use lane_ode::{
-//!     Kernel, Lane, MAX_LANES, N, Segment, SegmentEnd, Simd, Step, System, Task, rk4,
+//!     Kernel, Lane, MAX_LANES, N, ObservedStep, Segment, SegmentEnd, Simd, System, Task, rk4,
 //! };
 //!
 //! /// The stiffness k of the trajectory in each lane (1/s^2).
@@ -89,7 +89,7 @@
 //!
 //!     fn begin(&mut self, (): &(), _: &[N<T>; 2], _: &[N<T>; 2]) {}
 //!
-//!     fn observe(&mut self, (): &(), _: &Step<'_, T, 2>) {}
+//!     fn observe(&mut self, (): &(), _: &ObservedStep<'_, T, 2>) {}
 //! }
 //!
 //! struct Run<'a>(&'a [f64]);

@@ -182,7 +182,7 @@ fn failure_code(failure: Option<(Failure, f64)>) -> [f64; 2] {
 }
 
 fn write_answer(output: &mut Vec<f64>, result: &Result<Answer, PointError>, setup: &Setup) {
-    let metric_count = setup.rule.measures.per_model().count();
+    let metric_count = setup.rule.measures.model_columns().count();
     output.push(point_code(result.as_ref().err()));
     let Ok(answer) = result else {
         let channels = Channel::ALL.len();
