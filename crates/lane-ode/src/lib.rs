@@ -13,7 +13,8 @@
 //!    that it is part of, in the same way on every instruction set; [`Product::v`] rounds a product
 //!    that is not part of a sum.
 //! 2. [`Task`]: the trajectories of a system, each divided into [`Segment`]s at its kinks, and what
-//!    is recorded at every [`Step`]. [`Peaks`] finds the largest magnitudes, also inside steps.
+//!    is recorded at every [`ObservedStep`]. [`Peaks`] finds the largest magnitudes, also inside
+//!    steps.
 //! 3. [`Kernel`]: the work as a whole. [`Simd::dispatch`] is compiled for every instruction set and
 //!    runs it on one.
 //!

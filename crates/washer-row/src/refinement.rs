@@ -193,7 +193,7 @@ pub enum NextStep {
 }
 
 impl RowRefinement {
-    /// Takes a run that [`Self::next`] has requested.
+    /// Takes a run that [`Self::next_step`] has requested.
     pub fn add_run(
         &mut self,
         (model, level): (usize, usize),

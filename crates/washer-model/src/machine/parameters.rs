@@ -17,7 +17,7 @@ use table::{LISTS, TABLE};
 /// A number of the machine, the spin or the window that a user can name, set and sweep.
 ///
 /// Most parameters write one number. Some write several: `spring_stiffness_n_per_m` writes the
-/// stiffness of all springs; see [`MachineParameter::parts`].
+/// stiffness of all springs; see [`MachineParameter::single_names`].
 #[derive(Clone)]
 pub struct MachineParameter {
     name: Cow<'static, str>,

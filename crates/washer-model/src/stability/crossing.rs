@@ -96,8 +96,9 @@ pub fn follow_crossings(
 
 /// Returns the largest deviations (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL))
 /// of the nonlinear model within a window, in a run that enters each crossing on the periodic
-/// response instead of on what is left from before. The run is otherwise that of [`cross`]. None of
-/// a crossing's own responses is there where it is `None`: the run then goes on as it is.
+/// response, without the departures of earlier crossings. The run is otherwise that of
+/// [`follow_crossings`]. Where a crossing's response at entry is `None`, the run is continued as it
+/// is.
 ///
 /// # Errors
 /// [`LeftRangeError`].
