@@ -9,7 +9,7 @@ use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
 use sweep_engine::config::Keys;
-use sweep_engine::method::{ACCURACY, ATOL, IntegrationMethod, RTOL, STEP_S, StepRule, Steps};
+use sweep_engine::method::{ACCURACY, DOPRI5, IntegrationMethod, RK4, StepRule, Steps};
 use sweep_engine::store::{Done, Layout, axis_columns};
 use sweep_engine::{
     About, Build, Engine, Error, Evaluator, GridInput, GridTable, Model, ModelParameter, Plan,
@@ -23,18 +23,8 @@ use crate::{Coordinate, Oscillator, OscillatorParameter};
 
 /// The methods of integration.
 static INTEGRATION_METHODS: [IntegrationMethod; 3] = [
-    IntegrationMethod {
-        name: "rk4",
-        description: "classical Runge-Kutta of order 4, in fixed steps",
-        settings: &[STEP_S],
-        steps: StepRule::Fixed,
-    },
-    IntegrationMethod {
-        name: "dopri5",
-        description: "Dormand-Prince 5(4), adaptive",
-        settings: &[RTOL, ATOL],
-        steps: StepRule::ByError,
-    },
+    RK4,
+    DOPRI5,
     IntegrationMethod {
         name: "rk4-halved",
         description: "rk4 in steps that are halved until two runs agree",

@@ -77,6 +77,21 @@ pub struct IntegrationMethod {
     pub steps: StepRule,
 }
 
+/// The classical method in fixed steps, which models list under its own name.
+pub const RK4: IntegrationMethod = IntegrationMethod {
+    name: "rk4",
+    description: "classical Runge-Kutta of order 4, in fixed steps",
+    settings: &[STEP_S],
+    steps: StepRule::Fixed,
+};
+/// The adaptive method of Dormand and Prince, which models list under its own name.
+pub const DOPRI5: IntegrationMethod = IntegrationMethod {
+    name: "dopri5",
+    description: "Dormand-Prince 5(4), adaptive",
+    settings: &[RTOL, ATOL],
+    steps: StepRule::ByError,
+};
+
 /// The steps of a method with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steps {

@@ -3,7 +3,9 @@
 
 use lane_ode::Tolerance;
 pub use sweep_engine::method::Integrator;
-use sweep_engine::method::{ACCURACY, ATOL, IntegrationMethod, RTOL, STEP_S, Setting, StepRule};
+use sweep_engine::method::{
+    ACCURACY, ATOL, DOPRI5, IntegrationMethod, RK4, RTOL, Setting, StepRule,
+};
 use sweep_parameter::Range;
 use washer_model::{Method, MethodNumbers};
 use washer_row::{Level, MAX_ADAPTIVE_STEPS};
@@ -21,18 +23,8 @@ const LEVELS_ACCURACY: Setting = Setting {
 
 /// The methods of grid files; the last is the default.
 pub(crate) static METHODS: [IntegrationMethod; 4] = [
-    IntegrationMethod {
-        name: "rk4",
-        description: "classical Runge-Kutta of order 4, in fixed steps",
-        settings: &[STEP_S],
-        steps: StepRule::Fixed,
-    },
-    IntegrationMethod {
-        name: "dopri5",
-        description: "Dormand-Prince 5(4), adaptive",
-        settings: &[RTOL, ATOL],
-        steps: StepRule::ByError,
-    },
+    RK4,
+    DOPRI5,
     IntegrationMethod {
         name: "additive",
         description: "ARK5(4)8L[2]SA, adaptive, the springs of bearings and hinge implicit: for \
