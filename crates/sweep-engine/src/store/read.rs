@@ -165,11 +165,15 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     }
     let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
     let over = limits.map_or(0.0, RatioLimits::over_estimate);
-    let marked: Vec<Column> = columns(file.schema());
-    let mut extremes: Vec<ColumnExtreme> = marked.iter().filter_map(ColumnExtreme::new).collect();
+    // Files of other programs may mark a column that has no worse side.
+    let all_columns = columns(file.schema());
+    let (marked_names, mut extremes): (Vec<&str>, Vec<ColumnExtreme>) = all_columns
+        .iter()
+        .filter_map(|column| Some((column.name.as_str(), ColumnExtreme::new(column)?)))
+        .unzip();
     let mut names: Vec<&str> = ratios.collect();
     let ratios = names.len();
-    names.extend(marked.iter().filter(|it| it.is_in_summary).map(|it| it.name.as_str()));
+    names.extend(marked_names);
     let mut column = |name| {
         names.push(name);
         names.len() - 1
