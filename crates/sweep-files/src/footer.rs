@@ -88,7 +88,7 @@ const ELEMENT: &[i16] = &[2];
 /// Reads a file's metadata.
 ///
 /// # Errors
-/// Those of the library; fails if it could not read the footer safely.
+/// Returns the library's errors, and an error for a footer that it could not read safely.
 pub fn metadata<R: ChunkReader>(file: &R) -> Result<ParquetMetaData, ParquetError> {
     ParquetMetaDataReader::new().parse_and_finish(&Footer(file))
 }

@@ -203,7 +203,7 @@ fn lists(args: &CompareArgs, found: &Comparison) -> Vec<TitledTable> {
 
 /// Returns the table of the greatest changes of a column that `--fail-on` names.
 fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<TitledTable> {
-    let FailOn::DeclaredColumn(name, _) = fail_on else { return None };
+    let FailOn::Column(name, _) = fail_on else { return None };
     let column = found.columns.iter().find(|column| column.name == *name)?;
     let rows = column.worst.iter().take(most).map(|worst| {
         let [first, second] = worst.values;

@@ -12,12 +12,12 @@ const FEWEST_PULSES: usize = 3;
 /// are clear.
 const FEWEST_ROWS: usize = 3;
 
-/// The reason why a signal is none of pulses.
+/// The reason why a signal cannot be read as pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PulseError {
-    /// So few pulses.
+    /// Too few pulses: this number.
     Few(usize),
-    /// A pulse in this row that follows the one before too fast.
+    /// A pulse in this row that follows the previous one too soon.
     Fast(usize),
 }
 

@@ -19,7 +19,7 @@ pub(super) enum FailOn {
     Gap(f64),
     Boundary(f64),
     /// A column of numbers, and the greatest change that is allowed.
-    DeclaredColumn(String, f64),
+    Column(String, f64),
 }
 
 impl FromStr for FailOn {
@@ -52,7 +52,7 @@ impl FromStr for FailOn {
             ("gap", _) => Ok(Self::Gap(number()?)),
             ("boundary", _) => Ok(Self::Boundary(number()?)),
             ("any" | "plan" | "rows" | "flips" | "lost" | "sensitive" | "", _) => Err(expected()),
-            (column, Some(_)) => Ok(Self::DeclaredColumn(column.to_owned(), number()?)),
+            (column, Some(_)) => Ok(Self::Column(column.to_owned(), number()?)),
             _ => Err(expected()),
         }
     }
@@ -76,7 +76,7 @@ impl FailOn {
             Self::Boundary(_) => {
                 (found.boundary.is_some(), ["boundary", "two boundaries, or maps of two axes"])
             }
-            Self::DeclaredColumn(name, _) => {
+            Self::Column(name, _) => {
                 let is_number = |table: &ResultTable| {
                     table.column(name).is_some_and(|column| column.kind == CellKind::Number)
                 };
@@ -105,7 +105,7 @@ impl FailOn {
             Self::Sensitive => {
                 counted("sensitive verdicts that flipped", found.flips(true).count())
             }
-            Self::DeclaredColumn(name, most) => {
+            Self::Column(name, most) => {
                 let column = found.columns.iter().find(|column| column.name == *name)?;
                 let worst = column.worst.first().filter(|worst| worst.deviation() > *most)?;
                 let unit = column.unit.as_str();
@@ -146,7 +146,7 @@ mod tests {
         assert_eq!("flips".parse(), Ok(FailOn::Flips));
         assert_eq!("ratio=0.05".parse(), Ok(FailOn::Ratio(0.05)));
         assert_eq!("boundary=2".parse(), Ok(FailOn::Boundary(2.0)));
-        let column = FailOn::DeclaredColumn("growth_per_s".to_owned(), 0.5);
+        let column = FailOn::Column("growth_per_s".to_owned(), 0.5);
         assert_eq!("growth_per_s = 0.5".parse(), Ok(column));
         for (text, said) in [
             ("flip", "expected any, plan"),
