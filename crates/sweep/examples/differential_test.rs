@@ -274,19 +274,30 @@ const ERROR_FLOOR: f64 = 1e-6;
 
 /// Returns the greatest relative difference of the numbers of two rows.
 fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
-    let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
-    let amplitudes = models.iter().map(|(a, b)| amplitudes_differ(a, b));
-    let metrics = metrics_differ(plan, a, b).into_iter().map(|(_, share)| share);
+    greatest_difference(plan, a, b).1
+}
+
+/// Returns the number of two rows with the greatest relative difference, and that difference.
+fn greatest_difference(plan: &Plan, a: &Outcome, b: &Outcome) -> (String, f64) {
+    let mut differences = metrics_differ(plan, a, b);
+    let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
     // Gaps and ends are those of the whole run, which goes on after the window.
     let clearance_m = plan.model.machine.radial_clearance_m;
-    let gaps = models.iter().filter_map(|(a, b)| a.min_gap_m.zip(b.min_gap_m));
-    let gaps = gaps.map(|(a, b)| relative_from(clearance_m, a, b));
-    let ends = models.iter().filter_map(|(a, b)| a.fail_time_s.zip(b.fail_time_s));
-    let ends = ends.map(|(a, b)| (a - b).abs() / plan.end_s);
+    for (model, a, b) in models {
+        differences.push((format!("amplitudes {model}"), amplitudes_differ(a, b)));
+        if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
+            differences.push((format!("min_gap {model}"), relative_from(clearance_m, a, b)));
+        }
+        if let Some((a, b)) = a.fail_time_s.zip(b.fail_time_s) {
+            differences.push((format!("fail_time {model}"), (a - b).abs() / plan.end_s));
+        }
+    }
     let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
     // A ratio has the errors of both models.
     let ratios = turns.map(relative).fold(0.0, f64::max) / 2.0;
-    metrics.chain(amplitudes).chain(gaps).chain(ends).fold(ratios, f64::max)
+    differences.push(("turn_ratios".to_owned(), ratios));
+    let greatest = differences.into_iter().max_by(|(_, a), (_, b)| a.total_cmp(b));
+    greatest.expect("every row has amplitudes")
 }
 
 /// Returns the relative difference of each metric, with the name of its column.
@@ -456,19 +467,16 @@ fn try_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
             *count(&mut found) += 1;
             let method = row.method.name();
             let estimate = row.error.unwrap_or(f64::NAN);
-            let linear = amplitudes_differ(&row.linear, &reference.linear);
-            let metrics = metrics_differ(&plan, row, reference).into_iter();
-            let worst = metrics.max_by(|(_, a), (_, b)| a.total_cmp(b));
-            let (metric, share) = worst.unwrap_or_default();
+            let (number, _) = greatest_difference(&plan, row, reference);
             found.exceptions.push(format!(
-                "seed {seed}, row {i}, {method}: wrong {what}, by {error:.2e} ({linear:.2e} \
-                 linear, {share:.2e} {metric}); `error` is {estimate:.2e}"
+                "seed {seed}, row {i}, {method}: wrong {what}, by {error:.2e} in {number}; \
+                 `error` is {estimate:.2e}"
             ));
         };
         if statuses(row) != statuses(reference) {
             report(|found| &mut found.wrong_status, "status");
         } else if error > accuracy {
-            report(|found| &mut found.inaccurate, "amplitudes");
+            report(|found| &mut found.inaccurate, "number");
         } else if verdict(&plan, row) != verdict(&plan, reference) {
             report(|found| &mut found.wrong_verdict, "verdict");
         } else {

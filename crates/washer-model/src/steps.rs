@@ -17,11 +17,12 @@ pub(crate) const SUSPENSION_MODES: usize = 4;
 
 /// The least ratio of the hinge's frequency to the drum's speed at which modes are capped.
 ///
-/// Derived: at drum speeds near (f + f_i) / 3, with a frequency f of the hinge and f_i of the
-/// suspension, whirls of the hinge grow from the ringing of the bearings, which caps leave out. So
-/// the ratio is 3, and the rest allows for f_i. Doubling it leaves no capped modes above 600 rpm on
-/// the paper's machine.
-pub(crate) const HINGE_TO_DRUM: f64 = 3.2;
+/// Derived: a drum whose speed is a third of the hinge's frequency f (more exactly (f + f_i) / 3,
+/// with a frequency f_i of the suspension), or a quarter, excites a whirl of the hinge. The whirl
+/// decays slowly, but the long steps of capped levels damp it. So the ratio is 4, and the rest
+/// allows for f_i. The whirl at a fifth is a tenth of that at a quarter. Doubling it leaves no
+/// capped modes above 470 rpm on the paper's machine.
+pub(crate) const HINGE_TO_DRUM: f64 = 4.2;
 
 /// The product of step and cap, relative to [`Formula::limit`]. The reserve is for the hinge, whose
 /// modes are raised by a cap near them. Basis: `sweep check` finds the longest stable step with

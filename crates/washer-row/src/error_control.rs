@@ -11,8 +11,8 @@
 //! Richardson's (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, II.4) without
 //! its extrapolation: the difference of two levels bounds the error of the finer one where the step
 //! shrinks by enough. The second term is for two levels that agree by chance: c is the contraction
-//! of the error from level to level that the family guarantees, 1.5 where the step shrinks
-//! ([`STEP_CONTRACTION`]) and 10 where the tolerance does ([`TOLERANCE_RATIO`]).
+//! of the error from level to level, 1.5 where the step shrinks ([`STEP_CONTRACTION`]), and 10 where
+//! the tolerance does or another family begins ([`TOLERANCE_RATIO`]).
 //!
 //! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge's
 //!    mode is not capped, and limits the first step.
@@ -114,24 +114,16 @@ fn step_ratio(order: f64) -> f64 {
     STEP_CONTRACTION.powf(1.0 / order)
 }
 
-/// Returns the guaranteed contraction of the error from one level of a family to the next.
-fn contraction(level: Level) -> f64 {
-    match level {
-        Level::Additive => 1.0 / TOLERANCE_RATIO,
-        _ => STEP_CONTRACTION,
-    }
+/// Returns the contraction of the error from one level to the next. The first level of another
+/// family contracts it as a tolerance does.
+pub(crate) fn contraction(level: Level, starts_family: bool) -> f64 {
+    if starts_family || level == Level::Additive { 1.0 / TOLERANCE_RATIO } else { STEP_CONTRACTION }
 }
 
-/// Returns the error of a level from its difference and that of the level before; `None` if there
-/// is no difference, or it is not a number.
-pub(crate) fn error_of_level(level: Level, differences: &[Option<f64>]) -> Option<f64> {
-    let (last_difference, earlier) = differences.split_last()?;
-    let difference = (*last_difference)?;
-    let previous_difference = match earlier.last() {
-        Some(previous_difference) => (*previous_difference)?,
-        None => 0.0,
-    };
-    let error = SAFETY_FACTOR * difference.max(previous_difference / contraction(level));
+/// Returns the error of a level from its difference from the level before, and from that level's
+/// own difference divided by its contraction; `None` if the error is not a finite number.
+pub(crate) fn error_of_level(difference: f64, contracted_difference: f64) -> Option<f64> {
+    let error = SAFETY_FACTOR * difference.max(contracted_difference);
     error.is_finite().then_some(error)
 }
 
@@ -252,23 +244,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_level_has_no_error() {
-        assert_eq!(error_of_level(Level::Capped1, &[]), None);
-    }
-
-    #[test]
     fn the_error_is_twice_the_difference_or_more_if_the_difference_before_was_great() {
-        assert_eq!(error_of_level(Level::Capped1, &[Some(1e-4)]), Some(2e-4));
-        assert_eq!(error_of_level(Level::Capped1, &[Some(1e-4), Some(2e-4)]), Some(4e-4));
-        let by_chance = error_of_level(Level::Capped1, &[Some(1e-2), Some(1e-6)]).unwrap();
-        assert!((by_chance / (2e-2 / 1.5) - 1.0).abs() < 1e-9, "{by_chance}");
+        assert_eq!(error_of_level(1e-4, 0.0), Some(2e-4));
+        assert_eq!(error_of_level(1e-4, 2e-4), Some(4e-4));
+        assert_eq!(error_of_level(f64::INFINITY, 0.0), None);
+        assert_eq!(error_of_level(1e-4, f64::INFINITY), None);
     }
 
     #[test]
-    fn levels_that_cannot_be_compared_have_no_error() {
-        assert_eq!(error_of_level(Level::Capped1, &[Some(1e-3), None]), None);
-        assert_eq!(error_of_level(Level::Capped1, &[None, Some(1e-3)]), None);
-        assert_eq!(error_of_level(Level::Capped1, &[Some(f64::INFINITY)]), None);
+    fn a_new_family_contracts_the_error_more_than_a_shorter_step() {
+        assert_eq!(contraction(Level::Rk4, false), 1.5);
+        assert_eq!(contraction(Level::Rk4, true), 10.0);
+        assert_eq!(contraction(Level::Additive, false), 10.0);
     }
 
     /// Levels whose errors decrease at least by the ratio are never less accurate than estimated.
@@ -278,14 +265,10 @@ mod tests {
             let ratio = step_ratio(order);
             for steeper in [0.0, 0.5, 1.0, 4.0, 8.0] {
                 let error = |level: i32| ratio.powf(-f64::from(level) * (order + steeper));
-                let differences = [1, 2].map(|level| Some(error(level - 1) - error(level)));
-                assert!(
-                    error_of_level(Level::Capped1, &differences[..1]).unwrap()
-                        >= 0.999_999 * error(1)
-                );
-                assert!(
-                    error_of_level(Level::Capped1, &differences).unwrap() >= 0.999_999 * error(2)
-                );
+                let [first, second] = [1, 2].map(|level| error(level - 1) - error(level));
+                assert!(error_of_level(first, 0.0).unwrap() >= 0.999_999 * error(1));
+                let contracted = first / contraction(Level::Capped1, false);
+                assert!(error_of_level(second, contracted).unwrap() >= 0.999_999 * error(2));
             }
         }
     }

@@ -1,9 +1,9 @@
 //! Refines a row: keeps the finest trajectory so far of each model, and decides which level is
 //! integrated next.
 
-use washer_model::{ModelKind, Point, UnresolvedModes};
+use washer_model::{Level, ModelKind, Point, UnresolvedModes};
 
-use crate::error_control::{amplification, error_of_chaos, error_of_level};
+use crate::error_control::{amplification, contraction, error_of_chaos, error_of_level};
 use crate::levels::RefinementLevels;
 use crate::measures::TURN_FLOOR;
 use crate::metrics::Metric;
@@ -81,12 +81,33 @@ struct ModelRefinement {
     level: usize,
     /// The finest run that is not a perturbed one.
     run: Option<LevelRun>,
-    /// The relative difference of each run from the one before; `None` if they cannot be compared.
-    differences: Vec<Option<f64>>,
+    /// The difference of each run from the one before.
+    differences: Vec<LevelDifference>,
     /// The difference of the first two levels; zero before there are two.
     first_difference: f64,
     /// The comparison with a perturbed run, once there was one.
     perturbed: Option<PerturbedComparison>,
+}
+
+/// The difference of a level from the one before.
+#[derive(Clone, Copy, Debug)]
+struct LevelDifference {
+    /// The relative difference; `None` if the levels cannot be compared.
+    relative: Option<f64>,
+    /// Whether the level is the first of its family.
+    starts_family: bool,
+}
+
+impl LevelDifference {
+    /// Returns the difference divided by the contraction of the error from this level to the next
+    /// `level`. A family that cannot be compared with the one before says nothing of its own error.
+    fn contracted_to(self, level: Level) -> f64 {
+        match self.relative {
+            Some(relative) => relative / contraction(level, self.starts_family),
+            None if self.starts_family => 0.0,
+            None => f64::INFINITY,
+        }
+    }
 }
 
 /// The comparison of a perturbed run with its original.
@@ -114,11 +135,8 @@ impl ModelRefinement {
             self.run = Some(previous_run);
             return;
         }
-        // The earlier differences estimate the error of another method, so that they are dropped.
-        if rule.levels.starts_method_family(self.level) {
-            self.differences.clear();
-        }
-        self.differences.push(difference);
+        let starts_family = rule.levels.starts_method_family(level);
+        self.differences.push(LevelDifference { relative: difference, starts_family });
         if self.differences.len() == 1 && self.level == 0 {
             self.first_difference = difference.unwrap_or(f64::INFINITY);
         }
@@ -134,12 +152,23 @@ impl ModelRefinement {
         self.run.as_ref().is_some_and(|run| run.trajectory.status != Status::Ok)
     }
 
+    /// Returns the relative difference of the last two levels; `None` if there are no two, or they
+    /// cannot be compared.
+    fn last_difference(&self) -> Option<f64> {
+        self.differences.last()?.relative
+    }
+
     /// Returns the error of the finest run; `None` if there is no estimate.
     fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
         if let Some(PerturbedComparison { is_chaotic: true, difference }) = self.perturbed {
-            return error_of_chaos((*self.differences.last()?)?, difference?);
+            return error_of_chaos(self.last_difference()?, difference?);
         }
-        let error = error_of_level(rule.levels.levels[self.level].level, &self.differences)?;
+        let level = rule.levels.levels[self.level].level;
+        let contracted_difference = match self.differences[..] {
+            [.., previous, _] => previous.contracted_to(level),
+            _ => 0.0,
+        };
+        let error = error_of_level(self.last_difference()?, contracted_difference)?;
         Some(error.max(rule.relative_ringing(self.level, self)))
     }
 
@@ -283,8 +312,8 @@ impl RowRefinement {
             outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
             // If two levels agree, the motion is not chaotic, and its error is known without a
             // perturbed run.
-            let last_difference = nonlinear.differences.last().copied().flatten();
-            let disagrees = last_difference.is_none_or(|difference| difference > rule.accuracy);
+            let disagrees =
+                nonlinear.last_difference().is_none_or(|difference| difference > rule.accuracy);
             outcome.sensitive = Some(nonlinear.is_chaotic() && disagrees);
         }
         Some(outcome)
