@@ -31,7 +31,7 @@
 //!
 //! This file has all constants on which `error`, `converged` and `sensitive` depend, except the
 //! three of chaos (`separation.rs`), the shares of the limit of stability (`STABILITY_SHARE`,
-//! `CAP_SHARE` and `HINGE_TO_DRUM` beside [`StepSelector`]), the swing of a free body
+//! `CAP_LIMIT_SHARE` and `MIN_HINGE_SPEED_RATIO` beside [`StepSelector`]), the swing of a free body
 //! (`SWING_FACTOR`), and each metric's scale.
 
 use lane_ode::Tolerance;
@@ -154,7 +154,7 @@ pub fn refinement_levels(
     model: ModelKind,
     accuracy: f64,
 ) -> RefinementLevels {
-    if model == ModelKind::Nonlinear && steps.are_nonsmooth() {
+    if model == ModelKind::Nonlinear && steps.has_nonsmooth_force() {
         return levels_at_corners(steps, accuracy);
     }
     let mut levels = Vec::new();

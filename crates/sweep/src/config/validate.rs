@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{
-    ElementList, NoModes, Point, Spin, Target, Violation, decimal,
+    ElementList, ModesError, Point, Spin, Target, Violation, decimal,
     highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, prepare,
 };
 use washer_row::{Criterion, Level};
@@ -142,10 +142,10 @@ impl CornerCheck<'_> {
     }
 
     fn violations(&mut self, found: Vec<Violation>) {
-        for Violation { title, concerns, expected } in found {
-            let is_certain = !concerns.iter().any(|key| self.draft.report.is_doubtful(key));
-            if is_certain && self.reported.insert(concerns.clone()) {
-                refuse(self.draft, title, &concerns, &format!("expected {expected}"));
+        for Violation { title, parameters, expected } in found {
+            let is_certain = !parameters.iter().any(|key| self.draft.report.is_doubtful(key));
+            if is_certain && self.reported.insert(parameters.clone()) {
+                refuse(self.draft, title, &parameters, &format!("expected {expected}"));
             }
         }
     }
@@ -246,7 +246,7 @@ fn highest_additive_rad_per_s(draft: &Draft<'_, Washer>) -> f64 {
 /// that of the bearings. A machine without equilibrium has none, and its rows fail.
 fn highest_of_corners_rad_per_s(
     draft: &Draft<'_, Washer>,
-    highest_rad_per_s: fn(&Point, f64) -> Result<f64, NoModes>,
+    highest_rad_per_s: fn(&Point, f64) -> Result<f64, ModesError>,
 ) -> f64 {
     let plan = &draft.plan;
     let timing = timing(plan);
