@@ -79,7 +79,7 @@ pub fn simulate_with(
 
 /// Integrates one model at every point, like [`simulate_with`]. Returns `None` if `cancel` is
 /// requested before the end of all trajectories, which is polled at least every
-/// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps.
+/// [`CANCEL_POLL_STEPS`](lane_ode::CANCEL_POLL_STEPS) steps.
 pub fn simulate_until(
     simd: Simd,
     model: ModelKind,

@@ -226,7 +226,7 @@ impl<T: Real> LinearMotion<T> {
                 }
             }
         }
-        let mut outputs = [Sample::still(zero, zero); M];
+        let mut outputs = [Sample::constant(zero, zero); M];
         for i in 0..M {
             let [value, slope, curvature] = sums[i];
             outputs[i] = Sample { value, slope, curvature };

@@ -176,7 +176,7 @@ impl<J: LaneModel<Dual<f64>>> OutOfLine for JacobianKernel<'_, J> {
     #[inline(always)]
     fn run(self) -> Partials<COORDINATES> {
         let mut partials = Partials::zero();
-        partials.find(0.0, self.dual_model, self.t_s, &self.x.map(N));
+        partials.compute(0.0, self.dual_model, self.t_s, &self.x.map(N));
         partials
     }
 }

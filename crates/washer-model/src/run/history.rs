@@ -101,7 +101,7 @@ pub struct HistoryRequest<'a> {
 /// Integrates one model at several points. If the method of all is RK4, as many points as there are
 /// lanes are integrated at once. The bits of a history do not depend on the other points. Histories
 /// end early once `cancel` is requested, which is polled at least every
-/// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps.
+/// [`CANCEL_POLL_STEPS`](lane_ode::CANCEL_POLL_STEPS) steps.
 pub fn histories<'a>(
     model: ModelKind,
     requests: Vec<HistoryRequest<'a>>,
@@ -225,7 +225,7 @@ fn outputs<M: LaneModel<f64>>(
     let derivative = model.derivative(&forcing, &state);
     let (radial, channels) = model.observe(&forcing, &state, &derivative, true);
     let gap_m = point.machine.bodies.clearance.0 - squared_distance(&radial).value.0.sqrt();
-    let channels = channels.unwrap_or([Sample::still(N(f64::NAN), N(f64::NAN)); CHANNELS]);
+    let channels = channels.unwrap_or([Sample::constant(N(f64::NAN), N(f64::NAN)); CHANNELS]);
     let values = channels.map(|sample| sample.value.0);
     let rates = channels.map(|sample| sample.slope.0);
     let accelerations = channels.map(|sample| sample.curvature.0);
@@ -366,7 +366,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
             if is_reached == [false; MAX_LANES] {
                 return;
             }
-            let states = step.at(position);
+            let states = step.interpolate(position);
             for lane in (0..self.requests.len()).filter(|&lane| is_reached[lane]) {
                 self.samples[lane].states.push(states.map(|x| x.0.get(lane)));
             }

@@ -271,7 +271,7 @@ impl<T: Lane> Loads<T> {
             distribution,
             stops,
             speeds: vec![Peaks::new(zero); selection.dampers],
-            previous_tub: [Sample::still(zero, zero); 4],
+            previous_tub: [Sample::constant(zero, zero); 4],
             substeps,
         };
         for lane in 0..T::LANES {
@@ -343,8 +343,12 @@ impl<T: Lane> Loads<T> {
                 if substep < substeps {
                     for k in 0..4 {
                         let position = substep_share * f64::from(substep);
-                        tub[k] =
-                            Sample::between(&self.previous_tub[k], &tub_now[k], length_s, position);
+                        tub[k] = Sample::interpolate(
+                            &self.previous_tub[k],
+                            &tub_now[k],
+                            length_s,
+                            position,
+                        );
                     }
                 }
             }
@@ -364,7 +368,7 @@ impl<T: Lane> Loads<T> {
     ) {
         let Self { selection, laws, components, .. } = self;
         let zero = tub[0].value.lit(0.0);
-        let mut force_squared = Sample::still(zero, zero);
+        let mut force_squared = Sample::constant(zero, zero);
         match laws {
             LoadLaws::Nonlinear(elements) => {
                 let mut q = [tub[0].value.constant(); 4];

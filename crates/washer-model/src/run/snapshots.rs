@@ -61,7 +61,7 @@ pub(super) struct Snapshots<T> {
 impl<T: Lane> Snapshots<T> {
     #[inline(always)]
     pub(super) fn new(zero: N<T>) -> Self {
-        let still = Sample::still(zero, zero);
+        let still = Sample::constant(zero, zero);
         Self { lanes: Default::default(), channels: [still; CHANNELS], tub: [still; 4] }
     }
 
@@ -130,7 +130,7 @@ fn interpolate<T: Lane>(
         slope: N(sample.slope.0.get(lane)),
         curvature: N(sample.curvature.0.get(lane)),
     };
-    Sample::between(&in_lane(start), &in_lane(end), N(length_s), share)
+    Sample::interpolate(&in_lane(start), &in_lane(end), N(length_s), share)
 }
 
 #[cfg(test)]

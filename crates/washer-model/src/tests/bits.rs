@@ -7,7 +7,7 @@ use crate::{
     prepare, simulate_until, simulate_with,
 };
 use core::sync::atomic::{AtomicU32, Ordering};
-use lane_ode::{Cancel, STEPS_AT_ONCE, Simd, Tolerance};
+use lane_ode::{CANCEL_POLL_STEPS, Cancel, Simd, Tolerance};
 
 type BitsScenario = (Machine, Spin);
 
@@ -178,7 +178,7 @@ fn blocks_of_steps_do_not_change_bits() {
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853] {
         for model in MODELS {
             let together = simulate_with(simd, model, &method, &all_points, ALL_RECORDERS);
-            assert!(together.0[0].steps > 3 * STEPS_AT_ONCE, "{} steps", together.0[0].steps);
+            assert!(together.0[0].steps > 3 * CANCEL_POLL_STEPS, "{} steps", together.0[0].steps);
             for (k, point) in all_points.iter().enumerate() {
                 let alone = simulate_with(simd, model, &method, &[point], ALL_RECORDERS);
                 let expected = bits((&together.0[k], &together.1[k]));
