@@ -1,5 +1,5 @@
-//! Passes an option to Apple's linker that leaves Python's symbols to the process that loads the
-//! library; other linkers do so by default. maturin passes it too; this is for `cargo build`.
+//! Makes Apple's linker leave Python's symbols to the process that loads the library, which other
+//! linkers do by default. maturin passes the same option; this is for `cargo build`.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

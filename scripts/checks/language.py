@@ -14,9 +14,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 LAST_OLD_SUBJECT = "8ddff34c"
 SUBJECT_COLUMNS = 72
 IMPERATIVES = set("""
-    Accept Add Allow Answer Apply Ask Avoid Bound Build Call Change Check Clean Close Collect
-    Compare Compute Copy Correct Count Cut Decide Declare Delete Derive Describe Document Draw
-    Drop End Exclude Expect Explain Export Extend Fail Find Fix Follow Format Give Guard Handle
+    Accept Add Allow Answer Apply Ask Avoid Bound Build Call Change Check Clarify Clean Close
+    Collect Compare Compute Copy Correct Count Cut Decide Declare Delete Derive Describe Document
+    Draw Drop End Exclude Expect Explain Export Extend Fail Find Fix Follow Format Give Guard Handle
     Hold Implement Import Improve Include Install Integrate Join Keep Leave Let Limit List Load Lock
     Make Map Mark Match Measure Mend Merge Move Name Note Order Parse Plot Point Prefer Print
     Promise Protect

@@ -1,11 +1,10 @@
 //! NEON lanes: intrinsics behind a newtype.
 //!
-//! Every processor of this target has NEON. As on other architectures, only the entry function
-//! makes the first value of this type: a value of this type exists only where the instructions do,
-//! which makes the `unsafe` below sound.
+//! Every processor of this target has NEON. Like on other architectures, only the entry function
+//! makes the first value of this type, which makes the `unsafe` below sound.
 //!
-//! A value takes one register. With two, the right-hand sides need more than the 32 registers, and
-//! a lane's step takes a sixth more instructions (results/benchmarks/arm.md).
+//! A value takes one register. With two registers per value, the right-hand sides would need more
+//! than the 32 registers, and a lane's step a sixth more instructions (results/benchmarks/arm.md).
 #![allow(unsafe_code)]
 
 use crate::vector::vector;
@@ -41,8 +40,8 @@ vector!(
 
 /// Returns `-x`, computed by a separate instruction.
 ///
-/// LLVM 22 turns the negative of a fused a b + c into one `fnmadd`, which is -a b - c: 0 in place
-/// of -0 where the terms cancel. NEON's vectors have no such instruction.
+/// LLVM 22 turns the negative of a fused a b + c into one `fnmadd`, which is -a b - c. Where the
+/// terms cancel, that gives 0 and not -0. NEON's vectors have no such instruction.
 #[inline(always)]
 pub(crate) fn negated(x: f64) -> f64 {
     let negative;

@@ -3,7 +3,7 @@
 use crate::control::StepControl;
 use crate::{Failure, Lane, MAX_LANES, N, SegmentEnd, StepCount, Task, Tolerance};
 
-/// The segment of one lane.
+/// The current segment of one lane.
 #[derive(Clone, Copy, Default)]
 struct AdaptiveSegment {
     is_active: bool,
@@ -32,18 +32,18 @@ impl<T: Lane> AdaptiveLanes<T> {
         }
     }
 
-    /// Requests the next segment for every lane whose segment has ended. Returns whether there was
-    /// such a lane.
+    /// Requests the next segment for every lane whose segment has ended. Returns whether any lane's
+    /// segment had ended.
     #[inline(always)]
     pub(crate) fn start_pending_lanes<const D: usize, P: Task<T, D>>(
         &mut self,
         task: &mut P,
         x: &mut [N<T>; D],
     ) -> bool {
-        let mut has_begun = false;
+        let mut any_started = false;
         for lane in 0..T::LANES {
             let Some(end) = self.segment_ends[lane].take() else { continue };
-            has_begun = true;
+            any_started = true;
             let segment = task.next_segment(lane, end, x);
             self.segments[lane] = AdaptiveSegment {
                 is_active: segment.is_some(),
@@ -53,7 +53,7 @@ impl<T: Lane> AdaptiveLanes<T> {
             self.time.0.set(lane, segment.map_or(0.0, |segment| segment.start_s));
             self.control.start(lane, segment.map_or(0.0, |segment| segment.step_s));
         }
-        has_begun
+        any_started
     }
 
     /// Whether any lane has a segment.
@@ -68,9 +68,9 @@ impl<T: Lane> AdaptiveLanes<T> {
     pub(crate) fn steps(&self) -> N<T> {
         let mut h = self.control.step;
         for (lane, segment) in self.segments[..T::LANES].iter().enumerate() {
-            let left = segment.end_s - self.time.0.get(lane);
-            if segment.is_active && h.0.get(lane) * 1.01 >= left {
-                h.0.set(lane, left);
+            let rest_s = segment.end_s - self.time.0.get(lane);
+            if segment.is_active && h.0.get(lane) * 1.01 >= rest_s {
+                h.0.set(lane, rest_s);
             } else if !segment.is_active {
                 h.0.set(lane, 0.0);
             }
@@ -87,47 +87,48 @@ impl<T: Lane> AdaptiveLanes<T> {
         if time + step >= end_s || step == end_s - time { end_s } else { time + step }
     }
 
-    /// Accepts or rejects steps `h` by their error, and ends segments. `lanes` holds the lanes
-    /// whose errors are small enough, and the lanes whose new states are in range. Returns the
-    /// length that each lane has advanced.
+    /// Accepts or rejects steps `h` by their error, and ends segments. `masks` holds the mask of
+    /// lanes whose errors are small enough, and the mask of lanes whose new states are in range.
+    /// Returns the length by which each lane has advanced.
     #[inline(always)]
     pub(crate) fn accept_or_reject(
         &mut self,
         h: N<T>,
         error: N<T>,
-        lanes: [T::Mask; 2],
+        masks: [T::Mask; 2],
         tolerance: &Tolerance,
     ) -> N<T> {
         let mut length = h.lit(0.0);
-        let lanes = lanes.map(T::bits);
-        let next = self.control.proposals(error, h);
-        // The lanes are handled one by one, which costs little against the evaluations of a step.
+        let masks = masks.map(T::bits);
+        let proposals = self.control.proposals(error, h);
+        // The lanes are handled one by one, which takes little time compared with the evaluations
+        // of a step.
         for lane in 0..T::LANES {
             if !self.segments[lane].is_active {
                 continue;
             }
-            let [is_accepted, is_in_range] = lanes.map(|bits| bits >> lane & 1 == 1);
-            let reached = self.step_end_s(lane, h);
-            self.control.update(lane, is_accepted, &next);
+            let [is_accepted, is_in_range] = masks.map(|bits| bits >> lane & 1 == 1);
+            let end_time = self.step_end_s(lane, h);
+            self.control.update(lane, is_accepted, &proposals);
             let segment = &mut self.segments[lane];
             let count = &mut segment.count;
             let time = if is_accepted {
                 count.accepted += 1;
                 length.0.set(lane, h.0.get(lane));
-                self.time.0.set(lane, reached);
-                reached
+                self.time.0.set(lane, end_time);
+                end_time
             } else {
                 count.rejected += 1;
                 self.time.0.get(lane)
             };
-            let least = 16.0 * f64::EPSILON * time.abs().max(segment.end_s);
-            let is_stuck = !is_accepted && self.control.step.0.get(lane) <= least;
+            let min_step = 16.0 * f64::EPSILON * time.abs().max(segment.end_s);
+            let is_stuck = !is_accepted && self.control.step.0.get(lane) <= min_step;
             let fail = |reason, time_s| Some(SegmentEnd::Failed { reason, time_s, count: *count });
             self.segment_ends[lane] = if !is_in_range && (is_accepted || is_stuck) {
                 fail(Failure::Diverged, time)
             } else if is_stuck {
                 fail(Failure::StepTooSmall, time)
-            } else if is_accepted && reached >= segment.end_s {
+            } else if is_accepted && end_time >= segment.end_s {
                 Some(SegmentEnd::Completed(*count))
             } else if count.accepted + count.rejected >= tolerance.max_steps {
                 fail(Failure::StepLimit, time)

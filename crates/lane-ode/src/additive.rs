@@ -143,11 +143,11 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut before = x;
     let mut slope_before = x;
     let mut length = zero;
-    let mut is_fresh = lanes.start_pending_lanes(task, &mut x);
+    let mut is_start = lanes.start_pending_lanes(task, &mut x);
     while lanes.has_active_lane() && !task.cancel().is_requested() {
         let forcing = task.system().forcing_out_of_line(lanes.time);
         k[0] = task.system().derivative(&forcing, &x);
-        if is_fresh {
+        if is_start {
             task.begin(&forcing, &x, &k[0]);
         } else {
             task.observe(
@@ -162,15 +162,15 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
                     dense: None,
                 },
             );
-            is_fresh = lanes.start_pending_lanes(task, &mut x);
-            if is_fresh {
+            is_start = lanes.start_pending_lanes(task, &mut x);
+            if is_start {
                 continue;
             }
         }
-        is_fresh = false;
+        is_start = false;
 
         let h = lanes.steps();
-        // The equations of an idle lane need a positive g too.
+        // The equations of an idle lane need a positive g as well.
         let g = N((h * GAMMA).v().0.larger(zero.lit(f64::MIN_POSITIVE.sqrt()).0));
         let mut y = x;
         let mut r = x;

@@ -4,15 +4,16 @@ use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 /// A cancellation, which a computation polls. Once it is requested, the computation ends soon, and
-/// its result is meaningless or a part of the whole.
+/// its result is incomplete or meaningless.
 #[derive(Clone, Copy, Default)]
 pub enum Cancel<'a> {
-    /// No request, ever.
+    /// A cancellation that is never requested.
     #[default]
     Never,
-    /// A request once the flag is set.
+    /// A cancellation that is requested by setting the flag.
     Flag(&'a AtomicBool),
-    /// A request once the function returns true, from any thread.
+    /// A cancellation that is requested once the function returns true. The function is called from
+    /// any thread.
     When(&'a (dyn Fn() -> bool + Sync)),
 }
 

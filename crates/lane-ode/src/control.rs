@@ -25,19 +25,19 @@ impl Tolerance {
     ) -> N<T> {
         let zero = before[0].lit(0.0);
         let mut largest = zero;
-        let mut poison = zero;
+        let mut nan_sum = zero;
         for i in 0..D {
             let size = N(before[i].0.abs().larger(after[i].0.abs()));
             let ratio = error[i].abs() / (size * self.relative + self.absolute);
             largest = N(ratio.0.larger(largest.0));
-            // Comparisons lose a NaN, so that a product with zero carries it on.
-            poison += ratio * zero;
+            // The maximum ignores a NaN, so that the product with zero passes it on to the result.
+            nan_sum += ratio * zero;
         }
-        largest + poison
+        largest + nan_sum
     }
 }
 
-/// Returns a formula's matrix from its rows, which may omit zeros at their ends.
+/// Returns a matrix of coefficients from its rows, which may omit zeros at their ends.
 pub(crate) const fn pad_rows<const ROWS: usize, const COLUMNS: usize>(
     rows: [&[f64]; ROWS],
 ) -> [[f64; COLUMNS]; ROWS] {
@@ -51,28 +51,28 @@ pub(crate) const fn pad_rows<const ROWS: usize, const COLUMNS: usize>(
     matrix
 }
 
-/// Proportional-integral step control (Hairer and Wanner II, section IV.2): h grows by
-/// 0.9 err^-alpha err_before^beta, within 0.2 to 5.
+/// Proportional-integral step control (Hairer and Wanner II, section IV.2): h is multiplied by 0.9
+/// err^-alpha err_before^beta, within 0.2 to 5.
 ///
 /// The exponents are sums of powers of one half, so that they need square roots only and the bits
 /// are the same everywhere.
 pub(crate) struct StepControl<T> {
     /// The step to try next.
     pub(crate) step: N<T>,
-    /// The number err^beta of the last accepted step.
+    /// The factor err^beta of the last accepted step.
     memory: N<T>,
     /// A mask of the lanes whose last step was rejected: their next step must not grow.
     was_rejected: u32,
 }
 
-/// The next step of each lane, for an accepted and for a rejected step.
+/// The next step of each lane, if the current one is accepted and if it is rejected.
 pub(crate) struct Proposals<T> {
     accepted: N<T>,
     rejected: N<T>,
-    memory: N<T>,
+    accepted_memory: N<T>,
 }
 
-/// Returns a step's factor within the shrink limit and `greatest`.
+/// Clamps a step's factor to [`SHRINK_LIMIT`] and `greatest`.
 #[inline(always)]
 fn clamp_factor<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
     let least = factor.lit(SHRINK_LIMIT);
@@ -81,8 +81,8 @@ fn clamp_factor<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
     least.where_less(factor, factor, least)
 }
 
-/// The safety factor of the step size. Basis: `dopri5.f` (0.9). Doubling it would have nearly every
-/// step rejected.
+/// The safety factor of the step size. Basis: `dopri5.f` (0.9). With double the value nearly every
+/// step would be rejected.
 const SAFETY_FACTOR: f64 = 0.9;
 /// The least factor from one step to the next. Basis: `dopri5.f` (0.2). Doubling it takes more
 /// rejected steps where the motion suddenly becomes faster.
@@ -100,7 +100,7 @@ impl<T: Lane> StepControl<T> {
         Self { step: zero, memory: zero.lit(1.0), was_rejected: 0 }
     }
 
-    /// Starts a segment. It discards the control's memory of the lane's earlier trajectories, so
+    /// Starts a segment in a lane. The memory of the lane's earlier trajectories is discarded, so
     /// that results do not depend on them.
     #[inline(always)]
     pub(crate) fn start(&mut self, lane: usize, first_step_s: f64) {
@@ -109,10 +109,10 @@ impl<T: Lane> StepControl<T> {
         self.was_rejected &= !(1 << lane);
     }
 
-    /// Computes the next steps after error `error` over step `h`.
+    /// Computes the next steps after a step `h` with error `error`.
     #[inline(always)]
     pub(crate) fn proposals(&self, error: N<T>, h: N<T>) -> Proposals<T> {
-        // An error that is NaN counts as far too large.
+        // A NaN is treated as a far too large error.
         let error = error.where_less(error.lit(1e30), error, error.lit(1e30));
         let error = error.lit(LEAST_ERROR).where_less(error, error, error.lit(LEAST_ERROR));
         let root_2 = error.sqrt();
@@ -126,24 +126,24 @@ impl<T: Lane> StepControl<T> {
         Proposals {
             accepted: (h * clamp_factor(SAFETY_FACTOR * self.memory / alpha, GROWTH_LIMIT)).v(),
             rejected: (h * clamp_factor(SAFETY_FACTOR / alpha, 1.0)).v(),
-            memory: beta,
+            accepted_memory: beta,
         }
     }
 
-    /// Sets a lane's next step, after an accepted or a rejected one.
+    /// Sets a lane's next step, after its step was accepted or rejected.
     #[inline(always)]
-    pub(crate) fn update(&mut self, lane: usize, is_accepted: bool, next: &Proposals<T>) {
+    pub(crate) fn update(&mut self, lane: usize, is_accepted: bool, proposals: &Proposals<T>) {
         let bit = 1 << lane;
         if is_accepted {
-            let mut step = next.accepted.0.get(lane);
+            let mut step = proposals.accepted.0.get(lane);
             if self.was_rejected & bit != 0 {
                 step = step.min(self.step.0.get(lane));
             }
             self.step.0.set(lane, step);
-            self.memory.0.set(lane, next.memory.0.get(lane));
+            self.memory.0.set(lane, proposals.accepted_memory.0.get(lane));
             self.was_rejected &= !bit;
         } else {
-            self.step.0.set(lane, next.rejected.0.get(lane));
+            self.step.0.set(lane, proposals.rejected.0.get(lane));
             self.was_rejected |= bit;
         }
     }

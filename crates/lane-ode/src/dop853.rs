@@ -1,12 +1,12 @@
 //! The eighth-order Runge-Kutta method of Dormand and Prince with a fixed step.
 //!
-//! Coefficients: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5
-//! and the program `dop853.f` that goes with it. The formula's error estimate is omitted, because
-//! callers compare whole trajectories.
+//! Coefficients: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5,
+//! and its program `dop853.f`. The formula's error estimate is omitted, because callers compare
+//! whole trajectories.
 //!
 //! On the imaginary axis the method is stable up to |h w| = 5.96. This is half a radian per stage,
 //! against 0.71 of the classical method of order 4. The method is cheaper than the classical one
-//! where accuracy, not stability, limits the steps of the latter.
+//! where accuracy, not stability, limits the step.
 
 use crate::fixed::FixedSegments;
 use crate::{Lane, N, ObservedStep, System as _, Task};
@@ -34,7 +34,7 @@ const C: [f64; DOP853_STAGES] = [
     1.0,
 ];
 
-/// The nonzero coefficients of a row, each after the index of its stage.
+/// The nonzero coefficients of a row, each with the index of its stage before it.
 type SparseRow = &'static [(usize, f64)];
 
 /// Rows of the matrix, from the second stage on.
@@ -124,38 +124,38 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
     let zero = N(zero);
     let mut x = [zero; D];
     let mut segments = FixedSegments::new(zero);
-    while let Some(mut run) = segments.start_pending_lanes(task, &mut x) {
+    while let Some(mut step_limit) = segments.start_pending_lanes(task, &mut x) {
         let clock = segments.clock;
         let mut index = segments.index;
         let h = clock.h;
-        let mut time = clock.at(index);
-        // The compiler must not see through this call, or it copies the forcing repeatedly.
+        let mut time = clock.time_after(index);
+        // `black_box` prevents the compiler from copying the forcing repeatedly.
         let mut forcing = task.system().forcing_out_of_line(time);
         let forcing = black_box(&mut forcing);
         // The states at the start of this step and of the last one, which swap places, and the
-        // stage's state; then the slopes, with the first slope of the last step, which observers
-        // need, at the end.
+        // state of a stage.
         let mut states = [x; 3];
+        // The slopes of the stages, and the first slope of the last step, which observers need.
         let mut slopes = [x; DOP853_STAGES + 1];
         // Index of a stage's state among the states.
-        const STAGE: usize = 2;
+        const STAGE_STATE: usize = 2;
         // Index of the last step's first slope among the slopes.
-        const PREVIOUS: usize = DOP853_STAGES;
+        const PREVIOUS_SLOPE: usize = DOP853_STAGES;
         let mut current = 0;
         let mut previous = 1;
-        let mut is_fresh = true;
-        let mut done = 0;
+        let mut is_start = true;
+        let mut step_count = 0;
         loop {
-            // The pass after the last step only evaluates the slope, because observers need it at
-            // both ends of a step.
-            let is_last = done == run;
-            let next_time = clock.at(index + 1.0);
+            // The iteration after the last step only evaluates the slope, because observers need it
+            // at both ends of a step.
+            let is_last = step_count == step_limit;
+            let next_time = clock.time_after(index + 1.0);
             for stage in 0..DOP853_STAGES {
                 if stage == 0 {
                     slopes[0] = task.system().derivative(forcing, &states[current]);
-                    if is_fresh {
+                    if is_start {
                         task.begin(forcing, &states[current], &slopes[0]);
-                        is_fresh = false;
+                        is_start = false;
                     } else {
                         task.observe(
                             forcing,
@@ -163,7 +163,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                                 end_s: time,
                                 length_s: h,
                                 before: &states[previous],
-                                slope_before: &slopes[PREVIOUS],
+                                slope_before: &slopes[PREVIOUS_SLOPE],
                                 after: &states[current],
                                 slope_after: &slopes[0],
                                 dense: None,
@@ -173,16 +173,16 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     if is_last {
                         break;
                     }
-                    slopes[PREVIOUS] = slopes[0];
+                    slopes[PREVIOUS_SLOPE] = slopes[0];
                     continue;
                 }
-                let stage_time = clock.at(index + C[stage]);
+                let stage_time = clock.time_after(index + C[stage]);
                 task.system().update_forcing(
                     if stage == DOP853_STAGES - 1 { next_time } else { stage_time },
                     forcing,
                 );
-                add_slopes(h, A[stage - 1], &slopes, &mut states, current, STAGE);
-                slopes[stage] = task.system().derivative(forcing, &states[STAGE]);
+                add_slopes(h, A[stage - 1], &slopes, &mut states, current, STAGE_STATE);
+                slopes[stage] = task.system().derivative(forcing, &states[STAGE_STATE]);
             }
             if is_last {
                 break;
@@ -191,23 +191,24 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             (current, previous) = (previous, current);
             index = index + 1.0;
             time = next_time;
-            done += 1;
+            step_count += 1;
             let in_range = task.system().in_range(&states[current]);
-            if !T::all(in_range) && segments.fail(in_range, time, done) {
-                run = done;
+            if !T::all(in_range) && segments.fail(in_range, time, step_count) {
+                step_limit = step_count;
             }
         }
         x = states[current];
         segments.index = index;
-        segments.count_steps(done);
+        segments.count_steps(step_count);
     }
 }
 
-/// Number of sums that are kept in registers. Basis: AVX2 has sixteen registers. Doubling it has
-/// sums stored in memory.
+/// Number of coordinates whose sums are kept in registers. Basis: AVX2 has sixteen registers.
+/// Doubling it has sums stored in memory.
 const SUMS_IN_REGISTERS: usize = 10;
 
-/// Computes a stage's state: a given state plus the sum of slopes weighted by a row's coefficients.
+/// Computes a state from state `from` and the slopes weighted by a row's coefficients, and stores
+/// it as state `to`.
 #[expect(clippy::manual_memcpy, reason = "sums are registers, not memory")]
 #[inline(always)]
 fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
@@ -218,8 +219,8 @@ fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
     from: usize,
     to: usize,
 ) {
-    // Coordinates are summed in groups whose sums fit in registers: each weight is read once for a
-    // group, and no sum waits for its own last term.
+    // Coordinates are summed in groups whose sums fit in registers. Each weight is loaded once for
+    // a group, and the sums of a group are computed independently of each other.
     for first in (0..D).step_by(SUMS_IN_REGISTERS) {
         let mut x = [h; SUMS_IN_REGISTERS];
         for i in 0..SUMS_IN_REGISTERS.min(D - first) {

@@ -75,10 +75,10 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut x = [zero; D];
     let mut lanes = AdaptiveLanes::new(zero);
     let mut k = [[zero; D]; STAGES];
-    let mut is_fresh = true;
+    let mut is_start = true;
 
     loop {
-        is_fresh |= lanes.start_pending_lanes(task, &mut x);
+        is_start |= lanes.start_pending_lanes(task, &mut x);
         if task.cancel().is_requested() || !lanes.has_active_lane() {
             return;
         }
@@ -86,7 +86,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 
         // The last stage of a step is the first of the next, except after the start of a segment.
         let mut y = x;
-        for stage in usize::from(!is_fresh)..STAGES {
+        for stage in usize::from(!is_start)..STAGES {
             let forcing = task.system().forcing(h * C[stage] + lanes.time);
             for i in 0..D {
                 let mut sum = zero;
@@ -100,7 +100,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
                 task.begin(&forcing, &x, &k[0]);
             }
         }
-        is_fresh = false;
+        is_start = false;
 
         let in_range = task.system().in_range(&y);
         let error = tolerance.error_norm(&x, &y, &combine_stages(h, &k, &E));

@@ -1,4 +1,4 @@
-//! Forward automatic differentiation: numbers that carry one derivative along.
+//! Forward automatic differentiation by dual numbers: values with one derivative.
 
 use crate::real::operations;
 use crate::{Lane, N, OutOfLine, Real};
@@ -86,8 +86,8 @@ impl<T: Real> Real for Dual<T> {
     }
 }
 
-/// Lanes of dual numbers, over which whole systems can be evaluated. Each lane can carry a
-/// derivative along another direction.
+/// Lanes of dual numbers, over which whole systems can be evaluated. Each lane has its own
+/// direction of differentiation.
 impl<T: Lane> Lane for Dual<T> {
     const LANES: usize = T::LANES;
     #[inline(always)]

@@ -4,9 +4,9 @@ use crate::{Failure, Lane, MAX_LANES, N, Segment, SegmentEnd, StepCount, Task};
 
 /// Greatest number of steps between two polls of [`Task::cancel`]. Basis: they take some
 /// hundredths of a second. Doubling it doubles the time until an interrupt takes effect.
-pub const STEPS_AT_ONCE: u64 = 1 << 14;
+pub const CANCEL_POLL_STEPS: u64 = 1 << 14;
 
-/// Returns the number of equal steps in a segment: the least for which they are no longer than the
+/// Returns the number of equal steps in a segment: the smallest number with steps of at most the
 /// segment's `step_s`.
 pub(crate) fn fixed_steps(segment: &Segment) -> u64 {
     // Rounding may make the quotient slightly greater than the intended whole number.
@@ -15,7 +15,8 @@ pub(crate) fn fixed_steps(segment: &Segment) -> u64 {
     steps as u64
 }
 
-/// The time of each lane's segment. The end is exact in spite of the step's rounding error.
+/// The clock of each lane's segment. A segment's end is exact in spite of the step's rounding
+/// error.
 #[derive(Clone, Copy)]
 pub(crate) struct SegmentClock<T> {
     start: N<T>,
@@ -29,12 +30,12 @@ pub(crate) struct SegmentClock<T> {
 impl<T: Lane> SegmentClock<T> {
     /// Returns the time after `index` steps.
     #[inline(always)]
-    pub(crate) fn at(&self, index: N<T>) -> N<T> {
+    pub(crate) fn time_after(&self, index: N<T>) -> N<T> {
         index.where_less(self.total, index * self.h + self.start, self.end)
     }
 }
 
-/// The number of steps of a lane's segment, done and remaining.
+/// The progress of a lane's segment.
 #[derive(Clone, Copy, Default)]
 struct FixedProgress {
     is_active: bool,
@@ -81,10 +82,11 @@ impl<T: Lane> FixedSegments<T> {
                 total_steps: steps,
                 remaining_steps: steps,
             };
-            let (from, to) = segment.map_or((0.0, 0.0), |segment| (segment.start_s, segment.end_s));
-            self.clock.start.0.set(lane, from);
-            self.clock.end.0.set(lane, to);
-            self.clock.h.0.set(lane, (to - from) / steps.max(1) as f64);
+            let (start_s, end_s) =
+                segment.map_or((0.0, 0.0), |segment| (segment.start_s, segment.end_s));
+            self.clock.start.0.set(lane, start_s);
+            self.clock.end.0.set(lane, end_s);
+            self.clock.h.0.set(lane, (end_s - start_s) / steps.max(1) as f64);
             self.clock.total.0.set(lane, steps as f64);
             self.index.0.set(lane, 0.0);
         }
@@ -92,15 +94,16 @@ impl<T: Lane> FixedSegments<T> {
             return None;
         }
         let active = self.lanes[..T::LANES].iter().filter(|lane| lane.is_active);
-        active.map(|lane| lane.remaining_steps.min(STEPS_AT_ONCE)).min()
+        active.map(|lane| lane.remaining_steps.min(CANCEL_POLL_STEPS)).min()
     }
 
     /// Ends the segments of lanes that are out of range at `time`, `new_steps` steps after the last
-    /// call of [`Self::start_pending_lanes`]. Returns whether there are any.
+    /// call of [`Self::start_pending_lanes`]. Returns whether any lane's segment has ended.
     #[inline(always)]
     pub(crate) fn fail(&mut self, in_range: T::Mask, time: N<T>, new_steps: u64) -> bool {
-        let out = !T::bits(in_range);
-        for lane in (0..T::LANES).filter(|lane| self.lanes[*lane].is_active && out >> lane & 1 == 1)
+        let out_of_range = !T::bits(in_range);
+        for lane in (0..T::LANES)
+            .filter(|lane| self.lanes[*lane].is_active && out_of_range >> lane & 1 == 1)
         {
             let accepted_steps =
                 self.lanes[lane].total_steps - self.lanes[lane].remaining_steps + new_steps;

@@ -25,14 +25,14 @@ pub trait Lane: Real {
     fn round(self) -> Self;
     /// Packs the truth values of all lanes: bit `i` is that of lane `i`.
     fn bits(mask: Self::Mask) -> u32;
-    /// Returns the larger of each pair; `b` where either is NaN.
+    /// Returns the larger of each pair of lanes; `b` where either is NaN.
     #[inline(always)]
     #[must_use]
     fn larger(self, b: Self) -> Self {
         Self::select(b.less(self), self, b)
     }
-    /// Runs work over lanes of this type as a separate function, compiled once for all callers with
-    /// the type's instructions.
+    /// Runs `work`, which uses lanes of this type, as a separate function that is compiled once for
+    /// all callers with the type's instructions.
     #[inline(always)]
     fn run_out_of_line<W: OutOfLine>(self, work: W) -> W::Output {
         call_out_of_line(work)
@@ -41,8 +41,8 @@ pub trait Lane: Real {
 
 /// Work over lanes of one type that is compiled once, as a separate function instead of inline in
 /// each caller. It suits long code that runs rarely, because the time to compile a function grows
-/// faster than its length. [`Lane::run_out_of_line`] runs it in lanes,
-/// [`Simd::one_lane`](crate::Simd::one_lane) in a single one.
+/// faster than its length. [`Lane::run_out_of_line`] runs it over several lanes,
+/// [`Simd::one_lane`](crate::Simd::one_lane) over a single one.
 pub trait OutOfLine {
     /// The result of the work.
     type Output;
@@ -50,7 +50,7 @@ pub trait OutOfLine {
     fn run(self) -> Self::Output;
 }
 
-/// Runs work without instructions beyond the target's.
+/// Runs `work` compiled with the target's baseline instructions.
 #[inline(never)]
 pub(crate) fn call_out_of_line<W: OutOfLine>(work: W) -> W::Output {
     work.run()

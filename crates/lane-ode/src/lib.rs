@@ -153,7 +153,7 @@ mod x86;
 pub use cancel::Cancel;
 pub use control::Tolerance;
 pub use dual::Dual;
-pub use fixed::STEPS_AT_ONCE;
+pub use fixed::CANCEL_POLL_STEPS;
 pub use interval_peaks::IntervalPeaks;
 pub use lane::{Lane, MAX_LANES, OutOfLine};
 pub use linear_solve::Lu;

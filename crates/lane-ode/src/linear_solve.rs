@@ -14,8 +14,7 @@ pub struct Lu<const C: usize> {
 
 impl<const C: usize> Lu<C> {
     /// Factors `a`, with the largest remaining entry of a column as pivot (Golub and Van Loan,
-    /// Matrix Computations, Algorithm 3.4.1). Returns `None` if a column has only zeros left, or an
-    /// entry is not finite.
+    /// Matrix Computations, Algorithm 3.4.1). Returns `None` if a pivot is zero or not finite.
     #[inline(always)]
     pub fn new(mut a: [[N<f64>; C]; C]) -> Option<Self> {
         let mut order = [0; C];
@@ -29,18 +28,18 @@ impl<const C: usize> Lu<C> {
                     pivot = i;
                 }
             }
-            let size = a[pivot][j].0.abs();
-            if !(size > 0.0 && size.is_finite()) {
+            let pivot_size = a[pivot][j].0.abs();
+            if !(pivot_size > 0.0 && pivot_size.is_finite()) {
                 return None;
             }
             a.swap(j, pivot);
             order.swap(j, pivot);
             let reciprocal = a[j][j].recip();
-            let above = a[j];
+            let pivot_row = a[j];
             for i in j + 1..C {
                 let l = (a[i][j] * reciprocal).v();
                 for k in j + 1..C {
-                    a[i][k] -= l * above[k];
+                    a[i][k] -= l * pivot_row[k];
                 }
                 a[i][j] = l;
             }
@@ -56,7 +55,7 @@ impl<const C: usize> Lu<C> {
         for i in 0..C {
             x[i] = b[self.order[i]];
         }
-        // The elimination goes by columns, so that each pass is independent over the rows.
+        // The substitution goes column by column, so that each pass is independent over the rows.
         for j in 0..C {
             for i in j + 1..C {
                 x[i] -= self.packed[i][j] * x[j];

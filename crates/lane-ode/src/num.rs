@@ -77,7 +77,7 @@ impl<T: Real> N<T> {
     }
 }
 
-/// Implements a binary operator between two of value, product and plain constant.
+/// Implements a binary operator for two operands, each a value, a product or a plain constant.
 macro_rules! binary {
     ($Op:ident :: $op:ident, $L:ty, $R:ty => $Out:ty, |$a:ident, $b:ident| $body:expr) => {
         impl<T: Real> $Op<$R> for $L {
@@ -135,7 +135,7 @@ impl<T: Real> Neg for Product<T> {
     }
 }
 
-/// Implements an operator that changes a value.
+/// Implements a compound assignment operator.
 macro_rules! assign {
     ($Op:ident :: $op:ident, $R:ty, $sign:tt) => {
         impl<T: Real> $Op<$R> for N<T> {

@@ -24,7 +24,7 @@ impl<const C: usize> Partials<C> {
     /// every lane; each lane differentiates along its own direction, and the results do not depend
     /// on the number of lanes.
     #[inline(always)]
-    pub fn find<T: Lane, const D: usize, S: System<Dual<T>, D>>(
+    pub fn compute<T: Lane, const D: usize, S: System<Dual<T>, D>>(
         &mut self,
         zero: T,
         system: &S,
@@ -38,7 +38,7 @@ impl<const C: usize> Partials<C> {
         for i in 0..D {
             constant[i] = zero.lit(x[i].0).constant();
         }
-        // A loop, so that the right-hand side is compiled once for all directions.
+        // The directions are a loop, so that the right-hand side is compiled once for all of them.
         for group in 0..D.div_ceil(T::LANES) {
             let first = group * T::LANES;
             let mut seeded = constant;
@@ -79,11 +79,16 @@ mod tests {
             sin
         }
 
-        fn derivative(&self, push: &N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
-            let [angle, place, rate, speed] = *x;
-            let pull = (place - angle) * self.stiffness;
+        fn derivative(&self, forcing: &N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
+            let [angle, position, angular_speed, speed] = *x;
+            let pull = (position - angle) * self.stiffness;
             let (sin, _) = angle.sin_cos();
-            [rate, speed, pull - 9.0 * sin - 0.1 * rate + *push, 4.0 * *push - 2.0 * pull.v()]
+            [
+                angular_speed,
+                speed,
+                pull - 9.0 * sin - 0.1 * angular_speed + *forcing,
+                4.0 * *forcing - 2.0 * pull.v(),
+            ]
         }
 
         fn in_range(&self, x: &[N<T>; 4]) -> T::Mask {
@@ -95,19 +100,19 @@ mod tests {
     fn derivatives_are_exact_and_do_not_depend_on_the_lanes() {
         let pendulum = SprungPendulum { stiffness: 50.0 };
         let x = [0.4, 0.5, -1.0, 2.0].map(N);
-        let mut one = Partials::<2>::zero();
-        one.find(0.0, &pendulum, 2.0, &x);
-        let mut four = Partials::<2>::zero();
-        four.find(Array([0.0; 4]), &pendulum, 2.0, &x);
-        assert_eq!(format!("{one:?}"), format!("{four:?}"));
+        let mut one_lane = Partials::<2>::zero();
+        one_lane.compute(0.0, &pendulum, 2.0, &x);
+        let mut four_lanes = Partials::<2>::zero();
+        four_lanes.compute(Array([0.0; 4]), &pendulum, 2.0, &x);
+        assert_eq!(format!("{one_lane:?}"), format!("{four_lanes:?}"));
         let by_coordinate = [[-50.0 - 9.0 * 0.4_f64.cos(), 50.0], [100.0, -100.0]];
         let by_speed = [[-0.1, 0.0], [0.0, 0.0]];
         for i in 0..2 {
             for j in 0..2 {
-                let by_coordinate = (one.by_coordinate[i][j].0, by_coordinate[i][j]);
-                let by_speed = (one.by_speed[i][j].0, by_speed[i][j]);
-                for (found, expected) in [by_coordinate, by_speed] {
-                    assert!((found - expected).abs() < 1e-13, "{i}, {j}: {found} {expected}");
+                let by_coordinate = (one_lane.by_coordinate[i][j].0, by_coordinate[i][j]);
+                let by_speed = (one_lane.by_speed[i][j].0, by_speed[i][j]);
+                for (computed, expected) in [by_coordinate, by_speed] {
+                    assert!((computed - expected).abs() < 1e-13, "{i}, {j}: {computed} {expected}");
                 }
             }
         }

@@ -19,10 +19,10 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     /// Creates peaks without samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
-        Self { peak: [zero; M], last_samples: [Sample::still(zero, zero); M] }
+        Self { peak: [zero; M], last_samples: [Sample::constant(zero, zero); M] }
     }
 
-    /// Resets one lane.
+    /// Sets the peaks of one lane to zero.
     #[inline(always)]
     pub fn reset(&mut self, lane: usize) {
         self.peak.iter_mut().for_each(|peak| peak.0.set(lane, 0.0));
@@ -34,7 +34,7 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.peak.map(|peak| peak.0.get(lane))
     }
 
-    /// Adds samples that no step leads to, in the lanes that count.
+    /// Adds the samples at the start of the first step, in the lanes in which `counts` is true.
     #[inline(always)]
     pub fn begin(&mut self, samples: &[Sample<T>; M], counts: T::Mask) {
         for i in 0..M {
@@ -43,7 +43,7 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.last_samples = *samples;
     }
 
-    /// Adds the samples at the end of a step of `length_s` that began at the samples before, in the
+    /// Adds the samples at the end of a step of `length_s` that began at the last samples, in the
     /// lanes in which `counts` is true.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
@@ -52,14 +52,14 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         let mut highest = zero;
         let mut rises = [zero; M];
         for i in 0..M {
-            let last = self.last_samples[i];
-            let now = &samples[i];
-            self.raise_peak(i, now.value.abs(), counts);
+            let start = self.last_samples[i];
+            let end = &samples[i];
+            self.raise_peak(i, end.value.abs(), counts);
             // The height of the control polygon above the peak.
-            let polygon = (last.value + third * last.slope)
+            let polygon = (start.value + third * start.slope)
                 .abs()
                 .0
-                .larger((now.value - third * now.slope).abs().0);
+                .larger((end.value - third * end.slope).abs().0);
             rises[i] = N(polygon) - self.peak[i];
             highest = N(rises[i].0.larger(highest.0));
         }
@@ -67,18 +67,18 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
             for i in 0..M {
                 let rise = N(T::select(counts, rises[i].0, zero.0));
                 if T::bits(zero.0.less(rise.0)) != 0 {
-                    let inside =
+                    let extremum =
                         Quintic::new(length_s, &self.last_samples[i], &samples[i]).extremum();
-                    let inside = zero.where_less(rise, inside.abs(), zero);
-                    self.peak[i] = N(inside.0.larger(self.peak[i].0));
+                    let extremum = zero.where_less(rise, extremum.abs(), zero);
+                    self.peak[i] = N(extremum.0.larger(self.peak[i].0));
                 }
             }
         }
         self.last_samples = *samples;
     }
 
-    /// Adds samples as [`Peaks::advance`] does, for outputs whose curvatures are not known. A step
-    /// is then the cubic through values and slopes, and the sampling error is of fourth order.
+    /// Adds samples like [`Peaks::advance`], for outputs whose curvatures are not known. A step is
+    /// then the cubic through values and slopes, and the sampling error is of fourth order.
     #[inline(always)]
     pub fn advance_by_slopes(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let mut samples = *samples;
@@ -89,8 +89,8 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     }
 
     #[inline(always)]
-    fn raise_peak(&mut self, i: usize, size: N<T>, counts: T::Mask) {
-        let raised = size.0.larger(self.peak[i].0);
+    fn raise_peak(&mut self, i: usize, magnitude: N<T>, counts: T::Mask) {
+        let raised = magnitude.0.larger(self.peak[i].0);
         self.peak[i] = N(T::select(counts, raised, self.peak[i].0));
     }
 }

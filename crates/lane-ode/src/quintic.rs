@@ -15,9 +15,9 @@ pub struct Sample<T> {
 }
 
 impl<T: Copy> Sample<T> {
-    /// Returns a constant output.
+    /// Returns a sample of a constant output.
     #[inline(always)]
-    pub const fn still(value: N<T>, zero: N<T>) -> Self {
+    pub const fn constant(value: N<T>, zero: N<T>) -> Self {
         Self { value, slope: zero, curvature: zero }
     }
 }
@@ -25,17 +25,17 @@ impl<T: Copy> Sample<T> {
 impl<T: Lane> Sample<T> {
     /// Sets the curvatures at both ends of a step to those of the cubic through values and slopes.
     #[inline(always)]
-    pub(crate) fn curve_as_cubic(length_s: N<T>, last: &mut Self, now: &mut Self) {
-        let mean_slope = (now.value - last.value) / length_s;
-        last.curvature = (6.0 * mean_slope - (4.0 * last.slope + 2.0 * now.slope)) / length_s;
-        now.curvature = (2.0 * last.slope + 4.0 * now.slope - 6.0 * mean_slope) / length_s;
+    pub(crate) fn curve_as_cubic(length_s: N<T>, start: &mut Self, end: &mut Self) {
+        let mean_slope = (end.value - start.value) / length_s;
+        start.curvature = (6.0 * mean_slope - (4.0 * start.slope + 2.0 * end.slope)) / length_s;
+        end.curvature = (2.0 * start.slope + 4.0 * end.slope - 6.0 * mean_slope) / length_s;
     }
 
-    /// Interpolates between two samples, at a `share` (0 to 1) of the step of `length_s` from one
-    /// to the other, by the polynomial of degree 5 with the values, slopes and curvatures of both.
+    /// Interpolates between two samples, at a `fraction` (0 to 1) of the step of `length_s` between
+    /// them, by the polynomial of degree 5 with the values, slopes and curvatures of both.
     #[inline(always)]
-    pub fn between(start: &Self, end: &Self, length_s: N<T>, share: f64) -> Self {
-        Quintic::new(length_s, start, end).sample(length_s.lit(share), length_s)
+    pub fn interpolate(start: &Self, end: &Self, length_s: N<T>, fraction: f64) -> Self {
+        Quintic::new(length_s, start, end).sample(length_s.lit(fraction), length_s)
     }
 }
 
@@ -73,14 +73,15 @@ impl<T: Lane> Quintic<T> {
         }
     }
 
-    /// Returns the value where the slope vanishes, or at an end if it does not.
+    /// Returns the value where the slope vanishes, or the value at an end of the step if the slope
+    /// vanishes nowhere.
     #[inline(always)]
     pub(crate) fn extremum(&self) -> N<T> {
         self.value(self.extremum_position())
     }
 
     /// Finds the s at which the slope vanishes, by Newton's method from the zero of a linear slope.
-    /// Returns an end if there is none.
+    /// Returns an end of the step if the slope vanishes nowhere in it.
     #[inline(always)]
     pub(crate) fn extremum_position(&self) -> N<T> {
         let c = &self.c;

@@ -13,39 +13,41 @@ pub const RK4_STABILITY_LIMIT: f64 = 2.828_427_124_746_190_3;
 /// The coefficients a21, a32 and a43; all others are zero.
 const A: [f64; 3] = [0.5, 0.5, 1.0];
 
-/// Integrates every trajectory that the task has. A lane takes the next one as soon as it is free.
+/// Integrates every trajectory of the task. A lane starts the next trajectory as soon as its own
+/// has ended.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) {
     let zero = N(zero);
     let mut x = [zero; D];
     let mut segments = FixedSegments::new(zero);
-    while let Some(mut run) = segments.start_pending_lanes(task, &mut x) {
+    while let Some(mut step_limit) = segments.start_pending_lanes(task, &mut x) {
         let clock = segments.clock;
         let mut index = segments.index;
         let h = clock.h;
         let one_third = zero.lit(1.0 / 3.0);
         let h_sixth = h / zero.lit(6.0);
-        let mut time = clock.at(index);
+        let mut time = clock.time_after(index);
         // The forcing at the step's start, then at its middle, then at its end, which is the start
-        // of the next step. The compiler must not see through the call, or it keeps the forcing in
-        // variables and copies all of them in every step.
+        // of the next step. `black_box` prevents the compiler from keeping the forcing in
+        // variables, all of which it would copy in every step.
         let mut forcing = task.system().forcing_out_of_line(time);
         let forcing = black_box(&mut forcing);
         // The states and slopes at the start of this step and of the last one, which swap places,
-        // and the states of two stages. They are in one array, so that their addresses need no
-        // further registers, and few, so that they fit in the first cache.
+        // and the states of two stages. One array holds them, so that their addresses need no
+        // further registers. There are only four, so that they fit in the first-level cache.
         let mut states = [x; 4];
         let mut slopes = [x; 2];
         let mut current = 0;
         let mut previous = 1;
-        let mut is_fresh = true;
-        let mut done = 0;
+        let mut is_start = true;
+        let mut step_count = 0;
         loop {
-            // The one after the last is an evaluation only: observers want the slope at both ends
-            // of a step.
-            let is_last = done == run;
-            let next_time = clock.at(index + 1.0);
-            // The state at the last step's start is free once this step has been observed.
+            // The iteration after the last step only evaluates the slope, because observers need it
+            // at both ends of a step.
+            let is_last = step_count == step_limit;
+            let next_time = clock.time_after(index + 1.0);
+            // The state at the last step's start is overwritten only after that step has been
+            // observed.
             let second = 2;
             let third = previous;
             let fourth = 3;
@@ -55,20 +57,21 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             for stage in 0..4 {
                 if stage % 2 == 1 {
                     task.system().update_forcing(
-                        if stage == 1 { clock.at(index + 0.5) } else { next_time },
+                        if stage == 1 { clock.time_after(index + 0.5) } else { next_time },
                         forcing,
                     );
                 }
                 let slope = task.system().derivative(forcing, &states[stage_inputs[stage]]);
                 if stage == 3 {
-                    // x + h (k1 + 2 k2 + 2 k3 + k4) / 6, with h k1 to h k3 from the later stages'
-                    // states. No sum of slopes is stored, because stores are the bottleneck of this
-                    // loop.
+                    // Computes x + h (k1 + 2 k2 + 2 k3 + k4) / 6, where h k1 to h k3 follow from
+                    // the states of the later stages. No sum of slopes is stored, because stores
+                    // are the bottleneck of this loop.
                     for i in 0..D {
                         let x = states[current][i];
-                        let moved = states[second][i] + states[fourth][i] + 2.0 * states[third][i]
-                            - 4.0 * x;
-                        states[previous][i] = x + one_third * moved + h_sixth * slope[i];
+                        let stage_sum =
+                            states[second][i] + states[fourth][i] + 2.0 * states[third][i]
+                                - 4.0 * x;
+                        states[previous][i] = x + one_third * stage_sum + h_sixth * slope[i];
                     }
                     break;
                 }
@@ -79,9 +82,9 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                 }
                 if stage == 0 {
                     slopes[current] = slope;
-                    if is_fresh {
+                    if is_start {
                         task.begin(forcing, &states[current], &slopes[current]);
-                        is_fresh = false;
+                        is_start = false;
                     } else {
                         task.observe(
                             forcing,
@@ -107,14 +110,14 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             (current, previous) = (previous, current);
             index = index + 1.0;
             time = next_time;
-            done += 1;
+            step_count += 1;
             let in_range = task.system().in_range(&states[current]);
-            if !T::all(in_range) && segments.fail(in_range, time, done) {
-                run = done;
+            if !T::all(in_range) && segments.fail(in_range, time, step_count) {
+                step_limit = step_count;
             }
         }
         x = states[current];
         segments.index = index;
-        segments.count_steps(done);
+        segments.count_steps(step_count);
     }
 }

@@ -74,7 +74,8 @@ fn negated(x: f64) -> f64 {
     -x
 }
 
-/// Returns `a * b + c`, rounded once; rounded twice on targets whose lanes do so.
+/// Returns `a * b + c`, rounded once; rounded twice on WebAssembly, whose vector lanes round twice
+/// too.
 #[inline(always)]
 fn fused(a: f64, b: f64, c: f64) -> f64 {
     if cfg!(target_arch = "wasm32") { a * b + c } else { f64::mul_add(a, b, c) }

@@ -8,7 +8,8 @@ use crate::{Lane, OutOfLine};
 #[cfg(target_arch = "x86_64")]
 use x86::one_lane;
 
-/// An instruction set the integrators can run on. Results are the same bits on all of them.
+/// An instruction set that the integrators can run on. Results are the same bits on all of them,
+/// except [`Simd::Simd128`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Simd {
     /// A single lane, with the processor's fused multiply-add. On x86-64 this needs a processor
@@ -20,8 +21,8 @@ pub enum Simd {
     Avx512,
     /// Two lanes of NEON.
     Neon,
-    /// Two lanes of WebAssembly's vectors, which have no fused multiply-add: other bits (see
-    /// `wasm32.rs`).
+    /// Two lanes of WebAssembly's vectors, which have no fused multiply-add, so that results differ
+    /// from those of other sets in the last bits (see `wasm32.rs`).
     Simd128,
 }
 
@@ -47,8 +48,8 @@ impl core::error::Error for UnsupportedProcessor {}
 pub trait Kernel {
     /// The result of the work.
     type Output;
-    /// Does the work over lanes of type `T`; `zero` is the first value, from which all constants
-    /// are made.
+    /// Does the work over lanes of type `T`. `zero` is a value of that type, from which the kernel
+    /// makes all constants.
     fn run<T: Lane>(self, zero: T) -> Self::Output;
 }
 
@@ -56,8 +57,8 @@ impl Simd {
     /// Every instruction set, the widest first.
     pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Simd128, Self::Scalar];
 
-    /// Checks that this processor has any of these instruction sets. Programs call it before they
-    /// begin.
+    /// Checks that this processor has an instruction set that kernels are compiled for. Programs
+    /// call it before they begin.
     ///
     /// # Errors
     /// [`UnsupportedProcessor`] if it has none.
@@ -70,9 +71,9 @@ impl Simd {
         Self::ALL.into_iter().find(|simd| simd.is_available()).unwrap_or(Self::Scalar)
     }
 
-    /// Returns the instruction set with the fewest lanes, at most as many as this one has, that
-    /// holds `trajectories` at once; this one if none does. Half the lanes cost little more than
-    /// half the time on a processor that splits its widest instructions.
+    /// Returns the instruction set with the fewest lanes that still holds `trajectories` at once,
+    /// with at most as many lanes as this one; this one if none does. Half the lanes take little
+    /// more than half the time on a processor that splits its widest instructions.
     pub fn narrowed(self, trajectories: usize) -> Self {
         let fits = |simd: &Self| (trajectories..=self.lanes()).contains(&simd.lanes());
         let mut narrowest_first = Self::ALL.into_iter().rev().filter(|simd| simd.is_available());
@@ -156,7 +157,7 @@ impl Simd {
     }
 
     /// Runs work on one lane, for single trajectories. The work is compiled once, not for every
-    /// width, and has the same bits as in any lane.
+    /// number of lanes, and its results have the same bits as in any lane.
     ///
     /// # Panics
     /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].
@@ -165,9 +166,9 @@ impl Simd {
         one_lane(work)
     }
 
-    /// Runs a kernel that integrates one trajectory and uses lanes for another purpose, on a few
-    /// lanes. The result is the same on any number of lanes. Few suffice, and the kernel is
-    /// compiled for one instruction set instead of all.
+    /// Runs a kernel that integrates one trajectory and uses lanes for another purpose, such as
+    /// derivatives, on at most four lanes. The result is the same on any number of lanes. The
+    /// kernel is compiled for one instruction set instead of all, which shortens the build.
     ///
     /// # Panics
     /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].
@@ -190,7 +191,8 @@ impl Simd {
     }
 }
 
-/// An entry function with an instruction set, and a safe one around it that checks for it.
+/// Defines an entry function that is compiled for an instruction set, and a safe function around it
+/// that checks that the processor has the set.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32"))]
 macro_rules! entry {
     ($name:ident, $Work:ident, $features:literal, $simd:ident, |$work:ident| $run:expr) => {

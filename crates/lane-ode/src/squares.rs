@@ -17,10 +17,10 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
     /// Creates integrals without samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
-        Self { integral: [zero; M], last: [Sample::still(zero, zero); M] }
+        Self { integral: [zero; M], last: [Sample::constant(zero, zero); M] }
     }
 
-    /// Forgets one lane.
+    /// Sets the integrals of one lane to zero.
     pub fn reset(&mut self, lane: usize) {
         self.integral.iter_mut().for_each(|integral| integral.0.set(lane, 0.0));
     }
@@ -30,7 +30,7 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
         self.integral.map(|integral| integral.0.get(lane))
     }
 
-    /// Sets samples without a step before them.
+    /// Sets the samples at the start of the first step.
     #[inline(always)]
     pub fn begin(&mut self, samples: &[Sample<T>; M]) {
         for i in 0..M {
@@ -38,8 +38,8 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
         }
     }
 
-    /// Adds a step of `length_s` from the last samples to these, in the lanes in which `counts` is
-    /// true.
+    /// Adds a step of `length_s` from the last samples to `samples`, in the lanes in which `counts`
+    /// is true.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let zero = length_s.lit(0.0);

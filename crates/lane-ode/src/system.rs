@@ -10,15 +10,15 @@ pub trait System<T: Lane, const D: usize> {
     /// Computes the forcing at time `t_s`, which may differ between lanes.
     fn forcing(&self, t_s: N<T>) -> Self::Forcing;
 
-    /// Overwrites a forcing of this system with that at another time, which is cheaper than a new
-    /// one if forcings are large.
+    /// Replaces a forcing of this system by that at another time, which costs less than a new one
+    /// if forcings are large.
     #[inline(always)]
     fn update_forcing(&self, t_s: N<T>, forcing: &mut Self::Forcing) {
         *forcing = self.forcing(t_s);
     }
 
-    /// Computes [`Self::forcing`] as a function that all callers share, for callers that call it
-    /// rarely.
+    /// Computes [`Self::forcing`] in a function that all callers share. It suits callers that need
+    /// it rarely.
     #[inline(always)]
     fn forcing_out_of_line(&self, t_s: N<T>) -> Self::Forcing
     where
@@ -30,7 +30,7 @@ pub trait System<T: Lane, const D: usize> {
     /// Computes f at state `x`.
     fn derivative(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D];
 
-    /// Computes [`Self::derivative`] as a function that all callers share.
+    /// Computes [`Self::derivative`] in a function that all callers share.
     #[inline(always)]
     fn derivative_out_of_line(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D]
     where
@@ -94,22 +94,22 @@ pub trait Task<T: Lane, const D: usize> {
     /// Returns the system with the lanes' current parameters.
     fn system(&self) -> &Self::System;
 
-    /// Receives the end of the segment in lane `lane`, and returns the next segment: of the same
-    /// trajectory, or of a new one, whose parameters and state are then written; `None` if there is
-    /// no further trajectory.
+    /// Receives the end of the segment in lane `lane`, and returns the next segment. It belongs to
+    /// the same trajectory or to a new one, whose parameters and start state are then written into
+    /// the lane. Returns `None` if there is no further trajectory.
     fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment>;
 
     /// Receives the state at the start of a segment in one or more lanes, where the trajectory may
-    /// have a kink or be a new one. Lanes that are inside a segment are passed the same sample as
-    /// before.
+    /// have a kink or be a new one. Other lanes, which are inside a segment, receive their last
+    /// state once more.
     fn begin(&mut self, forcing: &Forcing<Self, T, D>, x: &[N<T>; D], dx: &[N<T>; D]);
 
-    /// Receives a step of every lane, of zero length in idle lanes.
+    /// Receives a step of every lane. The step's length is zero in idle lanes.
     fn observe(&mut self, forcing: &Forcing<Self, T, D>, step: &ObservedStep<'_, T, D>);
 
-    /// Returns the cancellation of the computation, which abandons unfinished trajectories. It is
-    /// polled at least every [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps, because a segment may
-    /// take hours.
+    /// Returns the cancellation of the computation, after which unfinished trajectories are
+    /// abandoned. It is polled at least once every [`CANCEL_POLL_STEPS`](crate::CANCEL_POLL_STEPS)
+    /// steps, because a segment may take hours.
     fn cancel(&self) -> Cancel<'_> {
         Cancel::Never
     }
@@ -201,18 +201,18 @@ impl<T: Lane, const D: usize> ObservedStep<'_, T, D> {
     /// The formula is that of Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I,
     /// section II.6 (`contd5`).
     #[inline(always)]
-    pub fn at(&self, s: N<T>) -> [N<T>; D] {
-        let rest = 1.0 - s;
+    pub fn interpolate(&self, s: N<T>) -> [N<T>; D] {
+        let remainder = 1.0 - s;
         let mut x = *self.before;
         for i in 0..D {
             let difference = self.after[i] - self.before[i];
             let start = self.length_s * self.slope_before[i] - difference;
             let end = difference - self.length_s * self.slope_after[i] - start;
-            let inner = match self.dense {
-                Some(dense) => end + rest * dense[i],
+            let curvature_term = match self.dense {
+                Some(dense) => end + remainder * dense[i],
                 None => end,
             };
-            x[i] += s * (difference + rest * (start + s * inner));
+            x[i] += s * (difference + remainder * (start + s * curvature_term));
         }
         x
     }

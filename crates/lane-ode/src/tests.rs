@@ -16,10 +16,10 @@ use crate::{
 };
 use core::marker::PhantomData;
 
-/// A family of equations x' = f(p, t, x), with `P` parameters that each lane has for itself.
+/// A family of equations x' = f(p, t, x) with `P` parameters, whose values differ between lanes.
 trait Equation<const D: usize, const P: usize> {
     /// The limit of the components' magnitudes, beyond which a state is out of range.
-    const FARTHEST: f64 = 1e6;
+    const RANGE_LIMIT: f64 = 1e6;
     /// Computes f.
     fn derivative<T: Lane>(p: &[N<T>; P], t_s: N<T>, x: &[N<T>; D]) -> [N<T>; D];
     /// Solves k = H(t, x, r + g k) for k, with H(t, x, x) = f(t, x). By default H is f(t, x).
@@ -38,7 +38,7 @@ trait Equation<const D: usize, const P: usize> {
     }
 }
 
-/// A member of the family, with its start and its segments.
+/// A trajectory of one member of the family.
 #[derive(Clone, Debug)]
 struct TestTrajectory<const D: usize, const P: usize> {
     parameters: [f64; P],
@@ -58,20 +58,20 @@ enum TestMethod {
 #[derive(Clone, Copy, Debug)]
 struct TestOutcome<const D: usize> {
     /// The end of the last segment.
-    ended: SegmentEnd,
+    end: SegmentEnd,
     /// The steps of all segments.
     count: StepCount,
     /// The state at the end.
     x: [f64; D],
     /// The end of the last step that an observer received.
     observed_to_s: f64,
-    /// The largest error of [`Step::at`] inside a step.
+    /// The largest error of [`ObservedStep::interpolate`] inside a step.
     error_inside: f64,
 }
 
 impl<const D: usize> TestOutcome<D> {
     const NONE: Self = Self {
-        ended: SegmentEnd::Idle,
+        end: SegmentEnd::Idle,
         count: StepCount { accepted: 0, rejected: 0 },
         x: [f64::NAN; D],
         observed_to_s: f64::NAN,
@@ -81,7 +81,7 @@ impl<const D: usize> TestOutcome<D> {
     /// Returns whether both trajectories have the same bits and the same steps.
     fn is_same(&self, other: &Self) -> bool {
         self.x.map(f64::to_bits) == other.x.map(f64::to_bits)
-            && self.ended == other.ended
+            && self.end == other.end
             && self.count == other.count
             && self.error_inside.to_bits() == other.error_inside.to_bits()
             && self.observed_to_s.to_bits() == other.observed_to_s.to_bits()
@@ -93,7 +93,8 @@ fn instruction_sets() -> Vec<Simd> {
     Simd::ALL.into_iter().filter(|simd| simd.is_available()).collect()
 }
 
-/// Solves every trajectory. Returns the outcomes, and the number of allocations of the integration.
+/// Solves every trajectory. Returns the outcomes, and the number of heap allocations during the
+/// integration.
 fn solve<E: Equation<D, P>, const D: usize, const P: usize>(
     simd: Simd,
     method: TestMethod,
@@ -116,8 +117,8 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for SolveKernel<'
         let mut batch = Batch::<'_, T, E, D, P> {
             member: Member { p: [N(zero); P], equation: PhantomData },
             trajectories: self.trajectories,
-            taken: 0,
-            at: [(0, 0); MAX_LANES],
+            started: 0,
+            current: [(0, 0); MAX_LANES],
             outcomes: vec![TestOutcome::NONE; self.trajectories.len()],
         };
         let heap = allocation_counter::measure(|| match self.method {
@@ -134,9 +135,9 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for SolveKernel<'
 struct Batch<'a, T, E, const D: usize, const P: usize> {
     member: Member<T, E, P>,
     trajectories: &'a [TestTrajectory<D, P>],
-    taken: usize,
-    /// The trajectory and the segment of each lane.
-    at: [(usize, usize); MAX_LANES],
+    started: usize,
+    /// The indices of the trajectory and of the segment in each lane.
+    current: [(usize, usize); MAX_LANES],
     outcomes: Vec<TestOutcome<D>>,
 }
 
@@ -163,8 +164,8 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> fo
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask {
         let mut sum = x[0].lit(0.0);
         for x in x {
-            let share = (*x * (1.0 / E::FARTHEST)).v();
-            sum += share * share;
+            let ratio = (*x * (1.0 / E::RANGE_LIMIT)).v();
+            sum += ratio * ratio;
         }
         sum.0.less(sum.lit(1.0).0)
     }
@@ -197,10 +198,10 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
 
     fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment> {
         if end != SegmentEnd::Idle {
-            let (trajectory, segment) = &mut self.at[lane];
+            let (trajectory, segment) = &mut self.current[lane];
             let segments = &self.trajectories[*trajectory].segments;
             let outcome = &mut self.outcomes[*trajectory];
-            outcome.ended = end;
+            outcome.end = end;
             match end {
                 SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } => {
                     outcome.count.add(count);
@@ -213,9 +214,9 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
             }
             outcome.x = x.map(|x| x.0.get(lane));
         }
-        let trajectory = self.trajectories.get(self.taken)?;
-        self.at[lane] = (self.taken, 0);
-        self.taken += 1;
+        let trajectory = self.trajectories.get(self.started)?;
+        self.current[lane] = (self.started, 0);
+        self.started += 1;
         for (p, value) in self.member.p.iter_mut().zip(trajectory.parameters) {
             p.0.set(lane, value);
         }
@@ -228,18 +229,19 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
     fn begin(&mut self, _: &N<T>, _: &[N<T>; D], _: &[N<T>; D]) {}
 
     fn observe(&mut self, _: &N<T>, step: &ObservedStep<'_, T, D>) {
-        for share in [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] {
-            let inside = step.at(step.length_s.lit(share));
+        for fraction in [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] {
+            let interpolated = step.interpolate(step.length_s.lit(fraction));
             for lane in (0..T::LANES).filter(|&lane| step.length_s.0.get(lane) > 0.0) {
-                let (trajectory, _) = self.at[lane];
+                let (trajectory, _) = self.current[lane];
                 let outcome = &mut self.outcomes[trajectory];
                 outcome.observed_to_s = step.end_s.0.get(lane);
-                let t_s = outcome.observed_to_s - (1.0 - share) * step.length_s.0.get(lane);
+                let t_s = outcome.observed_to_s - (1.0 - fraction) * step.length_s.0.get(lane);
                 let exact = E::exact(&self.trajectories[trajectory].parameters, t_s);
                 for i in 0..D {
-                    // `max` ignores NaN, so that an unknown solution has no error.
+                    // `max` ignores NaN, so that a trajectory without a known solution has no
+                    // error.
                     outcome.error_inside =
-                        outcome.error_inside.max((inside[i].0.get(lane) - exact[i]).abs());
+                        outcome.error_inside.max((interpolated[i].0.get(lane) - exact[i]).abs());
                 }
             }
         }
@@ -256,8 +258,8 @@ impl Equation<3, 1> for SwingEquation {
         [(w * (x[0] * cos)).v(), (w * x[2]).v(), -(w * x[1]).v()]
     }
 
-    /// The implicit part of the oscillator is w (1 + y^2), which is more than the whole frequency,
-    /// so that the explicit part has the opposite sign.
+    /// The implicit part of the oscillator is w (1 + y^2), which exceeds the oscillator's
+    /// frequency, so that the explicit part has the opposite sign.
     #[inline(always)]
     fn solve_implicit_stage<T: Lane>(
         p: &[N<T>; 1],
@@ -266,13 +268,13 @@ impl Equation<3, 1> for SwingEquation {
         r: &[N<T>; 3],
         g: N<T>,
     ) -> [N<T>; 3] {
-        let [x_rate, by_z, by_y] = Self::derivative(p, t_s, x);
-        let more = (x[1] * x[1]).v();
-        let rate = (p[0] * (1.0 + more)).v();
-        let turn = (g * rate).v();
-        let by_r = [rate * r[2] - more * by_z, -(rate * r[1]) - more * by_y];
-        let to_y = (by_r[0] + turn * by_r[1]) / (1.0 + turn * turn);
-        [x_rate, to_y, by_r[1] - turn * to_y]
+        let [x_rate, y_rate, z_rate] = Self::derivative(p, t_s, x);
+        let square = (x[1] * x[1]).v();
+        let rate = (p[0] * (1.0 + square)).v();
+        let angle = (g * rate).v();
+        let residual = [rate * r[2] - square * y_rate, -(rate * r[1]) - square * z_rate];
+        let y_slope = (residual[0] + angle * residual[1]) / (1.0 + angle * angle);
+        [x_rate, y_slope, residual[1] - angle * y_slope]
     }
 
     fn exact(&[w]: &[f64; 1], t_s: f64) -> [f64; 3] {
@@ -300,8 +302,8 @@ impl Equation<4, 1> for CoupledEquation {
         r: &[N<T>; 4],
         g: N<T>,
     ) -> [N<T>; 4] {
-        let apart = r[1] - r[0] + g * (r[3] - r[2] + g * x[0]);
-        let pull = (k * apart).v() / (1.0 + 2.0 * (k * (g * g).v()).v());
+        let stretch = r[1] - r[0] + g * (r[3] - r[2] + g * x[0]);
+        let pull = (k * stretch).v() / (1.0 + 2.0 * (k * (g * g).v()).v());
         let accelerations = [pull - x[0], -pull];
         [
             r[2] + g * accelerations[0],
@@ -313,7 +315,7 @@ impl Equation<4, 1> for CoupledEquation {
 }
 
 impl TestTrajectory<3, 1> {
-    /// Returns a trajectory from 0 to `end_s` in `count` equal segments.
+    /// Returns a trajectory of [`SwingEquation`] from 0 to `end_s` in `count` equal segments.
     fn swing(w: f64, end_s: f64, count: u32, step_s: f64) -> Self {
         let edge = |i: u32| end_s * f64::from(i) / f64::from(count);
         let segments =

@@ -54,22 +54,22 @@ fn polynomial<T: Real>(c: &[f64; 6], z: N<T>) -> N<T> {
 /// Rotates sine and cosine of an angle in quadrant 0 by `quadrant` (an integer) quarter turns.
 #[inline(always)]
 fn rotate_by_quarter_turns<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<T>, N<T>) {
-    // The quadrant as a fraction of a turn: 0, 0.25, 0.5 or 0.75. A multiple of 1/4 less 3/8 rounds
-    // to its floor.
+    // The quadrant as a fraction of a turn: 0, 0.25, 0.5 or 0.75. A multiple of 1/4 minus 3/8
+    // rounds to the floor of the multiple.
     let quarter = (quadrant * 0.25).v();
-    let part = quarter - N((quarter - 0.375).0.round());
+    let fraction = quarter - N((quarter - 0.375).0.round());
     (
-        select_by_quadrant(part, [sin, cos, -sin, -cos]),
-        select_by_quadrant(part, [cos, -sin, -cos, sin]),
+        select_by_quadrant(fraction, [sin, cos, -sin, -cos]),
+        select_by_quadrant(fraction, [cos, -sin, -cos, sin]),
     )
 }
 
-/// Selects the value of the quadrant that `part` (0, 0.25, 0.5 or 0.75 of a turn) stands for.
+/// Selects the value of the quadrant that `fraction` (0, 0.25, 0.5 or 0.75 of a turn) stands for.
 #[inline(always)]
-fn select_by_quadrant<T: Real>(part: N<T>, values: [N<T>; 4]) -> N<T> {
-    let upper = part.where_less(part.lit(0.625), values[2], values[3]);
-    let lower = part.where_less(part.lit(0.125), values[0], values[1]);
-    part.where_less(part.lit(0.375), lower, upper)
+fn select_by_quadrant<T: Real>(fraction: N<T>, values: [N<T>; 4]) -> N<T> {
+    let upper = fraction.where_less(fraction.lit(0.625), values[2], values[3]);
+    let lower = fraction.where_less(fraction.lit(0.125), values[0], values[1]);
+    fraction.where_less(fraction.lit(0.375), lower, upper)
 }
 
 /// Computes sine and cosine of any angle up to about 1e6 rad.
@@ -82,9 +82,9 @@ pub(crate) fn sin_cos<T: Lane>(x: T) -> (T, T) {
     sin_cos_by_lanes(x)
 }
 
-/// Computes sine and cosine lane by lane, out of line, so that the common path stays short. An
-/// angle within a quarter turn has the same bits as on the common path, so that a lane does not
-/// depend on the others.
+/// Computes sine and cosine lane by lane, out of line, so that the common path stays short. The
+/// result has the same bits as on the common path for an angle up to pi/4, so that a lane does not
+/// depend on the other lanes.
 #[cold]
 #[inline(never)]
 fn sin_cos_by_lanes<T: Lane>(x: T) -> (T, T) {
@@ -106,9 +106,9 @@ fn sin_cos_by_lanes<T: Lane>(x: T) -> (T, T) {
 /// Computes sine and cosine of an angle in turns, whose integer part is removed without rounding.
 #[inline(always)]
 pub fn sin_cos_turns<T: Lane>(turns: N<T>) -> (N<T>, N<T>) {
-    let part = turns - N(turns.0.round());
-    let quadrant = N((part * 4.0).v().0.round());
-    let rest = part - quadrant * 0.25;
+    let fraction = turns - N(turns.0.round());
+    let quadrant = N((fraction * 4.0).v().0.round());
+    let rest = fraction - quadrant * 0.25;
     let (sin, cos) = sin_cos_within_quarter((rest * core::f64::consts::TAU).v());
     rotate_by_quarter_turns(quadrant, sin, cos)
 }

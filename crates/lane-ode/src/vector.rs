@@ -25,7 +25,7 @@ macro_rules! vector {
             /// The processor must have this type's instruction set.
             #[inline(always)]
             pub(crate) unsafe fn first(value: f64) -> Self {
-                // SAFETY: the caller's promise.
+                // SAFETY: the caller guarantees the instruction set.
                 Self(unsafe { $set1(value) })
             }
         }
@@ -34,8 +34,8 @@ macro_rules! vector {
             type Mask = $mask;
             #[inline(always)]
             fn lit(self, value: f64) -> Self {
-                // SAFETY: `self` exists, so its instruction set does (module docs of the
-                // invocation); likewise below.
+                // SAFETY: a value of this type exists only on processors with its instruction set
+                // (module docs); likewise below.
                 Self(unsafe { $set1(value) })
             }
             $crate::real::operations! {

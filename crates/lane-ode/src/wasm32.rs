@@ -1,15 +1,17 @@
 //! Lanes of WebAssembly's vectors (simd128): intrinsics behind a newtype.
 //!
-//! WebAssembly has no fused multiply-add, and one in software is far slower than a multiplication
-//! and an addition. So the fused operations round twice here, and in one lane of this target too:
-//! results are not the bits of other instruction sets. Amplitudes at reliable points of the paper's
-//! map differ by less than 1e-9 of themselves (`tests/browser/check_live.py`). They are the same
-//! bits in every browser, because each operation is correctly rounded.
+//! WebAssembly has no fused multiply-add, and an emulation in software is far slower than a
+//! multiplication and an addition. So the fused operations round twice on this target, in one lane
+//! as well as in two: results differ from those of other instruction sets in the last bits.
+//! Relative differences of amplitudes at reliable points of the paper's map are below 1e-9
+//! (`tests/browser/check_live.py`). Every browser gives the same bits, because each operation is
+//! correctly rounded.
 //!
-//! An engine validates a module before it runs, so a value of this type exists only where the
-//! instructions do, which makes the `unsafe` below sound.
+//! An engine validates a module before it runs, so a value of this type exists only in engines with
+//! the instructions, which makes the `unsafe` below sound.
 #![allow(unsafe_code)]
-// On this target the intrinsics are safe to call, which the lint would report.
+// The intrinsics are safe to call on this target, so that the lint would report the `unsafe` blocks
+// of the macro.
 #![allow(unused_unsafe)]
 
 use crate::vector::vector;

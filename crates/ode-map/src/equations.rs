@@ -7,9 +7,8 @@ use lane_ode::{Dual, Lane, Lu, N, Partials, System};
 
 use crate::Oscillator;
 
-/// Greatest number of Newton steps to the equilibrium, which start with all coordinates at zero.
-/// Basis: Newton's method needs a few. Doubling it costs time for oscillators without an
-/// equilibrium near zero.
+/// Greatest number of Newton steps to the equilibrium, from zero. Basis: Newton's method needs a
+/// few steps. Doubling it doubles the time for oscillators without an equilibrium near zero.
 const MAX_NEWTON_STEPS: usize = 50;
 /// Limit of the magnitude of coordinates, beyond which a trajectory has diverged. Basis: far above
 /// any motion. Doubling it makes no difference.
@@ -24,7 +23,7 @@ pub(crate) enum OscillatorModel {
     Linear,
 }
 
-/// The parameters of a point, with what is computed once for all of its trajectories.
+/// The parameters of a point, with the numbers that are computed once for all of its trajectories.
 #[derive(Clone, Debug)]
 pub(crate) struct PreparedPoint<const C: usize, const P: usize> {
     pub(crate) p: [f64; P],
@@ -40,34 +39,34 @@ impl<const C: usize, const P: usize> PreparedPoint<C, P> {
         p: [f64; P],
         window_s: [f64; 2],
     ) -> Option<Self> {
-        let still = [0.0; C];
-        let mut equilibrium = still;
-        let mut tangent = tangent::<O, C, D, P>(&p, &still, &still);
-        // Because of rounding, the iteration may not end before the limit of steps.
+        let zero = [0.0; C];
+        let mut equilibrium = zero;
+        let mut tangent = tangent::<O, C, D, P>(&p, &zero, &zero);
+        // Rounding may prevent convergence to the last bit, so that the number of steps is limited.
         for _ in 0..MAX_NEWTON_STEPS {
-            let rest = O::accelerations(&p.map(N), &equilibrium.map(N), &still.map(N));
-            if rest.iter().all(|a| a.0 == 0.0) {
+            let residual = O::accelerations(&p.map(N), &equilibrium.map(N), &zero.map(N));
+            if residual.iter().all(|a| a.0 == 0.0) {
                 break;
             }
-            let step = Lu::new(tangent.by_coordinate)?.solve(&rest);
-            let before = equilibrium;
+            let step = Lu::new(tangent.by_coordinate)?.solve(&residual);
+            let previous = equilibrium;
             for i in 0..C {
                 equilibrium[i] -= step[i].0;
             }
             if !equilibrium.iter().all(|q| q.is_finite()) {
                 return None;
             }
-            if before == equilibrium {
+            if previous == equilibrium {
                 break;
             }
-            tangent = self::tangent::<O, C, D, P>(&p, &equilibrium, &still);
+            tangent = self::tangent::<O, C, D, P>(&p, &equilibrium, &zero);
         }
         Some(Self { p, window_s, equilibrium, tangent })
     }
 
-    /// Returns a bound of the frequencies of the linear model's free motions (rad/s), from the
-    /// norms of its matrices.
-    pub(crate) fn fastest_rad_per_s(&self) -> f64 {
+    /// Returns an upper bound of the frequencies of the linear model's free motions (rad/s), from
+    /// the norms of its matrices.
+    pub(crate) fn highest_frequency_rad_per_s(&self) -> f64 {
         let norm = |matrix: &[[N<f64>; C]; C]| {
             let row_sum = |row: &[N<f64>; C]| row.iter().map(|entry| entry.0.abs()).sum::<f64>();
             matrix.iter().map(row_sum).fold(0.0, f64::max)
@@ -83,7 +82,7 @@ fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
     u: &[f64; C],
 ) -> Partials<C> {
     let constant = |value: f64| N(value).constant();
-    let mut found = Partials::zero();
+    let mut partials = Partials::zero();
     let p = p.map(constant);
     for j in 0..C {
         let [mut q, mut u]: [[N<Dual<f64>>; C]; 2] = [q, u].map(|state| state.map(constant));
@@ -93,11 +92,11 @@ fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
         u[j].0.slope = 1.0;
         let by_speed = O::accelerations(&p, &q, &u);
         for i in 0..C {
-            found.by_coordinate[i][j] = N(by_coordinate[i].0.slope);
-            found.by_speed[i][j] = N(by_speed[i].0.slope);
+            partials.by_coordinate[i][j] = N(by_coordinate[i].0.slope);
+            partials.by_speed[i][j] = N(by_speed[i].0.slope);
         }
     }
-    found
+    partials
 }
 
 /// A model as a first-order system over lanes, with one point in each lane. States are deviations
@@ -108,7 +107,7 @@ pub(crate) struct Equations<O, T, const C: usize, const D: usize, const P: usize
     equilibrium: [N<T>; C],
     by_coordinate: [[N<T>; C]; C],
     by_speed: [[N<T>; C]; C],
-    farthest: N<T>,
+    limit: N<T>,
     oscillator: PhantomData<O>,
 }
 
@@ -123,18 +122,18 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             equilibrium: [zero; C],
             by_coordinate: [[zero; C]; C],
             by_speed: [[zero; C]; C],
-            farthest: zero.lit(DIVERGENCE_LIMIT),
+            limit: zero.lit(DIVERGENCE_LIMIT),
             oscillator: PhantomData,
         }
     }
 
     /// Writes a point into a lane.
-    pub(crate) fn set_point(&mut self, lane: usize, case: &PreparedPoint<C, P>) {
-        set(&mut self.p, lane, &case.p.map(N));
-        set(&mut self.equilibrium, lane, &case.equilibrium.map(N));
-        let Partials { by_coordinate, by_speed } = &case.tangent;
-        set(self.by_coordinate.as_flattened_mut(), lane, by_coordinate.as_flattened());
-        set(self.by_speed.as_flattened_mut(), lane, by_speed.as_flattened());
+    pub(crate) fn set_point(&mut self, lane: usize, point: &PreparedPoint<C, P>) {
+        set_lane(&mut self.p, lane, &point.p.map(N));
+        set_lane(&mut self.equilibrium, lane, &point.equilibrium.map(N));
+        let Partials { by_coordinate, by_speed } = &point.tangent;
+        set_lane(self.by_coordinate.as_flattened_mut(), lane, by_coordinate.as_flattened());
+        set_lane(self.by_speed.as_flattened_mut(), lane, by_speed.as_flattened());
     }
 }
 
@@ -150,15 +149,15 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
 
     #[inline(always)]
     fn derivative(&self, forcing: &[N<T>; C], x: &[N<T>; D]) -> [N<T>; D] {
-        let (q, u): ([N<T>; C], [N<T>; C]) = halves(x);
-        let mut free = q;
+        let (q, u): ([N<T>; C], [N<T>; C]) = split_state(x);
+        let mut acceleration = q;
         match self.model {
             OscillatorModel::Nonlinear => {
-                let mut place = q;
+                let mut position = q;
                 for i in 0..C {
-                    place[i] = q[i] + self.equilibrium[i];
+                    position[i] = q[i] + self.equilibrium[i];
                 }
-                free = O::accelerations(&self.p, &place, &u);
+                acceleration = O::accelerations(&self.p, &position, &u);
             }
             OscillatorModel::Linear => {
                 for i in 0..C {
@@ -167,14 +166,14 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
                         sum = self.by_coordinate[i][j] * q[j] + sum;
                         sum = self.by_speed[i][j] * u[j] + sum;
                     }
-                    free[i] = sum;
+                    acceleration[i] = sum;
                 }
             }
         }
         let mut slopes = *x;
         for i in 0..C {
             slopes[i] = u[i];
-            slopes[C + i] = free[i] + forcing[i];
+            slopes[C + i] = acceleration[i] + forcing[i];
         }
         slopes
     }
@@ -187,17 +186,17 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             // the limit.
             largest = N(T::select(x[i].abs().0.less(largest.0), largest.0, x[i].abs().0));
         }
-        largest.0.less(self.farthest.0)
+        largest.0.less(self.limit.0)
     }
 }
 
 /// Splits a state into coordinates and speeds.
-fn halves<T: Copy, const C: usize, const D: usize>(x: &[T; D]) -> ([T; C], [T; C]) {
+fn split_state<T: Copy, const C: usize, const D: usize>(x: &[T; D]) -> ([T; C], [T; C]) {
     const { assert!(D == 2 * C, "a state is the coordinates and their speeds") };
     (std::array::from_fn(|i| x[i]), std::array::from_fn(|i| x[C + i]))
 }
 
-fn set<T: Lane>(to: &mut [N<T>], lane: usize, from: &[N<f64>]) {
+fn set_lane<T: Lane>(to: &mut [N<T>], lane: usize, from: &[N<f64>]) {
     for (to, from) in to.iter_mut().zip(from) {
         to.0.set(lane, from.0);
     }

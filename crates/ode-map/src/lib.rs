@@ -42,7 +42,7 @@ pub trait Oscillator<const C: usize, const D: usize, const P: usize>:
     const PARAMETERS: [OscillatorParameter; P];
     /// The coordinates.
     const COORDINATES: [Coordinate; C];
-    /// The version of the equations: results of different versions are never mixed.
+    /// The version of the equations. Results of different versions are never combined.
     const VERSION: &'static str;
 
     /// Computes the accelerations q'' of the free motion at coordinates `q` with speeds `u`.

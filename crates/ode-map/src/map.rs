@@ -33,25 +33,26 @@ static INTEGRATION_METHODS: [IntegrationMethod; 3] = [
     },
 ];
 
-/// First step of the halving method, as the product of step and the linear model's highest
-/// frequency (rad). Basis: order 4 is then stable. Doubling it adds a useless first run.
+/// First step of the method with halved steps, as the product of step and the linear model's
+/// highest frequency (rad). Basis: order 4 is stable at this step. Doubling it adds a useless first
+/// run.
 const FIRST_STEP_RAD: f64 = 0.5;
-/// Greatest number of runs of the halving method, each with half the step of the one before. Basis:
-/// the last step is 1/2048 of the first. Doubling it makes rows that do not converge take 4096
-/// times as long.
+/// Greatest number of runs of the method with halved steps, each with half the step of the run
+/// before. Basis: the last step is 1/2048 of the first. Doubling it makes rows that do not converge
+/// take 4096 times as long.
 const MAX_HALVING_RUNS: u32 = 12;
 /// The error of a run of order 4, relative to its difference from the run with twice the step.
-/// Derived: 1 / (2^4 - 1). Doubling it doubles the estimate.
-const CONTRACTION: f64 = 1.0 / 15.0;
+/// Basis: 1 / (2^4 - 1). Doubling it doubles the estimate.
+const RICHARDSON_FACTOR: f64 = 1.0 / 15.0;
 /// Least scale of the difference of amplitudes, relative to the row's greatest amplitude. Basis:
 /// rounding errors are smaller. Doubling it halves the relative differences of smaller amplitudes.
-const FLOOR: f64 = 1e-9;
+const AMPLITUDE_FLOOR: f64 = 1e-9;
 
 /// Names of methods in results.
 const METHODS: [&str; 2] = ["rk4", "dopri5"];
-/// Values of `status`. First those of the nonlinear model: `ok`, then the reasons of
-/// [`lane_ode::Failure`] in their order, then that of a point without equilibrium. The last three
-/// are those of the linear model if it alone fails.
+/// Values of `status`: `ok`, the reasons of [`lane_ode::Failure`] in their order, and a point
+/// without equilibrium; then the same reasons of the linear model, for rows in which it alone
+/// fails.
 const STATUSES: [&str; 8] = [
     "ok",
     "diverged",
@@ -73,13 +74,13 @@ pub struct Map<O, const C: usize, const D: usize, const P: usize> {
 }
 
 /// The edges of the window, which can be set and swept like parameters.
-const EDGES: [(&str, &str); 2] =
+const WINDOW_EDGES: [(&str, &str); 2] =
     [("window_from_s", "where the window begins"), ("window_to_s", "where the window ends")];
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Model
     for Map<O, C, D, P>
 {
-    /// The position among the oscillator's parameters, behind which the window's edges are.
+    /// The position in the list of the oscillator's parameters and the window's edges.
     type Handle = usize;
 
     const ABOUT: About = About::new(
@@ -89,19 +90,19 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     );
 
     fn blank() -> Self {
-        Self { values: O::PARAMETERS.map(|one| one.default), oscillator: PhantomData }
+        Self { values: O::PARAMETERS.map(|parameter| parameter.default), oscillator: PhantomData }
     }
 
     fn parameters(&self) -> Vec<ModelParameter<Self>> {
-        let own = O::PARAMETERS.into_iter().zip(self.values).map(|(one, value)| {
-            let OscillatorParameter { name, unit, description, range, source, .. } = one;
+        let own = O::PARAMETERS.into_iter().zip(self.values).map(|(parameter, value)| {
+            let OscillatorParameter { name, unit, description, range, source, .. } = parameter;
             (name, unit, description, range, source, Some(value))
         });
         let source = "the grid file's [time]";
-        let edges = EDGES
+        let edges = WINDOW_EDGES
             .into_iter()
             .map(|(name, description)| (name, "s", description, Range::NonNegative, source, None));
-        let parameter = |(handle, (name, unit, description, range, source, value))| {
+        let to_model = |(handle, (name, unit, description, range, source, value))| {
             let window_edge = usize::checked_sub(handle, P);
             sweep_parameter::Parameter {
                 name: Cow::Borrowed(name),
@@ -116,7 +117,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
                 handle,
             }
         };
-        own.chain(edges).enumerate().map(parameter).collect()
+        own.chain(edges).enumerate().map(to_model).collect()
     }
 
     fn write(&mut self, handle: &usize, value: f64) {
@@ -126,8 +127,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     fn walk(&mut self, table: GridTable, keys: &mut Keys<'_>, _: Option<&GridInput<Self>>) {
         if table == GridTable::Top {
             let named = O::PARAMETERS.iter().zip(self.values);
-            let pair = |(one, value): (&OscillatorParameter, f64)| {
-                (one.name.to_owned(), Value::from(value))
+            let pair = |(parameter, value): (&OscillatorParameter, f64)| {
+                (parameter.name.to_owned(), Value::from(value))
             };
             keys.write("parameters", named.map(pair).collect());
         }
@@ -170,11 +171,16 @@ fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
                  failed";
     let limits = reliability.limits;
     let methods = METHODS.to_vec();
-    let mut columns = amplitude_columns(&reliability.channels, limits, amplitude, ratio);
+    let mut result_columns = amplitude_columns(&reliability.channels, limits, amplitude, ratio);
     let method_description = "the method that the row's numbers come from";
-    columns.extend(verdict_columns(&reliability.channels, limits, methods, method_description));
-    columns.extend(run_columns(STATUSES.to_vec()));
-    columns
+    result_columns.extend(verdict_columns(
+        &reliability.channels,
+        limits,
+        methods,
+        method_description,
+    ));
+    result_columns.extend(run_columns(STATUSES.to_vec()));
+    result_columns
 }
 
 /// The engine that computes the rows of a plan.
@@ -226,8 +232,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
 
     /// Returns the indices of the coordinates that the plan compares.
     fn channels(&self) -> Vec<usize> {
-        let place = |channel: &Coordinate| O::COORDINATES.iter().position(|one| one == channel);
-        self.plan.reliability.channels.iter().filter_map(place).collect()
+        let index = |channel: &Coordinate| O::COORDINATES.iter().position(|one| one == channel);
+        self.plan.reliability.channels.iter().filter_map(index).collect()
     }
 
     /// Returns the method if it is the same for all rows, and the index of its name.
@@ -243,27 +249,27 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     }
 
     fn rows(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<PointRuns<C>> {
-        let ready = |values: &Vec<f64>| {
+        let prepare = |values: &Vec<f64>| {
             let Scenario { model, window_s } = self.plan.scenario_at(values);
             PreparedPoint::new::<O, D>(model.values, window_s)
         };
-        let cases: Vec<Option<PreparedPoint<C, P>>> = axis_values.iter().map(ready).collect();
-        let places: Vec<usize> = (0..cases.len()).filter(|k| cases[*k].is_some()).collect();
-        let prepared: Vec<&PreparedPoint<C, P>> = cases.iter().flatten().collect();
+        let points: Vec<Option<PreparedPoint<C, P>>> = axis_values.iter().map(prepare).collect();
+        let positions: Vec<usize> = (0..points.len()).filter(|k| points[*k].is_some()).collect();
+        let prepared: Vec<&PreparedPoint<C, P>> = points.iter().flatten().collect();
         let none = ModelRun { failure: Some((NO_EQUILIBRIUM, None)), ..ModelRun::NONE };
         let mut rows =
-            vec![PointRuns { runs: [none; 2], error: None, converged: None }; cases.len()];
+            vec![PointRuns { runs: [none; 2], error: None, converged: None }; points.len()];
         if let (Some(method), _) = self.common_method() {
-            for (place, runs) in
-                places.into_iter().zip(self.run_both_models(method, &prepared, cancel))
+            for (position, runs) in
+                positions.into_iter().zip(self.run_both_models(method, &prepared, cancel))
             {
-                rows[place].runs = runs;
+                rows[position].runs = runs;
             }
             return rows;
         }
         // Each point has its own steps, so that a row does not depend on the other points.
-        for (place, case) in places.into_iter().zip(prepared) {
-            self.refine(&mut rows[place], case, cancel);
+        for (position, point) in positions.into_iter().zip(prepared) {
+            self.refine(&mut rows[position], point, cancel);
             if cancel.is_requested() {
                 break;
             }
@@ -275,7 +281,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     fn run_both_models(
         &self,
         method: OscillatorMethod,
-        cases: &[&PreparedPoint<C, P>],
+        points: &[&PreparedPoint<C, P>],
         cancel: Cancel<'_>,
     ) -> Vec<[ModelRun<C>; 2]> {
         let end_s = self.plan.end_s;
@@ -283,7 +289,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             Integration::<O, C, D, P> {
                 model,
                 method,
-                cases,
+                points,
                 end_s,
                 cancel,
                 oscillator: PhantomData,
@@ -295,16 +301,17 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     }
 
     /// Integrates both models with steps that are halved until two runs agree.
-    fn refine(&self, row: &mut PointRuns<C>, case: &PreparedPoint<C, P>, cancel: Cancel<'_>) {
+    fn refine(&self, row: &mut PointRuns<C>, point: &PreparedPoint<C, P>, cancel: Cancel<'_>) {
         let Steps::Checked(accuracy) = self.plan.integrator.steps() else { return };
         let channels = self.channels();
-        let mut step_s = (FIRST_STEP_RAD / case.fastest_rad_per_s()).min(self.plan.end_s / 8.0);
+        let mut step_s =
+            (FIRST_STEP_RAD / point.highest_frequency_rad_per_s()).min(self.plan.end_s / 8.0);
         for run_index in 0..MAX_HALVING_RUNS {
-            let now = self.run_both_models(OscillatorMethod::Rk4(step_s), &[case], cancel)[0];
+            let runs = self.run_both_models(OscillatorMethod::Rk4(step_s), &[point], cancel)[0];
             row.error =
-                if run_index > 0 { error_of_finer(&row.runs, &now, &channels) } else { None };
+                if run_index > 0 { error_of_finer_run(&row.runs, &runs, &channels) } else { None };
             row.converged = Some(row.error.is_some_and(|error| error <= accuracy));
-            row.runs = now;
+            row.runs = runs;
             if row.converged == Some(true) {
                 return;
             }
@@ -314,7 +321,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
 }
 
 /// Returns the relative error of the finer runs; `None` if any run failed.
-fn error_of_finer<const C: usize>(
+fn error_of_finer_run<const C: usize>(
     coarse: &[ModelRun<C>; 2],
     fine: &[ModelRun<C>; 2],
     channels: &[usize],
@@ -329,11 +336,11 @@ fn error_of_finer<const C: usize>(
             let a = coarse.peaks[channel];
             let b = fine.peaks[channel];
             if a != b {
-                greatest = greatest.max((a - b).abs() / b.max(FLOOR * largest));
+                greatest = greatest.max((a - b).abs() / b.max(AMPLITUDE_FLOOR * largest));
             }
         }
     }
-    Some(CONTRACTION * greatest)
+    Some(RICHARDSON_FACTOR * greatest)
 }
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Evaluator

@@ -10,12 +10,12 @@ use lane_ode::{
 use crate::Oscillator;
 use crate::equations::{Equations, OscillatorModel, PreparedPoint};
 
-/// Greatest number of steps of a trajectory, accepted and rejected ones together. Basis: it takes
-/// hours. Doubling it doubles the time until such a trajectory fails.
+/// Greatest number of steps of a trajectory, accepted and rejected ones together. Basis: this
+/// number takes hours. Doubling it doubles the time until such a trajectory fails.
 const MAX_STEPS: u64 = 100_000_000;
 
-/// First step that adaptive methods try, relative to the run. Basis: far shorter than any motion's
-/// period; the step control then corrects it. Doubling it saves less than a step.
+/// First step that adaptive methods try, relative to the length of the run. Basis: far shorter than
+/// any motion's period; the step control then corrects it. Doubling it saves less than a step.
 const FIRST_STEP: f64 = 1e-6;
 
 /// Number of segments of a trajectory: before its window, in it and after it.
@@ -51,9 +51,9 @@ impl<const C: usize> ModelRun<C> {
 pub(crate) struct Integration<'a, O, const C: usize, const D: usize, const P: usize> {
     pub(crate) model: OscillatorModel,
     pub(crate) method: OscillatorMethod,
-    pub(crate) cases: &'a [&'a PreparedPoint<C, P>],
+    pub(crate) points: &'a [&'a PreparedPoint<C, P>],
     pub(crate) end_s: f64,
-    /// The request to stop; the results are then meaningless.
+    /// The cancellation of the integration, after which the results are meaningless.
     pub(crate) cancel: Cancel<'a>,
     pub(crate) oscillator: PhantomData<O>,
 }
@@ -118,7 +118,7 @@ impl<'a, O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const 
             current: [(0, 0); MAX_LANES],
             peaks: Peaks::new(zero),
             in_window: zero,
-            runs: vec![ModelRun::NONE; integration.cases.len()],
+            runs: vec![ModelRun::NONE; integration.points.len()],
         }
     }
 
@@ -141,20 +141,15 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
         &self.system
     }
 
-    fn next_segment(
-        &mut self,
-        lane: usize,
-        ended: SegmentEnd,
-        x: &mut [N<T>; D],
-    ) -> Option<Segment> {
+    fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment> {
         let (trajectory, mut segment) = self.current[lane];
-        if let SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } = ended {
+        if let SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } = end {
             let run = &mut self.runs[trajectory];
             run.steps += count.accepted;
             run.rejected += count.rejected;
             run.peaks = self.peaks.lane(lane);
         }
-        match ended {
+        match end {
             SegmentEnd::Completed(_) => segment += 1,
             SegmentEnd::Failed { reason, time_s, .. } => {
                 self.runs[trajectory].failure = Some((1 + reason as usize, Some(time_s)));
@@ -165,7 +160,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
         loop {
             while segment < SEGMENTS {
                 // The run is divided into segments at the edges of the window.
-                let [from_s, to_s] = self.integration.cases[self.current[lane].0].window_s;
+                let [from_s, to_s] = self.integration.points[self.current[lane].0].window_s;
                 let ends = [0.0, from_s, to_s, self.integration.end_s];
                 let start_s = ends[segment];
                 let end_s = ends[segment + 1];
@@ -183,10 +178,10 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             }
             self.peaks.reset(lane);
             self.in_window.0.set(lane, 0.0);
-            let case = *self.integration.cases.get(self.started)?;
+            let point = *self.integration.points.get(self.started)?;
             self.current[lane] = (self.started, 0);
             self.started += 1;
-            self.system.set_point(lane, case);
+            self.system.set_point(lane, point);
             x.iter_mut().for_each(|value| value.0.set(lane, 0.0));
             segment = 0;
         }

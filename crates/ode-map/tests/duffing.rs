@@ -12,19 +12,19 @@ use arrow_array::types::{Float64Type, Int32Type};
 /// Returns the example, which cargo builds beside this test.
 fn program() -> PathBuf {
     let test = std::env::current_exe().unwrap();
-    let folder = test.parent().and_then(Path::parent).unwrap();
-    folder.join("examples").join(format!("duffing{}", std::env::consts::EXE_SUFFIX))
+    let target = test.parent().and_then(Path::parent).unwrap();
+    target.join("examples").join(format!("duffing{}", std::env::consts::EXE_SUFFIX))
 }
 
 /// Runs a grid and returns its rows.
 fn run(grid: &str) -> RecordBatch {
-    let home = tempfile::tempdir().unwrap();
-    std::fs::write(home.path().join("grid.toml"), grid).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("grid.toml"), grid).unwrap();
     let mut command = Command::new(program());
-    let words = ["run", "grid.toml", "--out", "x.parquet", "--progress", "none"];
-    let output = command.current_dir(home.path()).args(words).output().unwrap();
+    let arguments = ["run", "grid.toml", "--out", "x.parquet", "--progress", "none"];
+    let output = command.current_dir(folder.path()).args(arguments).output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    let file = sweep_files::ParquetFile::open(&home.path().join("x.parquet")).unwrap();
+    let file = sweep_files::ParquetFile::open(&folder.path().join("x.parquet")).unwrap();
     file.batches((0..file.schema().fields().len()).collect()).unwrap().next().unwrap().unwrap()
 }
 
@@ -39,9 +39,9 @@ fn are_ok(rows: &RecordBatch) -> Vec<bool> {
     statuses.into_iter().map(|status| status == Some("ok")).collect()
 }
 
-/// Returns the left side less the right of the frequency-response equation for an amplitude: Nayfeh
-/// and Mook, Nonlinear Oscillations (1979), equation (4.1.19), here without the assumption that the
-/// frequency is near 1, as harmonic balance with one harmonic has it.
+/// Returns the residual of the frequency-response equation for an amplitude: Nayfeh and Mook,
+/// Nonlinear Oscillations (1979), equation (4.1.19), without the assumption that the frequency is
+/// near 1 (harmonic balance with one harmonic).
 fn frequency_response(amplitude: f64, frequency: f64) -> f64 {
     let [damping, cubic, forcing] = [0.05, 0.1, 0.18];
     let square = amplitude * amplitude;
@@ -80,8 +80,9 @@ fn a_softening_spring_breaks_most_easily_at_the_frequency_given_by_davis() {
     let frequencies = numbers(&rows, "frequency");
     let forcings = numbers(&rows, "forcing");
     let broken = are_ok(&rows).into_iter().map(|is_ok| !is_ok);
-    let places = (0..rows.num_rows()).zip(broken).filter_map(|(row, is)| is.then_some(row));
-    let least = places.min_by(|a, b| forcings[*a].total_cmp(&forcings[*b])).unwrap();
-    let frequency = frequencies[least];
-    assert!((frequency - 0.8852).abs() < 0.003, "{frequency} by {}", forcings[least]);
+    let broken_rows =
+        (0..rows.num_rows()).zip(broken).filter_map(|(row, is_broken)| is_broken.then_some(row));
+    let weakest = broken_rows.min_by(|a, b| forcings[*a].total_cmp(&forcings[*b])).unwrap();
+    let frequency = frequencies[weakest];
+    assert!((frequency - 0.8852).abs() < 0.003, "{frequency} by {}", forcings[weakest]);
 }

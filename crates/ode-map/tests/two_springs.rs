@@ -27,25 +27,25 @@ const AXES: &str = "[[axis]]\nparameter = \"forcing\"\nvalues = [0.002, 0.005, 0
     [[axis]]\nparameter = \"forcing_rad_per_s\"\n\
     values = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5]\n";
 
-struct Home(tempfile::TempDir);
+struct GridFolder(tempfile::TempDir);
 
-impl Home {
+impl GridFolder {
     fn new(grid: &str) -> Self {
-        let home = tempfile::tempdir().unwrap();
-        std::fs::write(home.path().join("grid.toml"), grid).unwrap();
-        Self(home)
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("grid.toml"), grid).unwrap();
+        Self(folder)
     }
 
-    fn output(&self, words: &str) -> Output {
+    fn output(&self, arguments: &str) -> Output {
         let mut command = Command::new(program());
-        command.current_dir(self.0.path()).args(words.split(' ')).output().unwrap()
+        command.current_dir(self.0.path()).args(arguments.split(' ')).output().unwrap()
     }
 
     /// Runs a command, which must succeed, and returns its standard output and error.
-    fn run_successfully(&self, words: &str) -> String {
-        let output = self.output(words);
+    fn run_successfully(&self, arguments: &str) -> String {
+        let output = self.output(arguments);
         let text = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
-        assert!(output.status.success(), "{words}: {}", text.concat());
+        assert!(output.status.success(), "{arguments}: {}", text.concat());
         text.concat()
     }
 
@@ -66,9 +66,9 @@ fn number(rows: &RecordBatch, name: &str, row: usize) -> Option<f64> {
 
 /// Returns the greatest difference from the reference, relative to the peak.
 fn greatest_difference(integrator: &str) -> f64 {
-    let home = Home::new(&grid(integrator, AXES));
-    home.run_successfully("run grid.toml --out x.parquet --progress none");
-    let rows = home.rows("x.parquet");
+    let folder = GridFolder::new(&grid(integrator, AXES));
+    folder.run_successfully("run grid.toml --out x.parquet --progress none");
+    let rows = folder.rows("x.parquet");
     let text = include_str!("../testdata/two_springs.json");
     let reference: serde_json::Value = serde_json::from_str(text).unwrap();
     let expected = reference["rows"].as_array().unwrap();
@@ -109,29 +109,30 @@ const FAST: &str = "{ method = \"rk4\", step_s = 0.05 }";
 #[test]
 fn all_mistakes_are_reported_together_with_their_places_and_suggestions() {
     let wrong = grid("{ method = \"rk5\" }", "[[axis]]\nparameter = \"forcin\"\nvalues = [1, 1]\n");
-    let output = Home::new(&wrong).output("check grid.toml");
+    let output = GridFolder::new(&wrong).output("check grid.toml");
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{text}");
-    for said in ["did you mean `rk4`", "did you mean `forcing`", "grid.toml:6", "is twice"] {
-        assert!(text.contains(said), "no {said} in {text}");
+    for part in ["did you mean `rk4`", "did you mean `forcing`", "grid.toml:6", "is twice"] {
+        assert!(text.contains(part), "no {part} in {text}");
     }
 }
 
 #[test]
 fn merged_shards_have_the_same_bytes_as_one_run() {
-    let home = Home::new(&grid(FAST, AXES));
-    home.run_successfully("run grid.toml --out whole.parquet --threads 1 --progress none");
+    let folder = GridFolder::new(&grid(FAST, AXES));
+    folder.run_successfully("run grid.toml --out whole.parquet --threads 1 --progress none");
     for shard in ["1/2", "2/2"] {
-        home.run_successfully(&format!(
+        folder.run_successfully(&format!(
             "run grid.toml --out x.parquet --shard {shard} --progress none"
         ));
     }
     assert!(
-        home.run_successfully("status grid.toml --out x.parquet")
+        folder
+            .run_successfully("status grid.toml --out x.parquet")
             .contains("complete, to be merged")
     );
-    home.run_successfully("merge grid.toml --out x.parquet");
-    assert!(home.bytes("whole.parquet") == home.bytes("x.parquet"));
+    folder.run_successfully("merge grid.toml --out x.parquet");
+    assert!(folder.bytes("whole.parquet") == folder.bytes("x.parquet"));
 }
 
 #[test]
@@ -139,28 +140,35 @@ fn every_command_works() {
     let axes = "[[axis]]\nparameter = \"forcing_rad_per_s\"\nvalues = [1.05, 1.1]\n\
                 [[axis]]\nparameter = \"forcing\"\n\
                 range = { from = 0.001, to = 0.05, count = 9 }\n";
-    let home = Home::new(&format!("{}[reliability]\nratio_limit = 1.02\n", grid(FAST, axes)));
-    assert!(home.run_successfully("check grid.toml").contains("18"));
-    home.run_successfully("run grid.toml --out x.parquet --progress none");
-    assert!(home.run_successfully("show x.parquet").contains("below ratio 1.02"));
+    let folder =
+        GridFolder::new(&format!("{}[reliability]\nratio_limit = 1.02\n", grid(FAST, axes)));
+    assert!(folder.run_successfully("check grid.toml").contains("18"));
+    folder.run_successfully("run grid.toml --out x.parquet --progress none");
+    assert!(folder.run_successfully("show x.parquet").contains("below ratio 1.02"));
     assert!(
-        home.run_successfully("show x.parquet --top 1 --by ratio_x1").contains("forcing_rad_per_s")
+        folder
+            .run_successfully("show x.parquet --top 1 --by ratio_x1")
+            .contains("forcing_rad_per_s")
     );
-    home.run_successfully("plot x.parquet -o x.svg");
-    assert!(String::from_utf8(home.bytes("x.svg")).unwrap().starts_with("<svg"));
-    home.run_successfully("export x.parquet x.csv");
-    assert!(String::from_utf8(home.bytes("x.csv")).unwrap().contains("nonlinear_x1"));
-    home.run_successfully("require x.parquet count(status=='ok')==18");
-    let broken = home.output("require x.parquet ratio_x1<1");
-    assert_eq!(broken.status.code(), Some(4), "{broken:?}");
-    home.run_successfully("run grid.toml --set zeta_1=0.02 --out y.parquet --progress none");
-    assert!(home.run_successfully("compare x.parquet y.parquet").contains("zeta_1"));
-    let found = home.run_successfully("boundary grid.toml --out b.parquet --progress none");
-    assert!(found.contains("crossing"), "{found}");
-    home.run_successfully("plot x.parquet --boundary b.parquet -o y.svg");
-    let listed = home.run_successfully("parameters grid.toml");
-    assert!(listed.contains("omega_1_rad_per_s") && listed.contains("window_to_s"), "{listed}");
-    let schema: serde_json::Value = serde_json::from_str(&home.run_successfully("schema")).unwrap();
+    folder.run_successfully("plot x.parquet -o x.svg");
+    assert!(String::from_utf8(folder.bytes("x.svg")).unwrap().starts_with("<svg"));
+    folder.run_successfully("export x.parquet x.csv");
+    assert!(String::from_utf8(folder.bytes("x.csv")).unwrap().contains("nonlinear_x1"));
+    folder.run_successfully("require x.parquet count(status=='ok')==18");
+    let violated = folder.output("require x.parquet ratio_x1<1");
+    assert_eq!(violated.status.code(), Some(4), "{violated:?}");
+    folder.run_successfully("run grid.toml --set zeta_1=0.02 --out y.parquet --progress none");
+    assert!(folder.run_successfully("compare x.parquet y.parquet").contains("zeta_1"));
+    let boundary = folder.run_successfully("boundary grid.toml --out b.parquet --progress none");
+    assert!(boundary.contains("crossing"), "{boundary}");
+    folder.run_successfully("plot x.parquet --boundary b.parquet -o y.svg");
+    let parameters = folder.run_successfully("parameters grid.toml");
+    assert!(
+        parameters.contains("omega_1_rad_per_s") && parameters.contains("window_to_s"),
+        "{parameters}"
+    );
+    let schema: serde_json::Value =
+        serde_json::from_str(&folder.run_successfully("schema")).unwrap();
     assert!(schema["properties"]["set"]["properties"]["zeta_2"].is_object());
 }
 
@@ -168,13 +176,14 @@ fn every_command_works() {
 fn a_study_finds_the_resonance_that_a_fine_map_shows() {
     let axis = "[[axis]]\nparameter = \"forcing_rad_per_s\"\n\
                 range = { from = 0.7, to = 1.5, count = 401 }\n";
-    let home = Home::new(&grid(FAST, axis));
-    home.run_successfully("run grid.toml --out x.parquet --progress none");
-    let rows = home.rows("x.parquet");
-    let at = |row| number(&rows, "linear_x1", row).unwrap();
-    let highest = (0..rows.num_rows()).max_by(|a, b| at(*a).total_cmp(&at(*b))).unwrap();
+    let folder = GridFolder::new(&grid(FAST, axis));
+    folder.run_successfully("run grid.toml --out x.parquet --progress none");
+    let rows = folder.rows("x.parquet");
+    let linear_x1 = |row| number(&rows, "linear_x1", row).unwrap();
+    let highest =
+        (0..rows.num_rows()).max_by(|a, b| linear_x1(*a).total_cmp(&linear_x1(*b))).unwrap();
     let resonance = number(&rows, "forcing_rad_per_s", highest).unwrap();
-    let write = |name: &str, text: &str| std::fs::write(home.0.path().join(name), text).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.0.path().join(name), text).unwrap();
     write("point.toml", &grid(FAST, ""));
     write(
         "study.toml",
@@ -183,25 +192,25 @@ fn a_study_finds_the_resonance_that_a_fine_map_shows() {
          [[parameter]]\nname = \"forcing_rad_per_s\"\nfrom = 0.7\nto = 1.5\n",
     );
     for threads in [1, 2] {
-        let line = format!("optimise study.toml --threads {threads} --progress none --out");
-        let text = home.run_successfully(&format!("{line} {threads}.parquet"));
+        let arguments = format!("optimise study.toml --threads {threads} --progress none --out");
+        let text = folder.run_successfully(&format!("{arguments} {threads}.parquet"));
         assert!(text.contains("feasible  160 of 160\n"), "{text}");
     }
-    assert!(home.bytes("1.parquet") == home.bytes("2.parquet"));
-    let best = home.run_successfully(
+    assert!(folder.bytes("1.parquet") == folder.bytes("2.parquet"));
+    let best = folder.run_successfully(
         "show 1.parquet --where on_front --json --columns forcing_rad_per_s,linear_x1",
     );
     let best: serde_json::Value = serde_json::from_str(&best).unwrap();
-    let found = best[0]["forcing_rad_per_s"].as_f64().unwrap();
-    assert!((found - resonance).abs() <= 0.003, "{found} for {resonance}");
-    assert!(best[0]["linear_x1"].as_f64().unwrap() >= at(highest), "{best}");
+    let frequency = best[0]["forcing_rad_per_s"].as_f64().unwrap();
+    assert!((frequency - resonance).abs() <= 0.003, "{frequency} for {resonance}");
+    assert!(best[0]["linear_x1"].as_f64().unwrap() >= linear_x1(highest), "{best}");
 }
 
 #[test]
 fn a_design_has_its_number_of_points() {
     let design = "[design]\nmethod = \"sobol\"\npoints = 16\n\
                   [[axis]]\nparameter = \"zeta_1\"\nrange = { from = 0.005, to = 0.05 }\n";
-    let home = Home::new(&grid(FAST, design));
-    home.run_successfully("run grid.toml --out x.parquet --progress none");
-    assert_eq!(home.rows("x.parquet").num_rows(), 16);
+    let folder = GridFolder::new(&grid(FAST, design));
+    folder.run_successfully("run grid.toml --out x.parquet --progress none");
+    assert_eq!(folder.rows("x.parquet").num_rows(), 16);
 }

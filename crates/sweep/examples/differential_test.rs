@@ -32,23 +32,23 @@ use sweep::{
     rk4_mass_scaled,
 };
 
-/// Accuracies that grids require of the fast method, by turns. Basis: the default twice, and a
-/// finer and a coarser one. Doubling them doubles the errors that are allowed.
+/// Accuracies that grids request of the fast method, in turn. Basis: the default twice, a finer and
+/// a coarser one. Doubling them doubles the accepted errors.
 const ACCURACIES: [f64; 4] = [1e-3, 1e-3, 1e-4, 1e-2];
 
 /// Number of rows of a grid: three masses by three dampings.
 pub(crate) const GRID_ROWS: u64 = 9;
 
-/// Maximum number of grids that are tried, one after the other, until a valid one is found. Basis:
-/// at most three in ten are refused, so one of 40 is valid. Doubling it changes nothing.
-const MAX_REFUSED: u64 = 40;
+/// Maximum number of grids that are tried, one after the other, until one is valid. Basis: at most
+/// three in ten are refused, so that one of 40 is valid. Doubling it changes nothing.
+const MAX_REFUSED_GRIDS: u64 = 40;
 
 /// Step of RK4 (s) that resolves the vibration of the bearings after jumps of the speed. Basis: an
 /// eighth of [`STEP_S`]. Doubling it makes the reference's error 16 times as large.
 const JUMP_STEP_S: f64 = 1.25e-5;
 
 /// Step of RK4 (s) in all other grids. Basis: stable with bearings as stiff as the paper's, the
-/// stiffest here. Doubling it makes the reference's error 16 times as large.
+/// stiffest of these grids. Doubling it makes the reference's error 16 times as large.
 const STEP_S: f64 = 1e-4;
 
 const CHANNELS: [&str; 8] = [
@@ -62,8 +62,8 @@ const CHANNELS: [&str; 8] = [
     "tub_pitch",
 ];
 
-/// The parameters that vary, each with its mean value and the greatest factor.
-const VARIED: [(&str, f64, f64); 14] = [
+/// The parameters that vary, each with its central value and its greatest factor.
+const VARIED_PARAMETERS: [(&str, f64, f64); 14] = [
     ("spring_stiffness_n_per_m", 8000.0, 2.0),
     ("bearing_stiffness_n_per_m", 2e8, 1.0),
     ("flexure_stiffness_n_m_per_rad", 29670.0, 3.0),
@@ -83,9 +83,9 @@ const VARIED: [(&str, f64, f64); 14] = [
 /// A machine with every kind of element except a second unbalance.
 const WITH_ELEMENTS: &str = include_str!("../../../docs/examples/friction.toml");
 
-/// The parameters of elements that vary, each with its middle value m and an exponent e: values are
-/// between m / 10^e and m * 10^e.
-const ELEMENTS: [(&str, f64, f64); 17] = [
+/// The parameters of elements that vary, each with its central value m and an exponent e: values
+/// are between m / 10^e and m * 10^e.
+const VARIED_ELEMENTS: [(&str, f64, f64); 17] = [
     ("friction_n", 50.0, 0.5),
     ("damper_2_friction_n", 50.0, 0.5),
     ("friction_speed_m_per_s", 0.01, 0.7),
@@ -123,11 +123,11 @@ const TRIAL_KINDS: [(&str, TrialKind); 4] = [
     ("tiny", TrialKind::Tiny),
 ];
 
-/// Numbers from a seed: splitmix64.
+/// A random number generator with a seed (splitmix64).
 struct Rng(u64);
 
 impl Rng {
-    fn next(&mut self) -> f64 {
+    fn next_f64(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -135,17 +135,17 @@ impl Rng {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn between(&mut self, from: f64, to: f64) -> f64 {
-        from + (to - from) * self.next()
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next_f64()
     }
 
-    /// Returns a factor from `1 / most` to `most`, with a uniform logarithm.
-    fn factor(&mut self, most: f64) -> f64 {
-        most.powf(self.between(-1.0, 1.0))
+    /// Returns a factor from `1 / max_factor` to `max_factor`, with a uniform logarithm.
+    fn factor(&mut self, max_factor: f64) -> f64 {
+        max_factor.powf(self.between(-1.0, 1.0))
     }
 
     fn choose<'a, T>(&mut self, items: &'a [T]) -> &'a T {
-        &items[(self.next() * items.len() as f64) as usize]
+        &items[(self.next_f64() * items.len() as f64) as usize]
     }
 }
 
@@ -154,15 +154,16 @@ fn grid(seed: u64) -> String {
     let mut rng = Rng(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
     let end_s = rng.between(4.0, 26.0);
     let peak_rpm = *rng.choose(&[120.0, 300.0, 350.0, 350.0, 500.0, 900.0]) * rng.factor(1.3);
-    let spin = match (rng.next() * 4.0) as u32 {
+    let spin = match (rng.next_f64() * 4.0) as u32 {
         0 => format!("profile = \"cycloidal\"\nramp_s = {}", end_s * rng.between(0.5, 1.2)),
         1 => format!("profile = \"triangular\"\nramp_s = {}", end_s * rng.between(0.3, 1.2)),
         2 => format!("profile = \"ramp\"\nramp_s = {}", end_s * rng.between(0.3, 1.2)),
         _ => {
-            let [a, b] = [end_s * rng.between(0.2, 0.4), end_s * rng.between(0.5, 0.9)];
+            let [first_s, second_s] =
+                [end_s * rng.between(0.2, 0.4), end_s * rng.between(0.5, 0.9)];
             let [low, high] = [peak_rpm * rng.between(0.2, 0.9), peak_rpm];
             format!(
-                "profile = \"table\"\ntime_s = [0, {a}, {b}, {end_s}]\n\
+                "profile = \"table\"\ntime_s = [0, {first_s}, {second_s}, {end_s}]\n\
                  speed_rpm = [0, {low}, {low}, {high}]"
             )
         }
@@ -172,16 +173,16 @@ fn grid(seed: u64) -> String {
     let from_s = end_s * rng.between(0.0, 0.8);
     let to_s = rng.between(from_s + 0.1 * (end_s - from_s), end_s);
     let mut set = String::new();
-    for (name, value, most) in VARIED {
-        if rng.next() < 0.4 && most > 1.0 {
-            set += &format!("{name} = {}\n", value * rng.factor(most));
+    for (name, value, max_factor) in VARIED_PARAMETERS {
+        if rng.next_f64() < 0.4 && max_factor > 1.0 {
+            set += &format!("{name} = {}\n", value * rng.factor(max_factor));
         }
     }
-    if rng.next() < 0.15 {
+    if rng.next_f64() < 0.15 {
         set +=
             &format!("bearing_stiffness_n_per_m = {}\n", 2e8 * 10f64.powf(rng.between(-2.5, 0.0)));
     }
-    let mut channels: Vec<_> = CHANNELS.into_iter().filter(|_| rng.next() < 0.35).collect();
+    let mut channels: Vec<_> = CHANNELS.into_iter().filter(|_| rng.next_f64() < 0.35).collect();
     if channels.is_empty() {
         channels.push(*rng.choose(&CHANNELS));
     }
@@ -202,11 +203,11 @@ fn grid(seed: u64) -> String {
 
 /// The result of trials. Counts are numbers of rows.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Found {
+pub(crate) struct TrialTotals {
     pub(crate) rows: u64,
     pub(crate) refused: u64,
     sensitive: u64,
-    /// Sensitive rows for which RK4 with both steps agrees within the accuracy.
+    /// The number of sensitive rows for which RK4 with both steps agrees within the accuracy.
     needlessly_sensitive: u64,
     pub(crate) unconverged: u64,
     /// Unconverged rows that are within the accuracy.
@@ -214,30 +215,30 @@ pub(crate) struct Found {
     failed: u64,
     wrong_status: u64,
     wrong_verdict: u64,
-    /// Rows whose amplitudes have an error above the accuracy.
+    /// The number of rows whose amplitudes have an error above the accuracy.
     inaccurate: u64,
-    /// Rows whose error is above their own `error`, but within the accuracy.
+    /// The number of rows whose error is above their own `error`, but within the accuracy.
     above_error: u64,
-    /// The greatest error of all other rows, as a share of the accuracy.
-    worst: f64,
+    /// The greatest error of the rows that keep the promise, relative to the accuracy.
+    greatest_error: f64,
     by_method: [u64; Level::ALL.len()],
-    /// The greatest error as a share of the row's own `error`, by method.
-    share_of_estimate: [f64; Level::ALL.len()],
+    /// The greatest error relative to the row's own `error`, by method.
+    error_over_estimate: [f64; Level::ALL.len()],
     /// A description of each row that breaks the promise.
     pub(crate) exceptions: Vec<String>,
     /// The number of grids with exceptions. A grid is one machine, whose rows fail together.
     pub(crate) exceptional_grids: u64,
 }
 
-impl Found {
-    fn plus(mut self, other: Self) -> Self {
+impl TrialTotals {
+    fn merge(mut self, other: Self) -> Self {
         self.rows += other.rows;
         self.refused += other.refused;
         self.sensitive += other.sensitive;
         self.needlessly_sensitive += other.needlessly_sensitive;
         self.unconverged += other.unconverged;
         self.needlessly_unconverged += other.needlessly_unconverged;
-        for (share, other) in self.share_of_estimate.iter_mut().zip(other.share_of_estimate) {
+        for (share, other) in self.error_over_estimate.iter_mut().zip(other.error_over_estimate) {
             *share = share.max(other);
         }
         self.failed += other.failed;
@@ -245,7 +246,7 @@ impl Found {
         self.wrong_verdict += other.wrong_verdict;
         self.inaccurate += other.inaccurate;
         self.above_error += other.above_error;
-        self.worst = self.worst.max(other.worst);
+        self.greatest_error = self.greatest_error.max(other.greatest_error);
         for (count, other) in self.by_method.iter_mut().zip(other.by_method) {
             *count += other;
         }
@@ -255,21 +256,22 @@ impl Found {
     }
 }
 
-fn relative((a, b): (&f64, &f64)) -> f64 {
-    relative_from(0.0, *a, *b)
+fn relative_difference((a, b): (&f64, &f64)) -> f64 {
+    relative_difference_above(0.0, *a, *b)
 }
 
-/// Returns the difference of two numbers relative to the second, or to `least` if that is greater.
-fn relative_from(least: f64, a: f64, b: f64) -> f64 {
-    if a == b { 0.0 } else { (a - b).abs() / b.abs().max(least) }
+/// Returns the difference of two numbers relative to the greater of the second one and
+/// `min_scale`.
+fn relative_difference_above(min_scale: f64, a: f64, b: f64) -> f64 {
+    if a == b { 0.0 } else { (a - b).abs() / b.abs().max(min_scale) }
 }
 
-fn amplitudes_differ(a: &Trajectory, b: &Trajectory) -> f64 {
-    a.amplitudes.iter().zip(&b.amplitudes).map(relative).fold(0.0, f64::max)
+fn amplitude_difference(a: &Trajectory, b: &Trajectory) -> f64 {
+    a.amplitudes.iter().zip(&b.amplitudes).map(relative_difference).fold(0.0, f64::max)
 }
 
-/// Minimum of the bound that a row's own `error` gives. Basis: RK4 at 1e-4 s has errors of that
-/// size. Doubling it accepts rows twice as far beyond their `error` if that is smaller.
+/// Minimum of the bound that a row's own `error` gives. Basis: RK4 at 1e-4 s has errors of this
+/// size. Doubling it accepts rows with twice the error where their `error` is smaller.
 const ERROR_FLOOR: f64 = 1e-6;
 
 /// Returns the greatest relative difference of the numbers of two rows.
@@ -279,14 +281,15 @@ fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
 
 /// Returns the number of two rows with the greatest relative difference, and that difference.
 fn greatest_difference(plan: &Plan, a: &Outcome, b: &Outcome) -> (String, f64) {
-    let mut differences = metrics_differ(plan, a, b);
+    let mut differences = metric_differences(plan, a, b);
     let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
     // Gaps and ends are those of the whole run, which goes on after the window.
     let clearance_m = plan.model.machine.radial_clearance_m;
     for (model, a, b) in models {
-        differences.push((format!("amplitudes {model}"), amplitudes_differ(a, b)));
+        differences.push((format!("amplitudes {model}"), amplitude_difference(a, b)));
         if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
-            differences.push((format!("min_gap {model}"), relative_from(clearance_m, a, b)));
+            differences
+                .push((format!("min_gap {model}"), relative_difference_above(clearance_m, a, b)));
         }
         if let Some((a, b)) = a.fail_time_s.zip(b.fail_time_s) {
             differences.push((format!("fail_time {model}"), (a - b).abs() / plan.end_s));
@@ -294,14 +297,14 @@ fn greatest_difference(plan: &Plan, a: &Outcome, b: &Outcome) -> (String, f64) {
     }
     let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
     // A ratio has the errors of both models.
-    let ratios = turns.map(relative).fold(0.0, f64::max) / 2.0;
+    let ratios = turns.map(relative_difference).fold(0.0, f64::max) / 2.0;
     differences.push(("turn_ratios".to_owned(), ratios));
     let greatest = differences.into_iter().max_by(|(_, a), (_, b)| a.total_cmp(b));
     greatest.expect("every row has amplitudes")
 }
 
 /// Returns the relative difference of each metric, with the name of its column.
-fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
+fn metric_differences(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
     let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
     let machine = &plan.model.machine;
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
@@ -309,8 +312,8 @@ fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
     let metrics = models.iter().flat_map(|(model, a, b)| {
         plan.model.measures.model_columns().zip(a.metrics.iter().zip(&b.metrics)).map(
             |(number, (a, b))| {
-                let least = number.metric.scale(plan.window_s, weight_n);
-                (number.column(model), relative_from(least, *a, *b))
+                let min_scale = number.metric.scale(plan.window_s, weight_n);
+                (number.column(model), relative_difference_above(min_scale, *a, *b))
             },
         )
     });
@@ -338,24 +341,24 @@ fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
     let mut rng = Rng(!seed);
     let rows = evaluate_with(plan, rk4_mass_scaled(1e-3));
     let gap_m = rng.choose(&rows).nonlinear.min_gap_m?;
-    let reach_m = plan.model.machine.radial_clearance_m - gap_m;
+    let closest_approach_m = plan.model.machine.radial_clearance_m - gap_m;
     let overlap = 10f64.powf(rng.between(-6.0, -1.5));
-    Some(format!("radial_clearance_m={}", reach_m * (1.0 - overlap)))
+    Some(format!("radial_clearance_m={}", closest_approach_m * (1.0 - overlap)))
 }
 
-/// Returns the grid with a machine that has elements, whose file it writes.
+/// Writes the file of a machine with elements, and returns the grid with that machine.
 fn with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
     let mut rng = Rng(seed.rotate_left(32));
     let unbalance = "[[further_unbalances]]\nmass_kg = 0.1\nx_m = 0.1\nradius_m = -0.2\n";
-    // Each grid has a machine file of its own, because grids are read while others are written.
+    // Each grid has a separate machine file, because grids are read while others are written.
     let machine = format!("machine-{seed}.toml");
     std::fs::write(folder.join(&machine), format!("{WITH_ELEMENTS}\n{unbalance}"))
         .expect("the temporary folder can be written to");
     let mut set = String::new();
-    for (name, value, powers) in ELEMENTS {
+    for (name, value, exponent) in VARIED_ELEMENTS {
         let is_set_already = name.starts_with("damper_2") && set.contains("friction_n");
-        if rng.next() < 0.5 && !is_set_already {
-            set += &format!("{name} = {}\n", value * 10f64.powf(rng.between(-powers, powers)));
+        if rng.next_f64() < 0.5 && !is_set_already {
+            set += &format!("{name} = {}\n", value * 10f64.powf(rng.between(-exponent, exponent)));
         }
     }
     grid.replacen("[set]\n", &format!("machine = \"{machine}\"\n[set]\n{set}"), 1)
@@ -365,7 +368,7 @@ fn with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
 fn with_jumps(seed: u64, grid: &str) -> String {
     let mut rng = Rng(seed.rotate_left(16));
     let end_s = rng.between(3.0, 6.0);
-    let at_s = end_s * rng.between(0.2, 0.6);
+    let brake_start_s = end_s * rng.between(0.2, 0.6);
     let brake_s = 10f64.powf(rng.between(-3.5, -1.0));
     let from_s = rng.between(0.0, 0.9 * end_s);
     let [fast, slow, last] =
@@ -374,10 +377,10 @@ fn with_jumps(seed: u64, grid: &str) -> String {
     let (before, rest) = grid.split_once("[spin]").expect("a spin");
     let (_, after) = rest.split_once("[[axis]]").expect("an axis");
     format!(
-        "{before}[spin]\nprofile = \"table\"\ntime_s = [0, {at_s}, {}, {end_s}]\n\
+        "{before}[spin]\nprofile = \"table\"\ntime_s = [0, {brake_start_s}, {}, {end_s}]\n\
          speed_rpm = [0, {fast}, {slow}, {last}]\n\
          [time]\nend_s = {end_s}\nwindow_s = [{from_s}, {to_s}]\n[[axis]]{after}",
-        at_s + brake_s
+        brake_start_s + brake_s
     )
 }
 
@@ -395,7 +398,7 @@ fn with_tiny_unbalances(seed: u64, grid: &str) -> String {
 }
 
 /// Compares the rows of a grid with those of RK4.
-fn try_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
+fn check_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> TrialTotals {
     let path = folder.join(format!("{seed}.toml"));
     let mut text = grid(seed);
     let is_grazing = kind == TrialKind::Grazing;
@@ -426,25 +429,25 @@ fn try_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
         eprintln!("{text}");
     }
     let Some(plan) = loaded else {
-        return Found { refused: 1, ..Found::default() };
+        return TrialTotals { refused: 1, ..TrialTotals::default() };
     };
     let evaluate = |integrator| evaluate_with(&plan, integrator);
     let rows = evaluate(rk4_mass_scaled(accuracy));
     let reference_rows = evaluate(rk4(step_s));
     let mut coarser_rows = None;
     let mut finer_rows = None;
-    let mut found = Found { rows: rows.len() as u64, ..Found::default() };
+    let mut totals = TrialTotals { rows: rows.len() as u64, ..TrialTotals::default() };
     for (i, (row, reference)) in rows.iter().zip(&reference_rows).enumerate() {
-        found.by_method[row.method as usize] += 1;
-        found.failed += u64::from(statuses(row) != [Status::Ok; 2]);
+        totals.by_method[row.method as usize] += 1;
+        totals.failed += u64::from(statuses(row) != [Status::Ok; 2]);
         let mut coarser =
             || coarser_rows.get_or_insert_with(|| evaluate(rk4(2.0 * step_s)))[i].clone();
         if row.sensitive == Some(true) {
-            found.sensitive += 1;
+            totals.sensitive += 1;
             let coarser = coarser();
             let agrees = statuses(&coarser) == statuses(reference)
                 && difference(&plan, &coarser, reference) <= accuracy;
-            found.needlessly_sensitive += u64::from(agrees);
+            totals.needlessly_sensitive += u64::from(agrees);
             continue;
         }
         let mut reference = reference;
@@ -452,120 +455,133 @@ fn try_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
         let differs = difference(&plan, row, reference) > accuracy.min(estimate)
             || verdict(&plan, row) != verdict(&plan, reference);
         if differs {
-            // The reference may be wrong, because rows are refined to shorter steps.
+            // The reference may be wrong, because the fast method refines rows to shorter steps.
             let finer = rk4(step_s / 8.0);
             reference = &finer_rows.get_or_insert_with(|| evaluate(finer))[i];
         }
         let error = difference(&plan, row, reference);
         if row.converged == Some(false) {
-            found.unconverged += 1;
+            totals.unconverged += 1;
             let is_right = statuses(row) == statuses(reference) && error <= accuracy;
-            found.needlessly_unconverged += u64::from(is_right);
+            totals.needlessly_unconverged += u64::from(is_right);
             continue;
         }
-        let mut report = |count: fn(&mut Found) -> &mut u64, what: &str| {
-            *count(&mut found) += 1;
+        let mut report = |counter: fn(&mut TrialTotals) -> &mut u64, quantity: &str| {
+            *counter(&mut totals) += 1;
             let method = row.method.name();
             let estimate = row.error.unwrap_or(f64::NAN);
             let (number, _) = greatest_difference(&plan, row, reference);
-            found.exceptions.push(format!(
-                "seed {seed}, row {i}, {method}: wrong {what}, by {error:.2e} in {number}; \
+            totals.exceptions.push(format!(
+                "seed {seed}, row {i}, {method}: wrong {quantity}, by {error:.2e} in {number}; \
                  `error` is {estimate:.2e}"
             ));
         };
         if statuses(row) != statuses(reference) {
-            report(|found| &mut found.wrong_status, "status");
+            report(|totals| &mut totals.wrong_status, "status");
         } else if error > accuracy {
-            report(|found| &mut found.inaccurate, "number");
+            report(|totals| &mut totals.inaccurate, "number");
         } else if verdict(&plan, row) != verdict(&plan, reference) {
-            report(|found| &mut found.wrong_verdict, "verdict");
+            report(|totals| &mut totals.wrong_verdict, "verdict");
         } else {
-            found.worst = found.worst.max(error / accuracy);
-            let share = &mut found.share_of_estimate[row.method as usize];
+            totals.greatest_error = totals.greatest_error.max(error / accuracy);
+            let share = &mut totals.error_over_estimate[row.method as usize];
             *share = share.max(error / estimate);
-            found.above_error +=
+            totals.above_error +=
                 u64::from(row.error.is_some_and(|estimate| error > estimate.max(ERROR_FLOOR)));
         }
     }
-    found.exceptional_grids = u64::from(!found.exceptions.is_empty());
-    found
+    totals.exceptional_grids = u64::from(!totals.exceptions.is_empty());
+    totals
 }
 
-/// Returns a seed from the clock, which no constant was tuned to.
+/// Returns a seed from the clock, so that no constant can be fitted to it.
 pub(crate) fn seed_from_clock() -> u64 {
-    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    since.map_or(0, |since| since.as_secs() % 1_000_000)
+    let duration = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    duration.map_or(0, |duration| duration.as_secs() % 1_000_000)
 }
 
-/// Tries grids of nine rows from a seed on. A seed of a million or more is that of the first grid,
-/// as exceptions name it.
-pub(crate) fn try_grids(rows: u64, first: u64, kind: TrialKind) -> Found {
+/// Checks grids of nine rows, from a seed on. A seed of a million or more is that of the first
+/// grid, which messages about exceptions name.
+pub(crate) fn check_grids(rows: u64, first_seed: u64, kind: TrialKind) -> TrialTotals {
     let name = format!("sweep-differential-test-{}-{}", std::process::id(), kind as u8);
     let folder = std::env::temp_dir().join(name);
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let grids = rows.div_ceil(GRID_ROWS);
-    let first = if first < 1_000_000 { first * 1_000_000 } else { first };
-    let found = (first..first + grids)
+    let first_seed = if first_seed < 1_000_000 { first_seed * 1_000_000 } else { first_seed };
+    let totals = (first_seed..first_seed + grids)
         .into_par_iter()
         .map(|seed| {
-            // Another grid takes the place of one that is refused.
-            let seeds = (0..MAX_REFUSED).map(|k| seed + k * grids);
-            let mut found = Found::default();
+            // A refused grid is replaced by another one.
+            let seeds = (0..MAX_REFUSED_GRIDS).map(|k| seed + k * grids);
+            let mut totals = TrialTotals::default();
             for seed in seeds {
-                found = found.plus(try_grid(seed, kind, &folder));
-                if found.rows > 0 {
+                totals = totals.merge(check_grid(seed, kind, &folder));
+                if totals.rows > 0 {
                     break;
                 }
             }
-            found
+            totals
         })
-        .reduce(Found::default, Found::plus);
+        .reduce(TrialTotals::default, TrialTotals::merge);
     // A temporary folder that cannot be removed is harmless.
     let _ = std::fs::remove_dir_all(&folder);
-    found
+    totals
 }
 
 fn main() -> ExitCode {
-    let mut words = std::env::args().skip(1);
-    let rows = words.next().and_then(|word| word.parse::<u64>().ok());
-    let seed = match words.next().as_deref() {
+    let mut arguments = std::env::args().skip(1);
+    let rows = arguments.next().and_then(|argument| argument.parse::<u64>().ok());
+    let seed = match arguments.next().as_deref() {
         None | Some("clock") => Some(seed_from_clock()),
-        Some(word) => word.parse().ok(),
+        Some(argument) => argument.parse().ok(),
     };
-    let (Some(rows), Some(first)) = (rows, seed) else {
+    let (Some(rows), Some(first_seed)) = (rows, seed) else {
         let kinds = TRIAL_KINDS.map(|(name, _)| name).join("|");
         eprintln!("usage: differential_test ROWS [SEED|clock [{kinds}]]");
         return ExitCode::from(2);
     };
-    let named = |word: String| TRIAL_KINDS.into_iter().find(|(name, _)| *name == word).ok_or(word);
-    let kind = match words.next().map_or(Ok(("", TrialKind::Plain)), named) {
+    let find_kind = |argument: String| {
+        TRIAL_KINDS.into_iter().find(|(name, _)| *name == argument).ok_or(argument)
+    };
+    let kind = match arguments.next().map_or(Ok(("", TrialKind::Plain)), find_kind) {
         Ok((_, kind)) => kind,
-        Err(word) => {
-            eprintln!("{word} is none of {}", TRIAL_KINDS.map(|(name, _)| name).join(", "));
+        Err(argument) => {
+            eprintln!("{argument} is none of {}", TRIAL_KINDS.map(|(name, _)| name).join(", "));
             return ExitCode::from(2);
         }
     };
-    // A thread that waits for rows of its grid starts another grid on the same stack.
+    // A thread that waits for rows of its grid starts another grid on the same stack, which
+    // therefore is large.
     let pool = rayon::ThreadPoolBuilder::new().stack_size(1 << 28).build_global();
     pool.expect("nothing has used the pool");
-    let found = try_grids(rows, first, kind);
+    let totals = check_grids(rows, first_seed, kind);
     let grids = rows.div_ceil(GRID_ROWS);
-    eprintln!("{} rows of {grids} grids ({} refused), seed {first}", found.rows, found.refused);
-    eprintln!("  by method {:?}: {:?}", Level::ALL.map(Level::name), found.by_method);
+    eprintln!(
+        "{} rows of {grids} grids ({} refused), seed {first_seed}",
+        totals.rows, totals.refused
+    );
+    eprintln!("  by method {:?}: {:?}", Level::ALL.map(Level::name), totals.by_method);
     eprintln!(
         "  failed {}, sensitive {} ({} of them needlessly), unconverged {} ({} of them right)",
-        found.failed,
-        found.sensitive,
-        found.needlessly_sensitive,
-        found.unconverged,
-        found.needlessly_unconverged
+        totals.failed,
+        totals.sensitive,
+        totals.needlessly_sensitive,
+        totals.unconverged,
+        totals.needlessly_unconverged
     );
     eprintln!(
-        "  wrong: status {}, verdict {}, amplitudes {}; worst of the rest {:.2} of the accuracy; \
+        "  wrong: status {}, verdict {}, numbers {}; worst of the rest {:.2} of the accuracy; \
          {} above their `error`",
-        found.wrong_status, found.wrong_verdict, found.inaccurate, found.worst, found.above_error
+        totals.wrong_status,
+        totals.wrong_verdict,
+        totals.inaccurate,
+        totals.greatest_error,
+        totals.above_error
     );
-    eprintln!("  greatest error as a share of `error`, by method: {:.2?}", found.share_of_estimate);
-    found.exceptions.iter().for_each(|line| eprintln!("  {line}"));
-    if found.exceptions.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    eprintln!(
+        "  greatest error as a share of `error`, by method: {:.2?}",
+        totals.error_over_estimate
+    );
+    totals.exceptions.iter().for_each(|line| eprintln!("  {line}"));
+    if totals.exceptions.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

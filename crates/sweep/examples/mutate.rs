@@ -23,11 +23,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Maximum number of changes of an input. Doubling it makes more inputs invalid at once.
+/// Maximum number of changes of an input. Basis: few enough for most inputs to pass the first
+/// checks. Doubling it makes more inputs invalid at once.
 const MAX_CHANGES: u64 = 12;
 
-/// Maximum time of an input; a longer one is a finding. Basis: CONTRIBUTING.md. Doubling it finds
-/// fewer slow inputs.
+/// Maximum time of an input; a longer one is a finding. Basis: the definition of a finding in
+/// CONTRIBUTING.md. Doubling it finds fewer slow inputs.
 const MAX_TIME: Duration = Duration::from_secs(10);
 
 /// Bytes that are limits of formats, or have a meaning in them.
@@ -53,51 +54,53 @@ const SPECIAL_WORDS: [&[u8]; 12] = [
 struct Rng(u64);
 
 impl Rng {
-    fn bits(&mut self) -> u64 {
+    fn next_u64(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
     }
 
-    /// Returns a random number below `end`, or 0 if that is 0.
-    fn below(&mut self, end: usize) -> usize {
-        (self.bits() % end.max(1) as u64) as usize
+    /// Returns a random number below `end`; 0 if `end` is 0.
+    fn random_below(&mut self, end: usize) -> usize {
+        (self.next_u64() % end.max(1) as u64) as usize
     }
 
     /// Returns a random range within `length` bytes, mostly a short one.
     fn random_range(&mut self, length: usize) -> std::ops::Range<usize> {
-        let start = self.below(length);
-        let most = if self.below(4) == 0 { length } else { 16 };
-        start..(start + self.below(most) + 1).min(length)
+        let start = self.random_below(length);
+        let max_length = if self.random_below(4) == 0 { length } else { 16 };
+        start..(start + self.random_below(max_length) + 1).min(length)
     }
 }
 
 fn mutate(rng: &mut Rng, seeds: &[Vec<u8>]) -> Vec<u8> {
-    let mut bytes = seeds[rng.below(seeds.len())].clone();
-    for _ in 0..=rng.bits() % MAX_CHANGES {
-        let at = rng.below(bytes.len() + 1);
-        let here = rng.random_range(bytes.len());
-        match rng.below(8) {
-            0 | 1 if at < bytes.len() => bytes[at] ^= 1 << rng.below(8),
-            2 if at < bytes.len() => bytes[at] = rng.bits() as u8,
-            3 if at < bytes.len() => bytes[at] = SPECIAL_BYTES[rng.below(SPECIAL_BYTES.len())],
-            4 => drop(bytes.drain(here)),
+    let mut bytes = seeds[rng.random_below(seeds.len())].clone();
+    for _ in 0..=rng.next_u64() % MAX_CHANGES {
+        let position = rng.random_below(bytes.len() + 1);
+        let range = rng.random_range(bytes.len());
+        match rng.random_below(8) {
+            0 | 1 if position < bytes.len() => bytes[position] ^= 1 << rng.random_below(8),
+            2 if position < bytes.len() => bytes[position] = rng.next_u64() as u8,
+            3 if position < bytes.len() => {
+                bytes[position] = SPECIAL_BYTES[rng.random_below(SPECIAL_BYTES.len())]
+            }
+            4 => drop(bytes.drain(range)),
             5 => {
-                let copy = bytes[here].to_vec();
-                drop(bytes.splice(at..at, copy));
+                let copy = bytes[range].to_vec();
+                drop(bytes.splice(position..position, copy));
             }
             6 => {
-                let word = SPECIAL_WORDS[rng.below(SPECIAL_WORDS.len())];
-                let end = (at + rng.below(word.len() + 1)).min(bytes.len());
-                drop(bytes.splice(at..end, word.iter().copied()));
+                let word = SPECIAL_WORDS[rng.random_below(SPECIAL_WORDS.len())];
+                let end = (position + rng.random_below(word.len() + 1)).min(bytes.len());
+                drop(bytes.splice(position..end, word.iter().copied()));
             }
             7 => {
-                let other = &seeds[rng.below(seeds.len())];
-                let there = rng.random_range(other.len());
-                drop(bytes.splice(here, other[there].iter().copied()));
+                let other = &seeds[rng.random_below(seeds.len())];
+                let other_range = rng.random_range(other.len());
+                drop(bytes.splice(range, other[other_range].iter().copied()));
             }
-            _ => bytes.truncate(at),
+            _ => bytes.truncate(position),
         }
     }
     bytes
@@ -143,33 +146,33 @@ fn main() -> ExitCode {
     fs::create_dir_all(&findings).expect("a folder for findings");
     let seeds = seeds(&root.join("fuzz").join(format!("corpus-{name}")));
 
-    let began = Instant::now();
-    let mut tried = 0_u64;
-    let mut found = 0_u64;
+    let start_time = Instant::now();
+    let mut count = 0_u64;
+    let mut findings_count = 0_u64;
     let mut slowest = Duration::ZERO;
     let unchanged = seeds.clone().into_iter();
     let mut inputs = unchanged.chain(std::iter::repeat_with(|| mutate(&mut rng, &seeds)));
-    while began.elapsed() < Duration::from_secs(seconds) {
+    while start_time.elapsed() < Duration::from_secs(seconds) {
         let Some(input) = inputs.next() else { break };
         let start = thread_time();
         let is_sound = catch_unwind(|| run(&input)).is_ok();
-        let took = thread_time() - start;
-        tried += 1;
-        slowest = slowest.max(took);
-        if !is_sound || took > MAX_TIME {
-            found += 1;
-            let path = findings.join(format!("{name}-{tried}"));
+        let duration = thread_time() - start;
+        count += 1;
+        slowest = slowest.max(duration);
+        if !is_sound || duration > MAX_TIME {
+            findings_count += 1;
+            let path = findings.join(format!("{name}-{count}"));
             fs::write(&path, &input).expect("a finding is kept");
-            let what = if is_sound { "slow" } else { "panic" };
-            eprintln!("{}: {what} after {took:?}", path.display());
+            let kind = if is_sound { "slow" } else { "panic" };
+            eprintln!("{}: {kind} after {duration:?}", path.display());
         }
     }
     eprintln!(
-        "{name}: {tried} inputs from {} in {:.0} s, slowest {slowest:?}, \
-         at most {}, {found} findings",
+        "{name}: {count} inputs from {} in {:.0} s, slowest {slowest:?}, \
+         at most {}, {findings_count} findings",
         seeds.len(),
-        began.elapsed().as_secs_f64(),
+        start_time.elapsed().as_secs_f64(),
         peak_kb()
     );
-    if found == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if findings_count == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

@@ -23,11 +23,11 @@ use sweep_engine::{Error, RunContext};
 
 /// Maximum number of rows that a thread computes together. Basis: their starts fill the lanes.
 /// Doubling it leaves threads without work at the end of a run.
-const MAX_ROWS_TOGETHER: u64 = 16;
+const MAX_ROWS_PER_BATCH: u64 = 16;
 
 /// Maximum number of starts of the rows that a thread computes together. Basis: the history of a
 /// trajectory takes 0.1 MB. Doubling it doubles the memory of a thread.
-const MAX_STARTS_TOGETHER: u64 = 128;
+const MAX_STARTS_PER_BATCH: u64 = 128;
 
 named! {
     /// The direction in which the final state of a motion becomes the start at the next speed.
@@ -47,14 +47,14 @@ impl FromStr for Carry {
     }
 }
 
-/// The expected value of a kick and of the longest time, in messages.
+/// The expected value of a kick or of the longest time, in messages.
 const EXPECTED_POSITIVE: &str = "a number above 0, at most 1e5";
 
 fn is_positive(value: f64) -> bool {
     value > 0.0 && value <= 1e5
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+fn parse_positive(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value| is_positive(*value));
     value.ok_or_else(|| format!("expected {EXPECTED_POSITIVE}"))
 }
@@ -67,7 +67,7 @@ pub struct AttractorSearch {
           value_parser = clap::value_parser!(u64).range(1..=AttractorSearch::MAX_STARTS))]
     pub starts: u64,
     /// Hardest kick, in rad/s of the tub's rocking
-    #[arg(long, value_name = "RAD/S", default_value_t = 6.0, value_parser = positive)]
+    #[arg(long, value_name = "RAD/S", default_value_t = 6.0, value_parser = parse_positive)]
     pub kick: f64,
     /// Start at each speed from the motion at the speed before, going up or down, instead of from
     /// several starts
@@ -82,24 +82,24 @@ pub struct AttractorSearch {
           value_parser = clap::value_parser!(u64).range(..=256))]
     pub sections: u64,
     /// Maximum time for which a motion that does not settle is followed, in s
-    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = positive)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = parse_positive)]
     pub longest: f64,
 }
 
 impl fmt::Display for AttractorSearch {
     /// Writes the options that differ from the defaults, as on a command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let usual = StartRule::default();
+        let defaults = StartRule::default();
         if let Some(carry) = self.carry {
             write!(f, " --carry {}", carry.name())?;
         }
-        if self.starts != usual.count as u64 {
+        if self.starts != defaults.count as u64 {
             write!(f, " --starts {}", self.starts)?;
         }
-        if self.kick != usual.max_kick_rad_per_s {
+        if self.kick != defaults.max_kick_rad_per_s {
             write!(f, " --kick {}", decimal(self.kick))?;
         }
-        if self.longest != usual.max_time_s {
+        if self.longest != defaults.max_time_s {
             write!(f, " --longest {}", decimal(self.longest))?;
         }
         if self.sections > 0 {
@@ -110,8 +110,8 @@ impl fmt::Display for AttractorSearch {
 }
 
 impl AttractorSearch {
-    /// Maximum number of starts at a speed. Basis: far more than find further motions. Doubling it
-    /// doubles the longest time of a row.
+    /// Maximum number of starts at a speed. Basis: far more starts than lead to further motions.
+    /// Doubling it doubles the longest time of a row.
     const MAX_STARTS: u64 = 1024;
 
     /// Checks that the options are within their bounds.
@@ -173,53 +173,55 @@ pub(crate) struct AttractorEngine {
 
 impl AttractorEngine {
     pub(crate) fn new(plan: &Plan, search: AttractorSearch) -> Self {
-        // An attractor has no duration, so metrics over times and windows are not recorded.
+        // An attractor has no duration, so that metrics over times and windows are not recorded.
         let Recorders { mut gauges, .. } = plan.model.measures.recorders();
         gauges[Gauge::ClashTime as usize] = false;
-        let wanted = Recorders { gauges, ..Recorders::default() };
+        let recorders = Recorders { gauges, ..Recorders::default() };
         let starts = StartRule {
             count: if search.carry.is_some() { 1 } else { search.starts as usize },
             max_kick_rad_per_s: search.kick,
             max_time_s: search.longest,
             with_threshold: search.threshold,
-            recorders: wanted,
+            recorders,
         };
         Self { search, starts, columns: search.row_columns(plan) }
     }
 
-    /// Returns the number of rows that a thread computes together, given its share of the rows and
-    /// the number of speeds of a point.
-    pub(crate) fn rows_together(&self, share: u64, speeds: u64) -> u64 {
+    /// Returns the number of rows that a thread computes together. `rows_per_thread` is its part of
+    /// all rows, and `speeds` the number of speeds of a point.
+    pub(crate) fn rows_per_batch(&self, rows_per_thread: u64, speeds: u64) -> u64 {
         match self.search.carry {
             // All speeds of a point are one sequence.
-            Some(_) => speeds * (share / speeds).clamp(1, MAX_ROWS_TOGETHER),
-            None => share.min(MAX_STARTS_TOGETHER / self.search.starts).clamp(1, MAX_ROWS_TOGETHER),
+            Some(_) => speeds * (rows_per_thread / speeds).clamp(1, MAX_ROWS_PER_BATCH),
+            None => rows_per_thread
+                .min(MAX_STARTS_PER_BATCH / self.search.starts)
+                .clamp(1, MAX_ROWS_PER_BATCH),
         }
     }
 
-    /// Returns the row of a point at a speed without a motion.
-    pub(crate) fn failed_row(&self, number: u64, status: Status) -> Done {
+    /// Returns the row of a point at a speed for which no motion was found.
+    pub(crate) fn failed_row(&self, row_index: u64, status: Status) -> Done {
         let failed = DwellRow { found: Err(status), motion: 0, turn: 0 };
-        Done { point: number, rows: vec![row(&self.columns, &failed)] }
+        Done { point: row_index, rows: vec![row(&self.columns, &failed)] }
     }
 
-    /// Finds the motions of points at held speeds, each with its row's number, and passes the rows
-    /// to `keep`. Once the context is stopped, they are meaningless.
+    /// Finds the motions of the requested points at held speeds, each with its row's index, and
+    /// passes the rows to `sink`. After the context is stopped, they are meaningless.
     pub(crate) fn find(
         &self,
         simd: Simd,
         speeds_rpm: &[f64],
         requested: &[(u64, HeldSpeed<'_>)],
-        keep: &dyn Fn(Done),
+        sink: &dyn Fn(Done),
         context: &RunContext<'_>,
     ) {
         let is_stopped = || context.stopped();
         let Some(carry) = self.search.carry else {
-            let dwells: Vec<(HeldSpeed<'_>, Carried)> =
-                requested.iter().map(|(_, dwell)| (*dwell, None)).collect();
-            let found = find_motions(simd, &dwells, &self.starts, Cancel::When(&is_stopped));
-            for ((row, _), found) in requested.iter().zip(found) {
-                keep(self.found_rows(*row, found));
+            let held_speeds: Vec<(HeldSpeed<'_>, Carried)> =
+                requested.iter().map(|(_, held_speed)| (*held_speed, None)).collect();
+            let results = find_motions(simd, &held_speeds, &self.starts, Cancel::When(&is_stopped));
+            for ((row, _), result) in requested.iter().zip(results) {
+                sink(self.rows_of_motions(*row, result));
             }
             return;
         };
@@ -229,43 +231,44 @@ impl AttractorEngine {
         let mut carried: Vec<Carried> = vec![None; groups.len()];
         for step in 0..speeds {
             let position = if carry == Carry::Up { step } else { speeds - 1 - step };
-            // The speeds before the first requested row are needed for its start.
+            // The speeds before the first requested row are needed for its start state.
             let is_at_or_after = |(row, _): &(u64, HeldSpeed<'_>)| match carry {
                 Carry::Up => row % speeds >= position,
                 Carry::Down => row % speeds <= position,
             };
             let row_at = |k: usize| groups[k][0].0 / speeds * speeds + position;
             let is_requested = |k: usize| groups[k].iter().any(|(row, _)| *row == row_at(k));
-            let mut needed = Vec::new();
+            let mut groups_to_compute = Vec::new();
             for k in (0..groups.len()).filter(|k| groups[*k].iter().any(is_at_or_after)) {
                 match Some(k).filter(|k| !is_requested(*k)).and_then(|k| context.known(row_at(k))) {
                     Some(known) => carried[k] = columns::carried_state(&known),
-                    None => needed.push(k),
+                    None => groups_to_compute.push(k),
                 }
             }
-            let dwell = |k: &usize| {
+            let held_speed = |k: &usize| {
                 let speed_rpm = speeds_rpm[position as usize];
                 (HeldSpeed { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
             };
-            let dwells: Vec<(HeldSpeed<'_>, Carried)> = needed.iter().map(dwell).collect();
-            let found = find_motions(simd, &dwells, &self.starts, Cancel::When(&is_stopped));
+            let held_speeds: Vec<(HeldSpeed<'_>, Carried)> =
+                groups_to_compute.iter().map(held_speed).collect();
+            let results = find_motions(simd, &held_speeds, &self.starts, Cancel::When(&is_stopped));
             if is_stopped() {
                 return;
             }
-            for (k, found) in needed.into_iter().zip(found) {
-                carried[k] = found.as_ref().ok().and_then(final_state);
+            for (k, result) in groups_to_compute.into_iter().zip(results) {
+                carried[k] = result.as_ref().ok().and_then(final_state);
                 if is_requested(k) {
-                    keep(self.found_rows(row_at(k), found));
+                    sink(self.rows_of_motions(row_at(k), result));
                 }
             }
         }
     }
 
     /// Returns the rows of the motions of a point at a speed.
-    fn found_rows(&self, number: u64, found: Result<Attractors, Status>) -> Done {
+    fn rows_of_motions(&self, row_index: u64, found: Result<Attractors, Status>) -> Done {
         let mut found = match found {
             Ok(found) => found,
-            Err(status) => return self.failed_row(number, status),
+            Err(status) => return self.failed_row(row_index, status),
         };
         for motion in &mut found.attractors {
             let surplus = motion.sections.len().saturating_sub(self.search.sections as usize);
@@ -279,12 +282,12 @@ impl AttractorEngine {
                 rows.push(row(&self.columns, &dwell_row));
             }
         }
-        Done { point: number, rows }
+        Done { point: row_index, rows }
     }
 }
 
-/// Returns the state from which a machine is taken to the next speed, unless it left the model's
-/// range.
+/// Returns the state that the search carries to the next speed; `None` if the motion left the
+/// model's range.
 fn final_state(found: &Attractors) -> Carried {
     let motion = found.attractors.first()?;
     (!matches!(motion.status, AttractorStatus::LeftRange { .. })).then_some(motion.end)
@@ -312,8 +315,8 @@ mod tests {
             longest: 5.0,
         };
         let speeds_rpm = &[300.0, 305.0, 310.0];
-        let held = HeldPlan { plan: &plan, speeds_rpm, search: Some(search) };
-        let engine = held.engine().unwrap();
+        let held_plan = HeldPlan { plan: &plan, speeds_rpm, search: Some(search) };
+        let engine = held_plan.engine().unwrap();
         let interrupt = Interrupt::new();
         let evaluate = |rows: std::ops::Range<u64>, known: &RowLookup<'_>| {
             let remaining = Mutex::new(rows);
@@ -328,9 +331,10 @@ mod tests {
             finished.sort_by_key(|row: &Done| row.point);
             finished
         };
-        let all = evaluate(0..3, &|_| None);
-        assert_eq!(evaluate(2..3, &|row| all.get(row as usize).cloned()), all[2..]);
-        // With another known row the result differs: the row is used, and not computed again.
-        assert_ne!(evaluate(2..3, &|_| all.first().cloned()), all[2..]);
+        let all_rows = evaluate(0..3, &|_| None);
+        assert_eq!(evaluate(2..3, &|row| all_rows.get(row as usize).cloned()), all_rows[2..]);
+        // With another known row the result differs, which shows that the row is used and not
+        // computed again.
+        assert_ne!(evaluate(2..3, &|_| all_rows.first().cloned()), all_rows[2..]);
     }
 }

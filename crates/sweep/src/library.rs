@@ -45,22 +45,23 @@ fn refused_speeds(count: usize, expected: String) -> Error {
     Error::option("speeds", format!("with {count} values"), expected)
 }
 
-/// Checks that speeds (rpm) increase, that there are at least `least` and not too many, and that
-/// each `is_allowed`, which `condition` describes.
+/// Checks that speeds (rpm) increase, that there are at least `min_count` and at most
+/// [`MAX_SPEEDS`], and that each `is_allowed`, which `condition` describes.
 fn check_speeds(
     speeds_rpm: &[f64],
-    least: usize,
+    min_count: usize,
     is_allowed: fn(f64) -> bool,
     condition: &str,
 ) -> Result<(), Error> {
     let count = speeds_rpm.len();
     let are_increasing = speeds_rpm.windows(2).all(|pair| pair[0] < pair[1]);
     let are_speeds = speeds_rpm.iter().all(|speed| speed.is_finite() && is_allowed(*speed));
-    if are_increasing && are_speeds && count >= least && count as f64 <= MAX_SPEEDS + 1.0 {
+    if are_increasing && are_speeds && count >= min_count && count as f64 <= MAX_SPEEDS + 1.0 {
         return Ok(());
     }
     let expected = format!(
-        "from {least} to {MAX_SPEEDS} finite speeds in rpm{condition}, each above the one before"
+        "from {min_count} to {MAX_SPEEDS} finite speeds in rpm{condition}, each above the one \
+         before"
     );
     Err(refused_speeds(count, expected))
 }

@@ -23,23 +23,25 @@ use sweep_engine::store::{DeclaredColumn, Holds, Layout, axis_columns};
 use sweep_engine::{Error, Job, RowSink, RowSource};
 use sweep_files::{FileKind, key};
 
-/// Number of points whose rows a thread computes together. Basis: they fill the lanes, because the
-/// rows of a point share its curve of responses. Doubling it leaves threads without work at the end
-/// of a run.
-const POINTS_TOGETHER: u64 = 8;
+/// Number of points whose rows a thread computes together. Basis: the rows of a point share its
+/// curve of responses, so that this number of points fills the lanes. Doubling it leaves threads
+/// without work at the end of a run.
+const POINTS_PER_BATCH: u64 = 8;
 
-/// Minimum and maximum number of rows that a thread computes together. Basis: less than the minimum
-/// leaves lanes empty, and more than the maximum delays the first rows. Doubling them doubles these
-/// delays.
-const ROWS_TOGETHER: [u64; 2] = [32, 2048];
+/// Minimum and maximum number of rows that a thread computes together. Basis: fewer than the
+/// minimum leave lanes empty, and more than the maximum delay the first rows. Doubling the maximum
+/// doubles this delay.
+const ROWS_PER_BATCH: [u64; 2] = [32, 2048];
 
 /// Refuses a grid with an axis of the spin, which contradicts held speeds, or of the window, which
-/// has no meaning at them. `option` is the name of the option that gave the speeds.
+/// has no meaning at held speeds. `option` is the name of the option that gave the speeds, and
+/// `text` its value.
 ///
 /// # Errors
+///
 /// Returns [`Error::Refused`] for such an axis.
-pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
-    let refuse = |expected: String| Err(Error::option(option, given, expected));
+pub(crate) fn check(plan: &Plan, option: &'static str, text: &str) -> Result<(), Error> {
+    let refuse = |expected: String| Err(Error::option(option, text, expected));
     for axis in &plan.axes {
         let name = &axis.parameter.name;
         match axis.parameter.handle.target() {
@@ -66,8 +68,8 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
     Ok(())
 }
 
-/// The points of a plan at held speeds, of which the speeds vary fastest. With a search its rows
-/// are motions in which the machines end, otherwise periodic responses.
+/// The points of a plan at held speeds, of which the speeds vary fastest. With a search the rows
+/// are attractors, without one periodic responses.
 #[derive(Clone, Copy)]
 pub(crate) struct HeldPlan<'a> {
     pub(crate) plan: &'a Plan,
@@ -84,13 +86,14 @@ impl<'a> HeldPlan<'a> {
     }
 
     /// Returns the name of the command.
-    pub(crate) fn verb(&self) -> &'static str {
+    pub(crate) fn command_name(&self) -> &'static str {
         self.kind().word()
     }
 
     /// Returns the path of the result, by default one in `results`.
     pub(crate) fn output(&self, out: Option<&Path>) -> PathBuf {
-        let default = || format!("results/{}-{}.parquet", self.plan.name, self.verb()).into();
+        let default =
+            || format!("results/{}-{}.parquet", self.plan.name, self.command_name()).into();
         out.map_or_else(default, Path::to_owned)
     }
 
@@ -125,7 +128,7 @@ impl<'a> HeldPlan<'a> {
             metadata: vec![metadata],
         };
         let mut job = Job::new(plan);
-        job.plan[self.verb()] = options;
+        job.plan[self.command_name()] = options;
         Job {
             points: plan.points() * speeds,
             layout,
@@ -179,26 +182,26 @@ pub(crate) struct HeldSpeedEvaluator<'a> {
 }
 
 impl HeldSpeedEvaluator<'_> {
-    /// Computes these rows, which share the lanes, and passes them to `keep`.
-    fn evaluate_rows(&self, rows: &[u64], keep: &RowSink<'_>, context: &RunContext<'_>) {
+    /// Computes rows, which share the lanes, and passes them to `sink`.
+    fn evaluate_rows(&self, rows: &[u64], sink: &RowSink<'_>, context: &RunContext<'_>) {
         // Rows of a stopped search are meaningless.
         let is_stopped = || context.stopped();
-        let keep = |done| {
+        let store = |done| {
             if !is_stopped() {
-                keep(done)
+                sink(done)
             }
         };
         let speeds = self.held.speeds_rpm.len() as u64;
-        let mut numbers: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
-        numbers.dedup();
+        let mut point_indices: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
+        point_indices.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
-            numbers.iter().copied().zip(self.prepare(&numbers)).collect();
+            point_indices.iter().copied().zip(self.prepare(&point_indices)).collect();
         let mut requests = Vec::new();
         for &row in rows {
             let speed_rpm = self.held.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
                 Ok(point) => requests.push((row, HeldSpeed { point, speed_rpm })),
-                Err(status) => keep(match &self.analysis {
+                Err(status) => store(match &self.analysis {
                     HeldAnalysis::Responses(columns) => columns.done(Outcome::failed(row, *status)),
                     HeldAnalysis::Attractors(engine) => engine.failed_row(row, *status),
                 }),
@@ -206,17 +209,19 @@ impl HeldSpeedEvaluator<'_> {
         }
         match &self.analysis {
             HeldAnalysis::Responses(columns) => {
-                let dwells: Vec<HeldSpeed<'_>> = requests.iter().map(|(_, dwell)| *dwell).collect();
-                for ((row, _), found) in
-                    requests.iter().zip(find_responses(&dwells, Cancel::When(&is_stopped)))
+                let held_speeds: Vec<HeldSpeed<'_>> =
+                    requests.iter().map(|(_, held_speed)| *held_speed).collect();
+                for ((row, _), result) in
+                    requests.iter().zip(find_responses(&held_speeds, Cancel::When(&is_stopped)))
                 {
                     let failed = |status| Outcome::failed(*row, status);
-                    let outcome = found.map_or_else(failed, |found| self.outcome(*row, &found));
-                    keep(columns.done(outcome));
+                    let outcome =
+                        result.map_or_else(failed, |responses| self.outcome(*row, &responses));
+                    store(columns.done(outcome));
                 }
             }
             HeldAnalysis::Attractors(engine) => {
-                engine.find(self.simd, self.held.speeds_rpm, &requests, &keep, context);
+                engine.find(self.simd, self.held.speeds_rpm, &requests, &store, context);
             }
         }
     }
@@ -233,7 +238,8 @@ impl HeldSpeedEvaluator<'_> {
         map_isolating_panics(&machines, prepare_group, || Err(Status::Panicked))
     }
 
-    /// Returns the outcome of a row: that of the first response, with the other ones as coexisting.
+    /// Returns the outcome of a row: that of the first response, with those of further responses as
+    /// coexisting outcomes.
     fn outcome(&self, row: u64, responses: &[Response]) -> Outcome {
         let mut outcomes = responses.iter().map(|response| self.response_outcome(row, response));
         let first = outcomes.next().unwrap_or_else(|| Outcome::failed(row, Status::NoResponse));
@@ -253,25 +259,25 @@ impl HeldSpeedEvaluator<'_> {
 }
 
 impl Evaluator for HeldSpeedEvaluator<'_> {
-    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, context: &RunContext<'_>) {
+    fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         let speeds = self.held.speeds_rpm.len() as u64;
         // A small job is divided between all threads.
-        let share =
+        let rows_per_thread =
             self.held.plan.points().saturating_mul(speeds) / rayon::current_num_threads() as u64;
         let row_count = match &self.analysis {
-            HeldAnalysis::Responses(_) => {
-                share.min(POINTS_TOGETHER * speeds).clamp(ROWS_TOGETHER[0], ROWS_TOGETHER[1])
-            }
-            HeldAnalysis::Attractors(engine) => engine.rows_together(share, speeds),
+            HeldAnalysis::Responses(_) => rows_per_thread
+                .min(POINTS_PER_BATCH * speeds)
+                .clamp(ROWS_PER_BATCH[0], ROWS_PER_BATCH[1]),
+            HeldAnalysis::Attractors(engine) => engine.rows_per_batch(rows_per_thread, speeds),
         };
         rayon::broadcast(|_| {
             while !context.stopped() {
-                let rows = std::iter::from_fn(next).map(|(row, _)| row);
+                let rows = std::iter::from_fn(source).map(|(row, _)| row);
                 let rows: Vec<u64> = rows.take(row_count as usize).collect();
                 if rows.is_empty() {
                     break;
                 }
-                self.evaluate_rows(&rows, keep, context);
+                self.evaluate_rows(&rows, sink, context);
             }
         });
     }

@@ -14,7 +14,7 @@ use sweep_parameter::Worse;
 use sweep_plot::contour::zero_lines;
 use washer_row::{Criterion, Outcome, Verdict};
 
-const HEAD: &str = r#"
+const GRID_HEAD: &str = r#"
 name = "short"
 [spin]
 profile = "triangular"
@@ -28,8 +28,8 @@ method = "rk4"
 step_s = 2.5e-4
 "#;
 
-/// The axes of Fig. 12 at three masses, with dampings 12 N s/m apart.
-const GRID: &str = r#"
+/// The axes of Fig. 12 at three masses, with dampings at intervals of 12 N s/m.
+const AXES: &str = r#"
 [[axis]]
 parameter = "unbalance_mass_kg"
 values = [0.1, 0.35, 0.6]
@@ -47,18 +47,20 @@ fn plan(text: &str) -> Plan {
 
 #[test]
 fn a_held_speed_may_be_a_number() {
-    let held = |speed: &str| {
+    let held_speeds_for = |speed: &str| {
         let speeds = format!("[stability]\nspeed_rpm = {speed}\n");
-        plan(&format!("metrics = [\"dwell\"]\n{HEAD}{speeds}{GRID}")).model.held_speeds
+        plan(&format!("metrics = [\"dwell\"]\n{GRID_HEAD}{speeds}{AXES}")).model.held_speeds
     };
-    assert!(held("250").is_some() && held("250") == held("\"250\""));
-    assert_eq!(held("297.5"), held("\"297.5\""));
+    assert!(
+        held_speeds_for("250").is_some() && held_speeds_for("250") == held_speeds_for("\"250\"")
+    );
+    assert_eq!(held_speeds_for("297.5"), held_speeds_for("\"297.5\""));
 }
 
 type Task = BoundaryTask<Washer>;
 
 /// Returns the options for the boundary of the greatest ratio.
-fn boundary_options(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
+fn options_of_ratio(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
     BoundaryOptions { quantity: "ratio_max".to_owned(), limit: None, tolerance, lattice }
 }
 
@@ -75,20 +77,20 @@ fn all_points(plan: &Plan) -> Vec<Vec<f64>> {
 
 #[test]
 fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
-    let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, &boundary_options(Some(0.5), 3)).unwrap();
+    let plan = plan(&format!("{GRID_HEAD}{AXES}"));
+    let task = Task::new(&plan, &options_of_ratio(Some(0.5), 3)).unwrap();
     let interrupt = Interrupt::new();
-    let trace_boundary = [1, 3].map(|threads| trace_boundary(&task, threads, &interrupt).unwrap());
-    let [one, three] = [0, 1].map(|k| task.table(&trace_boundary[k]).finish().unwrap().1);
-    assert!(one == three, "other bytes on three threads");
+    let traced = [1, 3].map(|threads| trace_boundary(&task, threads, &interrupt).unwrap());
+    let [one_thread, three_threads] = [0, 1].map(|k| task.table(&traced[k]).finish().unwrap().1);
+    assert!(one_thread == three_threads, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
     let outcomes = engine.evaluate_at(&all_points(&plan));
     let channels = plan.reliability.channels.len();
-    for (row, outcomes) in trace_boundary[0].curves[0].iter().zip(outcomes.chunks(21)) {
+    for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
         assert!(row.trials < 21, "{row:?}");
         let edge = row.edges[0];
-        let logs: Vec<(f64, f64)> = outcomes
+        let distances: Vec<(f64, f64)> = outcomes
             .iter()
             .map(|outcome| {
                 let verdict = Verdict::new(outcome, channels, 2.0);
@@ -98,23 +100,27 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
             .collect();
         let Some([low, high]) = edge.bracket else {
             assert_eq!((row.first, edge.kind), (0.1, EdgeKind::NoneReliable));
-            assert!(logs.iter().all(|(_, log)| *log < 0.0));
+            assert!(distances.iter().all(|(_, distance)| *distance < 0.0));
             continue;
         };
         assert_eq!((row.edges.len(), edge.kind), (1, EdgeKind::Crossing));
         assert!(high - low <= 0.5);
-        for (damping, log) in &logs {
-            let reliable = *log < 0.0;
+        for (damping, distance) in &distances {
+            let reliable = *distance < 0.0;
             assert!(
                 if reliable { *damping > low } else { *damping < high },
-                "{damping} {log} {edge:?}"
+                "{damping} {distance} {edge:?}"
             );
         }
-        let contour = logs.windows(2).find_map(|pair| {
-            let [(a, from), (b, to)] = [pair[0], pair[1]];
-            (from >= 0.0 && to < 0.0).then(|| a + (b - a) * from / (from - to))
+        let contour_damping = distances.windows(2).find_map(|pair| {
+            let [(a, distance_a), (b, distance_b)] = [pair[0], pair[1]];
+            (distance_a >= 0.0 && distance_b < 0.0)
+                .then(|| a + (b - a) * distance_a / (distance_a - distance_b))
         });
-        assert!((contour.unwrap() - edge.at.unwrap()).abs() < 1.0, "{contour:?} {edge:?}");
+        assert!(
+            (contour_damping.unwrap() - edge.at.unwrap()).abs() < 1.0,
+            "{contour_damping:?} {edge:?}"
+        );
     }
 }
 
@@ -129,17 +135,17 @@ fn distance(outcome: &Outcome, plan: &Plan) -> f64 {
 fn grid_distances(plan: &Plan) -> Vec<Vec<f64>> {
     let engine = ModelEngine::new(plan).unwrap();
     let outcomes = engine.evaluate_at(&all_points(plan));
-    let log = |outcome: &Outcome| distance(outcome, plan);
+    let ratio_distance = |outcome: &Outcome| distance(outcome, plan);
     outcomes
         .chunks(plan.axes[1].values.len() as usize)
-        .map(|row| row.iter().map(log).collect())
+        .map(|row| row.iter().map(ratio_distance).collect())
         .collect()
 }
 
 #[test]
 fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
     // The masses are about 0.4 kg; one mass of the search lies between those of the grid.
-    let head = HEAD.split("[integrator]").next().unwrap();
+    let head = GRID_HEAD.split("[integrator]").next().unwrap();
     let masses = [0.39, 0.40, 0.41];
     let axes = |masses: &[f64], from: f64, to: f64, count: u32| {
         format!(
@@ -150,9 +156,9 @@ fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
     };
     for criterion in Criterion::ALL {
         let criterion_head = format!("{head}[reliability]\ncriterion = \"{}\"\n", criterion.name());
-        let wide =
+        let coarse =
             plan(&format!("{criterion_head}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
-        let task = Task::new(&wide, &boundary_options(Some(0.5), 4)).unwrap();
+        let task = Task::new(&coarse, &options_of_ratio(Some(0.5), 4)).unwrap();
         let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
         let edges: Vec<_> = rows.iter().map(|row| row.edges.last().copied().unwrap()).collect();
         assert!(
@@ -164,19 +170,19 @@ fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
         let count = 29;
         let fine = plan(&format!("{criterion_head}{}", axes(&masses, from, from + 14.0, count)));
         let dampings: Vec<f64> = (0..count).map(|k| from + 0.5 * f64::from(k)).collect();
-        let logs = grid_distances(&fine);
-        let contour = zero_lines(&masses, &dampings, |i, j| logs[i][j]).concat();
+        let grid = grid_distances(&fine);
+        let contour_damping = zero_lines(&masses, &dampings, |i, j| grid[i][j]).concat();
         for (row, edge) in rows.iter().zip(&edges) {
-            let nearest = contour.windows(2).find_map(|pair| {
+            let contour_point = contour_damping.windows(2).find_map(|pair| {
                 let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
                 let inside = (x0.min(x1)..=x0.max(x1)).contains(&row.first) && x0 != x1;
                 inside.then(|| y0 + (y1 - y0) * (row.first - x0) / (x1 - x0))
             });
-            let contour = nearest.unwrap();
-            let at = edge.at.unwrap();
+            let contour_damping = contour_point.unwrap();
+            let crossing = edge.at.unwrap();
             assert!(
-                (contour - at).abs() < 0.25,
-                "{criterion:?} at {} kg: {contour} and {at}",
+                (contour_damping - crossing).abs() < 0.25,
+                "{criterion:?} at {} kg: {contour_damping} and {crossing}",
                 row.first
             );
         }
@@ -204,20 +210,20 @@ fn reference_brackets(grid: &str) -> Vec<ReferenceBracket> {
 }
 
 #[test]
-fn committed_grids_have_the_brackets_of_an_earlier_search() {
+fn grids_of_the_repository_have_the_brackets_of_an_earlier_search() {
     let grids = [
         ("fig12", include_str!("../../../sweeps/fig12.toml"), 400),
         ("fig12_envelope", include_str!("../../../sweeps/fig12_envelope.toml"), 120),
         ("fig12_rms", include_str!("../../../sweeps/fig12_rms.toml"), 120),
         ("quick", include_str!("../../../sweeps/quick.toml"), 170),
     ];
-    for (name, text, most_trials) in grids {
-        let task = Task::new(&plan(text), &boundary_options(None, 6)).unwrap();
-        let found = trace_boundary(&task, 2, &Interrupt::new()).unwrap();
-        println!("{name}: {} points in {} rounds", found.trials, found.rounds);
-        assert!(found.trials <= most_trials, "{name}: {} points", found.trials);
+    for (name, text, max_trials) in grids {
+        let task = Task::new(&plan(text), &options_of_ratio(None, 6)).unwrap();
+        let traced = trace_boundary(&task, 2, &Interrupt::new()).unwrap();
+        println!("{name}: {} points in {} rounds", traced.trials, traced.rounds);
+        assert!(traced.trials <= max_trials, "{name}: {} points", traced.trials);
         let mut brackets = Vec::new();
-        for row in &found.curves[0] {
+        for row in &traced.curves[0] {
             for edge in row.edges.iter().filter(|edge| edge.bracket.is_some()) {
                 assert_eq!(edge.kind, EdgeKind::Crossing, "{name}: {row:?}");
                 brackets.push((row.first, edge.bracket.unwrap()));
@@ -237,8 +243,8 @@ fn committed_grids_have_the_brackets_of_an_earlier_search() {
 
 #[test]
 fn an_interrupt_stops_a_search_before_the_next_group() {
-    let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, &boundary_options(None, 6)).unwrap();
+    let plan = plan(&format!("{GRID_HEAD}{AXES}"));
+    let task = Task::new(&plan, &options_of_ratio(None, 6)).unwrap();
     assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
     let interrupt = Interrupt::new();
     interrupt.raise(2);
@@ -247,56 +253,58 @@ fn an_interrupt_stops_a_search_before_the_next_group() {
 
 #[test]
 fn an_interrupted_search_repeats_no_trial_and_ends_the_same() {
-    let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, &boundary_options(Some(2.0), 2)).unwrap();
+    let plan = plan(&format!("{GRID_HEAD}{AXES}"));
+    let task = Task::new(&plan, &options_of_ratio(Some(2.0), 2)).unwrap();
     let whole = trace_boundary(&task, 1, &Interrupt::new()).unwrap();
-    let home = tempfile::tempdir().unwrap();
-    let output = home.path().join("x.parquet");
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("x.parquet");
     let job = task.job();
     let mut stops = 0;
-    let (found, trials) = loop {
+    let (result, trials) = loop {
         let Ok(Opened::Open(trials)) = Trials::open(&output, &job, task.trial_columns(), false)
         else {
             panic!()
         };
         let interrupt = Interrupt::new();
-        let there = trials.count();
+        let trials_before = trials.count();
         // The search is interrupted after five trials, in the middle of a batch.
-        let tell = |done: u64| {
-            if done >= there as u64 + 5 {
+        let stop_after_five_trials = |done: u64| {
+            if done >= trials_before as u64 + 5 {
                 interrupt.raise(2);
             }
         };
         let engine = Washer::engine(&task.plan, task.column()).unwrap();
-        let evaluator = CachedEvaluator::new(engine, 2, &interrupt, Some(trials), &tell).unwrap();
+        let evaluator =
+            CachedEvaluator::new(engine, 2, &interrupt, Some(trials), &stop_after_five_trials)
+                .unwrap();
         let distances = task.distances(&evaluator);
-        let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut |_| {});
+        let result = trace(&distances, &task.firsts, task.curves, &task.search, &mut |_| {});
         drop(distances);
         let trials = evaluator.into_cache().unwrap();
-        match found {
-            Ok(found) => break (found, trials),
-            Err(Stopped::Interrupted) => assert!(trials.count() > there),
+        match result {
+            Ok(result) => break (result, trials),
+            Err(Stopped::Interrupted) => assert!(trials.count() > trials_before),
             Err(Stopped::Failed(error)) => panic!("{error}"),
         }
         stops += 1;
     };
     assert!(stops > 1);
-    assert_eq!((found, trials.count()), (whole.clone(), whole.trials));
+    assert_eq!((result, trials.count()), (whole.clone(), whole.trials));
 }
 
 #[test]
 fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
     // The position of one damper decides which dampings are reliable, if any are.
-    let head = HEAD.split("[integrator]").next().unwrap();
+    let head = GRID_HEAD.split("[integrator]").next().unwrap();
     let axes = "[[axis]]\nparameter = \"damper_1_cabinet_z_m\"\n\
                 range = { from = 0.1, to = 0.3, count = 17 }\n\
                 [[axis]]\nparameter = \"damping_n_s_per_m\"\n\
                 range = { from = 60.0, to = 300.0, count = 33 }\n";
     let plan = plan(&format!("{head}{axes}"));
-    let task = Task::new(&plan, &boundary_options(None, 6)).unwrap();
+    let task = Task::new(&plan, &options_of_ratio(None, 6)).unwrap();
     let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
-    // At 0.1 m no damping is reliable. From 0.125 m on all dampings above a crossing are. The row
-    // between has a reliable interval that no point of the lattice meets.
+    // At 0.1 m no damping is reliable. From 0.125 m on, all dampings above a crossing are reliable.
+    // The row between the two has a reliable interval that contains no point of the lattice.
     let kinds: Vec<EdgeKind> = rows.iter().map(|row| row.edges[0].kind).collect();
     assert_eq!(
         kinds[..3],
@@ -310,9 +318,9 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
             dampings.iter().map(|damping| vec![row.first, *damping]).collect();
         for (damping, outcome) in dampings.iter().zip(engine.evaluate_at(&points)) {
             let is_reliable = distance(&outcome, &plan) < 0.0;
-            let below =
+            let bracket_below =
                 row.edges.iter().rev().find(|edge| edge.bracket.is_some_and(|b| b[1] <= *damping));
-            let found = match (below, row.edges[0].distances[0]) {
+            let expected = match (bracket_below, row.edges[0].distances[0]) {
                 (Some(edge), _) => edge.distances[1].unwrap() < 0.0,
                 (None, Some(distance)) => distance < 0.0,
                 (None, None) => row.edges[0].kind == EdgeKind::NoneReliable,
@@ -320,7 +328,7 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
             let is_bracketed =
                 |edge: &Edge| edge.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1]);
             let context = (row.first, damping, &row.edges);
-            assert!(found == is_reliable || row.edges.iter().any(is_bracketed), "{context:?}");
+            assert!(expected == is_reliable || row.edges.iter().any(is_bracketed), "{context:?}");
         }
     }
 }
@@ -329,8 +337,8 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
 fn plans_without_a_boundary_are_refused_with_the_reason() {
     let mass = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2]\n";
     let refused = |text: &str, tolerance: Option<f64>| {
-        let plan = plan(&format!("{HEAD}{text}"));
-        Task::new(&plan, &boundary_options(tolerance, 6)).unwrap_err().to_string()
+        let plan = plan(&format!("{GRID_HEAD}{text}"));
+        Task::new(&plan, &options_of_ratio(tolerance, 6)).unwrap_err().to_string()
     };
     assert_eq!(
         refused(mass, None),
@@ -338,14 +346,15 @@ fn plans_without_a_boundary_are_refused_with_the_reason() {
          along which the curve is wanted, then the one that is searched; one that --at gives a \
          value is no axis, one with `values` of one number is"
     );
-    let one = format!("{mass}[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100.0]\n");
+    let one_value =
+        format!("{mass}[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100.0]\n");
     assert_eq!(
-        refused(&one, None),
+        refused(&one_value, None),
         "the second axis, `damping_n_s_per_m`, has one value: give it the range to search, as \
          range = { from, to, count } or as `values` whose least and greatest are its ends"
     );
     for tolerance in [0.0, -1.0, f64::NAN, 1e9] {
-        let error = refused(GRID, Some(tolerance));
+        let error = refused(AXES, Some(tolerance));
         assert!(error.contains("--tolerance") && error.contains("240"), "{error}");
     }
     let design = "[design]\nmethod = \"sobol\"\npoints = 8\n\
@@ -360,9 +369,9 @@ fn plans_without_a_boundary_are_refused_with_the_reason() {
 
 #[test]
 fn every_column_that_is_worse_in_one_direction_has_a_boundary() {
-    let plan = plan(&format!("{HEAD}{GRID}"));
-    let offered = quantity::offered(&plan);
-    let names: Vec<&str> = offered.iter().map(|(column, _)| column.name.as_str()).collect();
+    let plan = plan(&format!("{GRID_HEAD}{AXES}"));
+    let columns = quantity::offered(&plan);
+    let names: Vec<&str> = columns.iter().map(|(column, _)| column.name.as_str()).collect();
     assert_eq!(names[0], "ratio_max");
     for name in [
         "ratio_min",
@@ -403,32 +412,36 @@ fn every_column_that_is_worse_in_one_direction_has_a_boundary() {
 
 #[test]
 fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
-    let plan = plan(&format!("{HEAD}{GRID}"));
-    let ask = |quantity: &str, limit| {
+    let plan = plan(&format!("{GRID_HEAD}{AXES}"));
+    let new_task = |quantity: &str, limit| {
         let quantity = quantity.to_owned();
-        Task::new(&plan, &BoundaryOptions { quantity, limit, ..boundary_options(Some(2.0), 3) })
+        Task::new(&plan, &BoundaryOptions { quantity, limit, ..options_of_ratio(Some(2.0), 3) })
     };
     let crossings = |task: &Task| {
         let rows = trace_boundary(task, 2, &Interrupt::new()).unwrap().curves.remove(0);
         let edges = rows.into_iter().flat_map(|row| row.edges);
-        let at: Vec<f64> = edges.filter_map(|edge| edge.at).collect();
-        assert!(!at.is_empty());
-        at
+        let dampings: Vec<f64> = edges.filter_map(|edge| edge.at).collect();
+        assert!(!dampings.is_empty());
+        dampings
     };
     // Twice a force at twice its limit, and the condition that it is below the limit.
-    let force = crossings(&ask("cabinet_force_nonlinear_n", Some(900.0)).unwrap());
-    let twice = crossings(&ask("2 * cabinet_force_nonlinear_n", Some(1800.0)).unwrap());
-    let below = crossings(&ask("cabinet_force_nonlinear_n < 900", None).unwrap());
-    assert_eq!(force.len(), twice.len());
-    assert_eq!(force.len(), below.len());
-    for ((force, twice), below) in force.iter().zip(&twice).zip(&below) {
-        assert!((force - twice).abs() < 1e-6 && (force - below).abs() < 2.0, "{force} {below}");
+    let force = crossings(&new_task("cabinet_force_nonlinear_n", Some(900.0)).unwrap());
+    let doubled = crossings(&new_task("2 * cabinet_force_nonlinear_n", Some(1800.0)).unwrap());
+    let condition = crossings(&new_task("cabinet_force_nonlinear_n < 900", None).unwrap());
+    assert_eq!(force.len(), doubled.len());
+    assert_eq!(force.len(), condition.len());
+    for ((force, doubled), condition) in force.iter().zip(&doubled).zip(&condition) {
+        assert!(
+            (force - doubled).abs() < 1e-6 && (force - condition).abs() < 2.0,
+            "{force} {condition}"
+        );
     }
-    // A condition that is stricter still does not hold at more dampings.
-    let both = ask("cabinet_force_nonlinear_n < 900 and min_gap_nonlinear_m > 0", None).unwrap();
-    assert_eq!(both.quantity.limit, 0.0);
-    assert!(both.column().is_none());
-    let refused = |quantity, limit| ask(quantity, limit).unwrap_err().to_string();
+    // A stricter condition is false at more dampings.
+    let stricter =
+        new_task("cabinet_force_nonlinear_n < 900 and min_gap_nonlinear_m > 0", None).unwrap();
+    assert_eq!(stricter.quantity.limit, 0.0);
+    assert!(stricter.column().is_none());
+    let refused = |quantity, limit| new_task(quantity, limit).unwrap_err().to_string();
     assert!(refused("2 * ratio_max", None).contains("--limit"));
     assert!(refused("ratio_max < 2", Some(2.0)).contains("none with a condition"));
     assert!(refused("ratio_maxx < 2", None).contains("ratio_max"));
@@ -437,23 +450,24 @@ fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
 
 #[test]
 fn a_force_crosses_its_limit_within_the_bracket() {
-    let plan = plan(&format!("{HEAD}{GRID}"));
+    let plan = plan(&format!("{GRID_HEAD}{AXES}"));
     let limit = 900.0;
     let quantity = "cabinet_force_nonlinear_n".to_owned();
     let task = Task::new(
         &plan,
-        &BoundaryOptions { quantity, limit: Some(limit), ..boundary_options(Some(2.0), 3) },
+        &BoundaryOptions { quantity, limit: Some(limit), ..options_of_ratio(Some(2.0), 3) },
     )
     .unwrap();
     let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
     let crossings = rows.iter().flat_map(|row| row.edges.iter().map(|edge| (row.first, edge)));
-    let mut found = 0;
+    let mut crossing_count = 0;
     for (mass, edge) in crossings.filter(|(_, edge)| edge.kind == EdgeKind::Crossing) {
         let ends = edge.bracket.unwrap().map(|damping| vec![mass, damping]);
         let outcomes = ModelEngine::new(&task.plan).unwrap().evaluate_at(&ends);
-        let forces: Vec<f64> = outcomes.iter().map(|of| of.nonlinear.metrics[0]).collect();
+        let forces: Vec<f64> =
+            outcomes.iter().map(|outcome| outcome.nonlinear.metrics[0]).collect();
         assert!((forces[0] < limit) != (forces[1] < limit), "{mass} kg: {forces:?}");
-        found += 1;
+        crossing_count += 1;
     }
-    assert!(found > 0, "{rows:?}");
+    assert!(crossing_count > 0, "{rows:?}");
 }

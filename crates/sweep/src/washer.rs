@@ -60,7 +60,7 @@ impl Model for Washer {
     fn blank() -> Self {
         Self {
             machine: Machine::paper(),
-            spin: spin::BLANK,
+            spin: spin::PLACEHOLDER,
             measures: Measures::default(),
             held_speeds: None,
         }

@@ -7,7 +7,8 @@ use washer_model::{Machine, Method, ModelKind, Profile, Spin, Timing, prepare, s
 fn main() {
     let name = std::env::args().nth(1);
     let simd = Simd::ALL.into_iter().find(|simd| Some(simd.name()) == name.as_deref());
-    let simd = simd.filter(|simd| simd.is_available()).expect("a set that this machine has");
+    let simd =
+        simd.filter(|simd| simd.is_available()).expect("an instruction set that this machine has");
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let point = prepare(simd, &[(Machine::paper(), spin)], &timing).pop();

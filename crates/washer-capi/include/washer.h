@@ -21,23 +21,23 @@ typedef struct washer_setup {
     double ramp_s;       /* the duration of the run-up of every profile but "table" */
     const double *time_s;    /* the times of the profile "table": rising, the first 0 */
     const double *speed_rpm; /* the speeds at these times, linear in between */
-    size_t spin_points;      /* the number of times, and of speeds */
+    size_t spin_points;      /* the number of the table's points */
     /* the names and values of parameters that differ from the paper's machine, as in
      * `sweep parameters` */
     const char *const *names;
     const double *values;
-    size_t constants; /* the number of names, and of values */
+    size_t constants; /* the number of named parameters */
 } washer_setup;
 
 enum washer_status {
     WASHER_OK = 0,
     WASHER_NULL = 1,           /* a pointer that must not be null is, or a text is not UTF-8 */
     WASHER_UNKNOWN_NAME = 2,   /* a model, profile or parameter with this name does not exist */
-    WASHER_OUT_OF_RANGE = 3,   /* the machine or the spin is impossible */
+    WASHER_OUT_OF_RANGE = 3,   /* numbers are out of range or contradict each other */
     WASHER_NO_EQUILIBRIUM = 4, /* the springs cannot carry the machine */
 };
 
-/* Makes a machine. On WASHER_OK, *machine_out must be freed by washer_free. */
+/* Makes the equations of a machine. On WASHER_OK, *machine_out must be freed by washer_free. */
 enum washer_status washer_new(const washer_setup *setup, washer **machine_out);
 void washer_free(washer *machine);
 

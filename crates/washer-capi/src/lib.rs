@@ -1,5 +1,5 @@
-//! The washing machine's equations behind a C ABI: right-hand side, Jacobian and outputs at given
-//! parameters, for integrators in other languages. `include/washer.h` is the contract.
+//! The washing machine's equations behind a C ABI: right-hand side, Jacobian and outputs, for
+//! integrators in other languages. `include/washer.h` declares the functions.
 //!
 //! The compiler cannot check pointers that come from another language, hence the `unsafe`. Each
 //! function documents what its pointers must satisfy. A panic ends the process instead of unwinding
@@ -18,7 +18,7 @@ use washer_model::{
 /// The equations of one machine and its spin.
 pub struct WasherEquations(PointEquations);
 
-/// The machine, spin and model to make: `washer_setup` of `washer.h`.
+/// The machine, spin and model whose equations are made: `washer_setup` of `washer.h`.
 #[repr(C)]
 pub struct WasherSetup {
     /// "nonlinear" or "linear".
@@ -33,27 +33,27 @@ pub struct WasherSetup {
     pub time_s: *const f64,
     /// Speeds (rpm) of the profile "table" at these times.
     pub speed_rpm: *const f64,
-    /// The number of times, and of speeds.
+    /// The number of points of the table: the length of `time_s` and `speed_rpm`.
     pub spin_points: usize,
     /// Names of parameters that differ from the paper's machine.
     pub names: *const *const c_char,
     /// Values of these parameters.
     pub values: *const f64,
-    /// The number of names, and of values.
+    /// The number of named parameters: the length of `names` and `values`.
     pub constants: usize,
 }
 
-/// The outcome of a call.
+/// The outcome of `washer_new`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WasherStatus {
-    /// The machine was made.
+    /// The equations were made.
     Ok = 0,
     /// A pointer that must not be null is null, or a text is not UTF-8.
     Null = 1,
     /// There is no model, profile or parameter of the given name.
     UnknownName = 2,
-    /// The machine or the spin is impossible.
+    /// Numbers of the machine or the spin are out of range or contradict each other.
     OutOfRange = 3,
     /// The springs cannot carry the machine.
     NoEquilibrium = 4,
@@ -67,7 +67,7 @@ unsafe fn read_text<'a>(text: *const c_char) -> Result<&'a str, WasherStatus> {
     if text.is_null() {
         return Err(WasherStatus::Null);
     }
-    // SAFETY: not null, and the caller's promise.
+    // SAFETY: the pointer is not null, and the caller guarantees that it is valid.
     unsafe { CStr::from_ptr(text) }.to_str().map_err(|_| WasherStatus::Null)
 }
 
@@ -79,7 +79,7 @@ unsafe fn read_array<'a, T>(first: *const T, count: usize) -> Result<&'a [T], Wa
     match (first.is_null(), count) {
         (_, 0) => Ok(&[]),
         (true, _) => Err(WasherStatus::Null),
-        // SAFETY: not null, and the caller's promise.
+        // SAFETY: the pointer is not null, and the caller guarantees that it is valid.
         (false, _) => Ok(unsafe { slice::from_raw_parts(first, count) }),
     }
 }
@@ -89,7 +89,7 @@ unsafe fn read_array<'a, T>(first: *const T, count: usize) -> Result<&'a [T], Wa
 /// # Safety
 /// `setup` points at texts and arrays as `washer_new` requires them.
 unsafe fn make_equations(setup: &WasherSetup) -> Result<WasherEquations, WasherStatus> {
-    // SAFETY (of all five): the caller's promise.
+    // SAFETY (of all five blocks): the caller guarantees that the setup's pointers are valid.
     let (model, profile) = unsafe { (read_text(setup.model)?, read_text(setup.profile)?) };
     let time_s = unsafe { read_array(setup.time_s, setup.spin_points)? };
     let speed_rpm = unsafe { read_array(setup.speed_rpm, setup.spin_points)? };
@@ -108,7 +108,7 @@ unsafe fn make_equations(setup: &WasherSetup) -> Result<WasherEquations, WasherS
     };
     let mut machine = Machine::paper();
     for (&name, &value) in names.iter().zip(values) {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees valid pointers.
         let name = unsafe { read_text(name)? };
         let parameter =
             MachineParameter::find(name, &machine, &spin).map_err(|_| WasherStatus::UnknownName)?;
@@ -126,7 +126,7 @@ unsafe fn make_equations(setup: &WasherSetup) -> Result<WasherEquations, WasherS
     }
 }
 
-/// Makes a machine.
+/// Makes the equations of a machine and its spin, to be freed by `washer_free`.
 ///
 /// # Safety
 /// `setup` is null or points at a setup whose texts and arrays are null or valid; `machine_out` is
@@ -139,10 +139,10 @@ pub unsafe extern "C" fn washer_new(
     if setup.is_null() || machine_out.is_null() {
         return WasherStatus::Null;
     }
-    // SAFETY: not null, and the caller's promise.
+    // SAFETY: the pointer is not null, and the caller guarantees that it is valid.
     match unsafe { make_equations(&*setup) } {
         Ok(equations) => {
-            // SAFETY: not null, and the caller's promise.
+            // SAFETY: the pointer is not null, and the caller guarantees that it is valid.
             unsafe { *machine_out = Box::into_raw(Box::new(equations)) };
             WasherStatus::Ok
         }
@@ -150,14 +150,14 @@ pub unsafe extern "C" fn washer_new(
     }
 }
 
-/// Frees a machine; null is allowed.
+/// Frees the equations of a machine; null is allowed.
 ///
 /// # Safety
 /// `machine` comes from `washer_new` and is not used again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn washer_free(machine: *mut WasherEquations) {
     if !machine.is_null() {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees valid pointers.
         drop(unsafe { Box::from_raw(machine) });
     }
 }
@@ -171,17 +171,18 @@ pub extern "C" fn washer_dimension() -> usize {
 /// Writes the state of the machine at rest.
 ///
 /// # Safety
-/// `machine` is alive and `x` has room for a state.
+/// `machine` comes from `washer_new` and is not freed; `x` has room for a state.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn washer_initial_state(machine: *const WasherEquations, x: *mut f64) {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe { ptr::copy_nonoverlapping((*machine).0.at_rest().as_ptr(), x, STATE_LEN) };
 }
 
 /// Computes dx = f(t, x).
 ///
 /// # Safety
-/// `machine` is alive and in no other thread's call, `x` holds a state and `dx` has room for one.
+/// `machine` is not freed and in no other thread's call, `x` holds a state and `dx` has room for
+/// one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn washer_rhs(
     t_s: f64,
@@ -189,9 +190,10 @@ pub unsafe extern "C" fn washer_rhs(
     dx: *mut f64,
     machine: *mut WasherEquations,
 ) {
-    // SAFETY: the caller's promise; `x` is copied, so that `dx` may be the same array.
+    // SAFETY: the caller guarantees valid pointers; `x` is copied, so that `dx` may be the same
+    // array.
     let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe { *dx.cast::<[f64; STATE_LEN]>() = machine.0.derivative(t_s, &x) };
 }
 
@@ -206,9 +208,9 @@ pub unsafe extern "C" fn washer_jacobian(
     jacobian: *mut f64,
     machine: *mut WasherEquations,
 ) {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees valid pointers.
     let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees valid pointers.
     unsafe { *jacobian.cast::<[[f64; STATE_LEN]; STATE_LEN]>() = machine.0.jacobian(t_s, &x) };
 }
 
@@ -236,13 +238,13 @@ pub unsafe extern "C" fn washer_outputs(
     rates: *mut f64,
     machine: *mut WasherEquations,
 ) {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees valid pointers.
     let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
-    let (value, rate) = machine.0.channels(t_s, &x);
-    // SAFETY: the caller's promise.
+    let (channel_values, channel_rates) = machine.0.channels(t_s, &x);
+    // SAFETY: the caller guarantees valid pointers.
     unsafe {
-        ptr::copy_nonoverlapping(value.as_ptr(), values, value.len());
-        ptr::copy_nonoverlapping(rate.as_ptr(), rates, rate.len());
+        ptr::copy_nonoverlapping(channel_values.as_ptr(), values, channel_values.len());
+        ptr::copy_nonoverlapping(channel_rates.as_ptr(), rates, channel_rates.len());
     }
 }
 
@@ -267,10 +269,10 @@ mod tests {
 
     fn status(setup: &WasherSetup) -> WasherStatus {
         let mut machine = ptr::null_mut();
-        // SAFETY: everything that the setup points at lives until here.
+        // SAFETY: everything that the setup points at outlives the call.
         let status = unsafe { washer_new(setup, &raw mut machine) };
         assert_eq!(status == WasherStatus::Ok, !machine.is_null());
-        // SAFETY: made above, or null.
+        // SAFETY: `machine` comes from `washer_new`, or is null.
         unsafe { washer_free(machine) };
         status
     }
@@ -327,18 +329,28 @@ mod tests {
                 washer_jacobian(20.0, x.as_ptr(), jacobian.as_mut_ptr().cast(), machine);
                 for j in 0..STATE_LEN {
                     let step = 1e-5;
-                    let mut column = [[0.0; STATE_LEN]; 2];
+                    let mut shifted_rates = [[0.0; STATE_LEN]; 2];
                     for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
                         let mut shifted = x;
                         shifted[j] += sign * step;
-                        washer_rhs(20.0, shifted.as_ptr(), column[side].as_mut_ptr(), machine);
+                        washer_rhs(
+                            20.0,
+                            shifted.as_ptr(),
+                            shifted_rates[side].as_mut_ptr(),
+                            machine,
+                        );
                     }
-                    let largest =
-                        (0..STATE_LEN).fold(1.0_f64, |m, i| m.max(f64::abs(jacobian[i][j])));
+                    let largest = (0..STATE_LEN)
+                        .fold(1.0_f64, |largest, i| largest.max(f64::abs(jacobian[i][j])));
                     for i in 0..STATE_LEN {
-                        let slope = (column[0][i] - column[1][i]) / (2.0 * step);
-                        let error = (jacobian[i][j] - slope).abs() / largest;
-                        assert!(error < 1e-6, "{model:?} [{i}][{j}]: {} {slope}", jacobian[i][j]);
+                        let difference_quotient =
+                            (shifted_rates[0][i] - shifted_rates[1][i]) / (2.0 * step);
+                        let error = (jacobian[i][j] - difference_quotient).abs() / largest;
+                        assert!(
+                            error < 1e-6,
+                            "{model:?} [{i}][{j}]: {} {difference_quotient}",
+                            jacobian[i][j]
+                        );
                     }
                 }
                 washer_free(machine);

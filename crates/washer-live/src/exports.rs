@@ -29,7 +29,7 @@ struct ModuleState {
     setup: Option<Setup>,
 }
 
-/// The state between two calls of exports; a module has one thread.
+/// The state between two calls of exports. A module has one thread.
 static STATE: Mutex<ModuleState> =
     Mutex::new(ModuleState { input: Vec::new(), output: Vec::new(), setup: None });
 
@@ -47,7 +47,7 @@ pub extern "C" fn input(count: usize) -> *mut f64 {
     state.input.as_mut_ptr()
 }
 
-/// Returns the address of the last answer, which is valid until the next call.
+/// Returns the address of the last answer, which is valid until the next call of an export.
 #[unsafe(no_mangle)]
 pub extern "C" fn output() -> *const f64 {
     state().output.as_ptr()
@@ -77,7 +77,7 @@ fn answer_with_setup(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize
     output.len()
 }
 
-/// Answers points of `value_count` numbers each by both models at the quick level.
+/// Answers points with `value_count` numbers each, by both models at the quick level.
 #[unsafe(no_mangle)]
 pub extern "C" fn quick(value_count: usize) -> usize {
     answer_with_setup(|setup, input, output| {
@@ -88,7 +88,7 @@ pub extern "C" fn quick(value_count: usize) -> usize {
     })
 }
 
-/// Answers one point with a checked error.
+/// Answers one point with an error estimate.
 #[unsafe(no_mangle)]
 pub extern "C" fn checked() -> usize {
     answer_with_setup(|setup, input, output| write_answer(output, &check(setup, input), setup))
@@ -137,8 +137,8 @@ pub extern "C" fn growth(value_count: usize) -> usize {
 }
 
 /// Writes the largest attractor of a point of `value_count` numbers at the constant speeds (rpm)
-/// that follow it in the input. Output: the code; the speed at which the tub turns farthest (NaN if
-/// no attractor was found), the attractor's kind as an index into
+/// that follow it in the input. Output: the code; the speed at which yaw or pitch of the tub is
+/// greatest (NaN if no attractor was found), the attractor's kind as an index into
 /// [`washer_model::Attractor::KIND_NAMES`], and the largest deviation of each channel (m, rad).
 #[unsafe(no_mangle)]
 pub extern "C" fn dwell(value_count: usize) -> usize {
@@ -156,7 +156,7 @@ pub extern "C" fn dwell(value_count: usize) -> usize {
     })
 }
 
-/// Writes the speeds (rpm) at a point, every `every_s` from 0 to the end.
+/// Writes the speeds (rpm) at a point, at intervals of `every_s` from 0 to the end.
 #[unsafe(no_mangle)]
 pub extern "C" fn speeds(every_s: f64) -> usize {
     answer_with_setup(|setup, input, output| {
@@ -196,7 +196,7 @@ fn write_answer(output: &mut Vec<f64>, result: &Result<Answer, PointError>, setu
         let error = errors[model].unwrap_or(f64::NAN);
         output.extend([level_indices[model] as f64, f64::from(levels[model] as u8), error]);
         let Trajectory { status, fail_time_s, steps, min_gap_m, metrics, .. } = run;
-        // Failures of runs come first, in the order of `Failure`.
+        // Failures of runs are the first statuses, in the order of `Failure`.
         let failure = f64::from((*status as u8).min(Status::StepLimit as u8));
         let or_nan = |value: &Option<f64>| value.unwrap_or(f64::NAN);
         output.extend([failure, or_nan(fail_time_s), *steps as f64, or_nan(min_gap_m)]);

@@ -5,7 +5,7 @@
 //! workers load this crate as a WebAssembly module and call
 //!
 //! * [`quick`]: both models at some points at one refinement level, without an error estimate;
-//! * [`check`]: a point with a checked error, as a row of the map;
+//! * [`check`]: both models at a point with an error estimate, like a row of the map;
 //! * [`motion`]: the time history of one model at a point;
 //! * [`growth`]: the growth of disturbances while the drum turns at constant speeds;
 //! * [`dwell`]: the largest attractor at constant speeds.

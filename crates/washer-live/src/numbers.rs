@@ -1,16 +1,17 @@
 //! Converts structures to arrays of numbers and back. A single walk over the fields serves both
 //! directions.
 
-/// Upper bound of counts and indices; larger ones are rejected. Basis: no setup comes near it, and
-/// reading a damaged page must not allocate much memory. Doubling it doubles that memory.
+/// Upper bound of counts and indices; greater ones are rejected. Basis: far above those of any
+/// setup. Without a bound a damaged page could request a large amount of memory. Doubling it
+/// doubles that memory.
 const COUNT_LIMIT: usize = 100_000;
 
-/// A walk over the fields of a structure. Each step writes a number or reads the next one, and
+/// A traversal of a structure's fields. Each step writes a number or reads the next one, and
 /// returns `None` if the number is missing or invalid.
 pub(crate) enum NumberWalk<'a> {
     /// The numbers written so far.
     Write(Vec<f64>),
-    /// The numbers that are left to read.
+    /// The numbers not read yet.
     Read(&'a [f64]),
 }
 
@@ -32,7 +33,7 @@ impl NumberWalk<'_> {
         Some(())
     }
 
-    /// Writes or reads a number that may be absent.
+    /// Writes or reads a number that may be missing, as NaN.
     pub(crate) fn optional(&mut self, value: &mut Option<f64>) -> Option<()> {
         let mut number = value.unwrap_or(f64::NAN);
         self.numbers([&mut number])?;
@@ -40,7 +41,7 @@ impl NumberWalk<'_> {
         Some(())
     }
 
-    /// Writes `count` and returns it, or reads another count and returns that.
+    /// Writes `count` and returns it, or reads another count and returns the latter.
     pub(crate) fn count(&mut self, count: usize) -> Option<usize> {
         let mut value = count as f64;
         self.numbers([&mut value])?;
@@ -65,7 +66,7 @@ impl NumberWalk<'_> {
         values.iter_mut().try_for_each(|value| self.choice(value, all))
     }
 
-    /// Writes the length of a list, or reads a length and resizes the list. Its elements are
+    /// Writes the length of a list, or reads a length and resizes the list. The elements are
     /// written or read separately.
     pub(crate) fn resize<T: Clone>(&mut self, list: &mut Vec<T>, blank: &T) -> Option<()> {
         list.resize(self.count(list.len())?, blank.clone());

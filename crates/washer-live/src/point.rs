@@ -25,12 +25,12 @@ pub enum PointError {
 /// The results of both models at a point. Arrays of two have the nonlinear model first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// The row of a map; a quick answer lacks the numbers that follow from comparing runs.
+    /// The row of a map. A quick answer lacks the numbers that follow from the comparison of runs.
     pub outcome: Outcome,
     /// The amplitudes of all channels by the criterion (m, rad), also of channels that the verdict
     /// does not compare.
     pub amplitudes: [Deviations; 2],
-    /// The ratios, as if every channel were compared.
+    /// The ratios of all channels, also of those that the verdict does not compare.
     pub ratios: Vec<Option<f64>>,
     /// The index of the refinement level of each model's numbers.
     pub level_indices: [usize; 2],
@@ -66,7 +66,7 @@ impl Answer {
 /// The motion of one model at equal time intervals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointHistory {
-    /// The reason and the time (s) of a failure, after which there are no instants.
+    /// The reason and the time (s) of a failure, at which the lists end.
     pub failure: Option<(Failure, f64)>,
     /// The deviations from equilibrium in the order of [`Channel::ALL`] (m, rad).
     pub channels: Vec<[f64; Channel::ALL.len()]>,
@@ -74,7 +74,7 @@ pub struct PointHistory {
     pub gaps_m: Vec<f64>,
 }
 
-/// The machine, spin and window of a point: those of the setup with the point's values.
+/// The machine, spin and window of a point: those of the setup, changed by the point's values.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PointScenario {
     machine: Machine,
@@ -83,7 +83,7 @@ pub(crate) struct PointScenario {
 }
 
 impl PointScenario {
-    /// Returns the scenario with these values of the setup's sliders; sliders without a value keep
+    /// Creates the scenario with these values of the setup's sliders. Sliders without a value have
     /// that of the setup.
     pub(crate) fn new(setup: &Setup, values: &[f64]) -> Result<Self, PointError> {
         let Setup { machine, spin, rule, .. } = setup;
@@ -114,7 +114,7 @@ impl PointScenario {
     }
 }
 
-/// Returns the refinement levels of both models at these values.
+/// Returns the refinement levels of both models for these values of the sliders.
 fn refinement_levels<'a>(setup: &'a Setup, values: &[f64]) -> &'a [RefinementLevels; 2] {
     let other_sliders = setup.sliders.parameters.iter().zip(values).skip(setup.sliders.axes);
     let has_moved = |(parameter, value): (&washer_model::MachineParameter, &f64)| {
@@ -123,10 +123,11 @@ fn refinement_levels<'a>(setup: &'a Setup, values: &[f64]) -> &'a [RefinementLev
     if other_sliders.into_iter().any(has_moved) { &setup.wide_levels } else { &setup.levels }
 }
 
-/// Prepares a point.
+/// Prepares a point for integration.
 ///
 /// # Errors
-/// [`PointError`].
+///
+/// Returns a [`PointError`] if the point is impossible or has no equilibrium.
 fn prepare_point(setup: &Setup, values: &[f64]) -> Result<Point, PointError> {
     let scenario = PointScenario::new(setup, values)?;
     let timing = scenario.timing(setup);
@@ -166,10 +167,11 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, PointError>
     answers
 }
 
-/// Computes a point as a row of the map: each model is refined until two levels agree.
+/// Computes a point like a row of the map: each model is refined until two levels agree.
 ///
 /// # Errors
-/// [`PointError`].
+///
+/// Returns a [`PointError`] if the point is impossible or has no equilibrium.
 pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
     let point = prepare_point(setup, values)?;
     let levels = refinement_levels(setup, values);
@@ -209,17 +211,18 @@ fn run_method(model: usize, method: &Method, points: &[&Point], rule: &RowRule) 
     runs.unwrap_or_default()
 }
 
-/// Returns the index of the quick level: the second, which is accurate enough for most rows, or the
-/// first if no modes are capped.
+/// Returns the index of the quick level: the second level, which is accurate enough for most rows,
+/// or the first level if no modes are capped.
 fn quick_level_index(levels: &RefinementLevels) -> usize {
     usize::from(levels.levels.get(1).is_some_and(|second_level| second_level.level.is_capped()))
 }
 
-/// Integrates the motion of one model at a point, at a refinement level or else at the quick one,
-/// every `every_s` from 0 to the end.
+/// Integrates the motion of one model at a point, at a refinement level or by default at the quick
+/// one, and returns it at intervals of `every_s` from 0 to the end.
 ///
 /// # Errors
-/// [`PointError`].
+///
+/// Returns a [`PointError`] if the point is impossible or has no equilibrium.
 pub fn motion(
     setup: &Setup,
     values: &[f64],
@@ -242,18 +245,19 @@ pub fn motion(
 /// a response.
 ///
 /// # Errors
-/// [`PointError`].
+///
+/// Returns a [`PointError`] if the point is impossible or has no equilibrium.
 pub fn growth(
     setup: &Setup,
     values: &[f64],
     speeds_rpm: &[f64],
 ) -> Result<Vec<Option<(Disturbance, bool)>>, PointError> {
     let point = prepare_point(setup, values)?;
-    let dwells: Vec<HeldSpeed<'_>> =
+    let held_speeds: Vec<HeldSpeed<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let disturbance =
         |first_response: &Response| (first_response.disturbance(), first_response.is_on_curve);
-    let answers = find_responses(&dwells, Cancel::Never).into_iter();
+    let answers = find_responses(&held_speeds, Cancel::Never).into_iter();
     Ok(answers.map(|answer| answer.ok()?.first().map(disturbance)).collect())
 }
 
@@ -261,19 +265,20 @@ pub fn growth(
 /// starts; `None` if none was found.
 ///
 /// # Errors
-/// [`PointError`].
+///
+/// Returns a [`PointError`] if the point is impossible or has no equilibrium.
 pub fn dwell(
     setup: &Setup,
     values: &[f64],
     speeds_rpm: &[f64],
 ) -> Result<Option<DwellPeaks>, PointError> {
     let point = prepare_point(setup, values)?;
-    let dwells: Vec<HeldSpeed<'_>> =
+    let held_speeds: Vec<HeldSpeed<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
-    let no_carried_states = vec![None; dwells.len()];
+    let no_carried_states = vec![None; held_speeds.len()];
     let attractors = find_attractors(
         Simd::best(),
-        &dwells,
+        &held_speeds,
         &no_carried_states,
         &StartRule::default(),
         Cancel::Never,

@@ -1,4 +1,4 @@
-//! The setup of the module: everything that it computes with.
+//! The setup of the module: all data for its computations.
 
 use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
@@ -12,20 +12,20 @@ use crate::numbers::NumberWalk;
 /// The machine, its spin, the sliders, and the refinement levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
-    /// The machine before a point's values are set.
+    /// The machine, before a point's values are set.
     pub machine: Machine,
-    /// The spin before a point's values are set.
+    /// The spin, before a point's values are set.
     pub spin: Spin,
-    /// The number of parts of a run; two runs are compared at the end of each part.
+    /// The number of parts of a run. Two runs are compared at the end of each part.
     pub checkpoints: u32,
-    /// The rule of rows: results, and the accuracy of checked numbers.
+    /// The rule of rows: the results, and the accuracy of checked numbers.
     pub rule: RowRule,
     /// The parameters that a point sets.
     pub sliders: Sliders,
-    /// The refinement levels of the nonlinear and of the linear model for points that change axes
-    /// only. The levels' notes are not encoded.
+    /// The refinement levels of the nonlinear and of the linear model, for points that differ from
+    /// the setup only in axes. The levels' notes are not encoded.
     pub levels: [RefinementLevels; 2],
-    /// The refinement levels for points that change any slider within its range.
+    /// The refinement levels for points that differ in any slider, within its range.
     pub wide_levels: [RefinementLevels; 2],
 }
 
@@ -85,7 +85,7 @@ impl Setup {
         machine.cabinet = (cabinets > 0).then(|| machine.cabinet.unwrap_or_default());
         walk_profile(walk, spin)?;
         let parameters = MachineParameter::all(machine, spin);
-        // Numbers of single elements come after those that set all elements.
+        // The parameters of single elements come after those that set all elements.
         for parameter in &parameters {
             let mut value = parameter.get(machine, spin);
             walk.optional(&mut value)?;
@@ -93,7 +93,7 @@ impl Setup {
                 parameter.set(machine, spin, value);
             }
         }
-        // A spring without a free length gets it from the positions of its ends.
+        // If a spring has no free length, it follows from the positions of its ends.
         for spring in &mut machine.springs {
             walk.optional(&mut spring.free_length_m)?;
         }
@@ -127,7 +127,7 @@ fn walk_profile(walk: &mut NumberWalk<'_>, spin: &mut Spin) -> Option<()> {
     Some(())
 }
 
-/// Writes or reads the rule, without the numbers of the machine's elements.
+/// Writes or reads the rule, without the numbers of stops, feet and dampers.
 fn walk_rule(walk: &mut NumberWalk<'_>, rule: &mut RowRule) -> Option<()> {
     let RowRule { end_s, window_s: [from_s, to_s], accuracy, limits, channels, measures } = rule;
     walk.numbers([end_s, from_s, to_s, accuracy, &mut limits.most])?;

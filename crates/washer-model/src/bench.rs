@@ -18,8 +18,8 @@ pub enum RhsPart {
     Derivative,
 }
 
-/// Evaluates a part of one model's right-hand side `evaluations` times, each after the one before,
-/// with the same point in every lane; with capped modes if caps are given.
+/// Evaluates a part of one model's right-hand side `evaluations` times in sequence, with the same
+/// point in every lane; with capped modes if caps are given.
 pub fn evaluate(
     simd: Simd,
     model: ModelKind,
@@ -28,14 +28,14 @@ pub fn evaluate(
     caps: Option<Caps>,
     evaluations: u64,
 ) {
-    let subject = (point, part, caps, evaluations);
+    let arguments = (point, part, caps, evaluations);
     match model {
-        ModelKind::Nonlinear => simd.dispatch(Evaluate::<NonlinearFamily>(subject, PhantomData)),
-        ModelKind::Linear => simd.dispatch(Evaluate::<LinearFamily>(subject, PhantomData)),
+        ModelKind::Nonlinear => simd.dispatch(Evaluate::<NonlinearFamily>(arguments, PhantomData)),
+        ModelKind::Linear => simd.dispatch(Evaluate::<LinearFamily>(arguments, PhantomData)),
     }
 }
 
-/// The kernel that evaluates a part.
+/// The kernel that evaluates a part of the right-hand side.
 struct Evaluate<'a, F>((&'a Point, RhsPart, Option<Caps>, u64), PhantomData<F>);
 
 impl<F: ModelFamily> Kernel for Evaluate<'_, F> {

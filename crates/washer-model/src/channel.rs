@@ -3,7 +3,7 @@
 use core::ffi::CStr;
 
 /// Passes the table of channels to the macro `$then`, in the order of the models' output vectors. A
-/// row is all that the crate knows of a channel:
+/// row has all properties of a channel:
 ///
 /// - the variant, the name and the description;
 /// - the kind ([`ChannelKind`]);
@@ -61,7 +61,7 @@ pub(crate) use channels;
 /// The kind of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ChannelKind {
-    /// A point that moves with the tub, or mostly so.
+    /// A point whose motion is mostly that of the tub.
     TubPoint,
     /// A point of the drum.
     DrumPoint,
@@ -74,7 +74,8 @@ macro_rules! declare {
         $(#[$doc:meta])* $name:ident, $key:literal, $description:literal, $kind:ident,
         $from:tt, steady $steady:tt $(, turning cos $cos:tt sin $sin:tt rest $rest:tt)?;
     )+) => {
-        /// A compared motion, as deviation from the static equilibrium.
+        /// A motion that is compared between the two models, as deviation from the static
+        /// equilibrium.
         ///
         /// `y` is along c2 (up), `z` along c3 (horizontal). P_TE and P_DE are the front centres of
         /// tub and drum.
@@ -94,7 +95,7 @@ macro_rules! declare {
                 }
             }
 
-            /// Returns the name for C, with its zero byte.
+            /// Returns the name as a C string, for `washer-capi`.
             pub const fn c_name(self) -> &'static CStr {
                 match self {
                     $(Self::$name => to_c_string(concat!($key, "\0")),)+
@@ -108,7 +109,6 @@ macro_rules! declare {
                 }
             }
 
-            /// Returns the kind.
             pub(crate) const fn kind(self) -> ChannelKind {
                 match self {
                     $(Self::$name => ChannelKind::$kind,)+

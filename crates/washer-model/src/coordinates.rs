@@ -36,16 +36,17 @@ pub(crate) const FIRST_ANGLE: usize = TUB_YAW;
 pub(crate) const TUB: [usize; 4] = [TUB_Y, TUB_Z, TUB_YAW, TUB_PITCH];
 /// The coordinates of the shaft.
 pub(crate) const SHAFT: [usize; 4] = [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH];
-/// The coordinates that turn the tub.
-pub(crate) const TUB_TURNS: [usize; 2] = [TUB_YAW, TUB_PITCH];
-/// The coordinates that turn the rotor, whose forces depend on q3 and q4 through the bearings only.
-pub(crate) const ROTOR_TURNS: [usize; 4] = [SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
+/// The angles of the tub.
+pub(crate) const TUB_ROTATIONS: [usize; 2] = [TUB_YAW, TUB_PITCH];
+/// The angles of the rotor. The rotor's forces depend on q3 and q4 through the bearings only.
+pub(crate) const ROTOR_ROTATIONS: [usize; 4] = [SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
 
-/// The coordinates that change their sign in the mirror image of a state, by the vertical plane
-/// through the drum's axis.
+/// The coordinates whose sign changes when a state is mirrored in the vertical plane through the
+/// drum's axis.
 const MIRRORED: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
 
-/// Returns a state's mirror image: that of a mirrored machine whose drum turns the other way.
+/// Returns a state's mirror image: the state of a mirrored machine whose drum turns in the opposite
+/// direction.
 pub(crate) fn mirror_state(state: &[f64; STATES]) -> [f64; STATES] {
     let mut mirrored = *state;
     for i in MIRRORED {
@@ -57,15 +58,15 @@ pub(crate) fn mirror_state(state: &[f64; STATES]) -> [f64; STATES] {
 
 /// Returns `values` as dual numbers with the derivative `slope` in coordinate `j` and 0 elsewhere.
 #[inline(always)]
-pub(crate) fn with_unit_derivative<T: Lane>(
+pub(crate) fn with_derivative<T: Lane>(
     values: &[N<T>; COORDINATES],
     j: usize,
     slope: f64,
 ) -> [N<Dual<T>>; COORDINATES] {
-    let mut seeded = [values[0].constant(); COORDINATES];
+    let mut duals = [values[0].constant(); COORDINATES];
     for i in 0..COORDINATES {
-        seeded[i] = values[i].constant();
+        duals[i] = values[i].constant();
     }
-    seeded[j].0.slope = values[j].lit(slope).0;
-    seeded
+    duals[j].0.slope = values[j].lit(slope).0;
+    duals
 }

@@ -22,7 +22,7 @@ use lane_ode::{Cancel, Simd};
 use multipliers::{PeriodicOrbit, growths_per_s};
 use starts::{
     Directions, Kick, MODE_DIRECTIONS, add_kick, is_from_rest, kick_directions, kicks, perturb,
-    random_kicks,
+    random_kick_count,
 };
 use std::sync::Arc;
 use trajectory::{BLOCK_TURNS, HeldTrajectory, NextComputation, WINDOW_TURNS, are_close};
@@ -30,17 +30,17 @@ use turns::{HeldState, integrate_turns, record_turns};
 
 pub use exponent::Exponent;
 
-/// Maximum relative difference of the largest deviations of two settled motions that are the same
-/// one, in every channel. Doubling it may take two motions for one.
+/// Maximum relative difference of the largest deviations, in every channel, of two settled motions
+/// that count as the same. Doubling it may merge different motions.
 const SETTLED_TOLERANCE: f64 = 0.01;
 
-/// Maximum relative difference of the largest deviations of two motions that are the same one and
-/// are both chaotic or not settled. Basis: two stretches of a chaotic motion differ by that much.
-/// Doubling it takes any two such motions for one.
+/// Maximum relative difference of the largest deviations of two motions that count as the same if
+/// both are chaotic or have not settled. Basis: two intervals of a chaotic motion differ by up to
+/// this. Doubling it merges any two such motions.
 const CHAOS_TOLERANCE: f64 = 0.5;
 
-/// Maximum relative difference of the largest deviations of a motion that has not settled and of a
-/// settled one that it approaches. Doubling it may take two motions for one.
+/// Maximum relative difference of the largest deviations of a motion that has not settled and of
+/// the settled motion that it counts as approaching. Doubling it may merge different motions.
 const UNSETTLED_TOLERANCE: f64 = 0.05;
 
 /// Number of bisections between a kick after which the machine returns and one after which it does
@@ -50,7 +50,8 @@ const BISECTIONS: usize = 5;
 /// The starts of the trajectories at a held speed, and their length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartRule {
-    /// The number of starts, or that of the perturbed responses if it is greater.
+    /// The number of starts; each perturbed response is a start even if there are more responses
+    /// than this.
     pub count: usize,
     /// The hardest kick (rad/s of the tub's rocking).
     pub max_kick_rad_per_s: f64,
@@ -81,7 +82,7 @@ pub enum AttractorStatus {
     Ok,
     /// The trajectory left the range in which the model holds.
     LeftRange {
-        /// The time at which it did, to a turn (s).
+        /// The time at which it left the range, to within a turn (s).
         time_s: f64,
     },
     /// The trajectory did not settle within [`StartRule::max_time_s`].
@@ -102,11 +103,11 @@ pub enum MotionKind {
         /// The period in turns of the drum.
         turns: u32,
     },
-    /// A motion with a second frequency that is not locked to the drum's: states once a turn fill a
-    /// closed curve.
+    /// A motion with a second frequency that is not locked to the drum's: the states once a turn
+    /// lie on a closed curve.
     QuasiPeriodic {
-        /// The strongest line of these states, from 0 to half the drum's speed (cycles per
-        /// minute). The drum's speed less this frequency is another one.
+        /// The strongest line of these states, from 0 to half the drum's speed (cycles per minute).
+        /// The drum's speed less this frequency is an equivalent frequency.
         frequency_cpm: f64,
     },
     /// A motion whose largest Lyapunov exponent is above 0 by three standard errors, and in which
@@ -122,10 +123,11 @@ pub struct Attractor {
     pub status: AttractorStatus,
     /// The kind of the motion, if it has settled.
     pub motion_kind: Option<MotionKind>,
-    /// The number of starts that ended in the motion; 0 if only transients did.
+    /// The number of starts that ended in the motion; 0 if only transients ended in it.
     pub starts: u32,
-    /// The smallest kick off the response that led to the motion (rad/s); 0 if a perturbed response
-    /// did, `None` if only a kick of the machine at rest, a transient or a carried state did.
+    /// The smallest kick from the response that led to the motion (rad/s); 0 if a perturbed
+    /// response led to it, `None` if only a kick of the machine at rest, a transient or a carried
+    /// state led to it.
     pub least_kick_rad_per_s: Option<f64>,
     /// The largest deviations from equilibrium over the last turns (32 of a periodic motion, 128 of
     /// one with two frequencies, else 256), in the order of
@@ -165,10 +167,11 @@ pub struct Attractors {
 }
 
 /// Finds the motions in which machines end at held speeds, on lanes of `simd` or of a narrower
-/// instruction set. The results of a dwell do not depend on the other held_speeds. A dwell with a
-/// state in `carried` has that state, perturbed like a response, as its only start.
+/// instruction set. The results at a held speed do not depend on the other held speeds. A held
+/// speed with a state in `carried` has this state, perturbed like a response, as its only start.
 ///
-/// # Errors Returns [`ResponseError`] for a dwell without an answer, and [`ResponseError::Stopped`]
+/// # Errors
+/// Returns [`ResponseError`] for a held speed without an answer, and [`ResponseError::Stopped`]
 /// once `cancel` is requested.
 pub fn find_attractors(
     simd: Simd,
@@ -187,8 +190,8 @@ pub fn find_attractors(
     )
 }
 
-/// Finds motions like [`find_attractors`], given the results of [`find_responses`] for these
-/// held_speeds.
+/// Finds motions like [`find_attractors`], from the results of [`find_responses`] for these held
+/// speeds.
 ///
 /// # Errors
 /// Returns the errors of [`find_attractors`].
@@ -206,7 +209,7 @@ pub fn find_attractors_from_responses(
     for (k, (held_speed, responses_or_error)) in
         held_speeds.iter().zip(response_answers).enumerate()
     {
-        // Dwells of the same point share its settings.
+        // Consecutive held speeds of the same point share the point's settings.
         let is_same_point =
             |settings: &Settings<'_>| core::ptr::eq(settings.point, held_speed.point);
         let settings = match settings.take().filter(is_same_point) {
@@ -263,33 +266,33 @@ pub fn find_attractors_from_responses(
         .collect()
 }
 
-/// Integrates motions further, with the recorders of `wanted`.
+/// Integrates motions further, and records them with `recorders`.
 fn record_motions<'a, 'f>(
     simd: Simd,
     results: impl Iterator<Item = &'f mut (Attractors, TurnSetup<'a>)>,
-    wanted: Recorders,
+    recorders: Recorders,
 ) where
     'a: 'f,
 {
     let mut motions = Vec::new();
-    let mut held = Vec::new();
+    let mut held_states = Vec::new();
     for (attractors, setup) in results {
         let is_in_range =
             |motion: &&mut Attractor| !matches!(motion.status, AttractorStatus::LeftRange { .. });
         for motion in attractors.attractors.iter_mut().filter(is_in_range) {
-            held.push(HeldState { setup: *setup, state: motion.end });
+            held_states.push(HeldState { setup: *setup, state: motion.end });
             motions.push(motion);
         }
     }
     for (motion, (_, extra)) in
-        motions.into_iter().zip(record_turns(simd, &held, WINDOW_TURNS, wanted))
+        motions.into_iter().zip(record_turns(simd, &held_states, WINDOW_TURNS, recorders))
     {
         motion.extra = extra;
     }
 }
 
-/// Integrates the trajectories of all searches together until they end. Returns false if it was
-/// stopped before.
+/// Integrates the trajectories of all searches together until they end. Returns false once `cancel`
+/// is requested.
 fn run_to_end(
     simd: Simd,
     searches: &mut [Result<SpeedSearch<'_>, ResponseError>],
@@ -351,7 +354,7 @@ fn run_to_end(
 enum Origin {
     /// A perturbed periodic response.
     Response,
-    /// A kick off the first periodic response.
+    /// A kick from the first periodic response.
     Kicked(Kick),
     /// A kick of the machine at rest, whose drum turns at the held speed at once.
     Rest,
@@ -368,14 +371,15 @@ struct SpeedSearch<'a> {
     /// The state that is kicked: the first response, or rest without responses.
     kicked_state: [f64; STATES],
     directions: Directions,
-    longest_s: f64,
+    max_time_s: f64,
     trajectories: Vec<HeldTrajectory<'a>>,
     /// The origin of each trajectory.
     origins: Vec<Origin>,
-    /// The number of trajectories from starts, which come first. Further ones search for the
-    /// threshold, or test whether chaos lasts.
+    /// The number of trajectories from starts, which come first. Further trajectories search for
+    /// the threshold, or test whether chaos lasts.
     start_count: usize,
-    /// The index of a chaotic trajectory, and those of the trajectories from its states.
+    /// The indices of chaotic trajectories, each with the range of indices of the trajectories from
+    /// its states.
     survivors: Vec<(usize, core::ops::Range<usize>)>,
     /// The brackets of the threshold, by direction along mode shapes: the size of a kick after
     /// which the machine returns, and of one after which it does not (rad/s).
@@ -396,7 +400,7 @@ impl<'a> SpeedSearch<'a> {
         let rest_state = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
         let kicked_state = responses.first().map_or(rest_state, |response| response.start);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
-        let directions = kick_directions(point, &frozen_modes, random_kicks(rule.count));
+        let directions = kick_directions(point, &frozen_modes, random_kick_count(rule.count));
         if let Some(carried) = carried {
             states.push((perturb(point, &frozen_modes, &carried), Origin::Carried));
         } else {
@@ -420,7 +424,7 @@ impl<'a> SpeedSearch<'a> {
             responses,
             kicked_state,
             directions,
-            longest_s: rule.max_time_s,
+            max_time_s: rule.max_time_s,
             trajectories: Vec::new(),
             origins: Vec::new(),
             start_count: states.len(),
@@ -439,7 +443,7 @@ impl<'a> SpeedSearch<'a> {
         let grows = |response: &&Response| response.growth_per_s() > 0.0;
         let unstable = self.responses.iter().filter(grows);
         let unstable_orbits = unstable.map(|response| vec![response.start]).collect();
-        self.trajectories.push(HeldTrajectory::new(held, unstable_orbits, self.longest_s));
+        self.trajectories.push(HeldTrajectory::new(held, unstable_orbits, self.max_time_s));
         self.origins.push(origin);
     }
 
@@ -518,10 +522,11 @@ impl<'a> SpeedSearch<'a> {
                 }
             }
             kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let above = kicks.iter().position(|(_, returns)| !returns);
-            self.brackets[direction] = above.map(|above| {
-                let below = above.checked_sub(1).map_or(0.0, |below| kicks[below].0);
-                [below, kicks[above].0]
+            let first_above = kicks.iter().position(|(_, returns)| !returns);
+            self.brackets[direction] = first_above.map(|first_above| {
+                let last_below =
+                    first_above.checked_sub(1).map_or(0.0, |last_below| kicks[last_below].0);
+                [last_below, kicks[first_above].0]
             });
         }
     }
@@ -606,7 +611,7 @@ fn are_same_motion(a: &Attractor, b: &Attractor) -> bool {
 
 impl Attractors {
     /// Whether the largest deviations of a motion are near those of a periodic response. A motion
-    /// that has not settled there approaches or leaves the response slowly.
+    /// near a response that has not settled approaches or leaves the response slowly.
     pub fn is_near_response(&self, motion: &Attractor) -> bool {
         let is_near = |response: &Response| {
             are_close(&motion.peaks, &response.nonlinear_peaks, CHAOS_TOLERANCE)

@@ -3,15 +3,16 @@
 use core::marker::PhantomData;
 use lane_ode::{Dual, Lane, N, Real};
 
-/// A structure of lane values. `SingleLane` is the same structure of plain numbers, as one lane
-/// holds it.
+/// A structure of lane values. `SingleLane` is the same structure of plain numbers, with the values
+/// of one lane.
 pub(crate) trait InLanes<T: Lane> {
     /// The structure of plain numbers.
     type SingleLane;
-    /// Returns a structure with the same numbers in every lane. `zero` is any value of the lanes.
-    fn splat(zero: N<T>, one: &Self::SingleLane) -> Self;
+    /// Returns a structure with the same numbers in every lane. `zero` is any value of the lane
+    /// type.
+    fn splat(zero: N<T>, single: &Self::SingleLane) -> Self;
     /// Overwrites a lane.
-    fn set_lane(&mut self, lane: usize, one: &Self::SingleLane);
+    fn set_lane(&mut self, lane: usize, single: &Self::SingleLane);
     /// Returns the numbers of a lane.
     fn get_lane(&self, lane: usize) -> Self::SingleLane;
 }
@@ -27,12 +28,12 @@ pub(crate) trait ToDual {
 impl<T: Lane> InLanes<T> for N<T> {
     type SingleLane = N<f64>;
     #[inline(always)]
-    fn splat(zero: Self, one: &N<f64>) -> Self {
-        zero.lit(one.0)
+    fn splat(zero: Self, single: &N<f64>) -> Self {
+        zero.lit(single.0)
     }
     #[inline(always)]
-    fn set_lane(&mut self, lane: usize, one: &N<f64>) {
-        self.0.set(lane, one.0);
+    fn set_lane(&mut self, lane: usize, single: &N<f64>) {
+        self.0.set(lane, single.0);
     }
     #[inline(always)]
     fn get_lane(&self, lane: usize) -> N<f64> {
@@ -51,16 +52,16 @@ impl<T: Real> ToDual for N<T> {
 impl<T: Lane, A: InLanes<T> + Copy, const K: usize> InLanes<T> for [A; K] {
     type SingleLane = [A::SingleLane; K];
     #[inline(always)]
-    fn splat(zero: N<T>, one: &[A::SingleLane; K]) -> Self {
-        let mut array = [A::splat(zero, &one[0]); K];
+    fn splat(zero: N<T>, single: &[A::SingleLane; K]) -> Self {
+        let mut array = [A::splat(zero, &single[0]); K];
         for i in 1..K {
-            array[i] = A::splat(zero, &one[i]);
+            array[i] = A::splat(zero, &single[i]);
         }
         array
     }
     #[inline(always)]
-    fn set_lane(&mut self, lane: usize, one: &[A::SingleLane; K]) {
-        self.iter_mut().zip(one).for_each(|(to, from)| to.set_lane(lane, from));
+    fn set_lane(&mut self, lane: usize, single: &[A::SingleLane; K]) {
+        self.iter_mut().zip(single).for_each(|(to, from)| to.set_lane(lane, from));
     }
     #[inline(always)]
     fn get_lane(&self, lane: usize) -> [A::SingleLane; K] {
@@ -80,22 +81,22 @@ impl<A: ToDual<Dual: Copy>, const K: usize> ToDual for [A; K] {
     }
 }
 
-// These functions have loops instead of closures, because only code that is inlined into an entry
-// function is compiled for its instruction set.
+// `splat` and `constant` have loops instead of closures, because only code that is inlined into an
+// entry function is compiled for its instruction set.
 impl<T: Lane, A: InLanes<T>> InLanes<T> for Vec<A> {
     type SingleLane = Vec<A::SingleLane>;
     #[inline(always)]
-    fn splat(zero: N<T>, one: &Vec<A::SingleLane>) -> Self {
-        let mut list = Self::with_capacity(one.len());
-        for item in one {
+    fn splat(zero: N<T>, single: &Vec<A::SingleLane>) -> Self {
+        let mut list = Self::with_capacity(single.len());
+        for item in single {
             list.push(A::splat(zero, item));
         }
         list
     }
     /// Overwrites a lane; both lists have the same length.
     #[inline(always)]
-    fn set_lane(&mut self, lane: usize, one: &Vec<A::SingleLane>) {
-        self.iter_mut().zip(one).for_each(|(to, from)| to.set_lane(lane, from));
+    fn set_lane(&mut self, lane: usize, single: &Vec<A::SingleLane>) {
+        self.iter_mut().zip(single).for_each(|(to, from)| to.set_lane(lane, from));
     }
     #[inline(always)]
     fn get_lane(&self, lane: usize) -> Vec<A::SingleLane> {
@@ -115,12 +116,12 @@ impl<A: ToDual> ToDual for Vec<A> {
     }
 }
 
-/// A property of machines that holds if any machine that the lanes have held has it.
+/// A boolean property of machines that is true if any machine that was written to a lane has it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InAnyLane<T>(bool, PhantomData<T>);
 
 impl<T> InAnyLane<T> {
-    /// Creates the property of one machine.
+    /// Creates the property for one machine.
     pub(crate) fn new(holds: bool) -> Self {
         Self(holds, PhantomData)
     }
@@ -135,12 +136,12 @@ impl<T> InAnyLane<T> {
 impl<T: Lane> InLanes<T> for InAnyLane<T> {
     type SingleLane = InAnyLane<f64>;
     #[inline(always)]
-    fn splat(_: N<T>, one: &InAnyLane<f64>) -> Self {
-        Self::new(one.0)
+    fn splat(_: N<T>, single: &InAnyLane<f64>) -> Self {
+        Self::new(single.0)
     }
     #[inline(always)]
-    fn set_lane(&mut self, _: usize, one: &InAnyLane<f64>) {
-        self.0 |= one.0;
+    fn set_lane(&mut self, _: usize, single: &InAnyLane<f64>) {
+        self.0 |= single.0;
     }
     #[inline(always)]
     fn get_lane(&self, _: usize) -> InAnyLane<f64> {
@@ -178,12 +179,12 @@ macro_rules! lane_struct {
         impl<T: lane_ode::Lane> $crate::lanes::InLanes<T> for $name<T> {
             type SingleLane = $name<f64>;
             #[inline(always)]
-            fn splat(zero: lane_ode::N<T>, one: &$name<f64>) -> Self {
-                Self { $($field: $crate::lanes::InLanes::splat(zero, &one.$field),)* }
+            fn splat(zero: lane_ode::N<T>, single: &$name<f64>) -> Self {
+                Self { $($field: $crate::lanes::InLanes::splat(zero, &single.$field),)* }
             }
             #[inline(always)]
-            fn set_lane(&mut self, lane: usize, one: &$name<f64>) {
-                $($crate::lanes::InLanes::set_lane(&mut self.$field, lane, &one.$field);)*
+            fn set_lane(&mut self, lane: usize, single: &$name<f64>) {
+                $($crate::lanes::InLanes::set_lane(&mut self.$field, lane, &single.$field);)*
             }
             #[inline(always)]
             fn get_lane(&self, lane: usize) -> $name<f64> {

@@ -3,9 +3,9 @@
 //!
 //! A [`Machine`] is plain numbers in SI units; [`Machine::paper`] is the one of Park, Jeong and Yoo
 //! (2021). Every number also has a flat name ([`MachineParameter`]) by which it is read, set and
-//! swept. A check reports every [`Violation`] of a machine at once. With a [`Spin`] a machine
-//! becomes a [`Point`]: [`prepare`] finds the static equilibrium and the linear model there. A
-//! point leads to
+//! swept. [`Machine::violations`] reports every [`Violation`] of a machine at once. A machine with
+//! a [`Spin`] becomes a [`Point`]: [`prepare`] finds the static equilibrium and the linear model
+//! about it. A point is the input of
 //!
 //! * [`simulate`]: time histories of the nonlinear or the linear model through the lanes of an
 //!   integrator, and their [`Record`];
@@ -18,7 +18,8 @@
 //!
 //! # Example
 //!
-//! How a stiffer suspension moves the machine's first two resonances.
+//! Compares sag and first resonance of the paper's machine with those on springs of twice the
+//! stiffness.
 //!
 //! ```
 //! use lane_ode::Simd;
@@ -33,10 +34,10 @@
 //! let timing = Timing { end_s: 50.0, window_s: [0.0, 50.0], checkpoints: 0 };
 //! let points = prepare(Simd::best(), &[(standard, spin.clone()), (stiff, spin)], &timing);
 //!
-//! let mut firsts = Vec::new();
+//! let mut results = Vec::new();
 //! for point in points {
 //!     let point = point?;
-//!     // It sags under its weight (q1, m), less on stiffer springs.
+//!     // The sag under the machine's weight (q1, m).
 //!     let sag_m = -point.equilibrium()[0];
 //!     // The linear model at rest: a symmetric, positive stiffness.
 //!     let stiffness = point.matrices(0.0, 0.0, 0.0).stiffness;
@@ -45,14 +46,15 @@
 //!     // Its natural motions at 100 rpm, the slowest first, decay.
 //!     let slowest = modes(&point, 0.0, 100.0 * std::f64::consts::TAU / 60.0)?.modes[0];
 //!     assert!(slowest.damping_ratio() > 0.0 && slowest.damping_ratio() < 1.0);
-//!     // And where the spin speed meets one of them.
+//!     // The resonances: speeds that equal a mode's frequency.
 //!     let speeds_rpm: Vec<f64> = (2..=20).map(|k| 20.0 * f64::from(k)).collect();
 //!     let modes = campbell(&point, &speeds_rpm)?.into_iter();
-//!     let resonances_rpm = modes.flat_map(|mode| mode.resonances).map(|at| at.speed_rpm);
+//!     let resonances = modes.flat_map(|mode| mode.resonances);
+//!     let resonances_rpm = resonances.map(|resonance| resonance.speed_rpm);
 //!     let first_rpm = resonances_rpm.fold(f64::INFINITY, f64::min);
-//!     firsts.push((sag_m, first_rpm));
+//!     results.push((sag_m, first_rpm));
 //! }
-//! let [(sag_m, first_rpm), (stiff_sag_m, stiff_first_rpm)] = firsts[..] else { unreachable!() };
+//! let [(sag_m, first_rpm), (stiff_sag_m, stiff_first_rpm)] = results[..] else { unreachable!() };
 //! assert!((sag_m - 0.0141).abs() < 1e-4);
 //! assert!((first_rpm - 99.9).abs() < 0.5); // the paper: 99.9 rpm
 //! assert!(stiff_sag_m < 0.6 * sag_m && stiff_first_rpm > 1.2 * first_rpm);
@@ -99,7 +101,8 @@ pub use machine::{
 pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell, campbell_until};
 pub use modes::shape::{ModeMotion, MotionPlane, Movement};
 pub use modes::{
-    Mode, Modes, NoModes, highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, modes,
+    Mode, Modes, ModesError, highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s,
+    modes,
 };
 pub use nonlinear::coupling::Caps;
 pub use point::friction::FrictionSpeed;

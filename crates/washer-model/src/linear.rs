@@ -1,10 +1,10 @@
 //! The linear model: the exact linearisation about the static equilibrium (section 5 of the model
 //! page, Eq. 41).
 //!
-//! Every coefficient is a trigonometric polynomial in theta. It is computed once per grid point
-//! from the nonlinear source, by automatic differentiation at five angles, which determine it. As
-//! in the nonlinear model, the two halves are solved about their mass centres, and only the
-//! bearings couple them.
+//! Every coefficient is a trigonometric polynomial in theta. Automatic differentiation of the
+//! nonlinear equations at five angles determines the coefficients, once per point. As in the
+//! nonlinear model, the two halves are solved about their mass centres, and only the bearings
+//! couple them.
 
 pub(crate) mod harmonics;
 pub(crate) mod outputs;
@@ -15,10 +15,10 @@ pub(crate) mod symmetric;
 
 use crate::COORDINATES;
 use crate::coordinates::{
-    ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, with_unit_derivative,
+    ROTOR_ROTATIONS, SHAFT_Y, SHAFT_Z, TUB, TUB_ROTATIONS, TUB_Y, TUB_Z, with_derivative,
 };
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
-use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLES};
+use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLE_ANGLES};
 use crate::linear::rotor_terms::{
     self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients,
 };
@@ -37,14 +37,14 @@ lane_struct! {
     /// half's mass centre, columns the coordinates of `TUB`.
     #[derive(Clone, Copy, Debug)]
     Constants {
-        tub_per_mass: N<T>,
+        tub_inverse_mass: N<T>,
         /// The partial velocities of the tub's mass centre.
         tub_arm: [[N<T>; 2]; 2],
         tub_axis: [[N<T>; 2]; 2],
         tub_inertia: [[N<T>; 2]; 2],
         tub_stiffness: [[N<T>; 4]; 4],
         tub_damping: [[N<T>; 4]; 4],
-        rotor_per_mass: N<T>,
+        rotor_inverse_mass: N<T>,
         rotor_axis: [[N<T>; 2]; 2],
     }
 }
@@ -71,15 +71,15 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
         let zero = q[0].lit(0.0);
         let zeros = [zero; COORDINATES];
         let bodies = &machine.bodies;
-        let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load_on_shaft(bodies);
+        let shaft_load = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load_on_shaft(bodies);
         let dual_machine = machine.constant();
 
-        // The tub does not depend on the spin.
+        // The tub's equations do not depend on the spin.
         let at_rest = assemble_tub(machine, q, &zeros);
         let [tub_stiffness, tub_damping] = tub_tangents(machine, q);
 
         let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
-        for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
+        for (k, &(cos, sin)) in SAMPLE_ANGLES.iter().enumerate() {
             for (kind, (speed, acceleration)) in
                 [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate()
             {
@@ -87,7 +87,7 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
                 let spin = SpinState::new(angle, zero.lit(speed), zero.lit(acceleration));
                 let Half { mut floating, inertia, .. } =
                     assemble_rotor_in_lanes(bodies, &spin, q, &zeros);
-                floating.apply(&on_shaft);
+                floating.apply(&shaft_load);
                 let (force, torque) = floating.generalised_forces();
                 let arm = floating.arm;
                 let dual_spin = spin.constant();
@@ -98,11 +98,11 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
                     let column = direction % 4;
                     let entry = if direction < 4 { entry::stiffness } else { entry::damping };
                     let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
-                    let q = with_unit_derivative(q, ROTOR_TURNS[column], dq);
-                    let u = with_unit_derivative(&zeros, ROTOR_TURNS[column], du);
+                    let q = with_derivative(q, ROTOR_ROTATIONS[column], dq);
+                    let u = with_derivative(&zeros, ROTOR_ROTATIONS[column], du);
                     let Half { mut floating, .. } =
                         assemble_rotor_in_lanes(&dual_machine.bodies, &dual_spin, &q, &u);
-                    floating.apply(&on_shaft.constant());
+                    floating.apply(&shaft_load.constant());
                     let rows: [_; ROWS] =
                         transform_to_mass_centre(floating.generalised_forces(), &arm);
                     for row in 0..ROWS {
@@ -125,19 +125,19 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
         }
 
         let constants = Constants {
-            tub_per_mass: bodies.tub_per_mass,
+            tub_inverse_mass: bodies.tub_inverse_mass,
             tub_arm: at_rest.floating.arm,
             tub_axis: at_rest.floating.axis,
             tub_inertia: at_rest.inertia,
             tub_stiffness,
             tub_damping,
-            rotor_per_mass: bodies.rotor_per_mass,
+            rotor_inverse_mass: bodies.rotor_inverse_mass,
             rotor_axis: Tilt::shaft(q).axis_partials(),
         };
         (0..T::LANES)
             .map(|lane| LinearPoint {
                 constants: constants.get_lane(lane),
-                terms: rotor_coefficients_of_lane(&samples, lane, bodies.is_skewed_in(lane)),
+                terms: lane_rotor_coefficients(&samples, lane, bodies.is_skewed_in(lane)),
             })
             .collect()
     }
@@ -151,9 +151,9 @@ pub(crate) fn tub_tangents<T: Lane>(
 ) -> [[[N<T>; 4]; 4]; 2] {
     let zero = q[0].lit(0.0);
     let zeros = [zero; COORDINATES];
-    let on_shaft =
+    let shaft_load =
         Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load_on_shaft(&machine.bodies);
-    let on_tub = on_shaft.reaction().constant();
+    let tub_load = shaft_load.reaction().constant();
     let arm = assemble_tub(machine, q, &zeros).floating.arm;
     let dual_machine = machine.constant();
     let mut tangents = [[[zero; 4]; 4]; 2];
@@ -161,10 +161,10 @@ pub(crate) fn tub_tangents<T: Lane>(
         for (tangent, (dq, du)) in tangents.iter_mut().zip([(1.0, 0.0), (0.0, 1.0)]) {
             let Half { mut floating, .. } = assemble_tub(
                 &dual_machine,
-                &with_unit_derivative(q, j, dq),
-                &with_unit_derivative(&zeros, j, du),
+                &with_derivative(q, j, dq),
+                &with_derivative(&zeros, j, du),
             );
-            floating.apply(&on_tub);
+            floating.apply(&tub_load);
             let rows: [_; 4] = transform_to_mass_centre(floating.generalised_forces(), &arm);
             for (row, slope) in rows.iter().enumerate() {
                 tangent[row][column] = -*slope;
@@ -190,33 +190,38 @@ fn transform_to_mass_centre<T: Real, const R: usize, const ROWS: usize>(
     rows
 }
 
-/// Computes the terms of one lane from samples at rest, at unit speed and at unit acceleration.
-fn rotor_coefficients_of_lane<T: Lane>(
+/// Computes the coefficients of one lane from samples at rest, at unit speed and at unit
+/// acceleration.
+fn lane_rotor_coefficients<T: Lane>(
     samples: &[[[N<T>; HARMONICS]; ALL_ENTRIES]; 3],
     lane: usize,
-    skewed: bool,
+    is_skewed: bool,
 ) -> RotorCoefficients<f64> {
-    let coefficients = |entry: usize| {
-        let mut functions = [0.0; FUNCTIONS];
+    let entry_coefficients = |entry: usize| {
+        let mut coefficients = [0.0; FUNCTIONS];
         let harmonics_at = |kind: usize| {
             harmonics::harmonic_coefficients(samples[kind][entry].map(|v| v.0.get(lane)))
         };
         let at_rest = harmonics_at(0);
         let at_speed = harmonics_at(1);
-        let accelerated = harmonics_at(2);
-        functions[harmonics::ONE..harmonics::SPEED].copy_from_slice(&at_rest);
+        let at_acceleration = harmonics_at(2);
+        coefficients[harmonics::ONE..harmonics::SPEED].copy_from_slice(&at_rest);
         if (entry::damping(0, 0)..ENTRIES).contains(&entry) {
-            functions[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&at_speed);
+            coefficients[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&at_speed);
         } else {
             for harmonic in 0..HARMONICS {
-                functions[harmonics::SPIN + harmonic] = at_speed[harmonic] - at_rest[harmonic];
+                coefficients[harmonics::SPIN + harmonic] = at_speed[harmonic] - at_rest[harmonic];
             }
-            functions[harmonics::ACCELERATION] = accelerated[0] - at_rest[0];
+            coefficients[harmonics::ACCELERATION] = at_acceleration[0] - at_rest[0];
         }
-        functions
+        coefficients
     };
-    let inertia = core::array::from_fn(|entry| coefficients(ENTRIES + entry));
-    RotorCoefficients::select_coefficients(&inertia, &core::array::from_fn(coefficients), skewed)
+    let inertia = core::array::from_fn(|entry| entry_coefficients(ENTRIES + entry));
+    RotorCoefficients::select_coefficients(
+        &inertia,
+        &core::array::from_fn(entry_coefficients),
+        is_skewed,
+    )
 }
 
 /// The matrices M, C and K and the force F of Eq. 41 in the coordinates q, for one machine at one
@@ -235,14 +240,18 @@ pub struct Matrices {
 
 impl LinearPoint {
     /// Returns the model with another stiffness and damping of the tub.
-    pub(crate) fn with_tub(&self, [tub_stiffness, tub_damping]: [[[N<f64>; 4]; 4]; 2]) -> Self {
-        let mut other = self.clone();
-        other.constants.tub_stiffness = tub_stiffness;
-        other.constants.tub_damping = tub_damping;
-        other
+    pub(crate) fn with_tub_tangents(
+        &self,
+        [tub_stiffness, tub_damping]: [[[N<f64>; 4]; 4]; 2],
+    ) -> Self {
+        let mut model = self.clone();
+        model.constants.tub_stiffness = tub_stiffness;
+        model.constants.tub_damping = tub_damping;
+        model
     }
 
-    /// Computes the bearings' part of the stiffness matrix, without the part of their static load.
+    /// Computes the bearings' part of the stiffness matrix, without the part that comes from their
+    /// static load.
     pub(crate) fn bearing_stiffness(
         &self,
         bodies: &Bodies<f64>,
@@ -270,19 +279,23 @@ impl LinearPoint {
 
     /// Computes the matrices at an instant. `bodies` are those of the same machine.
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
-        let c = &self.constants;
-        let (inertia, e) = self.terms.at(&harmonics::spin_functions(spin));
-        let tub = MassCentreMap { midpoint: [TUB_Y, TUB_Z], rotations: TUB_TURNS, arm: c.tub_arm };
+        let constants = &self.constants;
+        let (inertia, entries) = self.terms.evaluate(&harmonics::spin_functions(spin));
+        let tub = MassCentreMap {
+            midpoint: [TUB_Y, TUB_Z],
+            rotations: TUB_ROTATIONS,
+            arm: constants.tub_arm,
+        };
         let rotor = MassCentreMap {
             midpoint: [SHAFT_Y, SHAFT_Z],
-            rotations: ROTOR_TURNS,
-            arm: entry::arms(&e),
+            rotations: ROTOR_ROTATIONS,
+            arm: entry::arms(&entries),
         };
         let mut matrices = Matrices {
             mass: [[0.0; COORDINATES]; COORDINATES],
             damping: [[0.0; COORDINATES]; COORDINATES],
             stiffness: self.bearing_stiffness(bodies),
-            force: rotor.generalised_forces(|row| e[entry::force(row)]),
+            force: rotor.generalised_forces(|row| entries[entry::force(row)]),
         };
         let mut add = |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
             for i in 0..COORDINATES {
@@ -291,18 +304,25 @@ impl LinearPoint {
             }
         };
         for column in 0..4 {
-            let stiffness = tub.generalised_forces(|row| c.tub_stiffness[row][column]);
-            add(TUB[column], stiffness, tub.generalised_forces(|row| c.tub_damping[row][column]));
-            let stiffness = rotor.generalised_forces(|row| e[entry::stiffness(row, column)]);
+            let stiffness = tub.generalised_forces(|row| constants.tub_stiffness[row][column]);
             add(
-                ROTOR_TURNS[column],
+                TUB[column],
                 stiffness,
-                rotor.generalised_forces(|row| e[entry::damping(row, column)]),
+                tub.generalised_forces(|row| constants.tub_damping[row][column]),
+            );
+            let stiffness = rotor.generalised_forces(|row| entries[entry::stiffness(row, column)]);
+            add(
+                ROTOR_ROTATIONS[column],
+                stiffness,
+                rotor.generalised_forces(|row| entries[entry::damping(row, column)]),
             );
         }
-        tub.write_mass(&mut matrices.mass, c.tub_per_mass, |r, s| c.tub_inertia[r][s]);
-        rotor
-            .write_mass(&mut matrices.mass, c.rotor_per_mass, |r, s| inertia[entry::inertia(r, s)]);
+        tub.write_mass(&mut matrices.mass, constants.tub_inverse_mass, |r, s| {
+            constants.tub_inertia[r][s]
+        });
+        rotor.write_mass(&mut matrices.mass, constants.rotor_inverse_mass, |r, s| {
+            inertia[entry::inertia(r, s)]
+        });
         matrices
     }
 }
@@ -333,10 +353,10 @@ impl<const R: usize> MassCentreMap<R> {
     fn write_mass(
         &self,
         mass: &mut [[f64; COORDINATES]; COORDINATES],
-        per_mass: N<f64>,
+        inverse_mass: N<f64>,
         inertia: impl Fn(usize, usize) -> N<f64>,
     ) {
-        let m = 1.0 / per_mass.0;
+        let m = 1.0 / inverse_mass.0;
         let arm = &self.arm;
         let rotations = &self.rotations;
         for (i, midpoint) in self.midpoint.into_iter().enumerate() {

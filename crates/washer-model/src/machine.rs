@@ -10,7 +10,7 @@ pub(crate) mod violations;
 /// horizontal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
-    /// The acceleration of gravity along -y.
+    /// The acceleration of gravity, which acts along -y.
     pub gravity_m_per_s2: f64,
     /// The radial clearance between drum and tub at rest.
     pub radial_clearance_m: f64,
@@ -36,16 +36,15 @@ pub struct Machine {
     pub stops: Vec<BumpStop>,
     /// The bushings between cabinet and tub, such as a door gasket.
     pub bushings: Vec<Bushing>,
-    /// The cabinet, if it is described. Only the loads of its feet depend on it.
+    /// The cabinet, if it is described. Only the loads of the feet depend on the cabinet.
     pub cabinet: Option<Cabinet>,
-    /// The three or four feet of the cabinet, if it is described.
+    /// The three or four feet of the cabinet, if a cabinet is described.
     pub feet: Vec<Foot>,
 }
 
 /// The tub, body T, which hangs on the springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tub {
-    /// The mass.
     pub mass_kg: f64,
     /// The mass centre on the tub axis (L_T).
     pub centre_x_m: f64,
@@ -58,7 +57,6 @@ pub struct Tub {
 /// The shaft with its rotor, body S.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shaft {
-    /// The mass.
     pub mass_kg: f64,
     /// The mass centre on the shaft axis, negative behind O (-L_S).
     pub centre_x_m: f64,
@@ -121,11 +119,11 @@ pub struct Spring {
     pub cabinet_m: [f64; 3],
     /// The end at the tub, in tub axes from P_T.
     pub tub_m: [f64; 3],
-    /// The stiffness.
     pub stiffness_n_per_m: f64,
-    /// The length without force; if absent, the distance between the given ends.
+    /// The length at which the spring has no tension; if absent, the distance between the given
+    /// ends.
     pub free_length_m: Option<f64>,
-    /// The tension per cube of the elongation (k_3), added to that of the stiffness.
+    /// The tension per cube of the elongation (k_3), added to the tension of the linear stiffness.
     pub cubic_n_per_m3: f64,
 }
 
@@ -146,10 +144,10 @@ pub struct Damper {
     /// The speed amplitude V at which the linear model's viscous damping 4 F_f / (pi V) dissipates
     /// as much energy in a cycle as friction does; if absent, the amplitude of the linear motion.
     pub friction_linear_speed_m_per_s: Option<f64>,
-    /// The free stroke s: friction and outer damping act where the damper's length differs from
-    /// that at rest by more than this.
+    /// The free stroke s: friction and outer damping act only if the damper's length differs from
+    /// its length at rest by more than s.
     pub free_stroke_m: f64,
-    /// The width over which they set in.
+    /// The width over which friction and outer damping set in beyond the free stroke.
     pub free_stroke_softness_m: f64,
     /// The damping beyond the free stroke, added to the damping that always acts.
     pub outer_damping_n_s_per_m: f64,
@@ -162,13 +160,13 @@ pub struct BumpStop {
     pub tub_m: [f64; 3],
     /// The direction from the tub to the stop, in cabinet axes; a vector of any length but 0.
     pub direction: [f64; 3],
-    /// The distance that the tub point may move in that direction from its place before loading.
+    /// The distance that the tub point may move in that direction from its position before loading.
     pub clearance_m: f64,
     /// The stiffness in contact.
     pub stiffness_n_per_m: f64,
     /// The damping in contact.
     pub damping_n_s_per_m: f64,
-    /// The depth s over which contact sets in.
+    /// The depth s of compression over which contact sets in.
     pub softness_m: f64,
 }
 
@@ -179,7 +177,7 @@ impl BumpStop {
 }
 
 impl Default for BumpStop {
-    /// Returns a stop without stiffness above the bearings' midpoint.
+    /// Returns a stop without stiffness, above the bearings' midpoint.
     fn default() -> Self {
         Self {
             tub_m: [0.0; 3],
@@ -192,15 +190,16 @@ impl Default for BumpStop {
     }
 }
 
-/// A bushing: springs and dampers along the cabinet's three axes on one tub point. Its force is
-/// zero while that point is in its place before loading.
+/// A bushing: springs and dampers along the cabinet's three axes on one tub point. The force is
+/// zero while the tub point is at its position before loading.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bushing {
     /// The tub point, in tub axes from P_T.
     pub tub_m: [f64; 3],
     /// The stiffness along c1, c2 and c3.
     pub stiffness_n_per_m: [f64; 3],
-    /// The force per cube of the displacement along each axis, added to that of the stiffness.
+    /// The force per cube of the displacement along each axis, added to the force of the linear
+    /// stiffness.
     pub cubic_n_per_m3: [f64; 3],
     /// The damping along each axis.
     pub damping_n_s_per_m: [f64; 3],
@@ -209,9 +208,7 @@ pub struct Bushing {
 /// The cabinet with everything fixed to it. It does not move.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cabinet {
-    /// The mass.
     pub mass_kg: f64,
-    /// The mass centre.
     pub centre_m: [f64; 3],
     /// The coefficient of friction between feet and floor.
     pub friction: f64,
@@ -225,7 +222,8 @@ pub struct Foot {
 }
 
 impl Unbalance {
-    /// Returns the place across the axis, along d2 and d3 (m). Quarter turns are exact.
+    /// Returns the position across the drum's axis, along d2 and d3 (m). Multiples of 90 degrees
+    /// are exact.
     pub(crate) fn position_m(&self) -> [f64; 2] {
         let quarters = (self.angle_deg / 90.0).round();
         let (sin, cos) = libm::sincos((self.angle_deg - 90.0 * quarters).to_radians());
@@ -240,86 +238,88 @@ impl Unbalance {
 }
 
 impl Damper {
-    /// The default of v_s. Basis: a usual value of suspension dampers. Doubling it makes friction
-    /// viscous up to twice the speed.
+    /// The default of the speed v_s below which friction fades. Basis: a usual value of suspension
+    /// dampers. Doubling it makes friction viscous up to twice the speed.
     pub const FRICTION_SPEED_M_PER_S: f64 = 0.01;
-    /// The default width over which forces beyond a free stroke set in. Basis: that of stops.
-    /// Doubling it makes them set in over twice the length.
+    /// The default width over which forces beyond a free stroke set in. Basis: the default of
+    /// stops. Doubling it makes the forces set in over twice the length.
     pub const FREE_STROKE_SOFTNESS_M: f64 = BumpStop::SOFTNESS_M;
-    /// The start of the search for V. Basis: a usual speed amplitude. Doubling it changes the
-    /// number of iterations only.
-    pub(crate) const FIRST_LINEAR_SPEED_M_PER_S: f64 = 0.1;
+    /// The initial estimate in the iteration for the speed amplitude V. Basis: a usual speed
+    /// amplitude. Doubling it changes the number of iterations only.
+    pub(crate) const INITIAL_LINEAR_SPEED_M_PER_S: f64 = 0.1;
 }
 
 impl Machine {
-    /// Returns the machine's mirror image in the vertical plane through the drum's axis: what it
-    /// does while its drum turns forwards, this machine does mirrored while its drum turns
-    /// backwards.
+    /// Returns the machine's mirror image in the vertical plane through the drum's axis. With its
+    /// drum turning backwards, the image moves as the mirror image of this machine with its drum
+    /// turning forwards.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let mut mirrored = self.clone();
-        let flip = |place: &mut [f64; 3]| place[2] = -place[2];
+        let negate_z = |position: &mut [f64; 3]| position[2] = -position[2];
         for spring in &mut mirrored.springs {
-            flip(&mut spring.cabinet_m);
-            flip(&mut spring.tub_m);
+            negate_z(&mut spring.cabinet_m);
+            negate_z(&mut spring.tub_m);
         }
         for damper in &mut mirrored.dampers {
-            flip(&mut damper.cabinet_m);
-            flip(&mut damper.tub_m);
+            negate_z(&mut damper.cabinet_m);
+            negate_z(&mut damper.tub_m);
         }
         for stop in &mut mirrored.stops {
-            flip(&mut stop.tub_m);
-            flip(&mut stop.direction);
+            negate_z(&mut stop.tub_m);
+            negate_z(&mut stop.direction);
         }
         for bushing in &mut mirrored.bushings {
-            flip(&mut bushing.tub_m);
+            negate_z(&mut bushing.tub_m);
         }
         for unbalance in mirrored.unbalances_mut() {
             unbalance.angle_deg = -unbalance.angle_deg;
         }
         for foot in &mut mirrored.feet {
-            flip(&mut foot.foot_m);
+            negate_z(&mut foot.foot_m);
         }
         if let Some(cabinet) = &mut mirrored.cabinet {
-            flip(&mut cabinet.centre_m);
+            negate_z(&mut cabinet.centre_m);
         }
         mirrored
     }
 
-    /// Iterates over all unbalances, first the one that every machine has.
+    /// Iterates over all unbalances, beginning with the one that every machine has.
     pub(crate) fn unbalances(&self) -> impl Iterator<Item = &Unbalance> {
         core::iter::once(&self.unbalance).chain(&self.further_unbalances)
     }
 
-    /// Iterates over all unbalances, first the one that every machine has.
+    /// Iterates over all unbalances, beginning with the one that every machine has.
     fn unbalances_mut(&mut self) -> impl Iterator<Item = &mut Unbalance> {
         core::iter::once(&mut self.unbalance).chain(&mut self.further_unbalances)
     }
 
     /// Returns the weight of tub, shaft, drum and unbalances (N).
     pub fn weight_n(&self) -> f64 {
-        let bodies_kg = self.tub.mass_kg + self.shaft.mass_kg + self.drum.mass_kg;
-        let further_kg: f64 = self.further_unbalances.iter().map(|one| one.mass_kg).sum();
-        let mass_kg = bodies_kg + self.unbalance.mass_kg + further_kg;
+        let bodies_mass_kg = self.tub.mass_kg + self.shaft.mass_kg + self.drum.mass_kg;
+        let further_mass_kg: f64 =
+            self.further_unbalances.iter().map(|unbalance| unbalance.mass_kg).sum();
+        let mass_kg = bodies_mass_kg + self.unbalance.mass_kg + further_mass_kg;
         self.gravity_m_per_s2 * mass_kg
     }
 
     /// Returns the machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 to 4 and
-    /// section 3.1, the bare drum and unbalance split of the equations page, and this project's
-    /// assumptions where the paper is silent (bearing positions, hinge, fronts, clearance, free
-    /// lengths of the springs).
+    /// section 3.1, the drum without its unbalance as section 2 of the model page derives it, and
+    /// this project's assumptions where the paper gives no value (bearing positions, hinge, fronts,
+    /// clearance, free lengths of the springs).
     pub fn paper() -> Self {
         let [unbalance_mass_kg, drum_mass_kg, drum_x_m] = [0.4, 3.64, 0.200];
         let unbalance =
             Unbalance { mass_kg: unbalance_mass_kg, x_m: 0.300, radius_m: 0.200, angle_deg: 0.0 };
-        // Tables 2 and 3 print the drum with its 0.4 kg unbalance; take the point mass out (model
-        // page, section 2).
+        // Tables 2 and 3 list the drum with its 0.4 kg unbalance, so that the point mass is
+        // subtracted (model page, section 2).
         let reduced_mass_kg = unbalance_mass_kg * drum_mass_kg / (unbalance_mass_kg + drum_mass_kg);
         let dx = unbalance.x_m - drum_x_m;
         let r = unbalance.radius_m;
-        let with_unbalance = [0.196, 0.162, 0.177];
-        let point = [r * r, dx * dx, r * r + dx * dx];
-        let bare = std::array::from_fn(|i| with_unbalance[i] - reduced_mass_kg * point[i]);
+        let inertia_with_unbalance = [0.196, 0.162, 0.177];
+        let point_inertia = [r * r, dx * dx, r * r + dx * dx];
+        let bare_inertia =
+            std::array::from_fn(|i| inertia_with_unbalance[i] - reduced_mass_kg * point_inertia[i]);
         let spring = |x: f64, side: f64| Spring {
             cabinet_m: [x, 0.3002, side * 0.2506],
             tub_m: [x, 0.1626, side * 0.1626],
@@ -355,7 +355,7 @@ impl Machine {
             drum: Drum {
                 mass_kg: drum_mass_kg,
                 centre_x_m: drum_x_m,
-                inertia_kg_m2: bare,
+                inertia_kg_m2: bare_inertia,
                 hinge_x_m: 0.150,
                 front_x_m: 0.450,
             },

@@ -9,7 +9,7 @@ pub(crate) mod shape;
 use crate::coordinates::{HINGE_PITCH, HINGE_YAW, SHAFT, STATES, TUB};
 use crate::linear::LinearPoint;
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coupling::BACKWARD_SHARE;
+use crate::nonlinear::coupling::BACKWARD_WHIRL_RATIO;
 use crate::{COORDINATES, Caps, Matrices, ModelKind, Point};
 use core::f64::consts::TAU;
 use faer::linalg::solvers::{Llt, Solve as _};
@@ -26,7 +26,7 @@ const ANGLES: usize = 8;
 
 /// A failure to compute the modes of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NoModes {
+pub enum ModesError {
     /// A body has no inertia.
     #[error("the mass matrix is not positive definite: some body has no inertia")]
     Mass,
@@ -59,7 +59,7 @@ impl Mode {
         -self.re_per_s / self.magnitude_rad_per_s
     }
 
-    /// Returns the hinge's share of the strain energy at the greatest deflection.
+    /// Returns the hinge's share of the mode's strain energy at the greatest deflection.
     pub(crate) fn hinge_share(&self, point: &Point) -> f64 {
         let squared = HINGE
             .map(|q| self.shape[q][0] * self.shape[q][0] + self.shape[q][1] * self.shape[q][1]);
@@ -113,8 +113,8 @@ pub(crate) fn mass_inner_product(
 /// Computes the modes at a frozen angle and a spin speed.
 ///
 /// # Errors
-/// [`NoModes`] for singular or infinite matrices.
-pub fn modes(point: &Point, theta_rad: f64, speed_rad_per_s: f64) -> Result<Modes, NoModes> {
+/// [`ModesError`] for singular or infinite matrices.
+pub fn modes(point: &Point, theta_rad: f64, speed_rad_per_s: f64) -> Result<Modes, ModesError> {
     modes_with_caps(point, theta_rad, speed_rad_per_s, None)
 }
 
@@ -125,10 +125,10 @@ pub(crate) fn modes_with_caps(
     theta_rad: f64,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
-) -> Result<Modes, NoModes> {
-    let system = first_order(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
+) -> Result<Modes, ModesError> {
+    let system = first_order_system(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
     let mass = system.mass;
-    let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
+    let decomposition = system.matrix.eigen().map_err(|_| ModesError::Eigenvalues)?;
     let values = decomposition.S().column_vector();
     let vectors = decomposition.U();
     let shape = |state: usize| {
@@ -151,9 +151,9 @@ pub(crate) fn mode_roots(
     point: &Point,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
-) -> Result<[ModeRoot; COORDINATES], NoModes> {
-    let system = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
-    let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
+) -> Result<[ModeRoot; COORDINATES], ModesError> {
+    let system = first_order_system(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
+    let values = system.matrix.eigenvalues().map_err(|_| ModesError::Eigenvalues)?;
     if values.iter().filter(|s| s.im == 0.0).count() > 2 {
         // If several modes are overdamped, their shapes decide which two real rates belong to one
         // mode.
@@ -183,37 +183,36 @@ pub(crate) struct ModeRoot {
 fn sort_into_modes(
     values: impl Iterator<Item = c64>,
     similarity: &dyn Fn(usize, usize) -> f64,
-) -> Result<[(ModeRoot, usize); COORDINATES], NoModes> {
+) -> Result<[(ModeRoot, usize); COORDINATES], ModesError> {
     let mut modes = Vec::with_capacity(COORDINATES);
-    let mut real = Vec::new();
+    let mut real_roots = Vec::new();
     for (state, s) in values.enumerate() {
         if !(s.re.is_finite() && s.im.is_finite()) {
-            return Err(NoModes::Eigenvalues);
+            return Err(ModesError::Eigenvalues);
         }
         if s.im > 0.0 {
             modes.push((ModeRoot { s, magnitude_rad_per_s: magnitude(s) }, state));
         } else if s.im == 0.0 {
-            real.push((s.re, state));
+            real_roots.push((s.re, state));
         }
     }
-    // The two rates of an overdamped mode have similar shapes. They need not be neighbours in
-    // order: the slow rates of several modes may all lie below the fast ones.
-    real.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
-    while let Some((slow, state)) = real.pop() {
-        let similarity_to_slow = |&index: &usize| similarity(state, real[index].1);
-        let partner = (0..real.len())
+    // The two rates of an overdamped mode have similar shapes. They may not be adjacent in the
+    // sorted list: the slow rates of several modes may all lie below the fast ones.
+    real_roots.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    while let Some((slow, state)) = real_roots.pop() {
+        let similarity_to_slow = |&index: &usize| similarity(state, real_roots[index].1);
+        let partner = (0..real_roots.len())
             .rev()
             .max_by(|a, b| similarity_to_slow(a).total_cmp(&similarity_to_slow(b)));
-        let (fast, _) = real.remove(partner.ok_or(NoModes::Eigenvalues)?);
+        let (fast, _) = real_roots.remove(partner.ok_or(ModesError::Eigenvalues)?);
         let s = c64::new(0.5 * (slow + fast), 0.0);
         modes.push((ModeRoot { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
     }
     modes.sort_by(|a, b| a.0.magnitude_rad_per_s.total_cmp(&b.0.magnitude_rad_per_s));
-    modes.try_into().map_err(|_| NoModes::Eigenvalues)
+    modes.try_into().map_err(|_| ModesError::Eigenvalues)
 }
 
-/// Returns |s|. The function `hypot` of the system's library would round differently on other
-/// systems.
+/// Returns |s|. This is not `hypot`, which rounds differently on different systems.
 fn magnitude(s: c64) -> f64 {
     s.norm_sqr().sqrt()
 }
@@ -242,8 +241,8 @@ fn normalize_to_unit_mass(
 ///
 /// # Errors
 /// The errors of [`modes`].
-pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Result<f64, NoModes> {
-    highest_with_caps(point, ModelKind::Nonlinear, speed_rad_per_s, None)
+pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Result<f64, ModesError> {
+    highest_capped_frequency_rad_per_s(point, ModelKind::Nonlinear, speed_rad_per_s, None)
 }
 
 /// The assumed step (s) of the additive method. Basis: forty steps in a period of 25 Hz. Doubling
@@ -261,31 +260,31 @@ const ADDITIVE_STEP_S: f64 = 1e-3;
 pub fn highest_explicit_frequency_rad_per_s(
     point: &Point,
     speed_rad_per_s: f64,
-) -> Result<f64, NoModes> {
+) -> Result<f64, ModesError> {
     let cap = 1.0 / (GAMMA * ADDITIVE_STEP_S);
     let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
-    highest_with_caps(point, ModelKind::Nonlinear, speed_rad_per_s, Some(&caps))
+    highest_capped_frequency_rad_per_s(point, ModelKind::Nonlinear, speed_rad_per_s, Some(&caps))
 }
 
 /// Computes the largest |s| (rad/s) over a turn of theta, with caps on the modes of bearings and
 /// hinge if any are given (section 4.3 of the model page). The linear model has the tangents at
 /// equilibrium, the nonlinear model also the steepest ones.
-pub(crate) fn highest_with_caps(
+pub(crate) fn highest_capped_frequency_rad_per_s(
     point: &Point,
     model: ModelKind,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
-) -> Result<f64, NoModes> {
+) -> Result<f64, ModesError> {
     let mut highest = 0.0_f64;
     let steepest = point.steepest_model.as_deref().filter(|_| model == ModelKind::Nonlinear);
     let models = core::iter::once(&point.linear).chain(steepest);
     let angles = (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
     for (model, theta) in models.flat_map(|model| angles.clone().map(move |theta| (model, theta))) {
-        let system = first_order(point, model, theta, speed_rad_per_s, caps)?;
-        for s in system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)? {
+        let system = first_order_system(point, model, theta, speed_rad_per_s, caps)?;
+        for s in system.matrix.eigenvalues().map_err(|_| ModesError::Eigenvalues)? {
             let magnitude = magnitude(s) * system.unit_per_s;
             if !magnitude.is_finite() {
-                return Err(NoModes::Eigenvalues);
+                return Err(ModesError::Eigenvalues);
             }
             highest = highest.max(magnitude);
         }
@@ -297,7 +296,10 @@ pub(crate) fn highest_with_caps(
 ///
 /// # Errors
 /// The errors of [`modes`].
-pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Result<f64, NoModes> {
+pub(crate) fn highest_rigid_frequency_rad_per_s(
+    point: &Point,
+    model: &LinearPoint,
+) -> Result<f64, ModesError> {
     let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &still);
     let add_rigid_pairs = |matrix: &[[f64; COORDINATES]; COORDINATES]| {
@@ -308,11 +310,11 @@ pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Res
         })
     };
     let mass = add_rigid_pairs(&mass);
-    let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;
+    let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| ModesError::Mass)?;
     let values = factors.solve(add_rigid_pairs(&stiffness)).eigenvalues();
-    let values = values.map_err(|_| NoModes::Eigenvalues)?;
+    let values = values.map_err(|_| ModesError::Eigenvalues)?;
     let fastest = values.iter().map(|square| magnitude(*square)).fold(0.0, f64::max).sqrt();
-    if fastest.is_finite() { Ok(fastest) } else { Err(NoModes::Eigenvalues) }
+    if fastest.is_finite() { Ok(fastest) } else { Err(ModesError::Eigenvalues) }
 }
 
 /// The first-order form x' = unit A x with x = (q, q' / unit).
@@ -325,13 +327,13 @@ struct FirstOrderSystem {
 }
 
 /// Computes the first-order form at a frozen angle and a spin speed.
-fn first_order(
+fn first_order_system(
     point: &Point,
     model: &LinearPoint,
     theta_rad: f64,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
-) -> Result<FirstOrderSystem, NoModes> {
+) -> Result<FirstOrderSystem, ModesError> {
     let bodies = &point.machine.bodies;
     let spin = SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(0.0));
     let mut matrices = model.matrices(bodies, &spin);
@@ -350,7 +352,7 @@ fn first_order(
             for q in HINGE {
                 matrices.mass[q][q] += inertia;
             }
-            let torque_per_speed = (1.0 + BACKWARD_SHARE) * speed_rad_per_s * inertia;
+            let torque_per_speed = (1.0 + BACKWARD_WHIRL_RATIO) * speed_rad_per_s * inertia;
             let [hinge_yaw, hinge_pitch] = HINGE;
             matrices.damping[hinge_yaw][hinge_pitch] -= torque_per_speed;
             matrices.damping[hinge_pitch][hinge_yaw] += torque_per_speed;
@@ -360,14 +362,14 @@ fn first_order(
         Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j])
     };
     let mass = to_matrix(&matrices.mass);
-    let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;
+    let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| ModesError::Mass)?;
     let stiffness = factors.solve(to_matrix(&matrices.stiffness));
     let damping = factors.solve(to_matrix(&matrices.damping));
     let largest = (0..COORDINATES)
         .flat_map(|i| (0..COORDINATES).map(move |j| (i, j)))
-        .fold(0.0_f64, |largest, at| largest.max(stiffness[at].abs()));
+        .fold(0.0_f64, |largest, entry| largest.max(stiffness[entry].abs()));
     if !largest.is_finite() {
-        return Err(NoModes::Eigenvalues);
+        return Err(ModesError::Eigenvalues);
     }
     let unit_per_s = largest.sqrt().max(1.0);
     let matrix = Mat::from_fn(STATES, STATES, |i, j| {

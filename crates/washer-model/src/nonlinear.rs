@@ -3,7 +3,8 @@
 //! Kane's equations are evaluated as recursive Newton-Euler in the frames in which vectors are
 //! sparse. Frame A has the shaft's yaw q7 and pitch q8, but not its spin. Frame S (the shaft's) is
 //! A turned by the spin theta, frame E (the hinge's) is S turned by q9, and frame D (the drum's) is
-//! E turned by q10. Names end in `_a`, `_s` or `_e` where the frame is not clear.
+//! E turned by q10. Names of vectors end in `_a`, `_s` or `_e`, the frame of their components,
+//! where several frames occur.
 
 pub(crate) mod coefficients;
 pub(crate) mod coupling;
@@ -52,14 +53,14 @@ pub(crate) fn coupled_halves<T: Lane>(
 ) -> Halves<T> {
     let mut tub = assemble_tub(machine, q, u);
     let mut rotor = assemble_rotor_in_lanes(&machine.bodies, spin, q, u);
-    let on_shaft = Deflection::new(q, &tub.tilt, &rotor.tilt).load_on_shaft(&machine.bodies);
-    tub.floating.apply(&on_shaft.reaction());
-    rotor.floating.apply(&on_shaft);
+    let shaft_load = Deflection::new(q, &tub.tilt, &rotor.tilt).load_on_shaft(&machine.bodies);
+    tub.floating.apply(&shaft_load.reaction());
+    rotor.floating.apply(&shaft_load);
     Halves { tub, rotor }
 }
 
-/// Computes the accelerations du/dt of all ten coordinates. `sag` is the machine's sag at the
-/// equilibrium.
+/// Computes the accelerations du/dt of all ten coordinates. `sag` holds the deflections of bearings
+/// and hinge at the equilibrium.
 #[inline(always)]
 pub(crate) fn accelerations<T: Lane>(
     machine: &Coefficients<T>,
@@ -97,27 +98,28 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     let speed = spin.speed;
     let mut unloaded_accelerations = [speed; COORDINATES];
     let mut per_load = [[speed; COORDINATES]; 4];
-    // The first pass of the loop has no load, so that the code for both cases is compiled once.
-    for load_number in 0..=TUB.len() {
+    // The first pass of the loop has no load, so that the code with and without a load is compiled
+    // once.
+    for load_case in 0..=TUB.len() {
         let mut floating = tub.floating;
-        if load_number > 0 {
-            floating.add_unit_force(load_number - 1);
+        if load_case > 0 {
+            floating.add_unit_force(load_case - 1);
         }
         let tub = (&floating, &tub_factors);
         let rotor = (&rotor.floating, &rotor_factors);
         let accelerations =
             coupling.accelerations(bodies, speed, &deflection, &sag.bearings, tub, rotor);
-        if load_number == 0 {
+        if load_case == 0 {
             unloaded_accelerations = accelerations;
         } else {
-            per_load[load_number - 1] = subtract(accelerations, &unloaded_accelerations);
+            per_load[load_case - 1] = subtract(accelerations, &unloaded_accelerations);
         }
     }
     per_load
 }
 
-/// Computes both halves without the bearings' forces. If the hinge's mode is capped, they include
-/// its scaled mass.
+/// Computes both halves without the bearings' forces. If the hinge's modes are capped, the rotor
+/// includes the hinge's scaled mass.
 #[inline(always)]
 fn uncoupled_halves<T: Lane>(
     machine: &Coefficients<T>,
@@ -175,7 +177,7 @@ pub(crate) fn assemble_tub<T: Lane>(
     let arm_yaw_x = (centre * tilt.axis_c[2]).v();
     let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
     let arm_pitch = scale(centre, tilt.second_c);
-    let axis_drift = tilt.in_cabinet_axes(&motion.axis_acceleration);
+    let axis_drift = tilt.to_cabinet_axes(&motion.axis_acceleration);
     let drift = scale(centre, axis_drift);
 
     let axial = (b.tub_mass * drift[0]).v();
@@ -191,7 +193,7 @@ pub(crate) fn assemble_tub<T: Lane>(
     let zero = s.lit(0.0);
     Half {
         floating: FloatingChain {
-            per_mass: b.tub_per_mass,
+            inverse_mass: b.tub_inverse_mass,
             force: [force[0] - b.gravity * b.tub_mass, force[1]],
             drift: [drift[1], drift[2]],
             arm: [[zero, arm_yaw_z], [arm_pitch[1], arm_pitch[2]]],
@@ -212,8 +214,8 @@ pub(crate) fn assemble_tub<T: Lane>(
 
 /// Computes the equations of the shaft S and the drum D about their common mass centre.
 ///
-/// The vector l s1 + rho between the centres of S and D moves like the arm of a point of the
-/// reduced mass mu. The terms in mu rho^2 are part of the drum's inertia about the hinge
+/// The relative motion of the mass centres of S and D, along the vector l s1 + rho, has the reduced
+/// mass mu. The terms in mu rho^2 are part of the drum's inertia about the hinge
 /// (`Bodies::drum_i11` ...); those in mu l rho and mu l^2 appear below with `mu_l` and `mu_l2`.
 #[inline(always)]
 pub(crate) fn assemble_rotor_in_lanes<T: Lane>(
@@ -229,9 +231,9 @@ pub(crate) fn assemble_rotor_in_lanes<T: Lane>(
     assemble_rotor::<T, false>(b, spin, q, u)
 }
 
-/// The equations of the shaft S and the drum D with an unbalance outside the plane of d1 and d2.
-/// Coefficients of zero add zeros, so that no machine's bits depend on the machines in the other
-/// lanes.
+/// The equations of the shaft S and the drum D with an unbalance outside the plane of d1 and d2. A
+/// machine without such an unbalance adds zeros, so that its results do not depend on the machines
+/// in other lanes.
 struct SkewedRotor<'a, T> {
     b: &'a Bodies<T>,
     spin: &'a SpinState<T>,
@@ -307,8 +309,8 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         moment
     };
 
-    // Inertia moment of shaft and drum together, in axes A. The shaft's and the drum's are added in
-    // axes S.
+    // Inertia moment of shaft and drum together, in axes A. The moments of shaft and drum are added
+    // in axes S.
     let shaft_moment = {
         let [x, y, z] = omega_s;
         [
@@ -327,36 +329,40 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         moment[2] + (b.mu_l * rho_acceleration_a[1] + b.mu_l2 * axis_acceleration[1]),
     ];
 
-    // The common mass centre w = along_shaft s1 + drum_share rho: its position from the bearing
-    // midpoint, its partial velocities (`arm`), and its acceleration for constant speeds (`drift`),
-    // all in cabinet axes.
+    // The common mass centre w = shaft_centre_offset s1 + drum_mass_share rho: its position from
+    // the bearing midpoint, its partial velocities (`arm`), and its acceleration for constant
+    // speeds (`drift`), all in cabinet axes.
     let mut rho_s = [(c9 * rho[0]).v(), rho[1], -(s9 * rho[0]).v()];
     if SKEWED {
         rho_s[0] += s9 * b.rho_3;
         rho_s[2] += c9 * b.rho_3;
     }
     let rho_a = from_shaft_axes(spin, &rho_s);
-    let w = tilt.in_cabinet_axes(&[
-        b.along_shaft + b.drum_share * rho_a[0],
-        (b.drum_share * rho_a[1]).v(),
-        (b.drum_share * rho_a[2]).v(),
+    let w = tilt.to_cabinet_axes(&[
+        b.shaft_centre_offset + b.drum_mass_share * rho_a[0],
+        (b.drum_mass_share * rho_a[1]).v(),
+        (b.drum_mass_share * rho_a[2]).v(),
     ]);
-    let drift =
-        linear_combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a);
-    let drift = tilt.in_cabinet_axes(&drift);
+    let drift = linear_combination(
+        b.shaft_centre_offset,
+        axis_acceleration,
+        b.drum_mass_share,
+        &rho_acceleration_a,
+    );
+    let drift = tilt.to_cabinet_axes(&drift);
     let mut arm_9 = {
-        let offset = -(b.drum_share * rho[0]).v();
+        let offset = -(b.drum_mass_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
-        scale(offset, tilt.in_cabinet_axes(&d3_a))
+        scale(offset, tilt.to_cabinet_axes(&d3_a))
     };
     if SKEWED {
-        let offset = (b.drum_share * b.rho_3).v();
+        let offset = (b.drum_mass_share * b.rho_3).v();
         let e1_a = [c9, (spin.sin * s9).v(), -(spin.cos * s9).v()];
-        arm_9 = add(arm_9, &scale(offset, tilt.in_cabinet_axes(&e1_a)));
+        arm_9 = add(arm_9, &scale(offset, tilt.to_cabinet_axes(&e1_a)));
     }
     let arm_10 = {
-        let [x, y] = [-(b.drum_share * rho[1]).v(), (b.drum_share * rho[0]).v()];
-        tilt.in_cabinet_axes(&from_shaft_axes(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
+        let [x, y] = [-(b.drum_mass_share * rho[1]).v(), (b.drum_mass_share * rho[0]).v()];
+        tilt.to_cabinet_axes(&from_shaft_axes(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
     };
     let zero = s9.lit(0.0);
     let arm_7_z = -w[0];
@@ -365,15 +371,15 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     let axial_arm = [w[2], -(tilt.cos_yaw * w[1]).v(), arm_9[0], arm_10[0]];
 
     // Generalised forces less inertia forces.
-    let [about_9, about_10] = flexure_moments(b.flexure_stiffness, (s9, c9), (s10, c10));
-    let about_centre = [
+    let [flexure_9, flexure_10] = flexure_moments(b.flexure_stiffness, (s9, c9), (s10, c10));
+    let torque = [
         -(tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]),
         -moment[2],
-        -(about_9 + drum_moment_e[1]),
-        -(about_10 + drum_moment_e[2]),
+        -(flexure_9 + drum_moment_e[1]),
+        -(flexure_10 + drum_moment_e[2]),
     ];
     let axial = (b.rotor_mass * drift[0]).v();
-    let axis_drift = tilt.in_cabinet_axes(axis_acceleration);
+    let axis_drift = tilt.to_cabinet_axes(axis_acceleration);
 
     let mut inertia = rotor_inertia::<T, SKEWED>(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {
@@ -384,13 +390,13 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     }
     Half {
         floating: FloatingChain {
-            per_mass: b.rotor_per_mass,
+            inverse_mass: b.rotor_inverse_mass,
             force: [-(b.gravity * b.rotor_mass).v(), zero],
             drift: [drift[1], drift[2]],
             arm,
             axis: tilt.axis_partials(),
             axis_drift: [axis_drift[1], axis_drift[2]],
-            torque: subtract(about_centre, &scale(axial, axial_arm)),
+            torque: subtract(torque, &scale(axial, axial_arm)),
         },
         inertia,
         tilt,
@@ -418,7 +424,7 @@ fn drum_inertia_in_e<T: Real, const SKEWED: bool>(
     let ss = (s10 * s10).v();
     let cs = (c10 * s10).v();
     // k11 = c^2 i11 - 2 c s i12 + s^2 i22; k22 follows from the trace.
-    let turned = difference * ss + 2.0 * (cs * b.drum_i12).v();
+    let rotation_term = difference * ss + 2.0 * (cs * b.drum_i12).v();
     let [mut k13, mut k23] = [b.drum_i13; 2];
     if SKEWED {
         k13 = c10 * b.drum_i13 - s10 * b.drum_i23;
@@ -427,8 +433,8 @@ fn drum_inertia_in_e<T: Real, const SKEWED: bool>(
     DrumInertia {
         k13,
         k23,
-        k11: b.drum_i11 - turned,
-        k22: b.drum_i22 + turned,
+        k11: b.drum_i11 - rotation_term,
+        k22: b.drum_i22 + rotation_term,
         k33: b.drum_i33,
         k12: cs * difference + b.drum_i12 * (1.0 - 2.0 * ss),
     }
@@ -480,17 +486,17 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
     if SKEWED {
         l12 += s9 * k.k23;
         l23 += c9 * k.k23;
-        let turned = (2.0 * (c9 * s9).v()).v();
-        l11 += turned * k.k13;
-        l33 -= turned * k.k13;
+        let rotation_term = (2.0 * (c9 * s9).v()).v();
+        l11 += rotation_term * k.k13;
+        l33 -= rotation_term * k.k13;
     }
     let mu_rho = scale(b.mu_l, *rho_s);
 
     // The matrix J: the whole rotor's inertia in axes S; then its entries in axes A (suffix `_a`).
-    let across = 2.0 * mu_rho[0] + b.mu_l2;
+    let transverse = 2.0 * mu_rho[0] + b.mu_l2;
     let j11 = l11 + b.shaft_i11;
-    let j22 = k.k22 + b.shaft_i22 + across;
-    let j33 = l33 + b.shaft_i33 + across;
+    let j22 = k.k22 + b.shaft_i22 + transverse;
+    let j33 = l33 + b.shaft_i33 + transverse;
     let mut l13 = (c9 * s9) * difference - mu_rho[2];
     if SKEWED {
         l13 += (1.0 - 2.0 * ss) * k.k13;
@@ -498,9 +504,9 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
     let [_, j12, j13] = from_shaft_axes(spin, &[j11, l12 - mu_rho[1], l13]);
     let half_sum = (0.5 * (j22 + j33)).v();
     let half_difference = (0.5 * (j22 - j33)).v();
-    let turned = half_difference * spin.cos_2 - l23 * spin.sin_2;
-    let j22_a = half_sum + turned;
-    let j33_a = half_sum - turned;
+    let rotation_term = half_difference * spin.cos_2 - l23 * spin.sin_2;
+    let j22_a = half_sum + rotation_term;
+    let j33_a = half_sum - rotation_term;
     let j23_a = half_difference * spin.sin_2 + l23 * spin.cos_2;
 
     // The angular momentum per unit speed of q9 and q10.

@@ -1,4 +1,5 @@
-//! A prepared grid point: everything that is computed once, before its trajectories start.
+//! A prepared point: the quantities that are computed once, before the point's trajectories are
+//! integrated.
 
 pub(crate) mod friction;
 pub(crate) mod ringing;
@@ -9,11 +10,11 @@ use crate::lanes::InLanes as _;
 use crate::linear::outputs::{LinearOutputs, LineariseOutputs};
 use crate::linear::{LinearPoint, Linearise, tub_tangents};
 use crate::machine::feet::Feet;
-use crate::machine::spin::{SpinState, SpinStretch, stretch_at};
+use crate::machine::spin::{SpinSegment, SpinState, segment_index};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates};
-use crate::point::ringing::{Ringing, jumps_rad_per_s2};
+use crate::point::ringing::{Ringing, jump_sum_rad_per_s2};
 use crate::{
     COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing, UnresolvedModes,
 };
@@ -34,8 +35,9 @@ pub struct Timing {
 
 /// The initial distance of a perturbed run from its original (m, rad).
 ///
-/// Basis: far above rounding, and so small that the separation of a chaotic motion grows by twenty
-/// factors of e before it is as large as the motion. Doubling it reduces these by less than one.
+/// Basis: far above rounding, and so small that the separation of a chaotic motion grows by a
+/// factor of e twenty times before it is as large as the motion. Doubling it reduces this number by
+/// less than one.
 const PERTURBATION: f64 = 1e-10;
 
 /// The machine has no static equilibrium, or none that is stable.
@@ -74,7 +76,7 @@ pub struct Point {
     /// The linear model with the steepest tangents of all elements, which limits explicit steps;
     /// `None` if these are the tangents at equilibrium.
     pub(crate) steepest_model: Option<Box<LinearPoint>>,
-    pub(crate) stretches: Arc<[SpinStretch]>,
+    pub(crate) spin_segments: Arc<[SpinSegment]>,
     pub(crate) segments: Arc<[PlannedSegment]>,
     pub(crate) ringing: Ringing,
     /// The initial deviation of every coordinate of the nonlinear model from equilibrium (m, rad).
@@ -92,12 +94,12 @@ pub struct Point {
 pub(crate) struct PlannedSegment {
     pub(crate) start_s: f64,
     pub(crate) end_s: f64,
-    /// The index of the stretch of the spin.
-    pub(crate) stretch: usize,
+    /// The index of the spin segment.
+    pub(crate) spin_segment: usize,
     /// Whether the segment is within the window.
     pub(crate) in_window: bool,
     /// The greatest speed of the drum up to the end of the segment (rad/s).
-    pub(crate) fastest_rad_per_s: f64,
+    pub(crate) max_speed_rad_per_s: f64,
 }
 
 impl Point {
@@ -107,8 +109,8 @@ impl Point {
     }
 
     /// Returns the sag of the tub's mass centre (m), from its position in the machine file to the
-    /// static equilibrium. In the machine file springs carry no load, unless they have free
-    /// lengths.
+    /// static equilibrium. At the positions of the machine file springs carry no load, unless they
+    /// have free lengths.
     pub fn static_sag_m(&self) -> f64 {
         let (sin_pitch, _) = N(self.equilibrium[TUB_PITCH]).sin_cos();
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
@@ -147,11 +149,11 @@ impl Point {
     /// Returns the edges of the window (s).
     pub fn window_s(&self) -> [f64; 2] {
         let window_segments = || self.segments.iter().filter(|segment| segment.in_window);
-        let from = window_segments().next().map_or(0.0, |segment| segment.start_s);
-        [from, window_segments().next_back().map_or(from, |segment| segment.end_s)]
+        let start_s = window_segments().next().map_or(0.0, |segment| segment.start_s);
+        [start_s, window_segments().next_back().map_or(start_s, |segment| segment.end_s)]
     }
 
-    /// Returns the speed amplitudes at which the linear model takes the friction of dampers.
+    /// Returns the speed amplitudes at which the linear model linearises the friction of dampers.
     pub fn friction_speeds(&self) -> &[FrictionSpeed] {
         &self.friction_speeds
     }
@@ -159,25 +161,29 @@ impl Point {
     /// Returns the greatest factor between the speed amplitude of a damper's friction and the
     /// damper's greatest speed (m/s, for all dampers) in a motion of this model; `None` if no
     /// friction is compared. A speed amplitude that was found from the linear motion agrees with
-    /// that motion by definition. So the nonlinear motion is compared only with amplitudes that the
-    /// user gave.
+    /// that motion by definition. Therefore the nonlinear motion is compared only with amplitudes
+    /// that the user gave.
     pub fn friction_speed_factor(&self, model: ModelKind, speeds_m_per_s: &[f64]) -> Option<f64> {
-        let is_compared =
-            |assumed: &&FrictionSpeed| model == ModelKind::Linear || !assumed.is_from_motion;
-        let factor = |assumed: &FrictionSpeed| {
-            let speed = speeds_m_per_s.get(assumed.damper)?.max(assumed.viscous_limit_m_per_s);
-            let quotient = assumed.speed_m_per_s.max(assumed.viscous_limit_m_per_s) / speed;
+        let is_compared = |friction_speed: &&FrictionSpeed| {
+            model == ModelKind::Linear || !friction_speed.is_from_motion
+        };
+        let factor = |friction_speed: &FrictionSpeed| {
+            let speed = speeds_m_per_s
+                .get(friction_speed.damper)?
+                .max(friction_speed.viscous_limit_m_per_s);
+            let quotient =
+                friction_speed.speed_m_per_s.max(friction_speed.viscous_limit_m_per_s) / speed;
             Some(quotient.max(1.0 / quotient))
         };
         self.friction_speeds.iter().filter(is_compared).filter_map(factor).reduce(f64::max)
     }
 
-    /// Returns the point with other speed amplitudes (m/s) for the dampers that have their own, in
-    /// the order of these dampers.
-    pub(crate) fn with_own_friction_speeds(&self, speeds_m_per_s: &[f64]) -> Self {
-        let mut own_speeds = speeds_m_per_s.iter().copied();
+    /// Returns the point with other speed amplitudes (m/s) for the dampers whose amplitudes follow
+    /// from the motion, in the order of these dampers.
+    pub(crate) fn with_motion_friction_speeds(&self, speeds_m_per_s: &[f64]) -> Self {
+        let mut speeds = speeds_m_per_s.iter().copied();
         self.with_friction_speeds(
-            |assumed| if assumed.is_from_motion { own_speeds.next() } else { None },
+            |friction_speed| if friction_speed.is_from_motion { speeds.next() } else { None },
         )
     }
 
@@ -193,15 +199,15 @@ impl Point {
         mut new_speed: impl FnMut(&FrictionSpeed) -> Option<f64>,
     ) -> Self {
         let mut point = self.clone();
-        for assumed in &mut point.friction_speeds {
-            if let Some(speed_m_per_s) = new_speed(assumed) {
-                assumed.speed_m_per_s = speed_m_per_s;
-                point.machine.elements.linearise_friction(assumed.damper, speed_m_per_s);
+        for friction_speed in &mut point.friction_speeds {
+            if let Some(speed_m_per_s) = new_speed(friction_speed) {
+                friction_speed.speed_m_per_s = speed_m_per_s;
+                point.machine.elements.linearise_friction(friction_speed.damper, speed_m_per_s);
             }
         }
         let tangents =
             tub_tangents(&point.machine.with_viscous_friction(), &self.equilibrium.map(N));
-        point.linear = point.linear.with_tub(tangents);
+        point.linear = point.linear.with_tub_tangents(tangents);
         point
     }
 
@@ -246,7 +252,7 @@ impl Kernel for PreparationKernel<'_> {
         for group in self.points.chunks(T::LANES) {
             let mut machines: Vec<_> =
                 group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
-            let lanes = in_lanes(zero, &machines);
+            let lanes = copy_to_lanes(zero, &machines);
             let (q, solved) =
                 zero.0.run_out_of_line(equilibrium::SolveEquilibrium { zero, machine: &lanes });
             for (lane, machine) in machines.iter_mut().enumerate() {
@@ -255,14 +261,16 @@ impl Kernel for PreparationKernel<'_> {
             let steepest = steepest_tangents(&machines, &q);
             let viscous: Vec<_> =
                 machines.iter().map(Coefficients::with_viscous_friction).collect();
-            let linear =
-                zero.0.run_out_of_line(Linearise { machine: &in_lanes(zero, &viscous), q: &q });
+            let linear = zero
+                .0
+                .run_out_of_line(Linearise { machine: &copy_to_lanes(zero, &viscous), q: &q });
             let linear_outputs =
                 zero.0.run_out_of_line(LineariseOutputs { bodies: &lanes.bodies, q: &q });
             let zeros = [zero; COORDINATES];
             let at_rest = MovingCoordinates { q, u: zeros, a: zeros };
             let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
-            let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
+            let rest_channels =
+                Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
             let models = zip(zip(machines, linear), zip(linear_outputs, steepest));
             let inputs = zip(group, planned_spins.by_ref());
             for (lane, (model, ((machine, _), planned_spin))) in zip(models, inputs).enumerate() {
@@ -273,24 +281,25 @@ impl Kernel for PreparationKernel<'_> {
                     continue;
                 }
                 let ((coefficients, linear), (linear_outputs, steepest)) = model;
-                let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
+                let steepest =
+                    steepest.map(|tangents| Box::new(linear.with_tub_tangents(tangents)));
                 let matrices_at = |angle_rad: f64, acceleration_rad_per_s2: f64| {
                     let spin =
                         SpinState::new(N(angle_rad).sin_cos(), N(0.0), N(acceleration_rad_per_s2));
                     linear.matrices(&coefficients.bodies, &spin)
                 };
                 prepared.push(Ok(Point {
-                    ringing: Ringing::new(machine, planned_spin.jumps_rad_per_s2, matrices_at),
+                    ringing: Ringing::new(machine, planned_spin.jump_sum_rad_per_s2, matrices_at),
                     perturbation: 0.0,
                     instants_s: [].into(),
                     machine: coefficients,
                     equilibrium: q.map(|q| q.0.get(lane)),
-                    channels_at_rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
+                    channels_at_rest: core::array::from_fn(|i| rest_channels[i].value.0.get(lane)),
                     linear,
                     linear_outputs,
-                    friction_speeds: FrictionSpeed::all(machine),
+                    friction_speeds: FrictionSpeed::for_dampers(machine),
                     steepest_model: steepest,
-                    stretches: planned_spin.stretches,
+                    spin_segments: planned_spin.spin_segments,
                     segments: planned_spin.segments,
                     weight_n: machine.weight_n(),
                     feet: Feet::new(machine),
@@ -301,9 +310,9 @@ impl Kernel for PreparationKernel<'_> {
     }
 }
 
-/// Copies machines into lanes, and the first one also into lanes without a machine.
+/// Copies machines into lanes, and the first machine also into the remaining lanes.
 #[inline(always)]
-fn in_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coefficients<T> {
+fn copy_to_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coefficients<T> {
     let mut lanes = Coefficients::splat(zero, &machines[0]);
     for (lane, machine) in machines.iter().enumerate() {
         lanes.set_lane(lane, machine);
@@ -328,52 +337,52 @@ fn steepest_tangents<T: Lane>(
 /// The spin of a trajectory, and the segments of the run.
 #[derive(Clone)]
 struct PlannedSpin {
-    stretches: Arc<[SpinStretch]>,
+    spin_segments: Arc<[SpinSegment]>,
     segments: Arc<[PlannedSegment]>,
     /// The sum of all jumps of the drum's acceleration.
-    jumps_rad_per_s2: f64,
+    jump_sum_rad_per_s2: f64,
 }
 
-/// Computes the course of each point's spin. Consecutive points with the same spin share a course,
-/// because a table may have thousands of rows.
+/// Plans the spin of each point. Consecutive points with the same spin share a plan, because a
+/// table may have thousands of rows.
 fn plan_spins(points: &[(Machine, Spin)], timing: &Timing) -> Vec<PlannedSpin> {
     let mut planned_spins: Vec<PlannedSpin> = Vec::with_capacity(points.len());
     for (k, (_, spin)) in points.iter().enumerate() {
         let same_spin =
             if k > 0 && points[k - 1].1 == *spin { planned_spins.last().cloned() } else { None };
         planned_spins.push(same_spin.unwrap_or_else(|| {
-            let stretches = spin.stretches();
-            let jumps_rad_per_s2 = jumps_rad_per_s2(&stretches, timing.end_s);
-            let segments = segments(&stretches, timing).into();
-            PlannedSpin { segments, jumps_rad_per_s2, stretches: stretches.into() }
+            let spin_segments = spin.segments();
+            let jump_sum_rad_per_s2 = jump_sum_rad_per_s2(&spin_segments, timing.end_s);
+            let segments = segments(&spin_segments, timing).into();
+            PlannedSpin { segments, jump_sum_rad_per_s2, spin_segments: spin_segments.into() }
         }));
     }
     planned_spins
 }
 
 /// Divides the run into segments at every kink of the spin, edge of the window and checkpoint.
-pub(crate) fn segments(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedSegment> {
+pub(crate) fn segments(spin_segments: &[SpinSegment], timing: &Timing) -> Vec<PlannedSegment> {
     let [from, to] = timing.window_s;
-    let kinks = stretches.iter().map(|s| s.start_s.0).chain([0.0, from, to, timing.end_s]);
+    let kinks = spin_segments.iter().map(|s| s.start_s.0).chain([0.0, from, to, timing.end_s]);
     let parts = f64::from(timing.checkpoints);
     let kinks = kinks.chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / parts)));
     let mut times: Vec<f64> = kinks.filter(|t| (0.0..=timing.end_s).contains(t)).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
-    let mut fastest_rad_per_s = 0.0_f64;
+    let mut max_speed_rad_per_s = 0.0_f64;
     times
         .windows(2)
         .map(|pair| {
             let start_s = pair[0];
             let end_s = pair[1];
-            let stretch = stretch_at(stretches, start_s);
-            // The speed is monotonic within a stretch.
+            let spin_segment = segment_index(spin_segments, start_s);
+            // The speed is monotonic within a spin segment.
             for time_s in [start_s, end_s] {
-                fastest_rad_per_s =
-                    fastest_rad_per_s.max(stretches[stretch].speed_rad_per_s(time_s).abs());
+                max_speed_rad_per_s = max_speed_rad_per_s
+                    .max(spin_segments[spin_segment].speed_rad_per_s(time_s).abs());
             }
             let in_window = from <= start_s && end_s <= to;
-            PlannedSegment { start_s, end_s, stretch, in_window, fastest_rad_per_s }
+            PlannedSegment { start_s, end_s, spin_segment, in_window, max_speed_rad_per_s }
         })
         .collect()
 }

@@ -2,14 +2,14 @@
 //! not give them: each damper has the amplitude of its own linear motion.
 //!
 //! Speed amplitudes and motion depend on each other, which is a fixed-point problem. At a resonance
-//! that a force drives against the dampings c and 4 F / (pi V), the reciprocal of the speed is
-//! linear in that of V. The unknowns are therefore reciprocals. Broyden's method (Math. Comp. 19,
-//! 1965) mostly finds the fixed point with three or four linear runs.
+//! with the dampings c and 4 F / (pi V), the reciprocal of the motion's speed is linear in the
+//! reciprocal of V. The unknowns are therefore reciprocals. Broyden's method (Math. Comp. 19, 1965)
+//! mostly finds the fixed point with three or four linear runs.
 //!
-//! Friction at speeds below 4 v_s / pi is viscous by its force law, with F / v_s. That is the least
-//! speed amplitude, which a damper has that the drum cannot move against its friction.
+//! Friction at speeds below 4 v_s / pi is viscous by its force law, with the damping F / v_s. This
+//! speed is the least amplitude; a damper that sticks has it.
 
-use crate::modes::fastest_rigid_rad_per_s;
+use crate::modes::highest_rigid_frequency_rad_per_s;
 use crate::point::{self, segments};
 use crate::steps::round_down_to_bits;
 use crate::{
@@ -20,8 +20,8 @@ use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 
 /// The relative tolerance of a speed amplitude: of the residual, and of the step to the fixed
-/// point, which near a resonance is many times as long. Basis: the equivalent damping is as
-/// accurate, and its idealisation is coarser. Doubling it saves less than a run.
+/// point, which near a resonance is many times as long. Basis: the error of the equivalent damping
+/// is then below that of its idealisation. Doubling it saves less than a run.
 const SPEED_TOLERANCE: f64 = 5e-3;
 
 /// The greatest number of linear runs. Basis: three or four are usual, and 38 were needed between
@@ -34,8 +34,9 @@ pub(crate) const MAX_RUNS: usize = 48;
 const FIRST_STEP_PHASE_RAD: f64 = 0.4;
 
 /// The step of the last runs, as a share of that of the first. Basis: it gives speeds within a
-/// thousandth, which a resonance with little viscous damping may make a percent of the fixed point,
-/// as in test `own_speeds_near_a_resonance_are_a_fixed_point`. Doubling it makes that four percent.
+/// thousandth, which a resonance with little viscous damping may amplify to a percent of the fixed
+/// point, as in test `own_speeds_near_a_resonance_are_a_fixed_point`. Doubling it makes the error
+/// four percent.
 const FINE_STEP_SHARE: f64 = 0.25;
 
 /// The factor of the step after an unstable run. Basis: a compromise between failed runs and
@@ -59,7 +60,7 @@ pub(crate) struct SpeedAmplitudeSearch {
     /// The reciprocals of the speeds (s/m).
     reciprocals: Vec<f64>,
     /// The greatest reciprocals (s/m).
-    maxima: Vec<f64>,
+    max_reciprocals: Vec<f64>,
     /// The reciprocals of the previous iteration, and their residuals.
     previous: Option<[Vec<f64>; 2]>,
     /// The inverse of the residuals' Jacobian, by rows.
@@ -69,13 +70,13 @@ pub(crate) struct SpeedAmplitudeSearch {
 impl SpeedAmplitudeSearch {
     /// Starts a search at the point's speeds; `None` if all are given.
     pub(crate) fn new(point: &Point) -> Option<Self> {
-        let own_dampers: Vec<_> = point
+        let motion_dampers: Vec<_> = point
             .friction_speeds
             .iter()
             .filter(|friction_speed| friction_speed.is_from_motion)
             .collect();
-        let damper_count = own_dampers.len();
-        let maxima: Vec<f64> = own_dampers
+        let damper_count = motion_dampers.len();
+        let max_reciprocals: Vec<f64> = motion_dampers
             .iter()
             .map(|friction_speed| 1.0 / friction_speed.viscous_limit_m_per_s)
             .collect();
@@ -83,18 +84,24 @@ impl SpeedAmplitudeSearch {
             max.min(1.0 / friction_speed.speed_m_per_s)
         };
         (damper_count > 0).then(|| Self {
-            reciprocals: own_dampers.iter().zip(&maxima).map(first_reciprocal).collect(),
+            reciprocals: motion_dampers
+                .iter()
+                .zip(&max_reciprocals)
+                .map(first_reciprocal)
+                .collect(),
             previous: None,
             inverse_jacobian: (0..damper_count)
                 .map(|i| (0..damper_count).map(|j| if i == j { -1.0 } else { 0.0 }).collect())
                 .collect(),
-            maxima,
+            max_reciprocals,
         })
     }
 
-    /// Starts a search at the least speeds, so that it does not depend on the point's own speeds.
+    /// Starts a search at the least speeds, so that the result does not depend on the point's
+    /// current speeds.
     pub(crate) fn from_min_speeds(point: &Point) -> Option<Self> {
-        Self::new(point).map(|search| Self { reciprocals: search.maxima.clone(), ..search })
+        Self::new(point)
+            .map(|search| Self { reciprocals: search.max_reciprocals.clone(), ..search })
     }
 
     /// Returns the speed amplitudes at which the friction of the next run is linearised (m/s).
@@ -105,7 +112,7 @@ impl SpeedAmplitudeSearch {
     /// Updates the speeds by the amplitudes (m/s) of the motion with friction at these speeds.
     /// Returns true if both agree, and then does not change the speeds.
     pub(crate) fn update(&mut self, motion_m_per_s: &[f64]) -> bool {
-        let amplitudes = motion_m_per_s.iter().zip(&self.maxima);
+        let amplitudes = motion_m_per_s.iter().zip(&self.max_reciprocals);
         let residuals: Vec<f64> = amplitudes
             .zip(&self.reciprocals)
             .map(|((speed, max), current)| (1.0 / speed).min(*max) - current)
@@ -160,7 +167,7 @@ impl SpeedAmplitudeSearch {
         follows_residuals: bool,
     ) -> f64 {
         let current = self.reciprocals[damper];
-        let max = self.maxima[damper];
+        let max = self.max_reciprocals[damper];
         let next = match (follows_residuals || step * residual > 0.0, residual > 0.0) {
             // The motion is slower than assumed, and slows down more than the assumed speed does,
             // and the speed of a fixed point would be negative: the damper sticks.
@@ -171,7 +178,7 @@ impl SpeedAmplitudeSearch {
         if next > 0.0 { next.min(max) } else { 0.5 * current }
     }
 
-    /// Discards the previous residuals, so that those of finer runs are not compared with them.
+    /// Discards the previous residuals, because those of runs with a finer step are not comparable.
     fn forget_previous(&mut self) {
         self.previous = None;
     }
@@ -185,15 +192,15 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Selects the speeds of the dampers whose amplitude is that of the motion.
-pub(crate) fn own_speeds(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
-    let own_dampers =
+/// Selects the speeds of the dampers whose speed amplitude follows from the motion.
+pub(crate) fn motion_speeds(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
+    let motion_dampers =
         point.friction_speeds.iter().filter(|friction_speed| friction_speed.is_from_motion);
-    own_dampers.map(|friction_speed| speeds_m_per_s[friction_speed.damper]).collect()
+    motion_dampers.map(|friction_speed| speeds_m_per_s[friction_speed.damper]).collect()
 }
 
-/// A point whose search is going on.
-struct OpenPoint {
+/// A point and the search for its speed amplitudes.
+struct PointSearch {
     /// The index among all points.
     index: usize,
     /// The point, with segments up to the window's end.
@@ -207,8 +214,8 @@ struct OpenPoint {
 }
 
 /// Prepares points on lanes: equilibrium, linear model, and the speed amplitudes of friction that
-/// the machine does not give, by runs up to the window's end. A point does not depend on the
-/// others.
+/// the machine does not give, by runs up to the window's end. The result of a point does not depend
+/// on the other points.
 ///
 /// # Errors
 /// [`NoEquilibrium`] for each point without one.
@@ -219,18 +226,21 @@ pub fn prepare(
 ) -> Vec<Result<Point, NoEquilibrium>> {
     let mut prepared = point::prepare(points, timing);
     let timing_to_window = Timing { end_s: timing.window_s[1], checkpoints: 0, ..*timing };
-    let to_open_point = |(index, point): (usize, &Result<Point, NoEquilibrium>)| {
+    let to_point_search = |(index, point): (usize, &Result<Point, NoEquilibrium>)| {
         let point = point.as_ref().ok()?;
         let search = SpeedAmplitudeSearch::new(point)?;
-        let segments = segments(&point.stretches, &timing_to_window).into();
-        let point = Point { segments, ..point.with_own_friction_speeds(&search.speeds_m_per_s()) };
-        let fastest_rad_per_s = fastest_rigid_rad_per_s(&point, &point.linear).ok()?;
+        let segments = segments(&point.spin_segments, &timing_to_window).into();
+        let point =
+            Point { segments, ..point.with_motion_friction_speeds(&search.speeds_m_per_s()) };
+        let highest_frequency_rad_per_s =
+            highest_rigid_frequency_rad_per_s(&point, &point.linear).ok()?;
         let step_s = round_down_to_bits(
-            FIRST_STEP_PHASE_RAD / fastest_rad_per_s.max(point.segments.last()?.fastest_rad_per_s),
+            FIRST_STEP_PHASE_RAD
+                / highest_frequency_rad_per_s.max(point.segments.last()?.max_speed_rad_per_s),
             STEP_BITS,
         );
         let min_step_s = MIN_STEP_SHARE * step_s;
-        Some(OpenPoint {
+        Some(PointSearch {
             index,
             point,
             search,
@@ -240,12 +250,12 @@ pub fn prepare(
             is_finished: false,
         })
     };
-    let mut open_points: Vec<OpenPoint> =
-        prepared.iter().enumerate().filter_map(to_open_point).collect();
+    let mut point_searches: Vec<PointSearch> =
+        prepared.iter().enumerate().filter_map(to_point_search).collect();
     let recorders = Recorders::gauge(Gauge::DamperSpeed);
     for _ in 0..MAX_RUNS {
-        let mut unfinished: Vec<&mut OpenPoint> =
-            open_points.iter_mut().filter(|open_point| !open_point.is_finished).collect();
+        let mut unfinished: Vec<&mut PointSearch> =
+            point_searches.iter_mut().filter(|point_search| !point_search.is_finished).collect();
         unfinished.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));
         // Points with equal steps run in one batch.
         for batch in unfinished.chunk_by_mut(|a, b| a.step_s == b.step_s) {
@@ -254,25 +264,25 @@ pub fn prepare(
             let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
             let method = Method::Capped { step_s, caps };
             let batch_points: Vec<&Point> =
-                batch.iter().map(|open_point| &open_point.point).collect();
+                batch.iter().map(|point_search| &point_search.point).collect();
             let simd = simd.narrowed(batch_points.len());
             let (_, readings) =
                 simulate_with(simd, ModelKind::Linear, &method, &batch_points, recorders);
-            for (open_point, reading) in batch.iter_mut().zip(readings) {
-                open_point.update(reading.gauge(Gauge::DamperSpeed));
+            for (point_search, reading) in batch.iter_mut().zip(readings) {
+                point_search.update(reading.gauge(Gauge::DamperSpeed));
             }
         }
     }
-    for OpenPoint { index, search, .. } in open_points {
+    for PointSearch { index, search, .. } in point_searches {
         if let Ok(point) = &mut prepared[index] {
-            *point = point.with_own_friction_speeds(&search.speeds_m_per_s());
+            *point = point.with_motion_friction_speeds(&search.speeds_m_per_s());
         }
     }
     prepared
 }
 
-impl OpenPoint {
-    /// Updates the search by the speeds (m/s) of all dampers in a run, which are none if it failed.
+impl PointSearch {
+    /// Updates the search by the speeds (m/s) of all dampers in a run; a failed run has no speeds.
     fn update(&mut self, speeds_m_per_s: &[f64]) {
         if speeds_m_per_s.is_empty() {
             // A hinge below its cap, or friction at a low speed, is too stiff for the step.
@@ -280,12 +290,12 @@ impl OpenPoint {
             self.is_finished = self.step_s < self.min_step_s;
             return;
         }
-        if self.search.update(&own_speeds(&self.point, speeds_m_per_s)) {
+        if self.search.update(&motion_speeds(&self.point, speeds_m_per_s)) {
             self.is_finished = self.has_fine_step;
             self.has_fine_step = true;
             self.step_s *= FINE_STEP_SHARE;
             self.search.forget_previous();
         }
-        self.point = self.point.with_own_friction_speeds(&self.search.speeds_m_per_s());
+        self.point = self.point.with_motion_friction_speeds(&self.search.speeds_m_per_s());
     }
 }

@@ -19,7 +19,7 @@ pub use snapshots::Snapshot;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::nonlinear::outputs::{RADIAL, squared_distance};
+use crate::nonlinear::outputs::{RADIAL_COMPONENTS, squared_distance};
 use crate::run::method::{
     LinearFamily, ModelFamily, NonlinearFamily, Stepper, StepperVisitor, coupling_for_method,
     start_segment,
@@ -77,9 +77,9 @@ pub fn simulate_with(
     simulate_until(simd, model, method, points, recorders, Cancel::Never).unwrap_or_default()
 }
 
-/// Integrates one model at every point, like [`simulate_with`]. Returns `None` if `stop` returned
-/// true before the end of all trajectories. It is called at least every
-/// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps.
+/// Integrates one model at every point, like [`simulate_with`]. Returns `None` if `cancel` is
+/// requested before the end of all trajectories, which is polled at least every
+/// [`CANCEL_POLL_STEPS`](lane_ode::CANCEL_POLL_STEPS) steps.
 pub fn simulate_until(
     simd: Simd,
     model: ModelKind,
@@ -146,7 +146,7 @@ struct LaneState {
     /// The index of the current segment.
     segment: usize,
     /// The steps up to the current segment.
-    count: StepCount,
+    step_count: StepCount,
 }
 
 /// The integration of every point by one model. A lane whose trajectory ends starts the next point.
@@ -167,7 +167,7 @@ struct SimulationTask<'a, T, M> {
     in_window: N<T>,
     records: Vec<Record>,
     active_recorders: Option<ActiveRecorders<T>>,
-    /// The coordinates at the ends of each point's segments; empty without that recorder.
+    /// The coordinates at the ends of each point's segments; empty if checkpoints are not recorded.
     checkpoints: Vec<Checkpoints>,
 }
 
@@ -183,16 +183,16 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
     fn next_segment(
         &mut self,
         lane: usize,
-        ended: SegmentEnd,
+        segment_end: SegmentEnd,
         x: &mut [N<T>; STATES],
     ) -> Option<Segment> {
         let state = &mut self.lanes[lane];
         let mut failure = None;
-        match ended {
+        match segment_end {
             SegmentEnd::Idle => return self.start_next_point(lane, x),
-            SegmentEnd::Completed(count) => state.count.add(count),
+            SegmentEnd::Completed(count) => state.step_count.add(count),
             SegmentEnd::Failed { reason, time_s, count } => {
-                state.count.add(count);
+                state.step_count.add(count);
                 failure = Some((reason, time_s));
             }
         }
@@ -206,7 +206,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
             return Some(self.start_segment(lane));
         }
         self.finished += 1;
-        let StepCount { accepted: steps, rejected } = state.count;
+        let StepCount { accepted: steps, rejected } = state.step_count;
         let record = &mut self.records[state.point];
         *record = Record { failure, steps, rejected, ..EMPTY_RECORD };
         if failure.is_none() {
@@ -251,8 +251,8 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
     }
 }
 
-/// A function that records the state at the start of a segment. It is called rarely, so that it is
-/// not inlined into the loop over steps.
+/// The recording of the state at the start of a segment. It is rare, so that it is not inlined into
+/// the loop over steps.
 struct RecordStart<'r, 'a, T: Lane, M: LaneModel<T>> {
     task: &'r mut SimulationTask<'a, T, M>,
     forcing: &'r M::Forcing,
@@ -278,19 +278,19 @@ impl<T: Lane, M: LaneModel<T>> OutOfLine for RecordStart<'_, '_, T, M> {
 
 /// Returns the mask that is true in every lane.
 #[inline(always)]
-pub(crate) fn all_lanes<T: Lane>(like: N<T>) -> T::Mask {
-    like.lit(0.0).0.less(like.lit(1.0).0)
+pub(crate) fn all_lanes<T: Lane>(any_value: N<T>) -> T::Mask {
+    any_value.lit(0.0).0.less(any_value.lit(1.0).0)
 }
 
 impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
-    /// Creates the task before any point has started. There is at least one point.
+    /// Creates the task before any point has started; `request` has at least one point.
     #[inline(always)]
     fn new(zero: N<T>, request: SimulationRequest<'a>, model: ModelKind) -> Self {
         let SimulationRequest { points, method, recorders, cancel } = request;
-        let parts = Substeps::for_method(method);
-        let reserved = |point: &&Point| Vec::with_capacity(point.segments.len());
+        let substeps = Substeps::for_method(method);
+        let with_capacity_for = |point: &&Point| Vec::with_capacity(point.segments.len());
         let checkpoints = match recorders.checkpoints {
-            true => points.iter().map(reserved).collect(),
+            true => points.iter().map(with_capacity_for).collect(),
             false => Vec::new(),
         };
         Self {
@@ -308,7 +308,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
             active_recorders: ActiveRecorders::new(
                 zero,
                 recorders,
-                (model, parts),
+                (model, substeps),
                 points[0],
                 points.len(),
             ),
@@ -331,13 +331,13 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         Some((self.records, readings))
     }
 
-    /// Passes a state with its outputs to the recorders in use.
+    /// Passes a state and its outputs to the recorders in use.
     #[inline(always)]
     fn record(
         &mut self,
         step: Option<(N<T>, N<T>)>,
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
-        radial: &[Sample<T>; RADIAL],
+        radial: &[Sample<T>; RADIAL_COMPONENTS],
         channels: &[Sample<T>; CHANNELS],
         lanes_in_window: T::Mask,
     ) {

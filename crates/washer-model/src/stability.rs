@@ -45,7 +45,8 @@ pub enum StabilityKind {
     Stable,
     /// A multiplier is below -1: the motion repeats every second turn.
     PeriodDoubling,
-    /// A complex pair is outside of the unit circle: two frequencies that no turn locks.
+    /// A complex pair is outside of the unit circle: the motion has a second frequency, which is
+    /// not locked to the drum's.
     QuasiPeriodic,
     /// A multiplier is above 1: the response jumps to another.
     Fold,
@@ -73,7 +74,7 @@ impl StabilityKind {
 pub struct Response {
     /// The drum's speed (rpm).
     pub speed_rpm: f64,
-    /// Whether it is on the curve of responses that begins at a low speed.
+    /// Whether the response is on the curve of responses that begins at a low speed.
     pub is_on_curve: bool,
     /// The number of folds on the curve before the response: 0 is the branch of a machine that
     /// runs up. On a second curve, which comes down from a high speed if the first one is lost, the
@@ -94,8 +95,8 @@ pub struct Response {
     pub start: [f64; STATES],
     /// The Floquet multiplier of the nonlinear response, real and imaginary part (not negative):
     /// the largest of those that belong to motions of the suspension. Motions of the bearings are
-    /// left out, and so are those of the hinge while its modes are fast compared with the drum's
-    /// speed, because these modes are capped.
+    /// excluded, because their modes are capped; motions of the hinge are excluded if the hinge's
+    /// modes are capped, which they are while they are fast compared with the drum's speed.
     pub multiplier: [f64; 2],
     /// The modes that take part in the disturbance that grows fastest, the greatest share first;
     /// empty if no disturbance grows.
@@ -105,9 +106,9 @@ pub struct Response {
 /// A limit of the machine's geometry, beyond which the equations do not hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GeometryLimit {
-    /// A spring's end at the tub passes its hook.
+    /// The tub end of a spring passes the spring's hook at the cabinet.
     SpringHooks,
-    /// A damper's end at the tub passes its end at the cabinet.
+    /// The tub end of a damper passes the damper's cabinet end.
     DamperEnds,
     /// The drum touches the tub.
     Clearance,
@@ -171,7 +172,7 @@ impl Disturbance {
         self.speed_rpm - self.frequency_cpm()
     }
 
-    /// Returns the kind of stability of a response with this as its fastest growing disturbance.
+    /// Returns the kind of stability of a response whose fastest growing disturbance this is.
     #[must_use]
     pub fn kind(&self) -> StabilityKind {
         let [re, im] = self.multiplier;
@@ -239,7 +240,7 @@ pub enum ResponseError {
 /// eigenvalue depend on the processor. Doubling it keeps one binary digit more.
 const ROUNDING_PER_UNIT: f64 = (1_u64 << 36) as f64;
 
-/// Rounds a number to the digits that do not depend on the processor.
+/// Rounds a number to digits that do not depend on the processor.
 pub(crate) fn round_last_digits(value: f64) -> f64 {
     (value * ROUNDING_PER_UNIT).round_ties_even() / ROUNDING_PER_UNIT
 }

@@ -8,8 +8,8 @@
 pub(crate) mod formula;
 
 use crate::highest_frequency_rad_per_s;
-use crate::modes::{highest_with_caps, mode_roots};
-use crate::{Caps, Formula, Method, ModelKind, NoModes, Point, Spin};
+use crate::modes::{highest_capped_frequency_rad_per_s, mode_roots};
+use crate::{Caps, Formula, Method, ModelKind, ModesError, Point, Spin};
 use lane_ode::Cancel;
 
 /// The number of modes of the suspension: yaw, pitch and two translations.
@@ -20,19 +20,20 @@ pub(crate) const SUSPENSION_MODES: usize = 4;
 /// Derived: a drum whose speed is a third of the hinge's frequency f (more exactly (f + f_i) / 3,
 /// with a frequency f_i of the suspension), or a quarter, excites a whirl of the hinge. The whirl
 /// decays slowly, but the long steps of capped levels damp it. So the ratio is 4, and the rest
-/// allows for f_i. The whirl at a fifth is a tenth of that at a quarter. Doubling it leaves no
-/// capped modes above 470 rpm on the paper's machine.
-pub(crate) const HINGE_TO_DRUM: f64 = 4.2;
+/// allows for f_i. On the machine of `differential_test -- 9 313678833`, the whirl at a fifth is a
+/// tenth of that at a quarter. Doubling the ratio leaves no capped modes above 470 rpm on the
+/// paper's machine.
+pub(crate) const MIN_HINGE_SPEED_RATIO: f64 = 4.2;
 
-/// The product of step and cap, relative to [`Formula::limit`]. The reserve is for the hinge, whose
-/// modes are raised by a cap near them. Basis: `sweep check` finds the longest stable step with
-/// this value; with 0.84 caps are lower and errors larger, with 0.99 steps are shorter. Doubling it
-/// leaves no step stable.
-const CAP_SHARE: f64 = 0.85;
+/// The product of step and cap, relative to [`Formula::limit`]. The reserve allows for the hinge: a
+/// cap near its modes raises their frequencies. Basis: `sweep check` finds the longest stable step
+/// with this value; with 0.84 caps are lower and errors larger, with 0.99 steps are shorter.
+/// Doubling it leaves no step stable.
+const CAP_LIMIT_SHARE: f64 = 0.85;
 
 /// The number of bits of a step's fraction that are kept, which is 1e-6 of the step. Basis: the
 /// last digits of an eigenvalue depend on the processor and on the system's mathematical library,
-/// and a step must not. Doubling it keeps such digits.
+/// and steps must not depend on them. Doubling it keeps such digits.
 const STEP_BITS: u32 = 20;
 
 /// The number of bisections of the interval of the longest step. Basis: they find its logarithm to
@@ -41,7 +42,7 @@ const BISECTIONS: usize = 10;
 
 /// The machines of a run with the frequencies that bound their steps.
 pub struct StepSelector<'a> {
-    machines: Vec<Result<Frequencies<'a>, NoModes>>,
+    machines: Vec<Result<Frequencies<'a>, ModesError>>,
     cancel: Cancel<'a>,
 }
 
@@ -49,36 +50,41 @@ pub struct StepSelector<'a> {
 struct Frequencies<'a> {
     point: &'a Point,
     /// The greatest speed of the drum.
-    top_rad_per_s: f64,
-    /// The fastest mode of the suspension at rest.
+    max_speed_rad_per_s: f64,
+    /// The frequency of the fastest mode of the suspension at rest.
     suspension_rad_per_s: f64,
-    /// The slower mode of the hinge at rest.
+    /// The frequency of the slower mode of the hinge at rest.
     hinge_rad_per_s: f64,
-    /// The fastest of all modes, at rest and at the drum's greatest speed.
-    fastest_rad_per_s: f64,
+    /// The highest frequency of all modes, at rest and at the drum's greatest speed.
+    highest_frequency_rad_per_s: f64,
 }
 
 impl<'a> Frequencies<'a> {
-    fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, NoModes> {
-        let top_rad_per_s = spin.greatest_speed_rad_per_s(end_s);
+    fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, ModesError> {
+        let max_speed_rad_per_s = spin.greatest_speed_rad_per_s(end_s);
         let at_rest = mode_roots(point, 0.0, None)?;
-        let fastest_at_rest = highest_frequency_rad_per_s(point, 0.0)?;
-        let fastest_at_top = highest_frequency_rad_per_s(point, top_rad_per_s)?;
+        let highest_at_rest = highest_frequency_rad_per_s(point, 0.0)?;
+        let highest_at_speed = highest_frequency_rad_per_s(point, max_speed_rad_per_s)?;
         Ok(Self {
             point,
-            top_rad_per_s,
+            max_speed_rad_per_s,
             suspension_rad_per_s: at_rest[SUSPENSION_MODES - 1].magnitude_rad_per_s,
             hinge_rad_per_s: at_rest[SUSPENSION_MODES].magnitude_rad_per_s,
-            fastest_rad_per_s: fastest_at_rest.max(fastest_at_top),
+            highest_frequency_rad_per_s: highest_at_rest.max(highest_at_speed),
         })
     }
 
     /// Whether a step with capped modes is stable, at rest and at the drum's greatest speed.
-    fn is_stable(&self, model: ModelKind, step_s: f64) -> Result<bool, NoModes> {
+    fn is_stable(&self, model: ModelKind, step_s: f64) -> Result<bool, ModesError> {
         let caps = caps(model, step_s);
         let limit = Formula::for_model(model).limit();
-        for speed_rad_per_s in [self.top_rad_per_s, 0.0] {
-            let highest = highest_with_caps(self.point, model, speed_rad_per_s, Some(&caps))?;
+        for speed_rad_per_s in [self.max_speed_rad_per_s, 0.0] {
+            let highest = highest_capped_frequency_rad_per_s(
+                self.point,
+                model,
+                speed_rad_per_s,
+                Some(&caps),
+            )?;
             if step_s * highest > limit {
                 return Ok(false);
             }
@@ -89,11 +95,11 @@ impl<'a> Frequencies<'a> {
 
 /// Returns the bearings' cap for a step; the hinge has none.
 fn caps(model: ModelKind, step_s: f64) -> Caps {
-    let bearings_rad_per_s = CAP_SHARE * Formula::for_model(model).limit() / step_s;
+    let bearings_rad_per_s = CAP_LIMIT_SHARE * Formula::for_model(model).limit() / step_s;
     Caps { bearings_rad_per_s, hinge_rad_per_s: None }
 }
 
-/// Returns the method that integrates a model in these steps with capped bearing modes.
+/// Returns the method that integrates a model in steps of `step_s` with capped bearing modes.
 pub fn capped_method(model: ModelKind, step_s: f64) -> Method {
     Method::Capped { step_s, caps: caps(model, step_s) }
 }
@@ -119,10 +125,10 @@ impl<'a> StepSelector<'a> {
     }
 
     /// Returns the longest step (s) at which a formula is stable at all points without capped
-    /// modes; `None` if there are no points. Machines whose modes are unknown are left out.
+    /// modes; `None` if there are no points. Machines whose modes cannot be computed are skipped.
     pub fn plain_step_s(&self, formula: Formula) -> Option<f64> {
         let machines = self.machines.iter().flatten();
-        let steps = machines.map(|machine| formula.limit() / machine.fastest_rad_per_s);
+        let steps = machines.map(|machine| formula.limit() / machine.highest_frequency_rad_per_s);
         steps.reduce(f64::min).map(round_down_step)
     }
 
@@ -131,49 +137,49 @@ impl<'a> StepSelector<'a> {
         self.plain_step_s(Formula::for_model(model))
     }
 
-    /// Whether the forces of any machine have corners, as those of friction and stops. At corners
-    /// errors do not decrease with the step by the order of a formula.
-    pub fn are_nonsmooth(&self) -> bool {
+    /// Whether any machine has forces with corners, such as friction or stops. At corners errors do
+    /// not decrease with the step by the order of a formula.
+    pub fn has_nonsmooth_force(&self) -> bool {
         let mut machines = self.machines.iter().flatten();
-        machines.any(|machine| machine.point.machine.elements.are_nonsmooth())
+        machines.any(|machine| machine.point.machine.elements.has_nonsmooth_force())
     }
 
     /// Returns the longest stable step (s) of a model's formula with capped bearing modes, over all
     /// points; `None` if it is not longer than the uncapped one, or if the search was stopped.
     ///
     /// # Errors
-    /// [`NoModes`] of a machine that has none.
-    pub fn capped_step_s(&self, model: ModelKind) -> Result<Option<f64>, NoModes> {
+    /// [`ModesError`] of a machine that has none.
+    pub fn capped_step_s(&self, model: ModelKind) -> Result<Option<f64>, ModesError> {
         let Some(uncapped_s) = self.uncapped_step_s(model) else { return Ok(None) };
         let mut machines = Vec::with_capacity(self.machines.len());
         for machine in &self.machines {
             machines.push(machine.as_ref().map_err(|none| *none)?);
         }
         let is_whirling = |machine: &&Frequencies<'_>| {
-            machine.hinge_rad_per_s < HINGE_TO_DRUM * machine.top_rad_per_s
+            machine.hinge_rad_per_s < MIN_HINGE_SPEED_RATIO * machine.max_speed_rad_per_s
         };
         if machines.iter().any(is_whirling) {
             return Ok(None);
         }
-        let slowest = |fastest: f64, machine: &&Frequencies<'_>| {
-            fastest.max(machine.suspension_rad_per_s).max(machine.top_rad_per_s)
+        let fastest_resolved = |fastest: f64, machine: &&Frequencies<'_>| {
+            fastest.max(machine.suspension_rad_per_s).max(machine.max_speed_rad_per_s)
         };
-        let followed_rad_per_s = machines.iter().fold(0.0, slowest);
+        let resolved_rad_per_s = machines.iter().fold(0.0, fastest_resolved);
         let mut stable_s = uncapped_s;
-        let mut unstable_s = Formula::for_model(model).limit() / followed_rad_per_s;
+        let mut unstable_s = Formula::for_model(model).limit() / resolved_rad_per_s;
         for _ in 0..BISECTIONS {
-            let between_s = (stable_s * unstable_s).sqrt();
+            let midpoint_s = (stable_s * unstable_s).sqrt();
             let mut is_stable = true;
             for machine in &machines {
                 if self.cancel.is_requested() {
                     return Ok(None);
                 }
-                is_stable = is_stable && machine.is_stable(model, between_s)?;
+                is_stable = is_stable && machine.is_stable(model, midpoint_s)?;
             }
             if is_stable {
-                stable_s = between_s;
+                stable_s = midpoint_s;
             } else {
-                unstable_s = between_s;
+                unstable_s = midpoint_s;
             }
         }
         Ok((stable_s > uncapped_s).then(|| round_down_step(stable_s)))
@@ -181,12 +187,12 @@ impl<'a> StepSelector<'a> {
 }
 
 /// Rounds a positive number down to few digits. The last digits of an eigenvalue depend on the
-/// processor and on the system's mathematical library, and a result must not.
+/// processor and on the system's mathematical library; results must not depend on them.
 pub(crate) fn round_down_step(number: f64) -> f64 {
     round_down_to_bits(number, STEP_BITS)
 }
 
-/// Rounds a positive number down to `bits` binary digits behind the first.
+/// Rounds a positive number down to `bits` binary digits after the first.
 pub(crate) fn round_down_to_bits(number: f64, bits: u32) -> f64 {
     let dropped = f64::MANTISSA_DIGITS - 1 - bits;
     f64::from_bits(number.to_bits() >> dropped << dropped)

@@ -7,7 +7,7 @@
 //! e_k = 2 max(d_k, d_(k-1) / c)
 //! ```
 //!
-//! and the trajectory is done at the first level where e_k is at most the accuracy. The rule is
+//! The trajectory is done at the first level where e_k is at most the accuracy. The rule is
 //! Richardson's (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, II.4) without
 //! its extrapolation: the difference of two levels bounds the error of the finer one where the step
 //! shrinks by enough. The second term is for two levels that agree by chance: c is the contraction
@@ -30,9 +30,9 @@
 //! is within the accuracy.
 //!
 //! This file has all constants on which `error`, `converged` and `sensitive` depend, except the
-//! three of chaos (`separation.rs`), the shares of the limit of stability (`STABILITY_SHARE`,
-//! `CAP_SHARE` and `HINGE_TO_DRUM` beside [`StepSelector`]), the swing of a free body
-//! (`SWING_FACTOR`), and each metric's scale.
+//! three of chaos (`separation.rs`), the steps relative to the limit of stability
+//! (`STABILITY_SHARE`, `CAP_LIMIT_SHARE` and `MIN_HINGE_SPEED_RATIO` beside [`StepSelector`]), the
+//! oscillation of a free body (`SWING_FACTOR`), and the scale of each metric.
 
 use lane_ode::Tolerance;
 use washer_model::{Formula, Level, Method, ModelKind, StepSelector, capped_method};
@@ -41,9 +41,9 @@ use crate::levels::{RESOLVING_LEVELS, RefinementLevel, RefinementLevels};
 
 /// Safety factor: the estimated error of a level, divided by its difference from the level before.
 ///
-/// Basis: 2 is the least whole number at which steps may shrink by less than a half from level to
-/// level ([`step_ratio`]). Doubling it doubles every `error`, and sends twice as many rows to the
-/// next level.
+/// Basis: 2 is the smallest whole number at which a step may be more than half of the step before
+/// ([`step_ratio`]). Doubling it doubles every `error`, and sends twice as many rows to the next
+/// level.
 const SAFETY_FACTOR: f64 = 2.0;
 
 /// The guaranteed contraction of the error from one step to the next: 1.5.
@@ -52,25 +52,25 @@ const SAFETY_FACTOR: f64 = 2.0;
 /// [`SAFETY_FACTOR`] s times that is at least E / c where c is at least 1 + 1 / s.
 const STEP_CONTRACTION: f64 = 1.0 + 1.0 / SAFETY_FACTOR;
 
-/// The order in which errors decrease with the step for capped modes: the error of a cap is
+/// The order with which errors decrease with the step for capped modes: the error of a cap is
 /// proportional to its inverse square, and the cap to the inverse step.
 const CAPPED_ORDER: f64 = 2.0;
 
-/// The order in which errors decrease with the step where steps cross corners of forces.
+/// The order with which errors decrease with the step where steps cross corners of forces.
 const CORNER_ORDER: f64 = 1.0;
 
-/// The ratio of the additive method's relative tolerances from level to level; the first tolerance
-/// is the accuracy times this ratio.
+/// The ratio of the additive method's relative tolerance at a level to that at the level before;
+/// the first tolerance is the accuracy times this ratio.
 ///
-/// Basis: `sweeps/friction.toml`, where the error of a trajectory is some ten times its tolerance
-/// per step and shrinks with it. Doubling it saves a third of the first level and sends more rows
-/// to the next level.
+/// Basis: `sweeps/friction.toml`, where the error of a trajectory is about ten times its tolerance
+/// per step and proportional to it. Doubling it saves a third of the first level's time and sends
+/// more rows to the next level.
 const TOLERANCE_RATIO: f64 = 0.1;
 
 /// The least relative tolerance of the additive method.
 ///
-/// Basis: at 1e-6 it takes 22 ms a row of `sweeps/friction.toml`, at 1e-7 40 ms, and order 8 at
-/// [`CORNER_STEP_S`] 31 ms. Doubling it leaves a level out at an accuracy of 1e-3.
+/// Basis: a row of `sweeps/friction.toml` takes 22 ms at 1e-6 and 40 ms at 1e-7, where order 8 at
+/// [`CORNER_STEP_S`] takes 31 ms. Doubling it removes a level at an accuracy of 1e-3.
 const LEAST_TOLERANCE: f64 = 1e-6;
 
 /// The absolute tolerance (m, rad, m/s, rad/s) of the additive method, divided by the relative one.
@@ -80,8 +80,9 @@ const ABSOLUTE_TO_RELATIVE: f64 = 2e-2;
 
 /// The longest step (s) of order 8 where forces have corners.
 ///
-/// Basis: corners are 3 ms wide, and order 8 needs some six steps for one. Doubling it makes the
-/// first of these levels useless: its median error grows from 7e-8 to that of the levels before.
+/// Basis: corners are 3 ms wide, and order 8 needs about six steps to resolve one. Doubling it
+/// makes the first of these levels useless: its median error grows from 7e-8 to that of the levels
+/// before.
 const CORNER_STEP_S: f64 = 5e-4;
 
 /// The number of levels without capped modes: two give one difference.
@@ -89,26 +90,26 @@ const UNCAPPED_LEVELS: usize = 2;
 
 /// The number of levels of order 8 at corners.
 ///
-/// Basis: corners leave errors of first order, which a second difference settles. Each further
-/// level costs a row that does not converge as much as all others together.
+/// Basis: corners leave errors of first order, for which one difference is not reliable, but two
+/// are. Each further level takes as long as all others together in rows that do not converge.
 const CORNER_LEVELS: usize = 3;
 
 /// The product of the first step that resolves the bearings' modes and their frequency (rad), for
 /// the formula of each model: of order 8 for the nonlinear one, of order 4 for the linear one.
 ///
-/// Basis: a step of order 4 damps by z^6 / 144 where z is this product, so ringing at 10^4 rad/s
-/// loses a fifth in 10 s at 0.2; order 8 errs by 5e-5 a radian at 1.4. With 0.7 for order 4, rows
-/// of `differential_test -- 180 965457 jumps` are off by up to 3.5e-4. Doubling it damps the
-/// ringing away.
+/// Basis: a step of order 4 damps by z^6 / 144 where z is this product, so that at 0.2 ringing at
+/// 10^4 rad/s loses a fifth of its amplitude in 10 s. Order 8 has an error of 5e-5 per radian at
+/// 1.4. With 0.7 for order 4, rows of `differential_test -- 180 965457 jumps` have errors up to
+/// 3.5e-4. Doubling it damps the ringing away.
 const RESOLVING_RAD: [f64; 2] = [1.4, 0.2];
 
 /// The greatest number of steps of an adaptive trajectory.
 ///
-/// Basis: so many steps take hours, so that a trajectory with more makes no progress. Doubling it
-/// doubles the time until such a row fails.
+/// Basis: this number of steps takes hours, so that a trajectory that reaches it makes no progress.
+/// Doubling it doubles the time until such a row fails.
 pub const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
 
-/// Returns the ratio of one level's step to that of the next, for errors that decrease with this
+/// Returns the ratio of one level's step to the next one's, for errors that decrease with this
 /// order.
 fn step_ratio(order: f64) -> f64 {
     STEP_CONTRACTION.powf(1.0 / order)
@@ -129,7 +130,8 @@ pub(crate) fn error_of_level(difference: f64, contracted_difference: f64) -> Opt
 
 /// Returns the amplification of unresolved ringing, from the difference of the first two levels.
 /// The levels are chosen so that a motion without amplification has a difference below the
-/// accuracy. If the difference is greater, the amplification is at least the quotient of the two.
+/// accuracy. If the difference is greater, the amplification is at least the quotient of difference
+/// and accuracy.
 pub(crate) fn amplification(first_difference: f64, accuracy: f64) -> f64 {
     (first_difference / accuracy).max(1.0)
 }
@@ -146,13 +148,13 @@ pub fn refinement_levels(
     model: ModelKind,
     accuracy: f64,
 ) -> RefinementLevels {
-    if model == ModelKind::Nonlinear && steps.are_nonsmooth() {
+    if model == ModelKind::Nonlinear && steps.has_nonsmooth_force() {
         return levels_at_corners(steps, accuracy);
     }
     let mut levels = Vec::new();
     let first_s = steps.plain_step_s(Formula::Rk4).unwrap_or(CORNER_STEP_S);
     let ratio = step_ratio(CAPPED_ORDER);
-    // For a machine whose modes are unknown, the rows report it.
+    // The rows of a machine whose modes are unknown report that themselves.
     if let Ok(Some(longest_s)) = steps.capped_step_s(model) {
         let mut step_s = longest_s;
         for level in Level::CAPPED {
@@ -163,12 +165,13 @@ pub fn refinement_levels(
             step_s /= ratio;
         }
     }
-    let next_s = push_uncapped(&mut levels, UNCAPPED_LEVELS, rk4, [first_s, ratio]);
-    push_resolving(&mut levels, steps, model, next_s);
+    let following_s = push_uncapped(&mut levels, UNCAPPED_LEVELS, rk4, [first_s, ratio]);
+    push_resolving(&mut levels, steps, model, following_s);
     RefinementLevels::checked(levels, None)
 }
 
-/// Returns the levels of the nonlinear model where friction and stops give forces corners.
+/// Returns the levels of the nonlinear model for a machine with friction or stops, whose forces
+/// have corners.
 fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevels {
     let mut levels = Vec::new();
     let mut relative = TOLERANCE_RATIO * accuracy;
@@ -185,8 +188,8 @@ fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevel
         None => CORNER_STEP_S,
     };
     let ratio = step_ratio(CORNER_ORDER);
-    let next_s = push_uncapped(&mut levels, CORNER_LEVELS, dop853, [first_s, ratio]);
-    push_resolving(&mut levels, steps, ModelKind::Nonlinear, next_s);
+    let following_s = push_uncapped(&mut levels, CORNER_LEVELS, dop853, [first_s, ratio]);
+    push_resolving(&mut levels, steps, ModelKind::Nonlinear, following_s);
     RefinementLevels::checked(levels, Some(AT_CORNERS.to_owned()))
 }
 
@@ -209,8 +212,8 @@ fn push_resolving(
     push_uncapped(levels, RESOLVING_LEVELS, level, [first_s, step_ratio(CAPPED_ORDER)]);
 }
 
-/// Adds levels with no capped modes from a first step (s), each shorter than the one before by a
-/// ratio, and returns the step that would come next.
+/// Adds levels without capped modes, the first with a step of `first_s`, each other with the step
+/// before divided by `ratio`. Returns the step after the last.
 fn push_uncapped(
     levels: &mut Vec<RefinementLevel>,
     count: usize,
@@ -225,12 +228,12 @@ fn push_uncapped(
     step_s
 }
 
-/// Returns the level of order 4 with no capped modes.
+/// Returns a level of order 4 without capped modes.
 fn rk4(step_s: f64) -> RefinementLevel {
     RefinementLevel { level: Level::Rk4, method: Method::Rk4 { step_s } }
 }
 
-/// Returns the level of order 8 with no capped modes.
+/// Returns a level of order 8 without capped modes.
 fn dop853(step_s: f64) -> RefinementLevel {
     RefinementLevel { level: Level::Dop853, method: Method::Dop853 { step_s } }
 }
@@ -258,7 +261,7 @@ mod tests {
         assert_eq!(contraction(Level::Additive, false), 10.0);
     }
 
-    /// Levels whose errors decrease at least by the ratio are never less accurate than estimated.
+    /// Levels whose errors decrease at least by the ratio have errors of at most the estimate.
     #[test]
     fn the_step_ratio_bounds_errors_of_the_order_that_it_is_made_for() {
         for order in [CAPPED_ORDER, CORNER_ORDER] {

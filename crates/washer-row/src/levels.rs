@@ -5,7 +5,7 @@ use washer_model::{Formula, Level, Method, MethodNumbers, ModelKind, UnresolvedM
 /// The number of levels that resolve the bearings' modes, which come last. Two give one difference.
 pub(crate) const RESOLVING_LEVELS: usize = 2;
 
-/// A refinement level.
+/// A level of refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RefinementLevel {
     /// The row's `method`.
@@ -72,9 +72,9 @@ impl RefinementLevels {
         self.levels.iter().take_while(|level| is_capped(level)).count()
     }
 
-    /// Whether the level at this index has another method than the one before, so that its error
-    /// has other terms. The methods are capped modes, the additive method, and the formulas without
-    /// capped modes.
+    /// Whether the level at this index has another method than the level before, so that its
+    /// differences measure an error of another kind. The methods are capped modes, the additive
+    /// method, and the formulas without capped modes.
     pub fn starts_method_family(&self, level_index: usize) -> bool {
         let family_at = |level_index: usize| {
             let level = self.levels[level_index].level;
@@ -100,13 +100,13 @@ impl RefinementLevels {
         }
     }
 
-    /// Returns the index that stands for the perturbed run of a level: the same method from a
-    /// slightly different start ([`Point::perturbed`](washer_model::Point::perturbed)).
+    /// Returns the index that denotes the perturbed run of a level: the same method from a slightly
+    /// different start ([`Point::perturbed`](washer_model::Point::perturbed)).
     pub const fn perturbed_index(&self, level_index: usize) -> usize {
         self.levels.len() + level_index
     }
 
-    /// Whether an index stands for a perturbed run.
+    /// Whether an index denotes a perturbed run.
     pub const fn is_perturbed(&self, level_index: usize) -> bool {
         level_index >= self.levels.len()
     }
@@ -116,8 +116,8 @@ impl RefinementLevels {
         &self.levels[level_index % self.levels.len()].method
     }
 
-    /// Returns the method of the given capped level; if the model lacks that level, of the finest
-    /// coarser capped level.
+    /// Returns the method of the given capped level. If the model lacks that level, returns the
+    /// method of the finest capped level that is coarser.
     pub fn capped_method(&self, level: Level) -> Option<Method> {
         let is_within =
             |candidate: &&RefinementLevel| candidate.level.is_capped() && candidate.level <= level;

@@ -1,9 +1,9 @@
-//! The computation of one row of a map: both models are integrated at a point, at finer and finer
-//! levels until two agree, and the row takes its numbers from these trajectories.
+//! Computes a row of a map: both models are integrated at a point, at finer and finer levels until
+//! two agree, and the row takes its numbers from these trajectories.
 //!
 //! The crate does not depend on grids, files or threads. `sweep` computes many rows at a time in
-//! lanes, a live page (`washer-live`) computes a single one. Both follow the rules of this crate,
-//! so that their rows have the same bits.
+//! lanes, a live page (`washer-live`) computes a single one. Both use the rules of this crate, so
+//! that their rows have the same bits.
 //!
 //! * [`RefinementLevels`] holds one model's levels, coarsest first; [`integrate_points`] integrates
 //!   trajectories at one of them.

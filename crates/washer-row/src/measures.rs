@@ -6,15 +6,15 @@ use washer_model::{Channel, Gauge, Reading, Recorders};
 use crate::metrics::{LeastScale, Metric, MetricProperties, MetricSource, PartKind};
 use crate::outcome::{Deviations, Outcome};
 
-/// The greatest deviation of a machine at rest, as a share of the clearance between drum and tub
-/// (angles: of the clearance over a lever of one metre).
+/// The greatest deviation of a machine at rest, relative to the clearance between drum and tub (for
+/// angles, to the clearance over a lever of one metre).
 ///
-/// Basis: rounding of an equilibrium leaves some 1e-15 of the clearance, and no machine feels a
-/// billionth of it. Doubling it is without effect.
+/// Basis: rounding of an equilibrium leaves about 1e-15 of the clearance, and a billionth of it has
+/// no effect on any machine. Doubling it changes no row.
 pub(crate) const REST_SHARE: f64 = 1e-9;
 
-/// The least deviation (m, rad) in the ratio of the models' deviations in a turn; smaller ones are
-/// replaced by it.
+/// The least deviation (m, rad) in the ratio of the models' deviations in a turn; smaller
+/// deviations are replaced by it.
 ///
 /// Basis: a motion of 10 um is invisible, and the quotient of two such motions says nothing about
 /// the models. Doubling it lowers the ratios of turns in which the machine hardly moves.
@@ -79,12 +79,12 @@ impl Metric {
         }
     }
 
-    /// Whether each model has a separate value. Otherwise the value belongs to the machine.
+    /// Whether each model has a separate value. Otherwise both models have the same value.
     pub const fn is_per_model(self) -> bool {
         self.gauge().is_some()
     }
 
-    /// Whether the metric is taken at the held speeds of `[stability]`.
+    /// Whether the metric is computed at the held speeds of `[stability]`.
     pub const fn is_at_held_speeds(self) -> bool {
         matches!(self.properties().source, MetricSource::HeldSpeeds)
     }
@@ -100,8 +100,8 @@ impl Metric {
         column(self.name(), if self.is_per_model() { model } else { "" }, self.properties().unit)
     }
 
-    /// Returns the scale that relative differences of smaller values have, in the metric's unit.
-    /// Differences of greater values are relative to the value itself.
+    /// Returns the least scale of relative differences, in the metric's unit. Differences of values
+    /// above it are relative to the value itself.
     pub fn scale(self, window_s: [f64; 2], weight_n: f64) -> f64 {
         match self.properties().scale {
             LeastScale::Value => 0.0,
@@ -112,15 +112,14 @@ impl Metric {
     }
 }
 
-/// Returns the name of a column from the quantity, the model and the unit, without those that are
-/// empty.
+/// Returns the name of a column from quantity, model and unit, without those that are empty.
 fn column(quantity: &str, model: &str, unit: &str) -> String {
     let unit = unit.to_lowercase().replace("1/", "per_").replace('/', "_per_");
     let words = [quantity, model, &unit].into_iter().filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("_")
 }
 
-/// A metric's column that each model has: for the whole machine, or for one stop, foot or damper.
+/// A metric's column, which each model has: of the whole machine, or of one stop, foot or damper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MetricColumn {
     /// The metric.
@@ -130,7 +129,7 @@ pub struct MetricColumn {
 }
 
 impl MetricColumn {
-    /// Returns the part with its number, such as `stop_1`; then the quantity in the column's name
+    /// Returns the part with its number, such as `stop_1`, with the quantity in the column's name
     /// and the column's description. `None` for the column of all parts.
     fn part_name_and_texts(self) -> Option<(String, [&'static str; 2])> {
         let MetricProperties { part, each_part, .. } = self.metric.properties();
@@ -236,7 +235,7 @@ impl Outcome {
         }));
     }
 
-    /// Frees the deviations by turn, which only [`Self::compare_turns`] needs.
+    /// Removes the deviations by turn, which only [`Self::compare_turns`] needs.
     pub fn drop_turns(&mut self) {
         self.nonlinear.turns = Vec::new();
         self.linear.turns = Vec::new();
@@ -266,8 +265,8 @@ mod tests {
 
     #[test]
     fn deviations_below_the_floor_count_as_the_floor() {
-        // The first channel's ratio is 1000 below the floor, so that it counts as 1. The second
-        // one's nonlinear deviation is four times the floor.
+        // In the first channel both deviations are below the floor, so that the ratio is 1, not
+        // 1000. In the second channel the nonlinear deviation is four times the floor.
         let compared = outcome(&[[1e-6, 4e-5], [1e-3, 1e-3]], &[[1e-9, 1e-9], [1e-3, 1e-3]]);
         let [Some(first), Some(second)] = compared.turn_ratios[..] else { panic!("{compared:?}") };
         assert_eq!(first, 1.0);
@@ -285,7 +284,7 @@ mod tests {
         let metrics = vec![Metric::SlipMargin, Metric::StopContact, Metric::FootLoad];
         let mut measures = Measures { metrics, stops: 3, feet: 1, ..Measures::default() };
         let columns = |measures: &Measures| -> Vec<String> {
-            measures.model_columns().map(|number| number.column("linear")).collect()
+            measures.model_columns().map(|column| column.column("linear")).collect()
         };
         let expected = [
             "slip_margin_linear_n",
@@ -314,9 +313,9 @@ mod tests {
         }
         let metrics = vec![Metric::StopForce, Metric::StopContact, Metric::FootLoad];
         let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
-        let found: Vec<_> =
-            measures.model_columns().filter_map(|number| number.value(&reading)).collect();
-        assert_eq!(found, [50.0, 20.0, 50.0, 0.3, 0.3, 0.1, -5.0, 90.0, -5.0, 70.0]);
+        let values: Vec<_> =
+            measures.model_columns().filter_map(|column| column.value(&reading)).collect();
+        assert_eq!(values, [50.0, 20.0, 50.0, 0.3, 0.3, 0.1, -5.0, 90.0, -5.0, 70.0]);
     }
 
     #[test]

@@ -57,7 +57,7 @@ pub struct MetricProperties {
     pub limit: Option<Limit>,
 }
 
-/// The facts shared by metrics of the whole machine that every machine has.
+/// The properties of metrics of the whole machine, except unit and description.
 const MACHINE_METRIC: MetricProperties = MetricProperties {
     unit: "",
     description: "",
@@ -69,7 +69,7 @@ const MACHINE_METRIC: MetricProperties = MetricProperties {
     limit: None,
 };
 
-/// The common facts of the metrics of the cabinet's feet.
+/// The common properties of the metrics of the cabinet's feet.
 const FEET_METRIC: MetricProperties = MetricProperties {
     part: Some(PartKind::Foot),
     scale: LeastScale::Weight,

@@ -4,7 +4,7 @@ use washer_model::{Attractors, Channel, Disturbance, GeometryLimit, Response, Re
 
 use crate::Level;
 
-/// The reason why a trajectory ended. The position in this list is the code in chunk files, so that
+/// The reason why a trajectory ended. Its position in this list is its code in chunk files, so that
 /// new reasons are added at the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Status {
@@ -19,14 +19,14 @@ pub enum Status {
     StepLimit,
     /// The machine has no static equilibrium at this point.
     NoEquilibrium,
-    /// The evaluation of this point panicked, which is a defect of this program. Other rows are
-    /// not affected.
+    /// The evaluation of this point panicked, which is a defect of this program. Other rows are not
+    /// affected.
     Panicked,
     /// No periodic response was found at a held speed.
     NoResponse,
     /// The multipliers of the response could not be computed.
     NoMultipliers,
-    /// The drum is so slow that a turn takes too many steps.
+    /// The drum turns so slowly that a turn takes too many steps.
     TooSlow,
 }
 
@@ -56,12 +56,12 @@ pub struct Trajectory {
     pub rejected: u64,
     /// The model's metrics that the plan asks for, in column order; empty if the model failed.
     pub metrics: Vec<f64>,
-    /// The greatest factor by which a damper's speed amplitude in this motion differs from the one
-    /// at which the linear model takes its friction. `None` without friction, if the model failed,
-    /// and for the nonlinear model if no speed amplitude is given.
+    /// The greatest ratio, in either direction, between a damper's speed amplitude in this motion
+    /// and the one at which the linear model takes its friction. `None` without friction, if the
+    /// model failed, and for the nonlinear model if no speed amplitude is given.
     pub friction_speed_off: Option<f64>,
-    /// The largest deviations in each turn of the drum. They are dropped once both models are
-    /// compared by them.
+    /// The largest deviations in each turn of the drum, until both models have been compared by
+    /// them.
     pub turns: Vec<Deviations>,
 }
 
@@ -69,7 +69,7 @@ pub struct Trajectory {
 pub type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {
-    /// Creates a failed trajectory, which has a status alone.
+    /// Creates a failed trajectory, which has only a status.
     pub fn failed(status: Status) -> Self {
         Self { status, ..Self::default() }
     }
@@ -127,8 +127,8 @@ impl From<&Response> for Growth {
 /// The largest deviations of the attractors at some held speeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DwellPeaks {
-    /// The largest deviations over all attractors. A motion that leaves the range of the model
-    /// counts until it does.
+    /// The largest deviations over all attractors. A motion that leaves the range of the model is
+    /// included up to that time.
     pub deviations: Deviations,
     /// The speed (rpm) at which the tub has the greatest yaw or pitch.
     pub speed_rpm: f64,
@@ -139,10 +139,14 @@ pub struct DwellPeaks {
 
 impl DwellPeaks {
     /// Computes the largest deviations of the attractors found at speeds (rpm); `None` if there are
-    /// no attractors. Of attractors with equal rotation the first one gives speed and kind.
-    pub fn from_attractors<E>(speeds_rpm: &[f64], found: &[Result<Attractors, E>]) -> Option<Self> {
-        let attractors = speeds_rpm.iter().zip(found).flat_map(|(&speed_rpm, found)| {
-            let attractors = found.iter().flat_map(|found| &found.attractors);
+    /// no attractors. Among attractors with equal rotation, the first one determines speed and
+    /// kind.
+    pub fn from_attractors<E>(
+        speeds_rpm: &[f64],
+        results: &[Result<Attractors, E>],
+    ) -> Option<Self> {
+        let attractors = speeds_rpm.iter().zip(results).flat_map(|(&speed_rpm, result)| {
+            let attractors = result.iter().flat_map(|found| &found.attractors);
             attractors.map(move |motion| (speed_rpm, motion))
         });
         let mut max_rotation_rad = 0.0;
@@ -199,7 +203,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Creates an outcome of two trajectories that have not been compared yet.
+    /// Creates an outcome of two trajectories.
     pub fn new(point: u64, nonlinear: Trajectory, linear: Trajectory) -> Self {
         Self { point, nonlinear, linear, ..Self::default() }
     }

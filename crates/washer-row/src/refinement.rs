@@ -1,5 +1,5 @@
-//! Refines a row: keeps the finest trajectory so far of each model, and decides which level is
-//! integrated next.
+//! Refines a row: stores the finest trajectory of each model, and decides which level is integrated
+//! next.
 
 use washer_model::{Level, ModelKind, Point, UnresolvedModes};
 
@@ -15,11 +15,11 @@ use crate::verdict::Verdict;
 /// The purpose of an outcome, on which its accuracy depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutcomePurpose {
-    /// A row: every number within the accuracy, and the verdict.
+    /// A row, with every number and the verdict within the accuracy.
     Row,
-    /// The ratio's side of the limit, and the ratio itself if it is near the limit.
+    /// The side of the limit on which the ratio lies, and the ratio itself if it is near the limit.
     Side,
-    /// The growth of disturbances at constant speeds, without a run.
+    /// The growth of disturbances at constant speeds, for which no trajectory is integrated.
     Growth,
 }
 
@@ -52,17 +52,18 @@ struct ModelRule<'a> {
 }
 
 impl ModelRule<'_> {
-    /// Returns the ringing that a level leaves unresolved, relative to the motion and with the
-    /// motion's amplification.
+    /// Returns the greatest ratio of unresolved ringing to a row's number: the vibration of
+    /// bearings and hinge that a level's steps do not resolve, relative to the amplitudes and to
+    /// the clearance, times the amplification of the motion.
     fn relative_ringing(&self, level: usize, refinement: &ModelRefinement) -> f64 {
         let Some(run) = &refinement.run else { return 0.0 };
         let Some(unresolved) = self.levels.unresolved_modes(level) else { return 0.0 };
-        let swing = self.point.ringing(unresolved);
-        let mut greatest_ringing = swing.gap_m / self.point.clearance_m();
+        let amplitude_bounds = self.point.ringing(unresolved);
+        let mut greatest_ringing = amplitude_bounds.gap_m / self.point.clearance_m();
         for (channel, amplitude) in self.rule.channels.iter().zip(&run.trajectory.amplitudes) {
-            let swing = swing.channels[channel.index()];
-            if swing > 0.0 {
-                greatest_ringing = greatest_ringing.max(swing / amplitude);
+            let bound = amplitude_bounds.channels[channel.index()];
+            if bound > 0.0 {
+                greatest_ringing = greatest_ringing.max(bound / amplitude);
             }
         }
         match unresolved {
@@ -85,7 +86,7 @@ struct ModelRefinement {
     differences: Vec<LevelDifference>,
     /// The difference of the first two levels; zero before there are two.
     first_difference: f64,
-    /// The comparison with a perturbed run, once there was one.
+    /// The comparison with a perturbed run, once it has run.
     perturbed: Option<PerturbedComparison>,
 }
 
@@ -114,7 +115,7 @@ impl LevelDifference {
 #[derive(Clone, Copy, Debug)]
 struct PerturbedComparison {
     is_chaotic: bool,
-    /// The relative difference of its numbers from the original's; `None` if one of them failed.
+    /// The relative difference of the two runs' numbers; `None` if a run failed.
     difference: Option<f64>,
 }
 
@@ -173,7 +174,8 @@ impl ModelRefinement {
     }
 
     /// Returns the level to run next if the error is above the accuracy or the verdict
-    /// `is_in_doubt`; `None` if the run is accurate enough, or no finer level would help.
+    /// `is_in_doubt`; `None` if the run is accurate enough, or no finer level would reduce the
+    /// error.
     fn next_level(&self, rule: ModelRule<'_>, is_in_doubt: bool) -> Option<usize> {
         let levels = rule.levels;
         if self.run.is_none() {
@@ -188,21 +190,22 @@ impl ModelRefinement {
             return None;
         }
         let has_little_ringing = |level: &usize| rule.relative_ringing(*level, self) <= accuracy;
-        let is_last_useful = self.level + 1 == levels.levels.len()
+        let is_finest_useful = self.level + 1 == levels.levels.len()
             || self.level + 1 == levels.first_resolving() && has_little_ringing(&self.level);
-        if is_last_useful {
-            // A chaotic motion does not converge at any step, which a perturbed run shows.
+        if is_finest_useful {
+            // A chaotic motion does not converge at any step. A perturbed run tells such a motion
+            // from one that needs finer steps.
             let may_be_chaos = !is_converged && rule.kind == ModelKind::Nonlinear;
-            let needs_perturbed = may_be_chaos && self.perturbed.is_none();
-            return needs_perturbed.then(|| levels.perturbed_index(self.level));
+            let needs_perturbed_run = may_be_chaos && self.perturbed.is_none();
+            return needs_perturbed_run.then(|| levels.perturbed_index(self.level));
         }
         let mut next = self.level + 1;
-        // The failure may be due to the capped modes.
+        // Capped modes may be the cause of the failure.
         if self.has_failed() {
             next = next.max(levels.first_uncapped());
         }
-        // Levels with the same unresolved ringing share its error, which their difference does not
-        // show.
+        // Levels with the same unresolved ringing have the same error from it, which their
+        // difference does not show.
         (next..levels.levels.len()).find(has_little_ringing)
     }
 }
@@ -211,18 +214,18 @@ impl ModelRefinement {
 #[derive(Clone, Debug, Default)]
 pub struct RowRefinement([ModelRefinement; 2]);
 
-/// The next step of a row.
+/// The action that a row needs next.
 #[derive(Clone, Debug)]
 pub enum NextStep {
-    /// The runs to do: for each the position of the model in [`ModelKind::ALL`] and the index of
-    /// its level.
+    /// The requested runs: for each the position of the model in [`ModelKind::ALL`] and the index
+    /// of its level.
     Runs(Vec<(usize, usize)>),
-    /// The row is done.
+    /// The outcome of the row, which needs no further run.
     Done(Box<Outcome>),
 }
 
 impl RowRefinement {
-    /// Takes a run that [`Self::next_step`] has requested.
+    /// Adds a run that [`Self::next_step`] has requested.
     pub fn add_run(
         &mut self,
         (model, level): (usize, usize),
@@ -233,8 +236,8 @@ impl RowRefinement {
         self.0[model].add_run(level, run, refinement_rule.for_model(model, point));
     }
 
-    /// Returns the finest run of a model with its level and its error, once there is one. The error
-    /// is `None` if there is no estimate.
+    /// Returns the finest run of a model with its level and its error; `None` if no run was added.
+    /// The error is `None` if there is no estimate.
     pub fn finest_run(
         &self,
         model: usize,
@@ -246,13 +249,13 @@ impl RowRefinement {
         refinement.run.as_ref().map(|run| (run, refinement.level, error))
     }
 
-    /// Returns the number of steps of a model's finest run; zero before there is one.
+    /// Returns the number of steps of a model's finest run; zero if no run was added.
     pub fn steps(&self, model: usize) -> u64 {
         self.0[model].run.as_ref().map_or(0, |run| run.trajectory.steps)
     }
 
-    /// Returns the next step, once every requested run has been taken. `point_index` is the point
-    /// of the outcome.
+    /// Returns the next step, after every requested run has been added. `point_index` is the index
+    /// of the outcome's point.
     pub fn next_step(
         &self,
         point_index: u64,
@@ -286,7 +289,7 @@ impl RowRefinement {
         }
     }
 
-    /// Returns the outcome of the runs so far, once both models have run.
+    /// Returns the outcome of the runs added so far; `None` unless both models have one.
     fn outcome(
         &self,
         point_index: u64,
@@ -327,8 +330,8 @@ fn relative_margin(outcome: &Outcome, rule: &RowRule) -> Option<f64> {
 }
 
 /// Returns the greatest relative difference of the numbers that a row takes from two trajectories;
-/// `None` if one of them failed. If both failed, the times of failure are compared, relative to the
-/// run's length.
+/// `None` if only one of them failed. If both failed, the times of failure are compared, relative
+/// to the run's length.
 fn relative_difference(
     first: &Trajectory,
     second: &Trajectory,
@@ -346,7 +349,7 @@ fn relative_difference(
     let mut compare = |first: f64, second: f64, scale: f64| {
         if first != second {
             let difference = (first - second).abs() / second.abs().max(scale);
-            // A quotient that is NaN counts as an infinite difference.
+            // A NaN is treated as an infinite difference.
             greatest_difference = if difference.is_nan() {
                 f64::INFINITY
             } else {
@@ -360,10 +363,10 @@ fn relative_difference(
     if let Some((first, second)) = first.min_gap_m.zip(second.min_gap_m) {
         compare(first, second, point.clearance_m());
     }
-    for ((first, second), number) in
+    for ((first, second), column) in
         first.metrics.iter().zip(&second.metrics).zip(rule.measures.model_columns())
     {
-        compare(*first, *second, number.metric.scale(rule.window_s, point.weight_n()));
+        compare(*first, *second, column.metric.scale(rule.window_s, point.weight_n()));
     }
     for (first, second) in first.turns.iter().zip(&second.turns) {
         for channel in &rule.channels {

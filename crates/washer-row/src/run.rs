@@ -34,7 +34,7 @@ impl RowRule {
     }
 }
 
-/// A trajectory at one refinement level.
+/// The results of a trajectory at one refinement level.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LevelRun {
     /// The numbers that a row takes from the trajectory.
@@ -46,7 +46,7 @@ pub struct LevelRun {
 }
 
 impl LevelRun {
-    /// Creates a failed run, which has a status alone.
+    /// Creates a failed run, which has only a status.
     pub fn failed(status: Status) -> Self {
         Self { trajectory: Trajectory::failed(status), ..Self::default() }
     }
@@ -57,8 +57,8 @@ impl LevelRun {
             Criterion::Peak | Criterion::Envelope => record.amplitudes,
             Criterion::Rms => reading.root_mean_squares.unwrap_or(record.amplitudes),
         };
-        let at_rest = REST_SHARE * point.clearance_m();
-        let amplitudes = amplitudes.map(|value| if value < at_rest { 0.0 } else { value });
+        let rest_limit = REST_SHARE * point.clearance_m();
+        let amplitudes = amplitudes.map(|value| if value < rest_limit { 0.0 } else { value });
         let trajectory = trajectory(record, reading, &amplitudes, rule);
         Self { trajectory, amplitudes, checkpoints }
     }

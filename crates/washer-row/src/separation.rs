@@ -1,7 +1,7 @@
-//! Measures the separation of a perturbed run from its original, whose exponential growth is the
-//! sign of chaos.
+//! Measures the separation of a perturbed run from the unperturbed one, whose exponential growth is
+//! the sign of chaos.
 
-/// The least separation at which a motion counts as chaotic, relative to the motion.
+/// The least separation of a chaotic motion, relative to the motion.
 ///
 /// Basis: a tenth is far more than the error of any step. Doubling it misses chaos that begins late
 /// in the run.
@@ -9,14 +9,15 @@ const LEAST_SEPARATION: f64 = 0.1;
 
 /// The least growth of the separation, as a logarithm.
 ///
-/// Basis: e^9 = 8,100, more than a passage through a band of instability amplifies in
-/// `sweeps/fig12.toml`. Doubling it asks for more than the 1e-10 of the start can grow.
+/// Basis: e^9 = 8,100, which is more than the amplification in a passage through a band of
+/// instability in `sweeps/fig12.toml`. With double the value the separation, which starts at 1e-10,
+/// could not grow enough in any motion.
 const LEAST_LOG_GROWTH: f64 = 9.0;
 
 /// The least mean exponent of the growth (1/s).
 ///
 /// Basis: every chaotic attractor in `docs/dwell.md` has a greater exponent. Doubling it misses the
-/// weakest.
+/// attractors with the smallest exponents.
 const LEAST_EXPONENT_PER_S: f64 = 0.1;
 
 /// The growth of a separation from its least value to the greatest value after it.
@@ -31,7 +32,8 @@ pub(crate) struct Separation {
 }
 
 impl Separation {
-    /// Finds the separation in a list of instants (s) and distances (relative to the motion).
+    /// Determines the separation from a list of instants (s) and distances (relative to the
+    /// motion).
     pub(crate) fn new(distances: &[(f64, f64)]) -> Self {
         let separated = distances.iter().filter(|(_, distance)| *distance > 0.0);
         let mut least_sample: Option<(f64, f64)> = None;

@@ -26,13 +26,13 @@ pub const ROW_STATUSES: [&str; 14] = [
     "too_slow",
 ];
 
-/// The number of statuses that a single model can have. All but `ok` have a second name with the
+/// The number of statuses that a single model can have. Each except `ok` has a second name with the
 /// prefix `linear_`.
 const MODEL_STATUSES: usize = Status::Panicked as usize + 1;
 
 /// Returns the row's index in [`ROW_STATUSES`], and the failing model's time of failure.
 pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
-    // The statuses that only a whole row can have follow those with the prefix.
+    // The statuses that apply only to a whole row follow those with the prefix.
     let code = |status: Status, linear_offset: usize| match status as usize {
         code if code < MODEL_STATUSES => code + linear_offset,
         code => code + MODEL_STATUSES - 1,
@@ -52,11 +52,11 @@ pub struct Verdict {
     /// The ratio of nonlinear to linear amplitude per channel of the plan, or the greatest such
     /// ratio over the drum's turns; `None` if the linear amplitude is zero or a model failed.
     pub ratios: Vec<Option<f64>>,
-    /// The channel's position in the plan and the value of the greatest defined ratio; of equal
-    /// ones, the first channel's.
+    /// The greatest defined ratio, with its channel's position in the plan; the first channel's if
+    /// several are equal.
     pub greatest: Option<(usize, f64)>,
-    /// The channel's position in the plan and the value of the least defined ratio; of equal ones,
-    /// the first channel's.
+    /// The least defined ratio, with its channel's position in the plan; the first channel's if
+    /// several are equal.
     pub least: Option<(usize, f64)>,
     /// Whether the ratios are between the limits; `None` where no ratio is defined.
     pub reliable: Option<bool>,
@@ -78,9 +78,11 @@ impl Verdict {
             }
         };
         let ratios: Vec<Option<f64>> = (0..channels).map(ratio).collect();
-        let extreme = |is_further: fn(f64, f64) -> bool| {
+        let extreme = |is_more_extreme: fn(f64, f64) -> bool| {
             let defined = ratios.iter().enumerate().filter_map(|(i, ratio)| Some((i, (*ratio)?)));
-            defined.reduce(|so_far, next| if is_further(next.1, so_far.1) { next } else { so_far })
+            defined.reduce(
+                |extreme, next| if is_more_extreme(next.1, extreme.1) { next } else { extreme },
+            )
         };
         let greatest = extreme(|a, b| a > b);
         let least = extreme(|a, b| a < b);
@@ -151,12 +153,12 @@ mod tests {
         );
         assert_eq!(Verdict::new(&row, 2, 2.0).ratios, [None, Some(1.0)]);
         assert_eq!(Verdict::new(&row, 2, 2.0).reliable, Some(true));
-        let still = outcome(
+        let at_rest = outcome(
             trajectory(Status::Ok, &[0.0, 0.0], None),
             trajectory(Status::Ok, &[0.0, 0.0], None),
         );
         assert_eq!(
-            Verdict::new(&still, 2, 2.0),
+            Verdict::new(&at_rest, 2, 2.0),
             Verdict { ratios: vec![None, None], greatest: None, least: None, reliable: None }
         );
     }

@@ -15,26 +15,26 @@ use crate::errors::plan_error;
 pub(crate) fn points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
     let py = table.py();
     if let Some((schema, batches)) = arrow::rows(table)? {
-        return PointTable::new(&schema, &batches).map_err(|wrong| plan_error(py, &wrong));
+        return PointTable::new(&schema, &batches).map_err(|error| plan_error(py, &error));
     }
     let Ok(columns) = table.cast::<PyMapping>() else {
-        let found = table.get_type().name()?;
+        let type_name = table.get_type().name()?;
         return Err(PyTypeError::new_err(format!(
             "expected a table with `__arrow_c_stream__` (polars, pyarrow, pandas, DuckDB), or a \
-             mapping of parameter name to numbers; got `{found}`"
+             mapping of parameter name to numbers; got `{type_name}`"
         )));
     };
     let column = |entry: Bound<'_, PyAny>| {
         let (name, values): (String, Bound<'_, PyAny>) = entry.extract()?;
         let values = numbers(&values).map_err(|error| {
-            let wrong = PyTypeError::new_err(format!("column `{name}`: expected numbers"));
-            wrong.set_cause(py, Some(error));
-            wrong
+            let error = PyTypeError::new_err(format!("column `{name}`: expected numbers"));
+            error.set_cause(py, Some(error));
+            error
         })?;
         Ok((name, values))
     };
     let columns = columns.items()?.iter().map(column).collect::<PyResult<Vec<_>>>()?;
-    PointTable::from_columns(columns).map_err(|wrong| plan_error(py, &wrong))
+    PointTable::from_columns(columns).map_err(|error| plan_error(py, &error))
 }
 
 /// Reads the numbers of a one-dimensional NumPy array, or of another iterable.
@@ -47,15 +47,17 @@ pub(crate) fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
         return Err(PyTypeError::new_err(text));
     }
     match PyBuffer::<f64>::get(values) {
-        // PyO3 does not check the byte order, so that arrays with another one are read value by
-        // value.
-        Ok(buffer) if [c"d", NATIVE].contains(&buffer.format()) => buffer.to_vec(values.py()),
+        // PyO3 does not check the byte order, so that arrays with another byte order are read value
+        // by value.
+        Ok(buffer) if [c"d", NATIVE_DOUBLE].contains(&buffer.format()) => {
+            buffer.to_vec(values.py())
+        }
         _ => values.try_iter()?.map(|value| number(&value?)).collect(),
     }
 }
 
-/// The buffer format of an eight-byte float with this machine's order of bytes.
-const NATIVE: &CStr = if cfg!(target_endian = "little") { c"<d" } else { c">d" };
+/// The buffer format of an eight-byte float with this machine's byte order.
+const NATIVE_DOUBLE: &CStr = if cfg!(target_endian = "little") { c"<d" } else { c">d" };
 
 /// Reads a number. Other types that Python converts to numbers are errors.
 pub(crate) fn number(value: &Bound<'_, PyAny>) -> PyResult<f64> {

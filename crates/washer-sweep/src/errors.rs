@@ -27,10 +27,10 @@ pub(crate) fn plan_error(py: Python<'_>, mistakes: &Diagnostics) -> PyErr {
         entry.set_item("hint", (!hint.is_empty()).then_some(hint))?;
         Ok(entry)
     };
-    let listed = mistakes.mistakes().into_iter().map(entry).collect::<PyResult<Vec<_>>>();
-    match listed.and_then(|listed| PyList::new(py, listed)) {
-        Ok(listed) => {
-            package_error(py, "PlanError", mistakes.to_string(), listed.into_any().unbind())
+    let entries = mistakes.mistakes().into_iter().map(entry).collect::<PyResult<Vec<_>>>();
+    match entries.and_then(|entries| PyList::new(py, entries)) {
+        Ok(entries) => {
+            package_error(py, "PlanError", mistakes.to_string(), entries.into_any().unbind())
         }
         Err(error) => error,
     }
@@ -52,7 +52,7 @@ pub(crate) fn error(py: Python<'_>, error: &Error) -> PyErr {
     }
 }
 
-/// Creates the exception of Ctrl-C, a `KeyboardInterrupt` with the result up to then.
+/// Creates the exception of Ctrl-C, a `KeyboardInterrupt` with the rows that were computed before.
 pub(crate) fn interrupted(py: Python<'_>, text: String, result: Py<PyAny>) -> PyErr {
     package_error(py, "Interrupted", text, result)
 }

@@ -11,7 +11,7 @@ use crate::errors;
 use crate::result::PyResultTable;
 use crate::work::{Supervised, WorkOptions, supervise};
 
-/// Returns the rows. After Ctrl-C it raises an exception with the rows up to then.
+/// Returns the rows. After Ctrl-C it raises an exception with the rows computed before.
 pub(crate) fn rows_or_raise(
     py: Python<'_>,
     evaluated: Supervised<MemoryTable>,
@@ -27,8 +27,8 @@ pub(crate) fn rows_or_raise(
     Ok(PyResultTable::new(table))
 }
 
-/// Runs a task in memory, or into a file if there is one, and returns the rows. With `fresh` the
-/// file is started anew; otherwise the call continues an unfinished one. With progress, the task
+/// Computes a task in memory, or into a file if `out` is given, and returns the rows. With `fresh`
+/// an unfinished file is started anew; otherwise the call continues it. With progress, the task
 /// prints the same lines as the command.
 pub(crate) fn rows_or_file(
     py: Python<'_>,
@@ -41,26 +41,26 @@ pub(crate) fn rows_or_file(
         return rows_or_raise(py, supervise(py, options, |effort| task.in_memory(effort))?);
     };
     let tell: fn(&str) = if options.progress { sweep::tell } else { |_| () };
-    let ran = supervise(py, options, |effort| task.to_file(&out, fresh, &tell, effort))?;
-    let ran = ran.value_or_raise(py, |ran| match ran {
+    let result = supervise(py, options, |effort| task.to_file(&out, fresh, &tell, effort))?;
+    let result = result.value_or_raise(py, |result| match result {
         Err(error) => errors::error(py, &error),
-        Ok(RanToFile::Whole(table)) => {
+        Ok(RanToFile::Complete(table)) => {
             let text = format!("interrupted after {} was complete", out.display());
             interruption(py, text, Some(table))
         }
-        Ok(RanToFile::Interrupted { kept, points }) => {
+        Ok(RanToFile::Interrupted { stored, points }) => {
             let text = format!(
-                "interrupted with {kept} of {points} points kept beside {}; the same call \
+                "interrupted with {stored} of {points} points kept beside {}; the same call \
                  continues with the others",
                 out.display()
             );
             interruption(py, text, None)
         }
     })?;
-    match ran {
-        RanToFile::Whole(table) => Ok(PyResultTable::new(table)),
-        RanToFile::Interrupted { kept, points } => Err(PyValueError::new_err(format!(
-            "stopped with {kept} of {points} points without an interruption"
+    match result {
+        RanToFile::Complete(table) => Ok(PyResultTable::new(table)),
+        RanToFile::Interrupted { stored, points } => Err(PyValueError::new_err(format!(
+            "stopped with {stored} of {points} points without an interruption"
         ))),
     }
 }
@@ -68,14 +68,14 @@ pub(crate) fn rows_or_file(
 /// Returns the table of a search, or raises `interrupted` after Ctrl-C.
 pub(crate) fn table_or_raise(
     py: Python<'_>,
-    found: Supervised<Option<MemoryTable>>,
+    result: Supervised<Option<MemoryTable>>,
     interrupted: impl Fn() -> PyErr,
 ) -> PyResult<PyResultTable> {
-    let found = found.value_or_raise(py, |_| interrupted())?;
-    found.map(PyResultTable::new).ok_or_else(interrupted)
+    let result = result.value_or_raise(py, |_| interrupted())?;
+    result.map(PyResultTable::new).ok_or_else(interrupted)
 }
 
-/// Creates the exception of an interruption, with the result up to then.
+/// Creates the exception of an interruption, with the rows computed before.
 pub(crate) fn interruption(py: Python<'_>, text: String, result: Option<MemoryTable>) -> PyErr {
     match result.map(|result| Py::new(py, PyResultTable::new(result))).transpose() {
         Ok(result) => {

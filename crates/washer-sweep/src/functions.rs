@@ -36,10 +36,10 @@ pub(crate) fn modes(
     }
     let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
     let input = plan.map(|plan| plan.get().input.clone());
-    let found = supervise_abandonable(py, None, move |effort| {
+    let table = supervise_abandonable(py, None, move |effort| {
         sweep::find_modes(input.as_ref(), &at, &speeds, effort.interrupt)
     })?;
-    Ok(PyResultTable::new(found))
+    Ok(PyResultTable::new(table))
 }
 
 /// Finds the periodic response of both models at each point of the plan's grid and each held
@@ -96,18 +96,19 @@ pub(crate) fn dwell(
     held_speeds(plan, speeds_rpm, Some(search), (out, fresh), WorkOptions { threads, progress })
 }
 
-/// Runs a task of held speeds: stability, or with a search the attractors.
+/// Returns the results at held speeds: attractors if there is a `search`, else periodic responses
+/// with the growth of disturbances.
 fn held_speeds(
     plan: &Bound<'_, PyPlan>,
     speeds_rpm: &Bound<'_, PyAny>,
     search: Option<AttractorSearch>,
-    into: (Option<PathBuf>, bool),
+    output: (Option<PathBuf>, bool),
     options: WorkOptions,
 ) -> PyResult<PyResultTable> {
     let py = plan.py();
     let speeds_rpm = &numbers(speeds_rpm)?;
     let task = sweep::hold_speeds(plan.get().evaluator.plan(), speeds_rpm, search);
-    finish::rows_or_file(py, task, into, options)
+    finish::rows_or_file(py, task, output, options)
 }
 
 /// Searches for the candidates of a study file with the least objectives within its constraints.
@@ -128,10 +129,10 @@ pub(crate) fn optimise(
     fresh: bool,
 ) -> PyResult<PyResultTable> {
     let sets = assignments(set)?;
-    let found = supervise(py, WorkOptions { threads, progress }, |effort| {
+    let result = supervise(py, WorkOptions { threads, progress }, |effort| {
         sweep::optimise_study(&study, &sets, out.as_deref(), fresh, effort)
     })?;
-    finish::table_or_raise(py, found, || errors::interrupted_without_result(py))
+    finish::table_or_raise(py, result, || errors::interrupted_without_result(py))
 }
 
 /// Explains why the linear model fails at one point: the unstable speeds that the run passes,
@@ -196,11 +197,12 @@ pub(crate) fn fit<'py>(
     if at.len() > tables.len() {
         return Err(PyTypeError::new_err("`at` has more entries than there are tables"));
     }
-    let constants = |k: usize| match at.get(k) {
+    let constants_of_table = |k: usize| match at.get(k) {
         Some(at) => assignments(Some(at.cast::<PyMapping>()?)),
         None => Ok(Vec::new()),
     };
-    let tables = tables.iter().enumerate().map(|(k, table)| Ok((points(table)?, constants(k)?)));
+    let tables =
+        tables.iter().enumerate().map(|(k, table)| Ok((points(table)?, constants_of_table(k)?)));
     let tables = tables.collect::<PyResult<Vec<_>>>()?;
     let model = if linear { "linear" } else { "nonlinear" }.to_owned();
     let no_shift = !shift;
@@ -213,9 +215,9 @@ pub(crate) fn fit<'py>(
 }
 
 /// Creates the package's `Explanation` from data and text.
-fn explanation(py: Python<'_>, found: Explained) -> PyResult<Bound<'_, PyAny>> {
-    let data = py.import("json")?.call_method1("loads", (found.found.to_string(),))?;
-    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, found.text))
+fn explanation(py: Python<'_>, explained: Explained) -> PyResult<Bound<'_, PyAny>> {
+    let data = py.import("json")?.call_method1("loads", (explained.explained.to_string(),))?;
+    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, explained.text))
 }
 
 /// Lists all numbers that can be set or swept, with their values in the plan or the built-in

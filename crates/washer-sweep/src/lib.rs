@@ -34,7 +34,7 @@ mod _native {
     use super::plan::PyPlan;
     #[pymodule_export]
     use super::result::{PyResultTable, read};
-    /// The version of the numerics: builds with the same one compute the same bits.
+    /// The version of the numerics. Builds with the same version compute the same bits.
     #[pymodule_export]
     const NUMERICS_VERSION: u32 = sweep::NUMERICS_VERSION;
     /// The version of the package.

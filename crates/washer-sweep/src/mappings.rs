@@ -9,13 +9,16 @@ use toml::{Table, Value};
 
 use crate::columns::number;
 
-/// Returns `NAME=VALUE` for each entry. Numbers have the shortest form that reads back to the same
-/// bits.
+/// Returns `NAME=VALUE` for each entry. A number is written in the shortest form that reads back to
+/// the same bits.
 pub(crate) fn assignments(values: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<String>> {
     let assignment = |entry: Bound<'_, PyAny>| {
         let (name, value): (String, Bound<'_, PyAny>) = entry.extract()?;
         let value = number(&value).map_err(|_| {
-            PyTypeError::new_err(format!("`{name}`: expected a number, got `{}`", type_of(&value)))
+            PyTypeError::new_err(format!(
+                "`{name}`: expected a number, got `{}`",
+                type_name(&value)
+            ))
         })?;
         Ok(format!("{name}={value:?}"))
     };
@@ -30,15 +33,15 @@ pub(crate) fn text(grid: &Bound<'_, PyMapping>) -> PyResult<String> {
     Ok(table(grid, 0)?.to_string())
 }
 
-/// The greatest depth of nested mappings and lists. Basis: five times that of a grid; a mapping
-/// that contains itself exceeds it. Doubling it accepts no further grid.
+/// The greatest depth of nested mappings and lists. Basis: five times that of a grid, and a limit
+/// for a mapping that contains itself. Doubling it accepts no further grid.
 const MAX_DEPTH: usize = 24;
 
 fn table(entries: &Bound<'_, PyMapping>, depth: usize) -> PyResult<Table> {
     let entry = |entry: Bound<'_, PyAny>| {
         let (key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = entry.extract()?;
         let key: String = key.extract().map_err(|_| {
-            PyTypeError::new_err(format!("a grid's keys are text, not `{}`", type_of(&key)))
+            PyTypeError::new_err(format!("a grid's keys are text, not `{}`", type_name(&key)))
         })?;
         let value = toml(&key, &value, depth + 1)?;
         Ok((key, value))
@@ -71,16 +74,16 @@ fn toml(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if let Ok(number) = value.extract::<i64>() {
         return Ok(Value::Integer(number));
     }
-    // The reader of grid files reports `nan` and `inf` with their place.
+    // The reader of grid files reports `nan` and `inf` with their location.
     if let Ok(number) = number(value) {
         return Ok(Value::Float(number));
     }
     if let Ok(path) = value.extract::<PathBuf>() {
         return Ok(Value::String(path.display().to_string()));
     }
-    Err(PyTypeError::new_err(format!("`{key}`: a grid cannot contain a `{}`", type_of(value))))
+    Err(PyTypeError::new_err(format!("`{key}`: a grid cannot contain a `{}`", type_name(value))))
 }
 
-fn type_of(value: &Bound<'_, PyAny>) -> String {
+fn type_name(value: &Bound<'_, PyAny>) -> String {
     value.get_type().name().map(|name| name.to_string()).unwrap_or_default()
 }

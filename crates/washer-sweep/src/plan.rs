@@ -11,7 +11,7 @@ use crate::result::PyResultTable;
 use crate::work::{WorkOptions, supervise, supervise_abandonable};
 use crate::{columns, counted, errors, finish};
 
-/// The name of a plan that has neither a file nor a name.
+/// The name of a plan without a file and without a name.
 const UNNAMED: &str = "plan";
 
 /// A validated plan.
@@ -42,7 +42,7 @@ impl PlanSource {
 
 impl PyPlan {
     fn load(py: Python<'_>, input: WasherGridInput, source: PlanSource) -> PyResult<Self> {
-        let plan = py.detach(|| input.load()).map_err(|wrong| errors::plan_error(py, &wrong))?;
+        let plan = py.detach(|| input.load()).map_err(|error| errors::plan_error(py, &error))?;
         Ok(Self { input, evaluator: PlanEvaluator::new(plan), source })
     }
 }
@@ -81,8 +81,8 @@ impl PyPlan {
             None => {
                 let path: PathBuf = source.extract()?;
                 // The path is made absolute because another process may work in another folder.
-                let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
-                let text = whole.to_string_lossy().into_owned();
+                let absolute = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
+                let text = absolute.to_string_lossy().into_owned();
                 let source = PlanSource { text, is_file: true, sets: sets.clone() };
                 (WasherGridInput::file(path, sets), source)
             }
@@ -108,9 +108,9 @@ impl PyPlan {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, (String, bool, Vec<String>))> {
-        let again = py.get_type::<Self>().getattr("_unpickled")?;
+        let constructor = py.get_type::<Self>().getattr("_unpickled")?;
         let PlanSource { text, is_file, sets } = self.source.clone();
-        Ok((again, (text, is_file, sets)))
+        Ok((constructor, (text, is_file, sets)))
     }
 
     /// Evaluates both models at each row of a table. The result's rows are in the same order.
@@ -238,10 +238,10 @@ impl PyPlan {
         let output = out.as_deref();
         let quantity = quantity.to_owned();
         let options = BoundaryOptions { quantity, limit, tolerance, lattice };
-        let found = supervise(py, WorkOptions { threads, progress }, |effort| {
+        let search = supervise(py, WorkOptions { threads, progress }, |effort| {
             sweep::find_boundary(self.evaluator.plan(), &options, output, fresh, effort)
         })?;
-        finish::table_or_raise(py, found, || {
+        finish::table_or_raise(py, search, || {
             let text = match output {
                 Some(out) => format!(
                     "interrupted; the results so far are kept beside {}, and the same call \

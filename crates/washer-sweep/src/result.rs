@@ -35,8 +35,8 @@ impl PyResultTable {
         })
     }
 
-    /// Whether the rows are points of a table that do not fill the grid over their values, so that
-    /// a map of them would be mostly empty.
+    /// Whether the rows are points of a table that do not form a full grid, so that a map of them
+    /// would be mostly empty.
     fn is_scattered(&self) -> bool {
         let plan = self.0.plan();
         if self.0.kind() != FileKind::Map || plan["design"].is_null() {
@@ -100,16 +100,19 @@ impl PyResultTable {
             }
             number if cells::is_number(number) => {
                 let values = parts.iter().flat_map(|part| cells::numbers(part).unwrap_or_default());
-                (values.flat_map(|it| it.unwrap_or(f64::NAN).to_ne_bytes()).collect(), "float64")
+                (
+                    values.flat_map(|value| value.unwrap_or(f64::NAN).to_ne_bytes()).collect(),
+                    "float64",
+                )
             }
             _ => {
                 let values = PyList::empty(py);
                 for part in parts {
                     append(&values, part)?;
                 }
-                let typed = PyDict::new(py);
-                typed.set_item("dtype", "object")?;
-                return numpy.call_method("array", (values,), Some(&typed));
+                let options = PyDict::new(py);
+                options.set_item("dtype", "object")?;
+                return numpy.call_method("array", (values,), Some(&options));
             }
         };
         numpy.call_method1("frombuffer", (PyByteArray::new(py, &bytes), kind))
@@ -159,12 +162,13 @@ impl PyResultTable {
         .map_err(|error| errors::error(py, &error))
     }
 
-    /// Draws the figure of `sweep plot`; `None` for points off a grid, which have none.
+    /// Draws the figure of `sweep plot` as SVG; `None` for points that do not form a grid, which
+    /// have no figure.
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
         if self.is_scattered() {
             return Ok(None);
         }
-        let drawn = py.detach(|| {
+        let svg = py.detach(|| {
             let folder = tempfile::tempdir()?;
             let path = folder.path().join("figure.svg");
             match self.0.draw(&path) {
@@ -172,7 +176,7 @@ impl PyResultTable {
                 Err(_) => Ok(None),
             }
         });
-        drawn.map_err(|error| PyOSError::new_err(format!("cannot draw: {error}")))
+        svg.map_err(|error| PyOSError::new_err(format!("cannot draw: {error}")))
     }
 
     /// Returns the function and the arguments by which pickle creates the result again: from the
@@ -185,8 +189,8 @@ impl PyResultTable {
             self.0.save(path).map_err(|error| errors::error(py, &error))?;
             Ok(std::fs::read(path)?)
         })?;
-        let again = py.get_type::<Self>().getattr("_unpickled")?;
-        Ok((again, (PyBytes::new(py, &bytes),)))
+        let constructor = py.get_type::<Self>().getattr("_unpickled")?;
+        Ok((constructor, (PyBytes::new(py, &bytes),)))
     }
 
     /// Creates a result that another process has pickled.
@@ -208,12 +212,12 @@ impl PyResultTable {
 }
 
 /// Calls a function with the path of a result file that is deleted afterwards.
-fn in_temporary_file<T>(work: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T> {
+fn in_temporary_file<T>(action: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T> {
     let folder = tempfile::tempdir()?;
-    work(&folder.path().join("result.parquet"))
+    action(&folder.path().join("result.parquet"))
 }
 
-/// Appends flags or words to a list, null as `None`.
+/// Appends flags or words to a list; a null becomes `None`.
 fn append(values: &Bound<'_, PyList>, part: &ArrayRef) -> PyResult<()> {
     if let Ok(flags) = cells::flags(part) {
         return flags.iter().try_for_each(|flag| values.append(flag));

@@ -10,11 +10,11 @@ use sweep::{Effort, Error, Interrupt, ProgressMode};
 
 use crate::errors;
 
-/// The interval at which signals are checked. Basis: Ctrl-C seems immediate. Doubling it doubles
-/// the delay.
+/// The interval at which signals are checked. Basis: too short for a user to notice after Ctrl-C.
+/// Doubling it doubles the delay.
 const SIGNAL_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The options of work that keywords set.
+/// The options of work that Python's keywords set.
 #[derive(Clone, Copy)]
 pub(crate) struct WorkOptions {
     pub(crate) threads: Option<usize>,
@@ -29,7 +29,7 @@ impl WorkOptions {
     }
 }
 
-/// The result of work, and the exception that a signal handler raised meanwhile.
+/// The result of work, and the exception that a signal handler raised during the work.
 pub(crate) struct Supervised<T> {
     value: Result<T, Error>,
     raised: Option<PyErr>,
@@ -37,7 +37,8 @@ pub(crate) struct Supervised<T> {
 
 impl<T> Supervised<T> {
     /// Returns the value, or raises its error. After Ctrl-C it raises the exception that
-    /// `interrupted` makes of the value; other exceptions of signal handlers are raised unchanged.
+    /// `interrupted` creates from the value; exceptions of other signal handlers are raised
+    /// unchanged.
     pub(crate) fn value_or_raise(
         self,
         py: Python<'_>,
@@ -53,18 +54,19 @@ impl<T> Supervised<T> {
     }
 }
 
-/// Waits for the result of work, and checks for signals meanwhile. A signal whose handler raises an
-/// exception, such as Ctrl-C, raises the interrupt; the function then returns at once if the work
-/// `is_abandoned`. Work that panics has no result.
+/// Waits for the result of work, and checks for signals in the meantime. A signal whose handler
+/// raises an exception, such as Ctrl-C, raises the interrupt; the function then returns at once if
+/// the work `is_abandoned`. Work that panics has no result.
 fn wait_for_result<T>(
-    ended: &Receiver<T>,
+    results: &Receiver<T>,
     interrupt: &Interrupt,
     is_abandoned: bool,
 ) -> (Option<T>, Option<PyErr>) {
     let mut raised = None;
     loop {
-        let received = ended.recv_timeout(SIGNAL_POLL_INTERVAL);
-        // Signals are checked after the end of the work too, because one may have come before it.
+        let received = results.recv_timeout(SIGNAL_POLL_INTERVAL);
+        // Signals are checked after the end of the work as well, because one may have arrived just
+        // before.
         if raised.is_none() {
             raised = Python::attach(|py| py.check_signals().err());
             if raised.is_some() {
@@ -87,18 +89,18 @@ pub(crate) fn supervise_abandonable<T: Send + 'static>(
     work: impl FnOnce(Effort<'_>) -> Result<Option<T>, Error> + Send + 'static,
 ) -> PyResult<T> {
     let result = py.detach(|| {
-        let (done, ended) = channel();
+        let (sender, results) = channel();
         let interrupt = Interrupt::new();
         let work_interrupt = interrupt.clone();
         let work = move || {
-            // The receiver is gone if the work was abandoned.
+            // The receiver no longer exists if the work was abandoned.
             let _ =
-                done.send(work(WorkOptions { threads, progress: false }.effort(&work_interrupt)));
+                sender.send(work(WorkOptions { threads, progress: false }.effort(&work_interrupt)));
         };
-        Builder::new().spawn(work).map_err(no_thread)?;
-        match wait_for_result(&ended, &interrupt, true) {
+        Builder::new().spawn(work).map_err(thread_error)?;
+        match wait_for_result(&results, &interrupt, true) {
             (_, Some(raised)) => Err(raised),
-            (value, None) => value.ok_or_else(panicked),
+            (value, None) => value.ok_or_else(panic_error),
         }
     });
     let value =
@@ -111,11 +113,11 @@ pub(crate) fn supervise_abandonable<T: Send + 'static>(
         .ok_or_else(|| errors::interrupted_without_result(py))
 }
 
-fn no_thread(error: std::io::Error) -> PyErr {
+fn thread_error(error: std::io::Error) -> PyErr {
     PyRuntimeError::new_err(format!("cannot start a thread: {error}"))
 }
 
-fn panicked() -> PyErr {
+fn panic_error() -> PyErr {
     PyRuntimeError::new_err("the engine panicked: please report this with the plan")
 }
 
@@ -129,17 +131,17 @@ pub(crate) fn supervise<T: Send>(
     py.detach(|| {
         let interrupt = Interrupt::new();
         std::thread::scope(|scope| {
-            let (done, ended) = channel();
+            let (sender, results) = channel();
             let interrupt = &interrupt;
             let work = move || {
                 // The receiver exists, because this function waits for the work.
-                let _ = done.send(work(options.effort(interrupt)));
+                let _ = sender.send(work(options.effort(interrupt)));
             };
-            let worker = Builder::new().spawn_scoped(scope, work).map_err(no_thread)?;
-            let (value, raised) = wait_for_result(&ended, interrupt, false);
+            let worker = Builder::new().spawn_scoped(scope, work).map_err(thread_error)?;
+            let (value, raised) = wait_for_result(&results, interrupt, false);
             // Without this join the scope would propagate a panic of the thread.
             let _ = worker.join();
-            value.map(|value| Supervised { value, raised }).ok_or_else(panicked)
+            value.map(|value| Supervised { value, raised }).ok_or_else(panic_error)
         })
     })
 }

@@ -18,13 +18,13 @@ fn an_integration_allocates_nothing() {
     for simd in instruction_sets() {
         let adaptive = [TestMethod::Dopri5(tolerance), TestMethod::Additive(tolerance)];
         for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(adaptive) {
-            let (outcomes, asked) = solve::<SwingEquation, 3, 1>(simd, method, &trajectories);
+            let (outcomes, allocations) = solve::<SwingEquation, 3, 1>(simd, method, &trajectories);
             assert!(
                 outcomes
                     .iter()
-                    .all(|o| matches!(o.ended, SegmentEnd::Completed(_)) && o.count.accepted > 20)
+                    .all(|o| matches!(o.end, SegmentEnd::Completed(_)) && o.count.accepted > 20)
             );
-            assert_eq!(asked, 0, "{method:?} on {simd:?}");
+            assert_eq!(allocations, 0, "{method:?} on {simd:?}");
         }
     }
 }

@@ -1,5 +1,4 @@
-//! Lanes in a plain array, of any number and on any processor, for tests that need no instruction
-//! set.
+//! Lanes in a plain array, of any number and on any processor.
 
 use crate::lane::Lane;
 use crate::real::Real;

@@ -2,25 +2,25 @@
 
 use crate::{Dual, N, Real};
 
-/// The function f(x) over plain numbers, with one derivative, and with two; and f' and f'' in
-/// closed form.
+/// A function f(x) over plain numbers, over dual numbers, and over dual numbers of dual numbers,
+/// with f' and f'' in closed form.
 struct DerivativeCase {
     name: &'static str,
     plain: fn(N<f64>) -> N<f64>,
-    first: fn(N<Dual<f64>>) -> N<Dual<f64>>,
-    second: fn(N<Dual<Dual<f64>>>) -> N<Dual<Dual<f64>>>,
-    by_hand: fn(f64) -> [f64; 2],
+    dual: fn(N<Dual<f64>>) -> N<Dual<f64>>,
+    nested_dual: fn(N<Dual<Dual<f64>>>) -> N<Dual<Dual<f64>>>,
+    closed_form: fn(f64) -> [f64; 2],
 }
 
 /// Makes a case from one expression, compiled for plain numbers, for duals and for duals of duals.
 macro_rules! case {
-    ($name:literal, |$x:ident| $f:expr, |$y:ident| $by_hand:expr) => {
+    ($name:literal, |$x:ident| $f:expr, |$y:ident| $closed_form:expr) => {
         DerivativeCase {
             name: $name,
             plain: |$x| ($f).into(),
-            first: |$x| ($f).into(),
-            second: |$x| ($f).into(),
-            by_hand: |$y: f64| $by_hand,
+            dual: |$x| ($f).into(),
+            nested_dual: |$x| ($f).into(),
+            closed_form: |$y: f64| $closed_form,
         }
     };
 }
@@ -69,8 +69,8 @@ fn is_close(a: f64, b: f64, tolerance: f64) -> bool {
 fn first_and_second_derivatives_agree_with_closed_forms() {
     for case in CASES {
         for x in ARGUMENTS {
-            let [first, second] = (case.by_hand)(x);
-            let y = (case.first)(N(Dual { value: x, slope: 1.0 })).0;
+            let [first, second] = (case.closed_form)(x);
+            let y = (case.dual)(N(Dual { value: x, slope: 1.0 })).0;
             assert_eq!(
                 y.value.to_bits(),
                 (case.plain)(N(x)).0.to_bits(),
@@ -83,9 +83,12 @@ fn first_and_second_derivatives_agree_with_closed_forms() {
                 case.name,
                 y.slope
             );
-            let once = Dual { value: x, slope: 1.0 };
-            let y =
-                (case.second)(N(Dual { value: once, slope: Dual { value: 1.0, slope: 0.0 } })).0;
+            let inner = Dual { value: x, slope: 1.0 };
+            let y = (case.nested_dual)(N(Dual {
+                value: inner,
+                slope: Dual { value: 1.0, slope: 0.0 },
+            }))
+            .0;
             assert!(is_close(y.slope.value, first, 1e-14), "{}: first of two at {x}", case.name);
             assert!(
                 is_close(y.slope.slope, second, 1e-13),
@@ -103,7 +106,7 @@ fn derivatives_agree_with_differences() {
     for case in CASES {
         for x in ARGUMENTS {
             let difference = ((case.plain)(N(x + H)).0 - (case.plain)(N(x - H)).0) / (2.0 * H);
-            let y = (case.first)(N(Dual { value: x, slope: 1.0 })).0;
+            let y = (case.dual)(N(Dual { value: x, slope: 1.0 })).0;
             assert!(
                 is_close(y.slope, difference, 1e-8),
                 "{}: {} against {difference}",
@@ -117,10 +120,10 @@ fn derivatives_agree_with_differences() {
 #[test]
 fn the_derivative_is_proportional_to_the_slope_and_zero_for_constants() {
     for case in CASES {
-        let one = (case.first)(N(Dual { value: 1.1, slope: 1.0 })).0.slope;
-        let many = (case.first)(N(Dual { value: 1.1, slope: -3.0 })).0.slope;
-        assert!(is_close(many, -3.0 * one, 1e-14), "{}", case.name);
-        assert_eq!((case.first)(N(1.1).constant()).0.slope, 0.0, "{}", case.name);
+        let unit_derivative = (case.dual)(N(Dual { value: 1.1, slope: 1.0 })).0.slope;
+        let scaled_derivative = (case.dual)(N(Dual { value: 1.1, slope: -3.0 })).0.slope;
+        assert!(is_close(scaled_derivative, -3.0 * unit_derivative, 1e-14), "{}", case.name);
+        assert_eq!((case.dual)(N(1.1).constant()).0.slope, 0.0, "{}", case.name);
     }
     assert_eq!(Dual::constant(2.0).lit(7.0).slope, 0.0);
 }

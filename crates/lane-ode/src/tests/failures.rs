@@ -1,4 +1,4 @@
-//! Tests that a trajectory that fails ends with reason and time, without effect on other lanes.
+//! Tests that a failing trajectory ends with its reason and time, without effect on other lanes.
 
 use super::{Equation, TestMethod, TestOutcome, TestTrajectory, instruction_sets, solve};
 use crate::{Failure, Lane, N, Segment, SegmentEnd, Tolerance};
@@ -8,7 +8,7 @@ use crate::{Failure, Lane, N, Segment, SegmentEnd, Tolerance};
 struct FailingEquation;
 
 impl Equation<3, 5> for FailingEquation {
-    const FARTHEST: f64 = 1e3;
+    const RANGE_LIMIT: f64 = 1e3;
 
     #[inline(always)]
     fn derivative<T: Lane>(&[a, b, c, d, w]: &[N<T>; 5], t_s: N<T>, x: &[N<T>; 3]) -> [N<T>; 3] {
@@ -24,66 +24,72 @@ fn trajectory(parameters: [f64; 5]) -> TestTrajectory<3, 5> {
 }
 
 /// Returns a trajectory that does not fail.
-fn sound(i: usize) -> TestTrajectory<3, 5> {
+fn regular(i: usize) -> TestTrajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, 100.0 + i as f64, 2.0 + 0.37 * i as f64])
 }
 
-fn explodes() -> TestTrajectory<3, 5> {
+fn diverging() -> TestTrajectory<3, 5> {
     trajectory([1.0, 0.0, 100.0, 100.0, 2.0])
 }
 
-fn has_no_value_after(t_s: f64) -> TestTrajectory<3, 5> {
+fn undefined_after(t_s: f64) -> TestTrajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, t_s, 2.0])
 }
 
-fn runs_into_a_pole_at(t_s: f64) -> TestTrajectory<3, 5> {
+fn with_pole_at(t_s: f64) -> TestTrajectory<3, 5> {
     trajectory([0.0, 1.0, t_s, 100.0, 2.0])
 }
 
-fn is_fast() -> TestTrajectory<3, 5> {
+fn fast() -> TestTrajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, 100.0, 1e4])
 }
 
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 };
 const ADAPTIVE: [TestMethod; 2] = [TestMethod::Dopri5(TOLERANCE), TestMethod::Additive(TOLERANCE)];
 
-/// Solves failing trajectories among sound ones in several orders, and asserts that the sound ones
-/// have the same bits as without failing ones. Returns the outcomes of the failing ones.
-fn among_others(method: TestMethod, failing: &[TestTrajectory<3, 5>]) -> Vec<TestOutcome<3>> {
-    let mut ends: Option<Vec<TestOutcome<3>>> = None;
+/// Solves failing trajectories among regular ones in several orders, and asserts that the regular
+/// ones have the same bits as without failing ones. Returns the outcomes of the failing ones.
+fn solve_among_regular(
+    method: TestMethod,
+    failing: &[TestTrajectory<3, 5>],
+) -> Vec<TestOutcome<3>> {
+    let mut first_failed: Option<Vec<TestOutcome<3>>> = None;
     for simd in instruction_sets() {
-        let alone: Vec<_> = (0..12).map(sound).collect();
-        let (alone, _) = solve::<FailingEquation, 3, 5>(simd, method, &alone);
-        assert!(alone.iter().all(|o| matches!(o.ended, SegmentEnd::Completed(_))));
+        let unmixed: Vec<_> = (0..12).map(regular).collect();
+        let (unmixed, _) = solve::<FailingEquation, 3, 5>(simd, method, &unmixed);
+        assert!(unmixed.iter().all(|o| matches!(o.end, SegmentEnd::Completed(_))));
         for offset in 0..4 {
             // Every third trajectory from `offset` on fails.
-            let mut mixed: Vec<_> = (0..12).map(sound).collect();
-            let mut places = Vec::new();
+            let mut mixed: Vec<_> = (0..12).map(regular).collect();
+            let mut positions = Vec::new();
             for (i, trajectory) in failing.iter().enumerate() {
-                let place = offset + 3 * i;
-                mixed.insert(place, trajectory.clone());
-                places.push(place);
+                let position = offset + 3 * i;
+                mixed.insert(position, trajectory.clone());
+                positions.push(position);
             }
             let (outcomes, _) = solve::<FailingEquation, 3, 5>(simd, method, &mixed);
-            let mut bad = Vec::new();
-            let mut good = Vec::new();
+            let mut failed = Vec::new();
+            let mut completed = Vec::new();
             for (i, outcome) in outcomes.into_iter().enumerate() {
-                if places.contains(&i) { bad.push(outcome) } else { good.push(outcome) }
+                if positions.contains(&i) { failed.push(outcome) } else { completed.push(outcome) }
             }
-            for (i, (with, without)) in good.iter().zip(&alone).enumerate() {
-                assert!(with.is_same(without), "{simd:?}, sound {i}: {with:?} against {without:?}");
+            for (i, (mixed, expected)) in completed.iter().zip(&unmixed).enumerate() {
+                assert!(
+                    mixed.is_same(expected),
+                    "{simd:?}, sound {i}: {mixed:?} against {expected:?}"
+                );
             }
-            let first = ends.get_or_insert_with(|| bad.clone());
-            for (now, then) in bad.iter().zip(first.iter()) {
-                assert_eq!((now.ended, now.count), (then.ended, then.count), "{simd:?}");
+            let first = first_failed.get_or_insert_with(|| failed.clone());
+            for (outcome, first) in failed.iter().zip(first.iter()) {
+                assert_eq!((outcome.end, outcome.count), (first.end, first.count), "{simd:?}");
             }
         }
     }
-    ends.unwrap()
+    first_failed.unwrap()
 }
 
 fn failure(outcome: &TestOutcome<3>) -> (Failure, f64) {
-    let SegmentEnd::Failed { reason, time_s, .. } = outcome.ended else {
+    let SegmentEnd::Failed { reason, time_s, .. } = outcome.end else {
         panic!("it did not fail: {outcome:?}")
     };
     (reason, time_s)
@@ -92,10 +98,10 @@ fn failure(outcome: &TestOutcome<3>) -> (Failure, f64) {
 #[test]
 fn a_diverged_trajectory_ends_alone() {
     for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(ADAPTIVE) {
-        let outcomes = among_others(method, &[explodes()]);
+        let outcomes = solve_among_regular(method, &[diverging()]);
         let (reason, time_s) = failure(&outcomes[0]);
         assert_eq!(reason, Failure::Diverged, "{method:?}");
-        // From x = 1 the solution of x' > x^2 + 9 is infinite before t = (pi/2 - atan(1/3)) / 3, or
+        // From x = 1 the solution of x' > x^2 + 9 diverges before t = (pi/2 - atan(1/3)) / 3 =
         // 0.42.
         assert!((0.1..0.42).contains(&time_s), "{method:?}: {time_s} s");
     }
@@ -104,11 +110,11 @@ fn a_diverged_trajectory_ends_alone() {
 #[test]
 fn a_state_that_is_not_finite_ends_alone() {
     for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(ADAPTIVE) {
-        let outcomes = among_others(method, &[has_no_value_after(0.7), has_no_value_after(0.2)]);
-        for (outcome, at_s) in outcomes.iter().zip([0.7, 0.2]) {
+        let outcomes = solve_among_regular(method, &[undefined_after(0.7), undefined_after(0.2)]);
+        for (outcome, expected_s) in outcomes.iter().zip([0.7, 0.2]) {
             let (reason, time_s) = failure(outcome);
             assert_eq!(reason, Failure::Diverged, "{method:?}");
-            assert!((time_s - at_s).abs() < 2e-3, "{method:?}: {time_s} s");
+            assert!((time_s - expected_s).abs() < 2e-3, "{method:?}: {time_s} s");
         }
     }
 }
@@ -116,31 +122,33 @@ fn a_state_that_is_not_finite_ends_alone() {
 #[test]
 fn a_step_too_small_for_time_ends_alone() {
     for method in ADAPTIVE {
-        let outcomes = among_others(method, &[runs_into_a_pole_at(0.6), runs_into_a_pole_at(1.5)]);
-        for (outcome, at_s) in outcomes.iter().zip([0.6, 1.5]) {
+        let outcomes = solve_among_regular(method, &[with_pole_at(0.6), with_pole_at(1.5)]);
+        for (outcome, expected_s) in outcomes.iter().zip([0.6, 1.5]) {
             let (reason, time_s) = failure(outcome);
             assert_eq!(reason, Failure::StepTooSmall, "{outcome:?}");
-            assert!((time_s - at_s).abs() < 1e-9, "{time_s} s");
+            assert!((time_s - expected_s).abs() < 1e-9, "{time_s} s");
         }
     }
 }
 
 #[test]
 fn a_trajectory_at_its_limit_of_steps_ends_alone() {
-    for outcome in ADAPTIVE.iter().flat_map(|method| among_others(*method, &[is_fast(), is_fast()]))
+    for outcome in
+        ADAPTIVE.iter().flat_map(|method| solve_among_regular(*method, &[fast(), fast()]))
     {
         let (reason, _) = failure(&outcome);
         assert_eq!(reason, Failure::StepLimit);
-        let SegmentEnd::Failed { count, .. } = outcome.ended else { unreachable!() };
+        let SegmentEnd::Failed { count, .. } = outcome.end else { unreachable!() };
         assert_eq!(count.accepted + count.rejected, 2000);
     }
 }
 
 #[test]
 fn all_failures_together_do_not_change_other_trajectories() {
-    let failing = [explodes(), has_no_value_after(0.3), runs_into_a_pole_at(0.9), is_fast()];
+    let failing = [diverging(), undefined_after(0.3), with_pole_at(0.9), fast()];
     for method in ADAPTIVE {
-        let reasons: Vec<_> = among_others(method, &failing).iter().map(|o| failure(o).0).collect();
+        let reasons: Vec<_> =
+            solve_among_regular(method, &failing).iter().map(|o| failure(o).0).collect();
         assert_eq!(
             reasons,
             [Failure::Diverged, Failure::Diverged, Failure::StepTooSmall, Failure::StepLimit]

@@ -9,11 +9,11 @@ use core::hint::black_box;
 /// The operands of one lane.
 type Operands = [f64; 3];
 
-/// The number of results for the operands: arithmetic, sine and cosine twice, two selections.
+/// The number of results for the operands.
 const RESULTS: usize = 21;
 
-/// Returns the results by IEEE 754 and the standard library. A negated sum is hidden from the
-/// compiler, which would fuse both (`aarch64::negated`).
+/// Returns the results by IEEE 754 and the standard library. `black_box` prevents the compiler from
+/// fusing a negation with its sum (`aarch64::negated`).
 fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
     let (sin, cos) = trig::sin_cos(a);
     let (sin_turns, cos_turns) = trig::sin_cos_turns(N(a));
@@ -49,7 +49,7 @@ impl Kernel for LaneOperations<'_> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut all = Vec::new();
+        let mut rows = Vec::new();
         for group in self.0.chunks(T::LANES) {
             let mut operands = [zero; 3];
             for (lane, values) in group.iter().enumerate() {
@@ -88,7 +88,7 @@ impl Kernel for LaneOperations<'_> {
             for (lane, [a, b, _]) in group.iter().enumerate() {
                 assert_eq!(less >> lane & 1 == 1, a < b, "{a} < {b}");
                 are_all_less &= a < b;
-                all.push(results.map(|r| r.get(lane)));
+                rows.push(results.map(|r| r.get(lane)));
             }
             if group.len() == T::LANES {
                 assert_eq!(T::all(a.less(b)), are_all_less);
@@ -96,7 +96,7 @@ impl Kernel for LaneOperations<'_> {
             }
             assert!((0..T::LANES).all(|lane| zero.lit(-1.5).get(lane) == -1.5));
         }
-        all
+        rows
     }
 }
 
@@ -124,23 +124,23 @@ fn operands() -> Vec<Operands> {
         -core::f64::consts::FRAC_PI_2,
         4_503_599_627_370_497.5,
     ];
-    let mut all = Vec::new();
+    let mut rows = Vec::new();
     for a in special {
         for b in special {
-            all.push([a, b, special[(all.len() * 7) % special.len()]]);
+            rows.push([a, b, special[(rows.len() * 7) % special.len()]]);
         }
     }
     let mut rng = fastrand::Rng::with_seed(1);
     for _ in 0..20_000 {
         let mut number = || (rng.f64() * 2.0 - 1.0) * 2.0_f64.powi(rng.i32(-40..40));
-        all.push([number(), number(), number()]);
+        rows.push([number(), number(), number()]);
     }
-    // For products and sums of similar magnitude a fused operation differs from two rounded ones.
+    // Fused operations differ from two rounded ones for products and sums of similar magnitude.
     for _ in 0..20_000 {
         let [a, b] = [rng.f64() + 0.5, rng.f64() + 0.5];
-        all.push([a, b, -a * b]);
+        rows.push([a, b, -a * b]);
     }
-    all
+    rows
 }
 
 /// Returns whether both numbers have the same bits. Two NaN are the same, because their sign and

@@ -7,9 +7,9 @@ use crate::{Segment, SegmentEnd, Simd, Tolerance};
 
 const END_S: f64 = 6.0;
 
-/// A tolerance that accepts any step: with segments of one step each, an adaptive method has fixed
-/// steps.
-const ANYTHING: Tolerance = Tolerance { relative: 1e30, absolute: 1e30, max_steps: u64::MAX };
+/// A tolerance that accepts any step. With segments of one step each, an adaptive method then has a
+/// fixed step.
+const ACCEPT_ALL: Tolerance = Tolerance { relative: 1e30, absolute: 1e30, max_steps: u64::MAX };
 
 /// Returns the error at the end and the largest error inside a step, for each number of steps.
 fn errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
@@ -26,13 +26,13 @@ fn errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
         .collect();
     let (outcomes, _) = solve::<SwingEquation, 3, 1>(Simd::best(), method, &trajectories);
     let exact = SwingEquation::exact(&[1.0], END_S);
-    let of = |(n, outcome): (&u32, TestOutcome<3>)| {
-        assert!(matches!(outcome.ended, SegmentEnd::Completed(_)), "{outcome:?}");
+    let trajectory_errors = |(n, outcome): (&u32, TestOutcome<3>)| {
+        assert!(matches!(outcome.end, SegmentEnd::Completed(_)), "{outcome:?}");
         assert_eq!((outcome.count.accepted, outcome.count.rejected), (u64::from(*n), 0));
-        let at_end = (0..3).map(|i| (outcome.x[i] - exact[i]).abs()).fold(0.0, f64::max);
-        [at_end, outcome.error_inside]
+        let end_error = (0..3).map(|i| (outcome.x[i] - exact[i]).abs()).fold(0.0, f64::max);
+        [end_error, outcome.error_inside]
     };
-    steps.iter().zip(outcomes).map(of).collect()
+    steps.iter().zip(outcomes).map(trajectory_errors).collect()
 }
 
 /// Computes the slope of the logarithm of the error over that of the step, by least squares.
@@ -50,10 +50,10 @@ fn slope(steps: &[u32], errors: impl Iterator<Item = f64>) -> f64 {
 /// Measures the slopes at the end and inside steps.
 fn slopes(name: &str, method: TestMethod, steps: &[u32]) -> [f64; 2] {
     let errors = errors(method, steps);
-    let slopes = [0, 1].map(|which| slope(steps, errors.iter().map(|e| e[which])));
-    let [most, least] = [0, steps.len() - 1].map(|i| errors[i][0]);
+    let slopes = [0, 1].map(|kind| slope(steps, errors.iter().map(|e| e[kind])));
+    let [coarse, fine] = [0, steps.len() - 1].map(|i| errors[i][0]);
     eprintln!(
-        "{name}: order {:.3}, between steps {:.3}; errors {most:.1e} to {least:.1e}",
+        "{name}: order {:.3}, between steps {:.3}; errors {coarse:.1e} to {fine:.1e}",
         slopes[0], slopes[1]
     );
     slopes
@@ -61,9 +61,9 @@ fn slopes(name: &str, method: TestMethod, steps: &[u32]) -> [f64; 2] {
 
 #[test]
 fn rk4_and_the_cubic_inside_its_steps_have_order_4() {
-    let [order, between] = slopes("rk4", TestMethod::Rk4, &[200, 283, 400, 566, 800]);
+    let [order, inside] = slopes("rk4", TestMethod::Rk4, &[200, 283, 400, 566, 800]);
     assert!((order - 4.0).abs() < 0.1, "order {order}");
-    assert!((between - 4.0).abs() < 0.1, "between steps {between}");
+    assert!((inside - 4.0).abs() < 0.1, "between steps {inside}");
 }
 
 #[test]
@@ -86,38 +86,40 @@ fn dop853_is_stable_on_the_imaginary_axis_to_its_limit() {
 fn dopri5_and_its_dense_output_have_order_5() {
     // Dense output of order 4 has a local error of order h^5, which does not accumulate, so that it
     // is as accurate as the method.
-    let [order, between] = slopes("dopri5", TestMethod::Dopri5(ANYTHING), &[64, 91, 128, 181, 256]);
+    let [order, inside] =
+        slopes("dopri5", TestMethod::Dopri5(ACCEPT_ALL), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
-    assert!((between - 5.0).abs() < 0.1, "between steps {between}");
+    assert!((inside - 5.0).abs() < 0.1, "between steps {inside}");
 }
 
 #[test]
 fn the_additive_method_has_order_5() {
-    let [order, between] =
-        slopes("additive", TestMethod::Additive(ANYTHING), &[64, 91, 128, 181, 256]);
+    let [order, inside] =
+        slopes("additive", TestMethod::Additive(ACCEPT_ALL), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
     // The cubic inside steps has order 4.
-    assert!((between - 4.0).abs() < 0.1, "between steps {between}");
+    assert!((inside - 4.0).abs() < 0.1, "between steps {inside}");
 }
 
 #[test]
 fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
-    // If the stiff spring were rigid, the masses would swing at the square root of 1/2.
+    // With a rigid spring in place of the stiff one, the masses would oscillate at an angular
+    // frequency of sqrt(1/2).
     let segments = vec![Segment { start_s: 0.0, end_s: 10.0, step_s: 1e-4 }];
     let trajectory = TestTrajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], segments };
     for tolerance in [1e-4, 1e-6] {
-        let allowed = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 5_000 };
+        let tolerances = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 5_000 };
         let (outcomes, _) = solve::<CoupledEquation, 4, 1>(
             Simd::best(),
-            TestMethod::Additive(allowed),
+            TestMethod::Additive(tolerances),
             core::slice::from_ref(&trajectory),
         );
-        let TestOutcome { ended, x, count, .. } = outcomes[0];
-        assert!(matches!(ended, SegmentEnd::Completed(_)), "{ended:?}");
+        let TestOutcome { end, x, count, .. } = outcomes[0];
+        assert!(matches!(end, SegmentEnd::Completed(_)), "{end:?}");
         let error = (x[0] - (10.0 * 0.5_f64.sqrt()).cos()).abs();
         eprintln!("additive at {tolerance:e}: error {error:.1e}, {count:?}");
         assert!(error < 10.0 * tolerance, "{tolerance:e} gave {error:e}");
-        // An explicit formula would need some 5e4 steps.
+        // An explicit formula would need about 5e4 steps.
         assert!(count.accepted + count.rejected < 1_000, "{count:?}");
     }
 }
@@ -128,14 +130,14 @@ fn steps_of_dopri5_are_proportional_to_the_fifth_root_of_the_tolerance() {
     let exact = SwingEquation::exact(&[1.0], 20.0);
     let mut steps = Vec::new();
     for tolerance in [1e-5, 1e-7, 1e-9, 1e-11] {
-        let allowed = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 100_000 };
+        let tolerances = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 100_000 };
         let (outcomes, _) = solve::<SwingEquation, 3, 1>(
             Simd::best(),
-            TestMethod::Dopri5(allowed),
+            TestMethod::Dopri5(tolerances),
             core::slice::from_ref(&trajectory),
         );
-        let TestOutcome { ended, x, count, error_inside, .. } = outcomes[0];
-        assert!(matches!(ended, SegmentEnd::Completed(_)));
+        let TestOutcome { end, x, count, error_inside, .. } = outcomes[0];
+        assert!(matches!(end, SegmentEnd::Completed(_)));
         let error = (0..3).map(|i| (x[i] - exact[i]).abs()).fold(error_inside, f64::max);
         eprintln!("dopri5 at {tolerance:e}: error {error:.2e}, {count:?}");
         assert!(error < 30.0 * tolerance, "{tolerance:e} gave {error:e}");
@@ -149,16 +151,16 @@ fn steps_of_dopri5_are_proportional_to_the_fifth_root_of_the_tolerance() {
 }
 
 #[test]
-fn every_segment_ends_where_it_should() {
-    // Ends and steps that binary fractions do not hit.
-    let ends = [0.1, 0.7, 1.0 / 3.0, 2.2, 5.3, 0.049, 7.77];
+fn every_segment_ends_exactly_at_its_end() {
+    // Times and steps that are not binary fractions.
+    let end_times = [0.1, 0.7, 1.0 / 3.0, 2.2, 5.3, 0.049, 7.77];
     for method in [
         TestMethod::Rk4,
         TestMethod::Dop853,
         TestMethod::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
         TestMethod::Additive(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
     ] {
-        let trajectories: Vec<_> = ends
+        let trajectories: Vec<_> = end_times
             .into_iter()
             .map(|end_s| {
                 let edges = [0.0, 0.3 * end_s, 0.31 * end_s, end_s];
@@ -172,8 +174,8 @@ fn every_segment_ends_where_it_should() {
             .collect();
         for simd in super::instruction_sets() {
             let (outcomes, _) = solve::<SwingEquation, 3, 1>(simd, method, &trajectories);
-            for (end_s, outcome) in ends.into_iter().zip(outcomes) {
-                assert!(matches!(outcome.ended, SegmentEnd::Completed(_)));
+            for (end_s, outcome) in end_times.into_iter().zip(outcomes) {
+                assert!(matches!(outcome.end, SegmentEnd::Completed(_)));
                 assert_eq!(
                     outcome.observed_to_s.to_bits(),
                     end_s.to_bits(),
@@ -191,10 +193,10 @@ fn fixed_steps_divide_a_segment_into_the_fewest_equal_steps() {
     };
     assert_eq!(steps(50.0, 2e-4), 250_000);
     assert_eq!(steps(1.0, 0.3), 4);
-    // 0.7 / 0.1 is a hair below 7, 0.3 / 0.1 a hair below 3, 4.35 / 0.01 a hair below 435: none is
-    // an eighth of a step off.
+    // The quotients 0.7 / 0.1, 0.3 / 0.1 and 4.35 / 0.01 are slightly below 7, 3 and 435 by
+    // rounding.
     assert_eq!([steps(0.7, 0.1), steps(0.3, 0.1), steps(4.35, 0.01)], [7, 3, 435]);
-    // 1.1 / 0.1 is a hair above 11.
+    // The quotient 1.1 / 0.1 is slightly above 11 by rounding.
     assert_eq!(steps(1.1, 0.1), 11);
     assert_eq!(steps(0.01, 1.0), 1);
 }

@@ -3,7 +3,7 @@
 use crate::{N, Peaks, Sample};
 use core::f64::consts::TAU;
 
-/// A sum of two waves: value and two derivatives.
+/// A sum of two sine waves, with its first two derivatives.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Waves {
     pub(super) amplitude: [f64; 2],
@@ -12,7 +12,7 @@ pub(super) struct Waves {
 }
 
 impl Waves {
-    fn at(&self, t: f64) -> [f64; 3] {
+    fn derivatives(&self, t: f64) -> [f64; 3] {
         let mut y = [0.0; 3];
         for k in 0..2 {
             let a = self.amplitude[k];
@@ -30,29 +30,29 @@ impl Waves {
     fn peak(&self, end: f64) -> f64 {
         let cells = 4000;
         let step = end / f64::from(cells);
-        let size = |i: i32| self.at(step * f64::from(i))[0].abs();
-        let best = (0..=cells).max_by(|&i, &j| size(i).total_cmp(&size(j))).unwrap();
+        let magnitude = |i: i32| self.derivatives(step * f64::from(i))[0].abs();
+        let best = (0..=cells).max_by(|&i, &j| magnitude(i).total_cmp(&magnitude(j))).unwrap();
         let mut t = step * f64::from(best);
         for _ in 0..20 {
-            let [_, slope, curvature] = self.at(t);
+            let [_, slope, curvature] = self.derivatives(t);
             t -= slope / curvature;
         }
         let is_inside = (0.0..=end).contains(&t) && (t - step * f64::from(best)).abs() <= step;
-        if is_inside { self.at(t)[0].abs().max(size(best)) } else { size(best) }
+        if is_inside { self.derivatives(t)[0].abs().max(magnitude(best)) } else { magnitude(best) }
     }
 
     pub(super) fn sample(&self, t: f64) -> Sample<f64> {
-        let [value, slope, curvature] = self.at(t).map(N);
+        let [value, slope, curvature] = self.derivatives(t).map(N);
         Sample { value, slope, curvature }
     }
 
-    /// Returns the peak that [`Peaks`] finds in `steps` equal steps.
-    fn found(&self, end: f64, steps: u32) -> f64 {
-        self.found_by(Peaks::advance, end, steps)
+    /// Returns the peak that [`Peaks`] determines in `steps` equal steps.
+    fn sampled_peak(&self, end: f64, steps: u32) -> f64 {
+        self.sampled_peak_by(Peaks::advance, end, steps)
     }
 
-    /// Returns the peak that [`Peaks`] finds in `steps` equal steps by a method of `advance`.
-    fn found_by(&self, advance: Advance, end: f64, steps: u32) -> f64 {
+    /// Returns the peak that [`Peaks`] determines in `steps` equal steps by the method `advance`.
+    fn sampled_peak_by(&self, advance: Advance, end: f64, steps: u32) -> f64 {
         let h = end / f64::from(steps);
         let mut peaks = Peaks::<f64, 1>::new(N(0.0));
         peaks.begin(&[self.sample(0.0)], true);
@@ -65,16 +65,16 @@ impl Waves {
 
 type Advance = fn(&mut Peaks<f64, 1>, N<f64>, &[Sample<f64>; 1], bool);
 
-/// Returns the largest error, as a share of the amplitude, for many sums of a wave of unit
-/// frequency and a slower or faster one.
+/// Returns the largest error relative to the amplitude, over many sums of a wave of unit frequency
+/// and a slower one.
 fn largest_error(steps_per_period: u32) -> f64 {
     largest_error_by(Peaks::advance, steps_per_period)
 }
 
-/// Returns the largest error like [`largest_error`], by a method of `advance`.
+/// Returns the largest error like [`largest_error`], by the method `advance`.
 fn largest_error_by(advance: Advance, steps_per_period: u32) -> f64 {
     let mut rng = fastrand::Rng::with_seed(7);
-    let mut most = 0.0_f64;
+    let mut largest = 0.0_f64;
     for _ in 0..400 {
         let waves = Waves {
             amplitude: [1.0, 0.3 * rng.f64()],
@@ -83,15 +83,17 @@ fn largest_error_by(advance: Advance, steps_per_period: u32) -> f64 {
         };
         let periods = 3;
         let peak = waves.peak(f64::from(periods));
-        let found = waves.found_by(advance, f64::from(periods), periods * steps_per_period);
-        most = most.max((found - peak).abs() / peak);
+        let sampled_peak =
+            waves.sampled_peak_by(advance, f64::from(periods), periods * steps_per_period);
+        largest = largest.max((sampled_peak - peak).abs() / peak);
     }
-    most
+    largest
 }
 
 #[test]
 fn the_sampling_error_stays_below_1e_5_down_to_ten_steps_a_period() {
-    // The longest steps in use are 6.25 ms at 350 rpm, or 27 steps in a turn.
+    // The longest steps that the washing machine's models take are 6.25 ms at 350 rpm, or 27 steps
+    // in a turn.
     for steps in [10, 12, 16, 27, 100] {
         let error = largest_error(steps);
         eprintln!("{steps} steps a period: {error:.2e} of the amplitude");
@@ -119,11 +121,12 @@ fn without_curvatures_the_sampling_error_is_of_fourth_order() {
 
 #[test]
 fn samples_alone_miss_the_peak() {
-    // The interpolation inside steps adds the difference.
+    // Interpolation inside steps finds the peak between the samples.
     let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [0.4, 0.0] };
-    let samples = (0..=20).map(|i| waves.at(f64::from(i) / 10.0)[0].abs()).fold(0.0, f64::max);
+    let samples =
+        (0..=20).map(|i| waves.derivatives(f64::from(i) / 10.0)[0].abs()).fold(0.0, f64::max);
     assert!(1.0 - samples > 1e-3);
-    assert!((waves.found(2.0, 20) - 1.0).abs() < 1e-5);
+    assert!((waves.sampled_peak(2.0, 20) - 1.0).abs() < 1e-5);
 }
 
 #[test]
@@ -131,12 +134,12 @@ fn a_peak_outside_the_window_does_not_count() {
     let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [0.0, 0.0] };
     let mut peaks = Peaks::<f64, 1>::new(N(0.0));
     peaks.begin(&[waves.sample(0.0)], false);
-    // The step over the crest at 1/4 is outside the window, the descent after it is inside.
-    let over = waves.sample(0.35);
-    peaks.advance(N(0.35), &[over], false);
-    peaks.begin(&[over], true);
+    // The step over the crest at 1/4 is outside the window, the step down from it is inside.
+    let descending = waves.sample(0.35);
+    peaks.advance(N(0.35), &[descending], false);
+    peaks.begin(&[descending], true);
     peaks.advance(N(0.1), &[waves.sample(0.45)], true);
-    assert_eq!(peaks.lane(0)[0], over.value.0);
+    assert_eq!(peaks.lane(0)[0], descending.value.0);
     peaks.reset(0);
     assert_eq!(peaks.lane(0)[0], 0.0);
 }

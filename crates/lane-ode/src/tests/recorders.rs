@@ -1,4 +1,4 @@
-//! Tests of peaks of parts, mean squares and times above zero on waves with known results.
+//! Tests of interval peaks, mean squares and times above zero on waves with known results.
 
 use super::array::Array;
 use super::peaks::Waves;
@@ -14,8 +14,8 @@ fn waves(seed: u64) -> Waves {
     }
 }
 
-/// Returns the peaks of the parts between cuts, in `steps` equal steps from 0 to `end`.
-fn parts(waves: &Waves, cuts: &[f64], end: f64, steps: u32) -> Vec<f64> {
+/// Returns the peaks of the parts between cuts, from `steps` equal steps over 0 to `end`.
+fn part_peaks(waves: &Waves, cuts: &[f64], end: f64, steps: u32) -> Vec<f64> {
     let h = end / f64::from(steps);
     let mut peaks = IntervalPeaks::<f64, 1>::new(N(0.0));
     peaks.reset(0, cuts);
@@ -27,14 +27,14 @@ fn parts(waves: &Waves, cuts: &[f64], end: f64, steps: u32) -> Vec<f64> {
     peaks.finish(0).into_iter().map(|[peak]| peak).collect()
 }
 
-/// Returns the peak between two times, in steps that end at both.
-fn peak_between(waves: &Waves, from: f64, to: f64) -> f64 {
+/// Returns the peak between two times, from steps that end at both.
+fn peak_between(waves: &Waves, start: f64, end: f64) -> f64 {
     const STEPS: u32 = 4000;
-    let h = (to - from) / f64::from(STEPS);
+    let h = (end - start) / f64::from(STEPS);
     let mut peaks = Peaks::<f64, 1>::new(N(0.0));
-    peaks.begin(&[waves.sample(from)], true);
+    peaks.begin(&[waves.sample(start)], true);
     for i in 1..=STEPS {
-        peaks.advance(N(h), &[waves.sample(from + h * f64::from(i))], true);
+        peaks.advance(N(h), &[waves.sample(start + h * f64::from(i))], true);
     }
     peaks.lane(0)[0]
 }
@@ -46,53 +46,53 @@ fn the_peak_of_a_part_is_that_of_a_separate_trajectory() {
     let edges: Vec<f64> = [0.0].into_iter().chain(cuts).chain([5.0]).collect();
     for seed in 0..20 {
         let waves = waves(seed);
-        let found = parts(&waves, &cuts, 5.0, 100);
-        assert_eq!(found.len(), cuts.len() + 1);
-        for (found, edge) in found.iter().zip(edges.windows(2)) {
+        let peaks = part_peaks(&waves, &cuts, 5.0, 100);
+        assert_eq!(peaks.len(), cuts.len() + 1);
+        for (peak, edge) in peaks.iter().zip(edges.windows(2)) {
             let expected = peak_between(&waves, edge[0], edge[1]);
-            assert!((found - expected).abs() < 1e-6, "{edge:?}: {found} for {expected}");
+            assert!((peak - expected).abs() < 1e-6, "{edge:?}: {peak} for {expected}");
         }
     }
-    assert_eq!(parts(&waves(1), &[], 5.0, 100).len(), 1);
+    assert_eq!(part_peaks(&waves(1), &[], 5.0, 100).len(), 1);
 }
 
 #[test]
 fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
     let cuts = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
-    let mut together = IntervalPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
+    let mut combined = IntervalPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
     let all: Vec<Waves> = (0..3).map(waves).collect();
     let sample = |t: f64| {
-        let mut lanes = Sample::still(N(Array([0.0; 3])), N(Array([0.0; 3])));
+        let mut lanes = Sample::constant(N(Array([0.0; 3])), N(Array([0.0; 3])));
         for (lane, waves) in all.iter().enumerate() {
-            let one = waves.sample(t);
-            lanes.value.0.set(lane, one.value.0);
-            lanes.slope.0.set(lane, one.slope.0);
-            lanes.curvature.0.set(lane, one.curvature.0);
+            let sample_of_wave = waves.sample(t);
+            lanes.value.0.set(lane, sample_of_wave.value.0);
+            lanes.slope.0.set(lane, sample_of_wave.slope.0);
+            lanes.curvature.0.set(lane, sample_of_wave.curvature.0);
         }
         [lanes]
     };
     for (lane, cuts) in cuts.iter().enumerate() {
-        together.reset(lane, cuts);
+        combined.reset(lane, cuts);
     }
-    together.begin(&sample(0.0), [true; 3]);
+    combined.begin(&sample(0.0), [true; 3]);
     for i in 1..=60 {
         let t = 0.05 * f64::from(i);
         let h = N(Array([0.05; 3]));
-        together.advance(N(Array([t; 3])), h, &sample(t), [true; 3]);
+        combined.advance(N(Array([t; 3])), h, &sample(t), [true; 3]);
     }
     for lane in 0..3 {
-        let mut alone = IntervalPeaks::<f64, 1>::new(N(0.0));
-        alone.reset(0, &cuts[lane]);
-        alone.begin(&[all[lane].sample(0.0)], true);
+        let mut separate = IntervalPeaks::<f64, 1>::new(N(0.0));
+        separate.reset(0, &cuts[lane]);
+        separate.begin(&[all[lane].sample(0.0)], true);
         for i in 1..=60 {
             let t = 0.05 * f64::from(i);
-            alone.advance(N(t), N(0.05), &[all[lane].sample(t)], true);
+            separate.advance(N(t), N(0.05), &[all[lane].sample(t)], true);
         }
-        assert_eq!(together.finish(lane), alone.finish(0), "lane {lane}");
+        assert_eq!(combined.finish(lane), separate.finish(0), "lane {lane}");
     }
 }
 
-/// Returns the relative error of the integral of the square over little more than two periods.
+/// Returns the relative error of the integral of the square over slightly more than two periods.
 fn square_error(steps: u32) -> f64 {
     let amplitude = 1.5;
     let phase = 0.4;
@@ -107,8 +107,8 @@ fn square_error(steps: u32) -> f64 {
         squares.advance(N(0.0), &[waves.sample(h * f64::from(i))], true);
     }
     squares.advance(N(1.0), &[waves.sample(end + 1.0)], false);
-    let half = |t: f64| t / 2.0 - (2.0 * (TAU * t + phase)).sin() / (4.0 * TAU);
-    let exact = amplitude * amplitude * (half(end) - half(0.0));
+    let antiderivative = |t: f64| t / 2.0 - (2.0 * (TAU * t + phase)).sin() / (4.0 * TAU);
+    let exact = amplitude * amplitude * (antiderivative(end) - antiderivative(0.0));
     (squares.lane(0)[0] - exact).abs() / exact
 }
 
@@ -120,35 +120,35 @@ fn integrals_of_squares_are_of_sixth_order() {
     assert!(order > 5.5 && fine < 1e-6, "{order} {fine:e}");
 }
 
-/// Returns the time above zero of a sine wave less `height` over whole periods, from `steps` steps,
-/// and its exact value.
-fn above(height: f64, phase: f64, periods: u32, steps: u32) -> [f64; 2] {
+/// Returns the time above zero of a sine wave minus `height` over whole periods: computed from
+/// `steps` steps, and exact.
+fn times_above(height: f64, phase: f64, periods: u32, steps: u32) -> [f64; 2] {
     let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [phase, 0.0] };
     let sample = |t: f64| {
         let sample = waves.sample(t);
         Sample { value: N(sample.value.0 - height), ..sample }
     };
     let h = f64::from(periods) / f64::from(steps);
-    let mut time = TimeAbove::<f64>::new(N(0.0));
-    time.begin(&sample(0.0));
+    let mut recorder = TimeAbove::<f64>::new(N(0.0));
+    recorder.begin(&sample(0.0));
     for i in 1..=steps {
-        time.advance(N(h), &sample(h * f64::from(i)), true);
+        recorder.advance(N(h), &sample(h * f64::from(i)), true);
     }
     let exact =
         f64::from(periods) * (core::f64::consts::PI - 2.0 * height.clamp(-1.0, 1.0).asin()) / TAU;
-    [time.lane(0), exact]
+    [recorder.lane(0), exact]
 }
 
 #[test]
 fn time_above_zero_is_found_between_steps() {
     for phase in [0.0, 0.3, 1.0, 2.2, 4.0] {
         for height in [-1.5, -0.999, -0.3, 0.0, 0.5, 0.97, 0.999, 1.5] {
-            // At a height of 0.999 the wave is above zero for a seventieth of a period, or a
-            // seventh of a step.
-            let [found, exact] = above(height, phase, 3, 30);
-            assert!((found - exact).abs() < 1e-3, "{height} at {phase}: {found} for {exact}");
-            let [finer, exact] = above(height, phase, 3, 300);
-            assert!((finer - exact).abs() < 1e-6, "{height} at {phase}: {finer} for {exact}");
+            // Above a height of 0.999 the wave stays for a seventieth of a period, or a seventh of
+            // a step.
+            let [coarse, exact] = times_above(height, phase, 3, 30);
+            assert!((coarse - exact).abs() < 1e-3, "{height} at {phase}: {coarse} for {exact}");
+            let [fine, exact] = times_above(height, phase, 3, 300);
+            assert!((fine - exact).abs() < 1e-6, "{height} at {phase}: {fine} for {exact}");
         }
     }
 }
@@ -156,7 +156,7 @@ fn time_above_zero_is_found_between_steps() {
 #[test]
 fn steps_outside_the_window_add_no_time() {
     let mut time = TimeAbove::<f64>::new(N(0.0));
-    let high = Sample::still(N(1.0), N(0.0));
+    let high = Sample::constant(N(1.0), N(0.0));
     time.begin(&high);
     time.advance(N(1.0), &high, false);
     time.advance(N(0.25), &high, true);

@@ -47,30 +47,30 @@ fn ulps(computed: f64, exact: &BigFloat) -> f64 {
     if difference.is_zero() {
         return 0.0;
     }
-    // A double m 2^e with m from 1/2 to 1 has 53 places, of which the last counts 2^(e - 53).
-    let place = exact.exponent().unwrap() - 53;
+    // A double m 2^e with m from 1/2 to 1 has 53 bits, the last of which has the value 2^(e - 53).
+    let unit_exponent = exact.exponent().unwrap() - 53;
     let (words, _, _, exponent, _) = difference.as_raw_parts().unwrap();
     let leading = *words.last().unwrap() as f64 / 2.0_f64.powi(64);
-    leading * 2.0_f64.powi(exponent - place)
+    leading * 2.0_f64.powi(exponent - unit_exponent)
 }
 
-/// Returns the largest error over many angles.
-fn largest(
+/// Returns the largest error over the angles.
+fn largest_error(
     name: &str,
     angles: impl Iterator<Item = f64>,
     mut error: impl FnMut(f64) -> f64,
 ) -> f64 {
-    let mut most = 0.0_f64;
-    let mut at = 0.0;
+    let mut largest = 0.0_f64;
+    let mut worst_angle = 0.0;
     for angle in angles {
         let error = error(angle);
         assert!(error.is_finite(), "{name}: {angle}");
-        if error > most {
-            (most, at) = (error, angle);
+        if error > largest {
+            (largest, worst_angle) = (error, angle);
         }
     }
-    eprintln!("{name}: at most {most:.4} ulp, at {at:e}");
-    most
+    eprintln!("{name}: at most {largest:.4} ulp, at {worst_angle:e}");
+    largest
 }
 
 /// Generates `count` random numbers of either sign from a seed.
@@ -85,46 +85,49 @@ fn sines_of_coordinates_are_within_1_5_ulp() {
     // Within a quarter turn on one path, up to where a trajectory has diverged on the other.
     let narrow =
         random(1, 3000, |u| u * FRAC_PI_4).chain(random(2, 1000, |u| 10.0_f64.powf(-12.0 * u)));
-    assert!(largest("below pi/4", narrow, |x| reference.radians(x)) < 1.2);
+    assert!(largest_error("below pi/4", narrow, |x| reference.radians(x)) < 1.2);
     let wide = random(3, 3000, |u| FRAC_PI_4 + u * FRAC_PI_4);
-    assert!(largest("pi/4 to pi/2", wide, |x| reference.radians(x)) < 1.5);
+    assert!(largest_error("pi/4 to pi/2", wide, |x| reference.radians(x)) < 1.5);
 }
 
 #[test]
 fn sines_of_any_angle_are_within_1_5_ulp() {
     let mut reference = Reference::new();
     let large = random(4, 3000, |u| 10.0_f64.powf(6.0 * u));
-    assert!(largest("up to 1e6", large, |x| reference.radians(x)) < 1.5);
-    // Almost all digits cancel here.
+    assert!(largest_error("up to 1e6", large, |x| reference.radians(x)) < 1.5);
+    // Almost all digits cancel at these angles.
     let close = (1..500_u32)
         .map(|k| f64::from(k * k) * FRAC_PI_2)
         .chain((1..500).map(|k| f64::from(k) * PI));
-    assert!(largest("near multiples of pi/2", close, |x| reference.radians(x)) < 1.5);
+    assert!(largest_error("near multiples of pi/2", close, |x| reference.radians(x)) < 1.5);
 }
 
 #[test]
 fn sines_of_any_number_of_turns_are_within_1_6_ulp() {
     let mut reference = Reference::new();
-    assert!(largest("turns below 1/2", random(5, 3000, |u| 0.5 * u), |t| reference.turns(t)) < 1.6);
+    assert!(
+        largest_error("turns below 1/2", random(5, 3000, |u| 0.5 * u), |t| reference.turns(t))
+            < 1.6
+    );
     let many = random(6, 3000, |u| 10.0_f64.powf(9.0 * u));
-    assert!(largest("up to 1e9 turns", many, |t| reference.turns(t)) < 1.6);
+    assert!(largest_error("up to 1e9 turns", many, |t| reference.turns(t)) < 1.6);
     // Angles near multiples of a quarter turn, but not the multiples themselves, at which sine or
     // cosine is zero and has no unit in the last place.
     let close = (0..2000_i32).map(|k| f64::from(k) * 0.125 + 1e-9 * (0.5 + f64::from(k % 7 - 3)));
-    assert!(largest("near eighths of a turn", close, |t| reference.turns(t)) < 1.6);
+    assert!(largest_error("near eighths of a turn", close, |t| reference.turns(t)) < 1.6);
 }
 
 #[test]
 fn whole_turns_are_removed_without_rounding() {
-    for part in [0.0, 0.125, 0.2, -0.3, 0.499] {
-        let [a, b] = [1.0, 1048576.0].map(|turns| {
-            // The rest of `part` after the whole turns have been added and taken away again.
-            let kept: f64 = (part + turns) - turns;
-            (trig::sin_cos_turns(N(kept)), trig::sin_cos_turns(N(kept + turns)))
+    for fraction in [0.0, 0.125, 0.2, -0.3, 0.499] {
+        let [near, far] = [1.0, 1048576.0].map(|turns| {
+            // The fraction, rounded as in a sum with `turns`.
+            let rounded: f64 = (fraction + turns) - turns;
+            (trig::sin_cos_turns(N(rounded)), trig::sin_cos_turns(N(rounded + turns)))
         });
-        for ((sin, cos), (sin_later, cos_later)) in [a, b] {
-            assert_eq!(sin.0.to_bits(), sin_later.0.to_bits(), "{part}");
-            assert_eq!(cos.0.to_bits(), cos_later.0.to_bits(), "{part}");
+        for ((sin, cos), (sin_later, cos_later)) in [near, far] {
+            assert_eq!(sin.0.to_bits(), sin_later.0.to_bits(), "{fraction}");
+            assert_eq!(cos.0.to_bits(), cos_later.0.to_bits(), "{fraction}");
         }
     }
 }

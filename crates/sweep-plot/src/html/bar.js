@@ -1,49 +1,50 @@
 // Colour scales and their bars, and hatches.
 
-// Returns the place of a value on a colour scale, from 0 to 1; both sides of its middle have half
-// the colours.
+// Returns the position of a value on a colour scale, from 0 to 1; both sides of its middle have
+// half the colours.
 function position(scale, value) {
-  const even = scale.log ? Math.log : (x) => x;
-  const [low, middle, high] = scale.stops.map(even);
-  const offset = even(value) - middle;
-  const place = 0.5 + (0.5 * offset) / (offset < 0 ? middle - low : high - middle);
-  return Math.min(Math.max(place, 0), 1);
+  const coordinate = scale.log ? Math.log : (x) => x;
+  const [low, middle, high] = scale.stops.map(coordinate);
+  const offset = coordinate(value) - middle;
+  const fraction = 0.5 + (0.5 * offset) / (offset < 0 ? middle - low : high - middle);
+  return Math.min(Math.max(fraction, 0), 1);
 }
 
 // Draws the colour bar below a map, `margin` px from the figure's edge.
 function drawBar(context, box, layer, margin) {
-  const [y, thick, right] = [box.top + box.height + 72, 16, box.left + box.width];
+  const [y, thickness, right] = [box.top + box.height + 72, 16, box.left + box.width];
   const { colours } = layer;
   colours.forEach((colour, k) => {
     const border = (step) => Math.round(box.left + (step / colours.length) * box.width);
     context.fillStyle = colour;
-    context.fillRect(border(k), y, border(k + 1) - border(k), thick);
+    context.fillRect(border(k), y, border(k + 1) - border(k), thickness);
   });
-  context.strokeStyle = themed("ink");
-  context.strokeRect(box.left, y, box.width, thick);
-  // The limit comes first; a number that would touch an earlier one is left out.
+  context.strokeStyle = themeColour("ink");
+  context.strokeRect(box.left, y, box.width, thickness);
+  // The limit is labelled first; a number that would touch an earlier one is omitted.
   const isCentre = ([value]) => value === layer.scale.limit;
-  const taken = [];
+  const labelRanges = [];
   context.font = `bold 13px ${FONT}`;
   for (const tick of [...layer.ticks].sort((a, b) => isCentre(b) - isCentre(a))) {
     const [value, label] = tick;
     const x = box.left + position(layer.scale, value) * box.width;
     const half = 0.5 * context.measureText(label).width + 4;
-    const [from, colour] = isCentre(tick) ? [y, DARK] : [y + thick, themed("ink")];
-    drawLine(context, x, from, x, y + thick + 4, [], colour);
-    if (taken.some(([low, high]) => x + half > low && x - half < high)) continue;
-    taken.push([x - half, x + half]);
+    const [from, colour] = isCentre(tick) ? [y, DARK] : [y + thickness, themeColour("ink")];
+    drawLine(context, x, from, x, y + thickness + 4, [], colour);
+    if (labelRanges.some(([low, high]) => x + half > low && x - half < high)) continue;
+    labelRanges.push([x - half, x + half]);
     const room = [box.left - 20 + half, right + margin - half];
-    write(context, label, Math.min(Math.max(x, room[0]), room[1]), y + thick + 18,
+    write(context, label, Math.min(Math.max(x, room[0]), room[1]), y + thickness + 18,
       { bold: isCentre(tick) ? "bold" : "" });
   }
   const middle = box.left + box.width / 2;
-  write(context, layer.label, middle, y + thick + 38, { room: box.width + 50 });
+  write(context, layer.label, middle, y + thickness + 38, { room: box.width + 50 });
 }
 
 // Draws slanted lines, each of a colour and a width, on a ground of this colour or on what is
 // there. A smaller `side` serves areas that could lie between the lines.
-function hatching(context, ground, { lines = [[DARK, 1]], falling = false, side = 8 } = {}) {
+function createHatchPattern(context, ground, options = {}) {
+  const { lines = [[DARK, 1]], falling = false, side = 8 } = options;
   const tile = element("canvas", { width: side, height: side });
   const brush = tile.getContext("2d");
   brush.fillStyle = ground ?? "transparent";

@@ -1,4 +1,4 @@
-// The decoded values of a map's cells, and questions about them.
+// The decoded values of a map's cells, and functions that evaluate them.
 
 // The code of a cell whose points have different words.
 const SEVERAL_WORDS = 254;
@@ -6,7 +6,7 @@ const SEVERAL_WORDS = 254;
 function createCells(data) {
   const columns = {};
   for (const [name, column] of Object.entries(data.columns)) {
-    columns[name] = { ...column, values: floats(column.data) };
+    columns[name] = { ...column, values: decodeFloats(column.data) };
   }
   const codes = {};
   for (const [name, coded] of Object.entries(data.codes)) {
@@ -14,8 +14,8 @@ function createCells(data) {
   }
   const word = (name, cell) => codes[name]?.words[codes[name].values[cell]] ?? null;
   // Counts of a cell's points by kind; a cell of one point has them in its words.
-  const counted = (name, holds) => (data.counts ? floats(data.counts[name])
-    : Uint8Array.from(codes.status.values, (_, cell) => holds(cell)));
+  const counted = (name, isCounted) => (data.counts ? decodeFloats(data.counts[name])
+    : Uint8Array.from(codes.status.values, (_, cell) => isCounted(cell)));
   const status = (cell) => word("status", cell);
   const counts = {
     points: counted("points", (cell) => status(cell) !== null),
@@ -40,7 +40,7 @@ function createCells(data) {
     return Number.isFinite(value) && (layer.group !== "ratio" || value > 0);
   };
   // Returns whether a cell has points that failed or have no value beside others with a value.
-  const partlyLost = (layer, cell) => hasValue(layer, cell)
+  const hasMissingValues = (layer, cell) => hasValue(layer, cell)
     && (failed(cell) || bit(layer.undefined, cell));
   // Returns whether a cell's colour depends on a chaotic motion.
   const sensitive = (layer, cell) => layer.nonlinear && counts.sensitive[cell] > 0;
@@ -53,10 +53,10 @@ function createCells(data) {
     const kinds = [[reliable, "reliable"], [unreliable, "unreliable"], [lost, "failed"],
       [points - reliable - unreliable - lost, "undefined"]].filter(([count]) => count > 0);
     if (kinds.length > 1) return kinds.map(([count, kind]) => `${count} ${kind}`).join(", ");
-    const ended = points === 1 ? `: ${status(cell)?.replaceAll("_", " ")}` : "";
-    const said = { reliable: "linear model reliable", unreliable: "linear model unreliable",
-      failed: `failed${ended}`, undefined: "undefined: no excitation" }[kinds[0][1]];
-    return points === 1 ? said : `${said} at all ${points} points`;
+    const statusNote = points === 1 ? `: ${status(cell)?.replaceAll("_", " ")}` : "";
+    const description = { reliable: "linear model reliable", unreliable: "linear model unreliable",
+      failed: `failed${statusNote}`, undefined: "undefined: no excitation" }[kinds[0][1]];
+    return points === 1 ? description : `${description} at all ${points} points`;
   }
 
   // Returns the places of a cell along all axes.
@@ -64,6 +64,6 @@ function createCells(data) {
     Math.floor(left / values.length), left % values.length, ...found], [cell]).slice(1);
   const valuesOf = (cell) => placesOf(cell).map((place, k) => data.axes[k].values[place]);
 
-  return { columns, codes, word, counts, wordsOf, bit, filled, failed, hasValue, partlyLost,
+  return { columns, codes, word, counts, wordsOf, bit, filled, failed, hasValue, hasMissingValues,
     placesOf, sensitive, valuesOf, verdict };
 }

@@ -21,17 +21,17 @@ function plainChart(xWords, xUnit, grid, panels) {
 // grids, panels, marks, markMeaning, shades, shadeMeaning }.
 // `pick` is called with the x of a click, and of Enter.
 function createChart(host, spec, name, pick = () => {}) {
-  const even = (x) => (spec.xLog ? Math.log(x) : x);
-  const back = (x) => (spec.xLog ? Math.exp(x) : x);
-  const all = spec.xRange.map(even);
-  let view = [...all];
+  const toCoordinate = (x) => (spec.xLog ? Math.log(x) : x);
+  const fromCoordinate = (x) => (spec.xLog ? Math.exp(x) : x);
+  const fullView = spec.xRange.map(toCoordinate);
+  let view = [...fullView];
   let cursor = null;
   // The height at which the pointer reads, px from the figure's top; null if keys read.
   let readAt = null;
 
-  const find = furnish(host, "chart");
-  const [picker, figure, tip, legend, said] = [".controls", ".figure", ".tip", ".legend", ".unseen"]
-    .map(find);
+  const find = appendTemplate(host, "chart");
+  const [picker, figure, tip, legend, announcement] = [".controls", ".figure", ".tip", ".legend",
+    ".unseen"].map(find);
   figure.ariaLabel = `${name}. Arrow keys read values, plus and minus zoom, 0 resets.`;
   if (spec.panels.length > 1) {
     picker.append(element("legend", {}, "Show"), ...spec.panels.map((panel) => {
@@ -39,7 +39,7 @@ function createChart(host, spec, name, pick = () => {}) {
         panel.shown = box.checked;
         changed();
       } });
-      return element("label", {}, box, capitalised(panel.words));
+      return element("label", {}, box, capitalise(panel.words));
     }));
   }
 
@@ -48,27 +48,30 @@ function createChart(host, spec, name, pick = () => {}) {
   const shown = () => spec.panels.filter((panel) => panel.shown);
   const heights = () => shown().reduce((sum, panel) => sum + panel.height + CHART.gap, 0);
   const height = () => CHART.top + strip + heights() + CHART.bottom;
-  const { request, canvas } = surface(figure, height, paint);
+  const { request, canvas } = createSurface(figure, height, paint);
   const area = () => ({ left: CHART.left, width: figure.clientWidth - CHART.left - CHART.right });
-  const atX = (x) => area().left + ((even(x) - view[0]) / (view[1] - view[0])) * area().width;
-  const toX = (px) => back(view[0] + ((px - area().left) / area().width) * (view[1] - view[0]));
+  const viewFraction = (x) => (toCoordinate(x) - view[0]) / (view[1] - view[0]);
+  const atX = (x) => area().left + viewFraction(x) * area().width;
+  const toX = (px) => fromCoordinate(
+    view[0] + ((px - area().left) / area().width) * (view[1] - view[0]),
+  );
 
   function changed() {
     request();
-    tellLegend();
-    tell();
+    updateLegend();
+    showReadout();
   }
 
   function setView(next) {
     view = next;
-    figure.dataset.view = view.map(back).join(" ");
+    figure.dataset.view = view.map(fromCoordinate).join(" ");
     changed();
   }
 
   // Returns the indices of a grid's points in the view, and one beyond on each side.
   function visible(grid) {
-    const from = Math.max(lowerBound(grid, back(view[0])) - 1, 0);
-    return [from, Math.min(lowerBound(grid, back(view[1])) + 1, grid.length - 1)];
+    const from = Math.max(lowerBound(grid, fromCoordinate(view[0])) - 1, 0);
+    return [from, Math.min(lowerBound(grid, fromCoordinate(view[1])) + 1, grid.length - 1)];
   }
 
   function yRange(panel) {
@@ -112,7 +115,8 @@ function createChart(host, spec, name, pick = () => {}) {
       const atY = (y) => top + panel.height * (1 - part(y));
       const [right, bottom] = [box.left + box.width, top + panel.height];
       const words = panel === panels.at(-1) && { words: spec.xWords, unit: spec.xUnit };
-      drawAxes(context, box, { range: view.map(back), at: atX, ticks: spec.xTicks, ...words },
+      const range = view.map(fromCoordinate);
+      drawAxes(context, box, { range, at: atX, ticks: spec.xTicks, ...words },
         { ...panel, range: [low, high], at: atY }, true);
       context.save();
       context.beginPath();
@@ -126,13 +130,13 @@ function createChart(host, spec, name, pick = () => {}) {
       }
       const dots = panel.series.map((series) => drawSeries(context, series, atY, box));
       for (const [value] of panel.levels) {
-        drawLine(context, box.left, atY(value), right, atY(value), [3, 3], themed("ink"));
+        drawLine(context, box.left, atY(value), right, atY(value), [3, 3], themeColour("ink"));
       }
       if (!hasValues(panel)) {
         write(context, "no values to show", box.left + box.width / 2, top + panel.height / 2);
       }
       for (const [x] of spec.marks) {
-        drawLine(context, atX(x), top, atX(x), bottom, [6, 4], themed("muted"));
+        drawLine(context, atX(x), top, atX(x), bottom, [6, 4], themeColour("muted"));
       }
       for (const [x, y, label] of panel.stars) {
         write(context, "★", atX(x), atY(y) + 6, { size: 20 });
@@ -145,22 +149,22 @@ function createChart(host, spec, name, pick = () => {}) {
         context.fill(path);
       });
       if (cursor !== null) {
-        drawLine(context, atX(cursor), top, atX(cursor), bottom, [], themed("accent"));
+        drawLine(context, atX(cursor), top, atX(cursor), bottom, [], themeColour("accent"));
       }
       box.top += panel.height + CHART.gap;
     }
   }
 
-  // A label that would cover another is moved aside.
+  // Draws the labels of marks. A label that would cover the label before it is moved to the right.
   function drawMarkLabels(context, { left, top, width }) {
-    let free = -Infinity;
+    let nextFree = -Infinity;
     for (const [x, label] of spec.marks) {
-      const at = atX(x);
-      if (at < left || at > left + width) continue;
-      const aside = Math.max(at, free);
-      free = aside + 15;
-      drawLine(context, at, top, aside, top - 8, [], themed("muted"));
-      write(context, label, aside + 4, top - 11, { align: "left", size: 12, stands: true });
+      const markX = atX(x);
+      if (markX < left || markX > left + width) continue;
+      const labelX = Math.max(markX, nextFree);
+      nextFree = labelX + 15;
+      drawLine(context, markX, top, labelX, top - 8, [], themeColour("muted"));
+      write(context, label, labelX + 4, top - 11, { align: "left", size: 12, isVertical: true });
     }
   }
 
@@ -214,18 +218,18 @@ function createChart(host, spec, name, pick = () => {}) {
     return dots;
   }
 
-  const signOf = (series) => (series.dots
+  const symbolStyle = (series) => (series.dots
     ? `width:9px;height:9px;border-radius:5px;margin:0 9px;background:${lineColour(series.colour)}`
     : `height:0;border-top:3px ${series.dashed ? "dashed" : "solid"} ${lineColour(series.colour)}`);
 
-  // The legend of lines and marks.
-  function tellLegend() {
+  // Updates the legend of lines and marks.
+  function updateLegend() {
     const entries = new Map();
     const add = (words, style = null) => {
       if (!entries.has(words)) entries.set(words, legendEntry([style, words]));
     };
     for (const panel of shown()) {
-      for (const series of panel.series) add(series.name || panel.words, signOf(series));
+      for (const series of panel.series) add(series.name || panel.words, symbolStyle(series));
     }
     const pair = shown().map((panel) => panel.series.slice(-2))
       .find((series) => series.at(-1)?.alpha < 1);
@@ -247,14 +251,14 @@ function createChart(host, spec, name, pick = () => {}) {
     legend.replaceChildren(...entries.values());
   }
 
-  // The values at the cursor, beside it.
-  function tell() {
+  // Shows the values at the cursor beside it.
+  function showReadout() {
     tip.hidden = cursor === null;
     if (cursor === null) {
-      said.textContent = "";
+      announcement.textContent = "";
       return;
     }
-    const x = `${spec.xWords} ${significant(cursor)} ${spec.xUnit}`.trim();
+    const x = `${spec.xWords} ${formatSignificant(cursor)} ${spec.xUnit}`.trim();
     const rows = [];
     const words = [x];
     for (const panel of shown()) {
@@ -263,18 +267,19 @@ function createChart(host, spec, name, pick = () => {}) {
       for (const group of together ? [panel.series] : panel.series.map((series) => [series])) {
         const title = together ? panel.words : group[0].name || panel.words;
         const cells = group.map((series) => {
-          const value = significant(series.y[nearest(spec.grids[series.grid], cursor)]);
+          const value = formatSignificant(series.y[nearest(spec.grids[series.grid], cursor)]);
           const name = together && series.name ? `${title}, ${series.name}` : title;
           words.push(`${name}: ${value} ${panel.unit}`.trim());
           const wide = together && group.length === 1 ? 2 : null;
-          return element("td", { "data-name": name, colspan: wide }, swatch(signOf(series)), value);
+          const attributes = { "data-name": name, colspan: wide };
+          return element("td", attributes, swatch(symbolStyle(series)), value);
         });
         rows.push(tableRow(title, [...cells, panel.unit]));
       }
     }
     tip.dataset.x = cursor;
     tip.replaceChildren(element("p", {}, x), table([], rows));
-    said.textContent = words.join("; ");
+    announcement.textContent = words.join("; ");
     // The box stays within the visible part of a figure that is higher than the window.
     const bounds = figure.getBoundingClientRect();
     const seen = [Math.max(0, -bounds.top), Math.min(bounds.height, innerHeight - bounds.top)];
@@ -284,7 +289,7 @@ function createChart(host, spec, name, pick = () => {}) {
   function setCursor(x, y = null) {
     [cursor, readAt] = [x, y];
     request();
-    tell();
+    showReadout();
   }
 
   const mainGrid = () => spec.grids[shown()[0]?.series[0]?.grid ?? 0];
@@ -296,14 +301,16 @@ function createChart(host, spec, name, pick = () => {}) {
     setCursor(grid[nearest(grid, toX(px))], event.clientY - canvas.getBoundingClientRect().top);
   }
 
-  const centre = () => (cursor === null ? (view[0] + view[1]) / 2 : even(cursor));
+  const centre = () => (cursor === null ? (view[0] + view[1]) / 2 : toCoordinate(cursor));
   picker.append(interact(figure, {
     view: () => view,
-    isZoomed: () => view[0] > all[0] || view[1] < all[1],
-    reset: () => setView([...all]),
-    move: (from, [by]) => setView(moved(from, (-by / area().width) * (from[1] - from[0]), all)),
-    zoom: (factor, event) => setView(zoomed(view, factor,
-      event ? even(toX(pxOf(event))) : centre(), all)),
+    isZoomed: () => view[0] > fullView[0] || view[1] < fullView[1],
+    reset: () => setView([...fullView]),
+    move: (from, [by]) => setView(
+      moveView(from, (-by / area().width) * (from[1] - from[0]), fullView),
+    ),
+    zoom: (factor, event) => setView(zoomView(view, factor,
+      event ? toCoordinate(toX(pxOf(event))) : centre(), fullView)),
     read,
     letGo: () => setCursor(null),
     pick(event) {
@@ -314,9 +321,9 @@ function createChart(host, spec, name, pick = () => {}) {
       const grid = mainGrid();
       const [from, to] = visible(grid);
       const stride = (event.shiftKey ? 10 : 1) * Math.max(1, Math.round((to - from) / 200));
-      const here = cursor === null ? Math.round((from + to) / 2) : nearest(grid, cursor);
+      const current = cursor === null ? Math.round((from + to) / 2) : nearest(grid, cursor);
       const step = { ArrowLeft: -stride, ArrowRight: stride }[event.key];
-      if (step) setCursor(grid[Math.min(Math.max(here + step, 0), grid.length - 1)]);
+      if (step) setCursor(grid[Math.min(Math.max(current + step, 0), grid.length - 1)]);
       else if (event.key === "Enter" && cursor !== null) pick(cursor);
       else return false;
       return true;
@@ -334,8 +341,10 @@ function nearest(sorted, value) {
 }
 
 // Returns the page's chart with decoded arrays; curves of time histories are quantised.
-function decodedChart(chart) {
-  const curve = (given) => given && (typeof given === "string" ? floats : quantised)(given);
+function decodeChart(chart) {
+  const decodeCurve = (values) => (typeof values === "string"
+    ? decodeFloats(values) : decodeQuantised(values));
+  const curve = (values) => values && decodeCurve(values);
   const series = (one) => ({ ...one, y: curve(one.y), low: curve(one.low), high: curve(one.high) });
   return {
     ...chart,

@@ -1,6 +1,6 @@
 "use strict";
-// Parts that map and charts share: decoding, numbers, axes, canvases that follow size and theme,
-// pointer and keys.
+// Functions that map and charts share: decoding, numbers, axes, canvases that follow size and
+// theme, pointer and keys.
 
 function decode(text) {
   const raw = atob(text);
@@ -9,22 +9,22 @@ function decode(text) {
   return bytes;
 }
 
-// Unpacks gzip, as a promise of the bytes.
-function unpacked(text) {
+// Unpacks gzip and returns a promise of the bytes.
+function unpackGzip(text) {
   const stream = new Blob([decode(text)]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();
 }
 
-const floats = (text) => new Float32Array(decode(text).buffer);
-const doubles = (text) => new Float64Array(decode(text).buffer);
+const decodeFloats = (text) => new Float32Array(decode(text).buffer);
+const decodeDoubles = (text) => new Float64Array(decode(text).buffer);
 
 // Decodes 16-bit integers times their unit; the least integer means no value.
-function quantised([text, unit]) {
+function decodeQuantised([text, unit]) {
   const whole = new Int16Array(decode(text).buffer);
   return Float32Array.from(whole, (value) => (value === -32768 ? NaN : value * unit));
 }
 
-function significant(value, digits = 4) {
+function formatSignificant(value, digits = 4) {
   if (value === undefined || value === null || Number.isNaN(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
@@ -40,17 +40,17 @@ const DATA = JSON.parse(document.getElementById("data").textContent);
 function ticks(low, high, count, sets) {
   if (!(high > low)) return [];
   const within = ([value]) => value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9);
-  let best = [];
+  let chosenTicks = [];
   for (const set of sets ?? []) {
-    const found = set.filter(within);
-    if (best.length >= 2 && found.length > Math.max(count, 2) + 1) break;
-    best = found;
+    const visibleTicks = set.filter(within);
+    if (chosenTicks.length >= 2 && visibleTicks.length > Math.max(count, 2) + 1) break;
+    chosenTicks = visibleTicks;
   }
-  if (best.length >= 2) return best;
+  if (chosenTicks.length >= 2) return chosenTicks;
   const { steps, slack, least } = DATA.ticks;
-  const wanted = (slack * (high - low)) / Math.max(count, 1);
-  for (let at = steps.findIndex(([step]) => step >= wanted); at >= 0; at--) {
-    const [step, decimals] = steps[at];
+  const wantedStep = (slack * (high - low)) / Math.max(count, 1);
+  for (let index = steps.findIndex(([step]) => step >= wantedStep); index >= 0; index--) {
+    const [step, decimals] = steps[index];
     const [first, last] = [Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9)];
     if (last - first + 1 < least) continue;
     return Array.from({ length: last - first + 1 }, (_, k) => {
@@ -65,7 +65,7 @@ function ticks(low, high, count, sets) {
 // Returns words with their unit, if they have one.
 const withUnit = (words, unit) => (unit ? `${words} (${unit})` : words);
 
-const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+const capitalise = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 function element(tag, attributes = {}, ...children) {
   const node = document.createElement(tag);
@@ -78,8 +78,8 @@ function element(tag, attributes = {}, ...children) {
   return node;
 }
 
-// Copies a template's elements into a host, and returns a function that finds them there.
-function furnish(host, name) {
+// Copies a template's elements into a host, and returns a function that finds elements in the host.
+function appendTemplate(host, name) {
   host.append(document.getElementById(`${name}-parts`).content.cloneNode(true));
   return (selector) => host.querySelector(selector);
 }
@@ -97,54 +97,54 @@ function table(heads, rows, attributes = {}) {
   return element("table", attributes, ...head, element("tbody", {}, ...rows));
 }
 
-// Returns a symbol of a legend, and an entry of it.
+// Return a symbol of a legend, and an entry with a symbol.
 const swatch = (style) => element("i", { style });
 const legendEntry = ([style, words]) => element("li", {}, ...(style ? [swatch(style)] : []), words);
 
 // Places a tip beside the range from left to right (px) within a figure; its top at y, within the
 // bounds.
 function placeTip(tip, [left, right], y, [top, bottom]) {
-  const room = tip.parentElement.clientWidth - tip.offsetWidth;
-  const fits = right <= room || left < tip.offsetWidth;
-  tip.style.left = `${Math.max(0, fits ? Math.min(right, room) : left - tip.offsetWidth)}px`;
+  const maxLeft = tip.parentElement.clientWidth - tip.offsetWidth;
+  const fits = right <= maxLeft || left < tip.offsetWidth;
+  tip.style.left = `${Math.max(0, fits ? Math.min(right, maxLeft) : left - tip.offsetWidth)}px`;
   tip.style.top = `${Math.max(top, Math.min(y, bottom - tip.offsetHeight))}px`;
 }
 
-function themed(name) {
+function themeColour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
 const darkTheme = matchMedia("(prefers-color-scheme: dark)");
 
-// Returns a lighter shade of a hue, for lines on a dark ground.
+// Returns a lighter shade of a colour for lines on a dark background.
 function lineColour(colour) {
-  if (colour === "ink") return themed("ink");
+  if (colour === "ink") return themeColour("ink");
   return darkTheme.matches ? `color-mix(in srgb, ${colour} 65%, white)` : colour;
 }
 
 const FONT = '"Noto Sans", "Segoe UI", "Helvetica Neue", Arial, sans-serif';
-// Colours that show on every ground: dark on light.
+// Colours that are visible on every background: dark on light.
 const [DARK, LIGHT] = ["#1b1f24", "#ffffff"];
 
 // Creates a canvas as wide as its host and `height` px high; `draw(context, width, height)` is
 // called whenever either changes.
-function surface(host, height, draw) {
+function createSurface(host, height, draw) {
   const canvas = element("canvas", { "aria-hidden": "true" });
   host.append(canvas);
   let pending = 0;
   const paint = () => {
     pending = 0;
-    const [width, tall, ratio] = [host.clientWidth, height(), window.devicePixelRatio || 1];
+    const [width, canvasHeight, ratio] = [host.clientWidth, height(), window.devicePixelRatio || 1];
     if (width === 0) return;
-    const size = [Math.round(width * ratio), Math.round(tall * ratio)];
+    const size = [Math.round(width * ratio), Math.round(canvasHeight * ratio)];
     if (canvas.width !== size[0] || canvas.height !== size[1]) {
       [canvas.width, canvas.height] = size;
-      canvas.style.height = `${tall}px`;
+      canvas.style.height = `${canvasHeight}px`;
     }
     const context = canvas.getContext("2d");
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, tall);
-    draw(context, width, tall);
+    context.clearRect(0, 0, width, canvasHeight);
+    draw(context, width, canvasHeight);
   };
   // Several changes before the next frame cause one drawing.
   const request = () => { pending ||= requestAnimationFrame(paint); };
@@ -165,8 +165,8 @@ function drawLine(context, x0, y0, x1, y1, dash, colour) {
   context.setLineDash([]);
 }
 
-// Strokes the current path, dark within light, with these widths.
-function outlined(context, [light, dark], dash = []) {
+// Strokes the current path twice with these widths, dark over light.
+function strokeOutlined(context, [light, dark], dash = []) {
   for (const [colour, width, dashed] of [[LIGHT, light, []], [DARK, dark, dash]]) {
     context.strokeStyle = colour;
     context.lineWidth = width;
@@ -176,15 +176,15 @@ function outlined(context, [light, dark], dash = []) {
   context.setLineDash([]);
 }
 
-// Writes text in ink, at most `room` px wide; upright if it `stands`.
-function write(context, text, x, y, how = {}) {
-  const { align = "center", size = 13, room, stands = false, bold = "" } = how;
+// Writes text in ink, at most `room` px wide; upwards if it `isVertical`.
+function write(context, text, x, y, options = {}) {
+  const { align = "center", size = 13, room, isVertical = false, bold = "" } = options;
   context.save();
   context.translate(x, y);
-  if (stands) context.rotate(-Math.PI / 2);
+  if (isVertical) context.rotate(-Math.PI / 2);
   context.font = `${bold} ${size}px ${FONT}`;
   context.textAlign = align;
-  context.fillStyle = themed("ink");
+  context.fillStyle = themeColour("ink");
   context.fillText(text, 0, 0, room);
   context.restore();
 }
@@ -194,7 +194,7 @@ function write(context, text, x, y, how = {}) {
 // numbers. Ticks are lines through the box if it is `ruled`.
 function drawAxes(context, { left, top, width, height }, x, y, ruled) {
   const [bottom, middle] = [top + height, left + width / 2];
-  const [ink, ruling] = [themed("ink"), themed("faint")];
+  const [ink, ruling] = [themeColour("ink"), themeColour("faint")];
   for (const [value, label] of ticks(...x.range, width / 90, x.ticks)) {
     const at = x.at(value);
     if (ruled) drawLine(context, at, top, at, bottom, [], ruling);
@@ -213,7 +213,7 @@ function drawAxes(context, { left, top, width, height }, x, y, ruled) {
   const size = 15;
   if (x.words) write(context, withUnit(x.words, x.unit), middle, bottom + 40, { size });
   write(context, withUnit(y.words, y.unit), 17, top + height / 2, {
-    size: height < 300 ? 13 : size, room: height, stands: true,
+    size: height < 300 ? 13 : size, room: height, isVertical: true,
   });
 }
 
@@ -221,48 +221,48 @@ function drawAxes(context, { left, top, width, height }, x, y, ruled) {
 const MIXED = DATA.both;
 const SHADE = DATA.shade;
 
-// Connects pointer, keys and buttons (for readers without a wheel) to a figure. `does` has view(),
-// isZoomed() and reset(); move(view, [x, y]) from an earlier view by px; zoom(factor, event), by
-// which the view grows about the event's place or, without one, about the reading; read(event) and
-// letGo(); pick(event), a click; key(event), which returns whether it uses the key.
-function interact(figure, does) {
-  const on = (kind, heard) => figure.addEventListener(kind, heard);
+// Connects pointer, keys and buttons (for readers without a wheel) to a figure. `actions` has
+// view(), isZoomed() and reset(); move(view, [x, y]) from an earlier view by px; zoom(factor,
+// event), by which the view grows about the event's place or, without one, about the reading;
+// read(event) and letGo(); pick(event), a click; key(event), which returns whether it uses the key.
+function interact(figure, actions) {
+  const on = (kind, handler) => figure.addEventListener(kind, handler);
   let drag = null;
   on("pointermove", (event) => {
-    const by = drag ? [event.clientX - drag.at[0], event.clientY - drag.at[1]] : [0, 0];
-    if (drag) drag.far ||= Math.hypot(...by) > 4;
-    if (!drag?.far || !does.isZoomed()) does.read(event);
+    const shift = drag ? [event.clientX - drag.at[0], event.clientY - drag.at[1]] : [0, 0];
+    if (drag) drag.far ||= Math.hypot(...shift) > 4;
+    if (!drag?.far || !actions.isZoomed()) actions.read(event);
     else {
-      does.letGo();
-      does.move(drag.view, by);
+      actions.letGo();
+      actions.move(drag.view, shift);
     }
   });
   on("pointerdown", (event) => {
-    drag = { at: [event.clientX, event.clientY], view: does.view(), far: false };
+    drag = { at: [event.clientX, event.clientY], view: actions.view(), far: false };
     figure.setPointerCapture(event.pointerId);
   });
   on("pointerup", (event) => {
     const isClick = drag && !drag.far;
     drag = null;
-    if (isClick) does.pick(event);
+    if (isClick) actions.pick(event);
   });
   on("pointercancel", () => { drag = null; });
-  // A lifted finger leaves its reading.
-  on("pointerleave", (event) => { if (event.pointerType === "mouse") does.letGo(); });
-  on("blur", does.letGo);
-  on("dblclick", does.reset);
+  // After a touch the reading stays.
+  on("pointerleave", (event) => { if (event.pointerType === "mouse") actions.letGo(); });
+  on("blur", actions.letGo);
+  on("dblclick", actions.reset);
   // The wheel alone scrolls the page. With Ctrl or Command it zooms, and so does a pinch on a
   // trackpad, which browsers report as such a wheel.
   figure.addEventListener("wheel", (event) => {
     if (!event.ctrlKey && !event.metaKey) return;
     event.preventDefault();
-    does.zoom(Math.exp(0.0015 * Math.min(Math.max(event.deltaY, -900), 900)), event);
+    actions.zoom(Math.exp(0.0015 * Math.min(Math.max(event.deltaY, -900), 900)), event);
   }, { passive: false });
-  const closer = () => does.zoom(0.7);
-  const farther = () => does.zoom(1 / 0.7);
-  const keys = { "+": closer, "=": closer, "-": farther, 0: does.reset, Escape: does.letGo };
+  const zoomIn = () => actions.zoom(0.7);
+  const zoomOut = () => actions.zoom(1 / 0.7);
+  const keys = { "+": zoomIn, "=": zoomIn, "-": zoomOut, 0: actions.reset, Escape: actions.letGo };
   on("keydown", (event) => {
-    if (does.key(event)) event.preventDefault();
+    if (actions.key(event)) event.preventDefault();
     else if (event.key in keys) {
       keys[event.key]();
       event.preventDefault();
@@ -271,24 +271,24 @@ function interact(figure, does) {
   const button = (text, label, onclick) => element("button", {
     type: "button", "aria-label": label, title: label, onclick,
   }, text);
-  return element("span", { class: "zoom" }, button("+", "Zoom in", closer),
-    button("−", "Zoom out", farther), button("Reset zoom", null, does.reset));
+  return element("span", { class: "zoom" }, button("+", "Zoom in", zoomIn),
+    button("−", "Zoom out", zoomOut), button("Reset zoom", null, actions.reset));
 }
 
 // Returns a view [low, high] zoomed by `factor` about `centre`, within [least, greatest].
-function zoomed([low, high], factor, centre, [least, greatest]) {
+function zoomView([low, high], factor, centre, [least, greatest]) {
   const span = Math.min((high - low) * factor, greatest - least);
   const start = centre - ((centre - low) / (high - low)) * span;
-  return moved([start, start + span], 0, [least, greatest]);
+  return moveView([start, start + span], 0, [least, greatest]);
 }
 
-function moved([low, high], by, [least, greatest]) {
+function moveView([low, high], by, [least, greatest]) {
   const shift = Math.min(Math.max(by, least - low), greatest - high);
   return [low + shift, high + shift];
 }
 
-// Returns the place of the first value of a sorted list that is no less.
+// Returns the index of the first value of a sorted list that is not less than `value`.
 function lowerBound(sorted, value) {
-  const at = sorted.findIndex((one) => one >= value);
-  return at < 0 ? sorted.length : at;
+  const index = sorted.findIndex((other) => other >= value);
+  return index < 0 ? sorted.length : index;
 }

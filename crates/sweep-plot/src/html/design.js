@@ -2,7 +2,7 @@
 // the histogram, and the influence of each parameter.
 
 // Distance within which the pointer finds a point, px.
-const REACH = 12;
+const MAX_POINTER_DISTANCE = 12;
 
 // `panel` is the live panel, which computes the chosen point.
 function createDesign(main, data, panel) {
@@ -11,7 +11,7 @@ function createDesign(main, data, panel) {
     histogram: (host) => {
       const { title, subtitle, chart } = data.histogram;
       host.append(element("h2", {}, title), element("p", { class: "help" }, subtitle));
-      createChart(host, decodedChart(chart), title);
+      createChart(host, decodeChart(chart), title);
     },
     influence: (host) => {
       host.append(element("div", { class: "figure drawn" }));
@@ -26,13 +26,14 @@ function createDesign(main, data, panel) {
   }
 }
 
-// The picture is drawn by the program; the page finds points in it and marks them.
+// Shows the picture that the program has drawn, finds points in it under the pointer, and marks
+// them.
 function createMatrix(host, data, choose = () => {}) {
-  const directions = data.directions.map((one) => ({ ...one, values: floats(one.values) }));
-  let found = null;
+  const directions = data.directions.map((one) => ({ ...one, values: decodeFloats(one.values) }));
+  let selected = null;
 
-  const find = furnish(host, "design");
-  const [figure, tip, said] = [".figure", ".tip", ".unseen"].map(find);
+  const find = appendTemplate(host, "design");
+  const [figure, tip, announcement] = [".figure", ".tip", ".unseen"].map(find);
   if (data.note) find(".help").append(` Shown: ${data.note}.`);
   figure.insertAdjacentHTML("afterbegin", data.picture);
   const picture = figure.firstElementChild;
@@ -41,39 +42,41 @@ function createMatrix(host, data, choose = () => {}) {
   const marks = document.createElementNS(picture.namespaceURI, "g");
   picture.append(marks);
 
-  const part = (one, value) => {
-    const even = one.log ? Math.log : (x) => x;
-    const [from, to] = one.range.map(even);
-    return (even(value) - from) / (to - from);
+  const fraction = (one, value) => {
+    const coordinate = one.log ? Math.log : (x) => x;
+    const [from, to] = one.range.map(coordinate);
+    return (coordinate(value) - from) / (to - from);
   };
   // Returns a panel's directions and its place in the picture: [x, y, [left, top, width, height]].
   const panels = data.panels.map(([x, y, ...box]) => [directions[x], directions[y], box]);
   // Points without a value of y lie at the lower edge.
   const at = ([x, y, [left, top, width, height]], k) => {
-    const up = part(y, y.values[k]);
+    const yFraction = fraction(y, y.values[k]);
     return [
-      left + part(x, x.values[k]) * width,
-      top + (Number.isFinite(up) ? (1 - up) * height : height - 5),
+      left + fraction(x, x.values[k]) * width,
+      top + (Number.isFinite(yFraction) ? (1 - yFraction) * height : height - 5),
     ];
   };
   // Returns the picture's units in a pixel of the page.
   const scale = () => data.view[2] / picture.clientWidth;
 
-  function tell(place) {
-    tip.hidden = found === null;
-    marks.innerHTML = found === null ? "" : panels.map((panel) => at(panel, found))
+  function showPoint(place) {
+    tip.hidden = selected === null;
+    marks.innerHTML = selected === null ? "" : panels.map((panel) => at(panel, selected))
       .map(([x, y]) => `<circle cx="${x}" cy="${y}" r="7"/>`).join("");
-    if (found === null) {
-      said.textContent = "";
+    if (selected === null) {
+      announcement.textContent = "";
       return;
     }
-    const head = `Point ${data.points[found]}: ${data.sides[data.of[found]]}`;
-    const rows = directions.map((one) => [one.words, significant(one.values[found]), one.unit]);
+    const head = `Point ${data.points[selected]}: ${data.sides[data.of[selected]]}`;
+    const rows = directions.map(({ words, values, unit }) => [
+      words, formatSignificant(values[selected]), unit,
+    ]);
     tip.replaceChildren(element("p", {}, head),
       table([], rows.map(([words, ...cells]) => tableRow(words, cells))));
-    tip.dataset.point = data.points[found];
-    said.textContent = [head, ...rows.map((row) => row.join(" ").trim())].join("; ");
-    const [x, y] = (place ?? at(panels.at(-1), found))
+    tip.dataset.point = data.points[selected];
+    announcement.textContent = [head, ...rows.map((row) => row.join(" ").trim())].join("; ");
+    const [x, y] = (place ?? at(panels.at(-1), selected))
       .map((value, k) => (value - data.view[k]) / scale());
     placeTip(tip, [x - 16, x + 16], y + 12, [0, picture.clientHeight]);
   }
@@ -82,18 +85,18 @@ function createMatrix(host, data, choose = () => {}) {
     const bounds = picture.getBoundingClientRect();
     const x = data.view[0] + (event.clientX - bounds.left) * scale();
     const y = data.view[1] + (event.clientY - bounds.top) * scale();
-    let nearestBy = REACH * scale();
-    found = null;
+    let nearestDistance = MAX_POINTER_DISTANCE * scale();
+    selected = null;
     for (const panel of panels) {
       const [left, top, width, height] = panel[2];
       if (x < left || y < top || x > left + width || y > top + height) continue;
       data.of.forEach((_, k) => {
         const [px, py] = at(panel, k);
-        const away = Math.hypot(px - x, py - y);
-        if (away < nearestBy) [nearestBy, found] = [away, k];
+        const distance = Math.hypot(px - x, py - y);
+        if (distance < nearestDistance) [nearestDistance, selected] = [distance, k];
       });
     }
-    tell([x, y]);
+    showPoint([x, y]);
   }
 
   figure.addEventListener("pointermove", read);
@@ -102,24 +105,26 @@ function createMatrix(host, data, choose = () => {}) {
     chosen();
   });
   function chosen() {
-    if (found === null) return;
-    choose(Object.fromEntries(directions.map((one) => [one.name, one.values[found]])));
+    if (selected === null) return;
+    choose(Object.fromEntries(directions.map((one) => [one.name, one.values[selected]])));
   }
-  // A lifted finger leaves its reading.
-  const letGo = () => {
-    found = null;
-    tell();
+  // After a touch the reading stays.
+  const release = () => {
+    selected = null;
+    showPoint();
   };
-  figure.addEventListener("pointerleave", ({ pointerType }) => pointerType === "mouse" && letGo());
-  figure.addEventListener("blur", letGo);
+  figure.addEventListener("pointerleave", ({ pointerType }) => {
+    if (pointerType === "mouse") release();
+  });
+  figure.addEventListener("blur", release);
   figure.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -10, ArrowDown: 10 }[event.key];
-    if (event.key === "Escape") letGo();
+    if (event.key === "Escape") release();
     else if (event.key === "Enter") chosen();
     else if (step && data.of.length) {
-      const next = found === null ? 0 : found + step;
-      found = Math.min(Math.max(next, 0), data.of.length - 1);
-      tell();
+      const next = selected === null ? 0 : selected + step;
+      selected = Math.min(Math.max(next, 0), data.of.length - 1);
+      showPoint();
     } else return;
     event.preventDefault();
   });

@@ -11,12 +11,12 @@ function createMap(host, data, panel) {
   const extra = data.axes.slice(2);
   const [nx, ny] = [xAxis.values.length, yAxis.values.length];
   const cuts = extra.reduce((product, axis) => product * axis.values.length, 1);
-  const { columns, codes, word, counts, wordsOf, bit, filled, failed, hasValue, partlyLost,
+  const { columns, codes, word, counts, wordsOf, bit, filled, failed, hasValue, hasMissingValues,
     placesOf, sensitive, valuesOf, verdict } = createCells(data);
 
-  const evens = data.axes.map((axis) => (axis.log ? Math.log : (value) => value));
-  const [evenX, evenY] = evens;
-  const borders = [xAxis.borders.map(evenX), yAxis.borders.map(evenY)];
+  const toCoordinates = data.axes.map((axis) => (axis.log ? Math.log : (value) => value));
+  const [toCoordinateX, toCoordinateY] = toCoordinates;
+  const borders = [xAxis.borders.map(toCoordinateX), yAxis.borders.map(toCoordinateY)];
   const full = borders.map((list) => [list[0], list[list.length - 1]]);
   let view = full.map((range) => [...range]);
   let rest = [...data.first.rest];
@@ -26,13 +26,14 @@ function createMap(host, data, panel) {
   let cursor = [Math.floor(nx / 2), Math.floor(ny / 2)];
 
   const centreOf = (place) => place.map((at, k) => 0.5 * (borders[k][at] + borders[k][at + 1]));
-  const cutNow = () => extra.reduce((index, axis, k) => index * axis.values.length + rest[k], 0);
-  const pointAt = (i, j) => (i * ny + j) * cuts + cutNow();
+  const currentCut = () => extra
+    .reduce((index, axis, k) => index * axis.values.length + rest[k], 0);
+  const pointAt = (i, j) => (i * ny + j) * cuts + currentCut();
   const places = Array.from({ length: nx * ny }, (_, at) => [Math.floor(at / ny), at % ny]);
 
-  const find = furnish(host, "map");
-  const [controls, figure, tip, legend, readout, said, histories] = [".controls", "#map", "#tip",
-    "#legend", "#readout", "#said", "#histories"].map(find);
+  const find = appendTemplate(host, "map");
+  const [controls, figure, tip, legend, readout, announcement, histories] = [".controls", "#map",
+    "#tip", "#legend", "#readout", "#said", "#histories"].map(find);
   const quantity = find("#quantity");
   quantity.addEventListener("change", () => changed());
   for (const { group, groupWords } of data.layers) {
@@ -49,13 +50,13 @@ function createMap(host, data, panel) {
       changed();
     } });
     cut.append(...axis.values.map((value, index) => element("option",
-      { value: index, selected: index === rest[k] }, `${significant(value)} ${axis.unit}`)));
+      { value: index, selected: index === rest[k] }, `${formatSignificant(value)} ${axis.unit}`)));
     controls.append(element("label", {}, axis.words, cut));
   });
 
   const height = () => Math.min(Math.max(figure.clientWidth, 470), 640);
-  const cells = surface(figure, height, paint);
-  const over = surface(figure, height, paintOver);
+  const cells = createSurface(figure, height, paint);
+  const over = createSurface(figure, height, paintOver);
   over.canvas.classList.add("over");
 
   const currentLayer = () => data.layers.find((layer) => layer.column === quantity.value) ?? null;
@@ -64,10 +65,10 @@ function createMap(host, data, panel) {
     const layer = currentLayer();
     figure.dataset.layer = layer ? layer.column : "status";
     document.getElementById("title").textContent = layer ? layer.title : "How each point ended";
-    tellLegend(layer);
+    updateLegend(layer);
     cells.request();
     over.request();
-    tell();
+    showReadout();
     listeners.forEach((listener) => listener());
   }
 
@@ -122,7 +123,10 @@ function createMap(host, data, panel) {
     const box = area();
     const layer = currentLayer();
     const fill = filler(layer);
-    const special = { failed: hatching(context, data.palettes.failed), undefined: themed("paper") };
+    const special = {
+      failed: createHatchPattern(context, data.palettes.failed),
+      undefined: themeColour("paper"),
+    };
     context.save();
     context.beginPath();
     context.rect(box.left, box.top, box.width, box.height);
@@ -141,7 +145,7 @@ function createMap(host, data, panel) {
         context.fillRect(xs[i], ys[j], xs[i + 1] - xs[i], ys[start] - ys[j]);
         if (kind === "undefined") {
           const side = Math.min(4, 0.4 * (xs[i + 1] - xs[i]), 0.4 * (ys[start] - ys[j]));
-          context.fillStyle = themed("muted");
+          context.fillStyle = themeColour("muted");
           const dot = [(xs[i] + xs[i + 1] - side) / 2, (ys[start] + ys[j] - side) / 2];
           context.fillRect(...dot, side, side);
         }
@@ -152,8 +156,8 @@ function createMap(host, data, panel) {
       const least = (list) => Math.min(...list.slice(1).map((at, k) => Math.abs(at - list[k])));
       const side = Math.min(Math.max(Math.round((least(xs) + least(ys)) / 1.5), 3), 8);
       const chaos = { lines: [[DARK, 2.4], [LIGHT, 1]], falling: true, side };
-      const marks = [[partlyLost, hatching(context, null, { side })],
-        [sensitive, hatching(context, null, chaos)]];
+      const marks = [[hasMissingValues, createHatchPattern(context, null, { side })],
+        [sensitive, createHatchPattern(context, null, chaos)]];
       for (const [marked, hatch] of marks) {
         context.fillStyle = hatch;
         for (const [i, j] of places) {
@@ -164,21 +168,21 @@ function createMap(host, data, panel) {
     }
     if (layer?.lines) {
       context.beginPath();
-      for (const line of layer.lines[cutNow()]) {
+      for (const line of layer.lines[currentCut()]) {
         for (let k = 0; k < line.length; k += 2) {
-          const at = [toPx(box, evenX(line[k])), toPy(box, evenY(line[k + 1]))];
+          const at = [toPx(box, toCoordinateX(line[k])), toPy(box, toCoordinateY(line[k + 1]))];
           if (k === 0) context.moveTo(...at);
           else context.lineTo(...at);
         }
       }
       context.lineJoin = "round";
-      outlined(context, [5, 2.4]);
+      strokeOutlined(context, [5, 2.4]);
     }
     context.restore();
     const range = (axis, k) => view[k].map((even) => (axis.log ? Math.exp(even) : even));
     drawAxes(context, box,
-      { ...xAxis, range: range(xAxis, 0), at: (value) => toPx(box, evenX(value)) },
-      { ...yAxis, range: range(yAxis, 1), at: (value) => toPy(box, evenY(value)) });
+      { ...xAxis, range: range(xAxis, 0), at: (value) => toPx(box, toCoordinateX(value)) },
+      { ...yAxis, range: range(yAxis, 1), at: (value) => toPy(box, toCoordinateY(value)) });
     if (layer) drawBar(context, box, layer, MARGINS.right);
     figure.dataset.area = [box.left, box.top, box.width, box.height].join(" ");
     figure.dataset.view = view.flat().join(" ");
@@ -197,7 +201,7 @@ function createMap(host, data, panel) {
         const [x, y] = centreOf(place);
         context.beginPath();
         context.arc(toPx(box, x), toPy(box, y), 4, 0, 2 * Math.PI);
-        outlined(context, [4, 1.5]);
+        strokeOutlined(context, [4, 1.5]);
       }
     }
     panel?.over(context, (x, y) => [toPx(box, x), toPy(box, y)]);
@@ -208,11 +212,11 @@ function createMap(host, data, panel) {
       const [low, high] = [toPy(box, borders[1][j]), toPy(box, borders[1][j + 1])];
       context.beginPath();
       context.rect(left, high, right - left, low - high);
-      outlined(context, [thick + 3, thick]);
+      strokeOutlined(context, [thick + 3, thick]);
     }
   }
 
-  function tellLegend(layer) {
+  function updateLegend(layer) {
     const fine = layer && panel?.hasFine()
       ? [["border:1.5px dashed currentColor", "finer cells: preview, not checked"]] : [];
     const entries = [...(layer?.legend ?? data.legend), ...fine];
@@ -223,17 +227,18 @@ function createMap(host, data, panel) {
     return placesOf(pointAt(...place)).map((index, k) => {
       const axis = data.axes[k];
       const [from, to] = axis.spans?.[index] ?? [axis.values[index], axis.values[index]];
-      const value = from === to ? significant(from) : `${significant(from)} to ${significant(to)}`;
+      const [first, last] = [from, to].map((end) => formatSignificant(end));
+      const value = from === to ? first : `${first} to ${last}`;
       return `${axis.words} ${value} ${axis.unit}`.trim();
     });
   }
 
   function shownValue(name, point, digits = 4) {
     const column = columns[name];
-    return column ? significant(column.values[point] * column.factor, digits) : "–";
+    return column ? formatSignificant(column.values[point] * column.factor, digits) : "–";
   }
 
-  function tell() {
+  function showReadout() {
     const place = hovered ?? pinned;
     readout.replaceChildren();
     readout.classList.toggle("empty", !place);
@@ -253,7 +258,7 @@ function createMap(host, data, panel) {
     const largest = word("ratio_max_channel", point);
     const channelWords = largest ? ` (${wordsOf(largest)})` : "";
     const where = several ? ` at point ${figure.dataset.point}` : "";
-    readout.append(element("p", { class: "verdict" }, capitalised(verdict(point))),
+    readout.append(element("p", { class: "verdict" }, capitalise(verdict(point))),
       // The digits are those of the value if no step of the axis decides on them.
       ...(counts.sensitive[point] ? [element("p", {}, `The motion is chaotic ${several
         ? `at ${counts.sensitive[point]} of ${counts.points[point]} points` : "here"}: `
@@ -268,9 +273,9 @@ function createMap(host, data, panel) {
     const cell = (column, k) => element("td", { "data-kind": kinds[k] },
       column === null ? "" : shownValue(column, point));
     const rows = data.rows.map((row) => {
-      const made = tableRow(withUnit(row.words, row.unit), row.columns.map(cell));
-      made.dataset.channel = row.name;
-      return made;
+      const tableRowElement = tableRow(withUnit(row.words, row.unit), row.columns.map(cell));
+      tableRowElement.dataset.channel = row.name;
+      return tableRowElement;
     });
     readout.append(table(["", ...kinds], rows));
     if (data.traces) {
@@ -279,7 +284,7 @@ function createMap(host, data, panel) {
     }
     const value = layer ? [`${layer.label}: ${shownValue(layer.column, point)}`] : [];
     const lines = [...coordinates(place), ...value, verdict(point)];
-    said.textContent = lines.join("; ");
+    announcement.textContent = lines.join("; ");
     tip.textContent = lines.join("\n");
     tip.hidden = !hovered;
     if (hovered) placeTipAt(hovered);
@@ -296,7 +301,7 @@ function createMap(host, data, panel) {
     hovered = place;
     if (place) cursor = place;
     over.request();
-    tell();
+    showReadout();
   }
 
   function pin(place) {
@@ -304,7 +309,7 @@ function createMap(host, data, panel) {
     over.request();
     showHistories(place);
     if (place) panel?.pinned(valuesAt(place));
-    tell();
+    showReadout();
   }
 
   const valuesAt = (place) => valuesOf(pointAt(...place));
@@ -320,11 +325,11 @@ function createMap(host, data, panel) {
     const trace = place && data.traces?.[point];
     if (!trace) return;
     histories.append(element("h2", {}, `Time histories at ${coordinates(place).join(", ")}`));
-    const chart = decodedChart(trace);
+    const chart = decodeChart(trace);
     const channel = currentLayer()?.channel ?? word("ratio_max_channel", point);
-    const one = chart.panels.find(({ name }) => name === channel) ?? chart.panels[0];
+    const shownPanel = chart.panels.find(({ name }) => name === channel) ?? chart.panels[0];
     for (const panel of chart.panels) {
-      panel.shown = panel === one || ["gap", "speed"].includes(panel.name);
+      panel.shown = panel === shownPanel || ["gap", "speed"].includes(panel.name);
     }
     createChart(histories, chart, "Time histories");
   }
@@ -348,7 +353,7 @@ function createMap(host, data, panel) {
     move(from, by) {
       const box = area();
       const shift = [-by[0] / box.width, by[1] / box.height];
-      setView(from.map((range, k) => moved(range, shift[k] * (range[1] - range[0]), full[k])));
+      setView(from.map((range, k) => moveView(range, shift[k] * (range[1] - range[0]), full[k])));
     },
     zoom(factor, event) {
       const middle = view.map(([low, high]) => 0.5 * (low + high));
@@ -357,7 +362,7 @@ function createMap(host, data, panel) {
         const [box, px] = [area(), pxOf(event)];
         centre = [fromPx(box, px[0]), fromPy(box, px[1])];
       }
-      setView(view.map((range, k) => zoomed(range, factor, centre[k], full[k])));
+      setView(view.map((range, k) => zoomView(range, factor, centre[k], full[k])));
       if (event) hover(cellAt(event));
     },
     read: (event) => hover(cellAt(event)),
@@ -385,18 +390,18 @@ function createMap(host, data, panel) {
   panel?.connect({
     sliders: data.axes.map(({ name }) => data.live.sliders.findIndex((one) => one.name === name)),
     start: valuesAt(cursor),
-    even: (k, value) => evens[k](value),
+    even: (k, value) => toCoordinates[k](value),
     back: (k, value) => (data.axes[k].log ? Math.exp(value) : value),
     // The range about a point that is so many cells wide, or the view if it is zoomed.
     region: (at, cellsWide) => view.map(([low, high], k) => {
       if (isZoomed()) return [low, high];
       const half = (0.5 * cellsWide * (high - low)) / (k === 0 ? nx : ny);
-      const middle = evens[k](at[k]);
+      const middle = toCoordinates[k](at[k]);
       return [Math.max(middle - half, low), Math.min(middle + half, high)];
     }),
     mark: over.request,
     request: () => {
-      tellLegend(currentLayer());
+      updateLegend(currentLayer());
       cells.request();
     },
   });

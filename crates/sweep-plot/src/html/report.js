@@ -2,30 +2,31 @@
 // and downloads.
 
 // Number of rows of the table that are added at a time.
-const ROWS_AT_ONCE = 20;
+const ROWS_PER_STEP = 20;
 
 function createReport(host, data, map, panel) {
   const { columns, filled, word, wordsOf, verdict, valuesOf, shownValue } = map.cells;
-  const all = Array.from({ length: columns.point.values.length }, (_, cell) => cell)
+  const filledCells = Array.from({ length: columns.point.values.length }, (_, cell) => cell)
     .filter(filled);
 
-  const find = furnish(host, "report");
-  const said = find("#taken");
-  for (const take of [link, picture, numbers]) {
-    find(`#${take.name}`).addEventListener("click", take);
+  const find = appendTemplate(host, "report");
+  const message = find("#taken");
+  for (const action of [link, picture, numbers]) {
+    find(`#${action.name}`).addEventListener("click", action);
   }
   createTable();
 
   function createTable() {
     const heads = ["", ...data.axes.map((axis) => withUnit(axis.words, axis.unit)), "",
       "Largest ratio", "in", "Verdict"];
-    const find = furnish(document.getElementById("about"), "points");
+    const find = appendTemplate(document.getElementById("about"), "points");
     const [title, more] = [find("h2:last-of-type"), find("#more")];
     more.addEventListener("click", extend);
-    const made = table(heads, [], { id: "points" });
-    more.before(made);
-    const [body, shownHead] = [made.tBodies[0], made.rows[0].cells[data.axes.length + 1]];
-    // The quantity shown, beside the ratio, which is always there.
+    const pointTable = table(heads, [], { id: "points" });
+    more.before(pointTable);
+    const body = pointTable.tBodies[0];
+    const shownHead = pointTable.rows[0].cells[data.axes.length + 1];
+    // The layer of the quantity shown, which has a column in addition to the ratio's.
     let layer = null;
     function sort() {
       layer = map.layer() ?? data.layers[0];
@@ -33,7 +34,7 @@ function createReport(host, data, map, panel) {
       const sign = layer.worse === "less" ? 1 : -1;
       // Points without a value come last.
       const order = (cell) => (Number.isFinite(values[cell]) ? sign * values[cell] : Infinity);
-      all.sort((a, b) => order(a) - order(b) || a - b);
+      filledCells.sort((a, b) => order(a) - order(b) || a - b);
       const isOther = layer.column !== "ratio_max";
       shownHead.hidden = !isOther;
       shownHead.textContent = withUnit(layer.title, columns[layer.column].unit);
@@ -45,20 +46,20 @@ function createReport(host, data, map, panel) {
     }
     let shown = 0;
     function extend() {
-      for (const cell of all.slice(shown, shown + ROWS_AT_ONCE)) body.append(row(cell));
-      shown = Math.min(shown + ROWS_AT_ONCE, all.length);
-      more.hidden = shown === all.length;
-      more.textContent = `${Math.min(ROWS_AT_ONCE, all.length - shown)} more of `
-        + `${all.length - shown}`;
+      for (const cell of filledCells.slice(shown, shown + ROWS_PER_STEP)) body.append(row(cell));
+      shown = Math.min(shown + ROWS_PER_STEP, filledCells.length);
+      more.hidden = shown === filledCells.length;
+      more.textContent = `${Math.min(ROWS_PER_STEP, filledCells.length - shown)} more of `
+        + `${filledCells.length - shown}`;
     }
     function row(cell) {
       const show = element("button", { type: "button", onclick: () => map.go(cell) }, "show");
       const largest = word("ratio_max_channel", cell);
-      const own = layer.column === "ratio_max" ? [] : [shownValue(layer.column, cell)];
-      const texts = [...valuesOf(cell).map((value) => significant(value)), ...own,
+      const layerValue = layer.column === "ratio_max" ? [] : [shownValue(layer.column, cell)];
+      const texts = [...valuesOf(cell).map((value) => formatSignificant(value)), ...layerValue,
         shownValue("ratio_max", cell), largest ? wordsOf(largest) : "",
         verdict(cell).replace("linear model ", "")];
-      return element("tr", {}, ...[show, ...texts].map((of) => element("td", {}, of)));
+      return element("tr", {}, ...[show, ...texts].map((content) => element("td", {}, content)));
     }
     sort();
     map.onChange(() => map.layer() !== layer && sort());
@@ -67,9 +68,11 @@ function createReport(host, data, map, panel) {
   function link() {
     const state = { ...map.state(), live: panel?.values() };
     history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify(state))}`);
-    const tell = (too) => () => { said.textContent = `The link is in the address bar${too}.`; };
+    const showMessage = (suffix) => () => {
+      message.textContent = `The link is in the address bar${suffix}.`;
+    };
     (navigator.clipboard?.writeText(location.href) ?? Promise.reject())
-      .then(tell(" and copied"), tell(""));
+      .then(showMessage(" and copied"), showMessage(""));
   }
 
   function restore() {
@@ -78,7 +81,7 @@ function createReport(host, data, map, panel) {
     try {
       state = JSON.parse(decodeURIComponent(location.hash.slice(1)));
     } catch {
-      said.textContent = "The link holds no view of this page.";
+      message.textContent = "The link holds no view of this page.";
     }
     if (!state || typeof state !== "object") return;
     map.restore(state);
@@ -89,26 +92,27 @@ function createReport(host, data, map, panel) {
     const url = URL.createObjectURL(blob);
     element("a", { href: url, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(url), 10000);
-    said.textContent = `Saved as ${name}.`;
+    message.textContent = `Saved as ${name}.`;
   }
 
   function picture() {
-    const [under] = map.canvases;
-    const head = Math.round(40 * (under.width / under.clientWidth));
-    const whole = element("canvas", { width: under.width, height: under.height + head });
-    const context = whole.getContext("2d");
-    context.fillStyle = themed("paper");
-    context.fillRect(0, 0, whole.width, whole.height);
-    write(context, map.title(), head / 3, 0.65 * head,
-      { align: "left", size: head / 2, bold: "bold", room: whole.width - head });
-    for (const canvas of map.canvases) context.drawImage(canvas, 0, head);
-    whole.toBlob((blob) => save(blob, "map.png"));
+    const [mapCanvas] = map.canvases;
+    const headHeight = Math.round(40 * (mapCanvas.width / mapCanvas.clientWidth));
+    const { width, height } = mapCanvas;
+    const image = element("canvas", { width, height: height + headHeight });
+    const context = image.getContext("2d");
+    context.fillStyle = themeColour("paper");
+    context.fillRect(0, 0, image.width, image.height);
+    write(context, map.title(), headHeight / 3, 0.65 * headHeight,
+      { align: "left", size: headHeight / 2, bold: "bold", room: image.width - headHeight });
+    for (const canvas of map.canvases) context.drawImage(canvas, 0, headHeight);
+    image.toBlob((blob) => save(blob, "map.png"));
   }
 
   function numbers() {
     const place = map.chosen();
     if (!place) {
-      said.textContent = "Choose a point of the map first: click it, or press Enter on it.";
+      message.textContent = "Choose a point of the map first: click it, or press Enter on it.";
       return;
     }
     const cell = map.index(...place);

@@ -9,7 +9,7 @@
     createReport(reportHost, DATA, createMap(figureHost, DATA, panel), panel);
   } else {
     if (DATA.kind === "design") createDesign(figureHost, DATA, panel);
-    else createChart(figureHost, decodedChart(DATA.chart), DATA.title, (x) => panel?.pinned([x]));
+    else createChart(figureHost, decodeChart(DATA.chart), DATA.title, (x) => panel?.pinned([x]));
     panel?.connect();
   }
 })();

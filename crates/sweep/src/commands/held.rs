@@ -82,7 +82,7 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<O
         let [own_options, merge_options] = command_options(speed, search);
         let command = RunCommand {
             name: &plan.name,
-            verb: held.verb(),
+            verb: held.command_name(),
             rows: "rows",
             target,
             work,
@@ -184,7 +184,7 @@ impl HeldArgs {
         let search = self.dwell.then_some(self.search);
         let held = HeldPlan { plan, speeds_rpm: speed.values(), search };
         let [own_options, merge_options] = command_options(speed, search);
-        let again = [held.verb().to_owned(), own_options, merge_options];
+        let again = [held.command_name().to_owned(), own_options, merge_options];
         (held.job(), held.output(target.out.as_deref()), again)
     }
 }

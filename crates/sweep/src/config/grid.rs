@@ -19,14 +19,15 @@ use crate::speeds::SpeedList;
 /// The machine of a grid that names none.
 pub(super) const DEFAULT_MACHINE: &str = "paper";
 
-/// Maximum number of characters of a path in a message. Basis: no system has much longer paths.
-/// Doubling it doubles the longest message.
+/// Maximum number of characters of a path in a message. Basis: longer than paths in use. Doubling
+/// it doubles the longest message.
 const MAX_PATH_CHARS: usize = 1000;
 
 /// Names of machines that need no file.
 const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 
-/// Reads or describes the key `machine`. The grid's machine may be given in place of its file.
+/// Reads or describes the key `machine`. The machine may also be given with the input instead of in
+/// a file.
 pub(super) fn walk_machine(
     machine: &mut Machine,
     keys: &mut Keys<'_>,
@@ -42,26 +43,26 @@ pub(super) fn walk_machine(
     });
 }
 
-/// Returns the machine that a grid names, or the one given in its place.
+/// Returns the machine that a grid names, or the one that was given with the input.
 fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
     let report = root.report;
     if let Some(text) = &input.own_file {
         return parse_machine(text, "its machine", report);
     }
-    let Some(named) = root.text("machine").given() else { return Machine::paper() };
-    if named.value == DEFAULT_MACHINE {
+    let Some(name) = root.text("machine").given() else { return Machine::paper() };
+    if name.value == DEFAULT_MACHINE {
         return Machine::paper();
     }
-    let path = beside(&input.path, named.value);
+    let path = beside(&input.path, name.value);
     match read(&path) {
         Ok(text) => parse_machine(&text, &path.display().to_string(), report),
         Err(error) => {
-            let shown = cut(&path.display().to_string(), MAX_PATH_CHARS);
-            let title = format!("cannot read the machine file {shown}: {error}");
+            let short_path = cut(&path.display().to_string(), MAX_PATH_CHARS);
+            let title = format!("cannot read the machine file {short_path}: {error}");
             let expected =
                 format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
-            let refusal = Diagnostic::new(title).at(&named.at, expected);
-            report.push(refusal.nearest(named.value, MACHINES));
+            let refusal = Diagnostic::new(title).at(&name.at, expected);
+            report.push(refusal.nearest(name.value, MACHINES));
             Machine::paper()
         }
     }
@@ -74,29 +75,30 @@ fn parse_machine(text: &str, name: &str, report: &Report) -> Machine {
     if is_another::<Washer>("machine", table.get_ref(), source, report) {
         return Machine::paper();
     }
-    let at = Location::new(source, 0..0);
-    machine::read(text, Section::new("the machine file", at, table.get_ref(), report))
+    let location = Location::new(source, 0..0);
+    machine::read(text, Section::new("the machine file", location, table.get_ref(), report))
 }
 
-/// Reads or describes the section `[stability]`, which has the held speeds of metrics. Such a
-/// metric needs the section, and the section needs such a metric. `found` has the place of the
-/// metrics.
+/// Reads or describes the section `[stability]`, which has the held speeds of metrics. A metric at
+/// held speeds needs the section, and the section needs such a metric. `metrics_field` has the
+/// location of the metrics.
 pub(super) fn walk_stability(
     metrics: &[Metric],
-    found: Field<()>,
+    metrics_field: Field<()>,
     speeds: &mut Option<SpeedList>,
     keys: &mut Keys<'_>,
 ) {
     let held_metric = metrics.iter().find(|metric| metric.is_at_held_speeds());
     let needs_speeds = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
-    if let (KeyWalk::Set(_), Field::Given(found)) = (&keys.walk, found) {
+    if let (KeyWalk::Set(_), Field::Given(location)) = (&keys.walk, metrics_field) {
         if let (Some(metric), None, Some(report)) = (held_metric, &speeds, keys.report()) {
             let expected = "expected a grid file with this metric and a section [stability]";
-            report.refuse::<()>(&found.at, needs_speeds(metric), expected);
+            report.refuse::<()>(&location.at, needs_speeds(metric), expected);
         }
         speeds.take_if(|_| held_metric.is_none());
     }
-    let about = "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \"60:400:1\": those \
+    let description = "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \
+                       \"60:400:1\": those \
                  of the metrics `growth` and `dwell`";
     let expected = "constant speeds in rpm, as 250, \"240,305\" or \"60:400:1\"";
     let mut text = speeds.as_ref().map(ToString::to_string);
@@ -105,12 +107,12 @@ pub(super) fn walk_stability(
             section.text_or_number(key).map(|found| found.value.into())
         };
         let kind = Form::Own(&read, json!({ "type": ["string", "number"] }));
-        let field = keys.key(Key::new("speed_rpm", about).needed(expected), &kind, &mut text);
+        let field = keys.key(Key::new("speed_rpm", description).needed(expected), &kind, &mut text);
         let (Field::Given(found), Some(text), Some(report)) = (field, text, keys.report()) else {
             return;
         };
         match text.parse() {
-            Ok(read) => *speeds = Some(read),
+            Ok(list) => *speeds = Some(list),
             Err(expected) => {
                 let title = format!("`speed_rpm` = \"{text}\" is no list of speeds");
                 report.refuse::<()>(&found.at, title, expected);

@@ -19,17 +19,19 @@ use sweep_engine::plan::WrittenIn;
 
 use sheet::{MOVING_MASS, SheetKeys, UNBALANCE_X, UNBALANCES};
 
-/// A section of machine files. It has the parameters whose names begin with its prefix. Three that
-/// differ in a component are an array: `inertia_kg_m2` has `inertia_11_kg_m2` and two more.
+/// A section of machine files. It has the parameters whose names begin with the section's prefix.
+/// Three parameters that differ only in a component are an array: `inertia_kg_m2` is
+/// `inertia_11_kg_m2` and two others.
 struct MachineSection {
     /// The key of the section; empty for the numbers at the top of the file.
     name: &'static str,
-    /// The prefix of its parameters' names. In a list of elements the element's number follows it.
+    /// The prefix of the names of the section's parameters. In a list of elements the element's
+    /// number follows it.
     prefix: String,
     occurrence: Occurrence,
-    /// A function that returns the number of the machine's elements in this section.
+    /// A function that returns the number of the machine's elements in the section.
     count: fn(&Machine) -> usize,
-    /// A function that gives a machine a number of elements, whose optional numbers are omitted.
+    /// A function that gives a machine this number of elements, whose optional numbers are omitted.
     fill: fn(&mut Machine, usize),
 }
 
@@ -45,7 +47,7 @@ enum Occurrence {
 /// A key of a section: a number, or an array of three.
 struct MachineKey {
     name: String,
-    /// The names of its parameters without the section's prefix.
+    /// The names of the key's parameters, without the section's prefix.
     parameters: Vec<String>,
     if_omitted: IfOmitted,
 }
@@ -56,30 +58,33 @@ enum IfOmitted {
     Refused,
     /// The number has this default.
     Default(f64),
-    /// The parameter has no value of its own.
-    Nothing,
-    /// The program finds the number, which [`AUTO`] says explicitly.
+    /// The parameter remains without a value.
+    Unset,
+    /// The program determines the number; [`AUTO`] is the explicit form.
     Auto,
 }
 
-/// The word in place of a number that the program finds.
+/// The word in place of a number that the program determines.
 const AUTO: &str = "auto";
 
 /// The keys of each section, made from the table of parameters.
 static KEYS: LazyLock<Vec<Vec<MachineKey>>> = LazyLock::new(|| {
     let mut machine = Machine::paper();
     SECTIONS.iter().for_each(|section| (section.fill)(&mut machine, 1));
-    let all = MachineParameter::all(&machine, &no_spin());
-    let is_single =
-        |one: &&MachineParameter| matches!(one.target(), Target::Machine | Target::Cabinet);
+    let parameters = MachineParameter::all(&machine, &no_spin());
+    let is_single = |parameter: &&MachineParameter| {
+        matches!(parameter.target(), Target::Machine | Target::Cabinet)
+    };
     let mut names = vec![Vec::new(); SECTIONS.len()];
-    for one in all.iter().filter(is_single) {
-        let name = one.name();
-        let rest = |section: &MachineSection| name.strip_prefix(&section.prefix(0));
-        let candidates = (0..SECTIONS.len()).filter_map(|k| Some((rest(&SECTIONS[k])?, k)));
+    for parameter in parameters.iter().filter(is_single) {
+        let name = parameter.name();
+        let suffix = |section: &MachineSection| name.strip_prefix(&section.prefix(0));
+        let candidates = (0..SECTIONS.len()).filter_map(|k| Some((suffix(&SECTIONS[k])?, k)));
         // A parameter belongs to the section with the longest prefix of its name.
-        let own = candidates.min_by_key(|(rest, _)| rest.len());
-        own.into_iter().for_each(|(rest, k)| names[k].push((rest.to_owned(), one.default_value())));
+        let owner = candidates.min_by_key(|(rest, _)| rest.len());
+        owner
+            .into_iter()
+            .for_each(|(rest, k)| names[k].push((rest.to_owned(), parameter.default_value())));
     }
     SECTIONS.iter().zip(names).map(|(section, names)| section.keys(&names)).collect()
 });
@@ -119,7 +124,7 @@ impl MachineSection {
     /// Walks over the keys of element `k`.
     fn walk(
         &self,
-        own: &'static [MachineKey],
+        section_keys: &'static [MachineKey],
         k: usize,
         machine: &mut Machine,
         sheet: &mut SheetKeys,
@@ -127,7 +132,7 @@ impl MachineSection {
     ) {
         keys.places = format!("{}.", self.name);
         sheet.walk(self, k, keys);
-        own.iter().for_each(|key| key.walk(self, k, machine, sheet, keys));
+        section_keys.iter().for_each(|key| key.walk(self, k, machine, sheet, keys));
     }
 
     /// Returns the prefix of the parameters' names of element `k`.
@@ -164,16 +169,21 @@ impl MachineKey {
         self.names(&section.prefix(0)).iter().all(|name| has_rule(name).is_some())
     }
 
-    /// Returns the numbers of element `k`, unless a file may omit them.
-    fn given(&self, section: &MachineSection, k: usize, machine: &Machine) -> Option<Vec<f64>> {
+    /// Returns the numbers of element `k` that a file contains; `None` if the file may omit them.
+    fn written_values(
+        &self,
+        section: &MachineSection,
+        k: usize,
+        machine: &Machine,
+    ) -> Option<Vec<f64>> {
         let names = self.names(&section.prefix(k)).into_iter();
         let values: Vec<f64> =
             names.map(|name| parameter_value(&name, machine)).collect::<Option<_>>()?;
         let is_given = match self.if_omitted {
             IfOmitted::Refused => true,
             IfOmitted::Default(default) => values.iter().any(|value| *value != default),
-            // A spring without a free length of its own has one by its ends.
-            IfOmitted::Nothing | IfOmitted::Auto => {
+            // If a spring has no free length, it follows from the spring's ends.
+            IfOmitted::Unset | IfOmitted::Auto => {
                 self.name != FREE_LENGTH || machine.springs[k].free_length_m.is_some()
             }
         };
@@ -193,9 +203,9 @@ fn once(name: &'static str) -> MachineSection {
 /// The key of a spring's free length, which follows from its ends if it is omitted.
 const FREE_LENGTH: &str = "free_length_m";
 
-/// Keys that may be omitted, besides those with a default in the table of parameters.
+/// Keys that may be omitted, in addition to those with a default in the table of parameters.
 const OPTIONAL: [(&str, IfOmitted); 2] =
-    [(FREE_LENGTH, IfOmitted::Nothing), ("friction_linear_speed_m_per_s", IfOmitted::Auto)];
+    [(FREE_LENGTH, IfOmitted::Unset), ("friction_linear_speed_m_per_s", IfOmitted::Auto)];
 
 /// Every section of a machine file.
 static SECTIONS: LazyLock<Vec<MachineSection>> = LazyLock::new(|| {
@@ -206,20 +216,20 @@ static SECTIONS: LazyLock<Vec<MachineSection>> = LazyLock::new(|| {
         count: |machine| usize::from(machine.cabinet.is_some()),
         fill: |machine, count| machine.cabinet = (count > 0).then(Cabinet::default),
     };
-    let list = |&ElementList { name, element, first, count, fill, .. }: &_| {
+    let to_section = |&ElementList { name, element, first, count, fill, .. }: &_| {
         let occurrence = Occurrence::Many(first);
         MachineSection { name, prefix: format!("{element}_"), occurrence, count, fill }
     };
     let once = ["", "tub", "shaft", "drum", "unbalance", "flexure", "bearings"].map(once);
-    once.into_iter().chain([cabinet]).chain(ElementList::all().map(list)).collect()
+    once.into_iter().chain([cabinet]).chain(ElementList::all().map(to_section)).collect()
 });
 
-/// Maximum number of elements in a list. Basis: no machine has as many, and a run that computes all
-/// of them stays fast. Doubling it doubles the time of a step with that many.
+/// Maximum number of elements in a list. Basis: far above real machines, and a run stays fast with
+/// this number. Doubling it doubles the time of a step with this number.
 const MAX_ELEMENTS: usize = 1000;
 
-/// Returns the paper's machine with one of each element that it lacks. It has parameters of every
-/// kind.
+/// Returns the paper's machine with one element of each kind that it lacks, so that it has
+/// parameters of every kind.
 pub(crate) fn with_one_of_each() -> Machine {
     let mut machine = Machine::paper();
     for section in SECTIONS.iter().filter(|section| (section.count)(&Machine::paper()) == 0) {
@@ -228,7 +238,8 @@ pub(crate) fn with_one_of_each() -> Machine {
     machine
 }
 
-/// Returns a spin without parameters, in place of a spin that machine files do not have.
+/// Returns a spin without parameters, for functions that need a spin where only machine files are
+/// read.
 pub(super) fn no_spin() -> Spin {
     Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() }
 }
@@ -255,8 +266,8 @@ pub(crate) fn schema() -> Value {
     document("Machine file of sweep", description.finish())
 }
 
-/// Returns a machine as JSON with the tables of a machine file, as result files have it. Every
-/// number is the shortest decimal that reads back the same.
+/// Returns a machine as JSON with the tables of a machine file, which result files contain. Every
+/// number is the shortest decimal that reads back to the same bits.
 pub(crate) fn to_json(machine: &Machine) -> Value {
     Keys::described(false, |keys| walk(&mut machine.clone(), keys)).finish()
 }
@@ -284,24 +295,30 @@ pub(crate) const MACHINE_KEYS: [&str; 16] = [
 /// Walks over every section.
 fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
     let mut sheet = SheetKeys::new(keys);
-    for (section, own) in SECTIONS.iter().zip(&*KEYS) {
+    for (section, section_keys) in SECTIONS.iter().zip(&*KEYS) {
         let table = keys::Key::new(section.name, "");
         match section.occurrence {
-            _ if section.name.is_empty() => section.walk(own, 0, machine, &mut sheet, keys),
+            _ if section.name.is_empty() => {
+                section.walk(section_keys, 0, machine, &mut sheet, keys)
+            }
             Occurrence::Once => {
                 let expected = format!("a section {}", section.header());
-                let is_assumed = own.iter().all(|key| key.is_assumed(section, machine));
+                let is_assumed = section_keys.iter().all(|key| key.is_assumed(section, machine));
                 let is_needed = !(is_assumed && (sheet.is_given || keys.is_schema()));
                 let table = if is_needed { table.needed(&expected) } else { table };
-                let field =
-                    keys.table(table, |keys| section.walk(own, 0, machine, &mut sheet, keys));
+                let field = keys
+                    .table(table, |keys| section.walk(section_keys, 0, machine, &mut sheet, keys));
                 if !is_needed && matches!(field, Field::Absent) && keys.section().is_some() {
-                    let names = own.iter().flat_map(|key| key.names(&section.prefix));
+                    let names = section_keys.iter().flat_map(|key| key.names(&section.prefix));
                     sheet.omitted.extend(names.filter_map(|name| find_parameter(&name, machine)));
                     continue;
                 }
-                if let (None, Some(report)) = (field.given(), keys.section().map(|it| it.report)) {
-                    own.iter().for_each(|key| mark_doubtful(key.names(&section.prefix), report));
+                if let (None, Some(report)) =
+                    (field.given(), keys.section().map(|section| section.report))
+                {
+                    section_keys
+                        .iter()
+                        .for_each(|key| mark_doubtful(key.names(&section.prefix), report));
                 }
             }
             Occurrence::AtMostOnce => drop(keys.table(table, |keys| {
@@ -309,7 +326,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                     (section.fill)(machine, 1);
                 }
                 for k in 0..(section.count)(machine) {
-                    section.walk(own, k, machine, &mut sheet, keys);
+                    section.walk(section_keys, k, machine, &mut sheet, keys);
                 }
             })),
             Occurrence::Many(_) => {
@@ -323,7 +340,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 let count = (section.count)(machine);
                 if count > 0 || ["springs", "dampers"].contains(&section.name) {
                     keys.tables(table, sections, count, |keys, k| {
-                        section.walk(own, k, machine, &mut sheet, keys);
+                        section.walk(section_keys, k, machine, &mut sheet, keys);
                     });
                 }
             }
@@ -373,11 +390,11 @@ impl MachineKey {
             names.iter().filter_map(|name| find_parameter(name, machine)).collect();
         let Some(first) = parameters.first() else { return };
         let number = Form::Number(first.range());
-        let or_auto = |section: &Section<'_>, key| match section.is_text(key) {
+        let read_number_or_auto = |section: &Section<'_>, key| match section.is_text(key) {
             true => section.choice(key, &[AUTO]).map(|_| AUTO.into()),
             false => number.read(section, key, ""),
         };
-        let (kind, about, expected) = match self.if_omitted {
+        let (kind, description, expected) = match self.if_omitted {
             _ if self.is_vector() => {
                 let three = Numbers::new(first.range(), 3..=3, "expected three numbers");
                 (
@@ -390,7 +407,7 @@ impl MachineKey {
                 let schema =
                     parameter_schema(&engine_parameter(first.clone(), machine, &no_spin()));
                 let schema = json!({ "anyOf": [schema, { "const": AUTO }] });
-                (Form::Own(&or_auto, schema), String::new(), String::new())
+                (Form::Own(&read_number_or_auto, schema), String::new(), String::new())
             }
             _ => {
                 let expected = format!("{}: {}", first.description(), first.range());
@@ -407,7 +424,7 @@ impl MachineKey {
         let has_plane =
             sheet.has_plane(section, k, &self.name) || may_have_plane && self.name == UNBALANCE_X;
         let is_needed = self.if_omitted == IfOmitted::Refused && !is_assumed && !has_plane;
-        let key = keys::Key::new(&self.name, &about);
+        let key = keys::Key::new(&self.name, &description);
         let key = if is_needed { key.needed(&expected) } else { key };
         let mut value = match self.if_omitted {
             _ if !keys.is_schema() => self.json(section, k, machine),
@@ -415,16 +432,16 @@ impl MachineKey {
             IfOmitted::Default(default) if !self.is_vector() => default.into(),
             _ => Value::Null,
         };
-        let found = keys.key(key, &kind, &mut value);
+        let field = keys.key(key, &kind, &mut value);
         let Some(report) = keys.section().map(|section| section.report) else { return };
         let numbers = value.as_array().map_or(slice::from_ref(&value), Vec::as_slice);
-        match found {
-            Field::Given(found) => {
+        match field {
+            Field::Given(location) => {
                 let numbers = numbers.iter().filter_map(Value::as_f64);
                 for (parameter, number) in parameters.iter().zip(numbers) {
                     parameter.set(machine, &mut no_spin(), number);
                     if !self.is_vector() {
-                        report.put(parameter.name(), found.at.clone());
+                        report.put(parameter.name(), location.at.clone());
                     }
                 }
             }
@@ -435,9 +452,9 @@ impl MachineKey {
         }
     }
 
-    /// Returns the value of the key in a file of the machine, null if the file omits it.
+    /// Returns the value of the key in a file of the machine; null if the file omits it.
     fn json(&self, section: &MachineSection, k: usize, machine: &Machine) -> Value {
-        match self.given(section, k, machine) {
+        match self.written_values(section, k, machine) {
             Some(values) if self.is_vector() => values.into(),
             Some(values) => values[0].into(),
             None if self.if_omitted == IfOmitted::Auto && machine.dampers[k].friction_n != 0.0 => {
@@ -464,8 +481,8 @@ fn parameter_value(name: &str, machine: &Machine) -> Option<f64> {
 }
 
 /// Returns the text of a machine file, in which each number has its description and source. A
-/// number that no file gave has the source of the built-in machine's. Reading the text gives the
-/// same machine, bit for bit.
+/// number that no file gave has the source of the built-in machine's number. The text reads back to
+/// the same machine, bit for bit.
 pub(crate) fn to_toml(machine: &Machine, written: &WrittenIn) -> String {
     let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the \
                     bearings before loading: x along the\n\
@@ -473,27 +490,28 @@ pub(crate) fn to_toml(machine: &Machine, written: &WrittenIn) -> String {
          centre, in body axes.\n"
         .to_owned();
     let parts = SECTIONS.iter().zip(&*KEYS);
-    for (section, own, k) in parts
-        .flat_map(|(section, own)| (0..(section.count)(machine)).map(move |k| (section, own, k)))
-    {
+    for (section, section_keys, k) in parts.flat_map(|(section, section_keys)| {
+        (0..(section.count)(machine)).map(move |k| (section, section_keys, k))
+    }) {
         if !section.name.is_empty() {
             text.push_str(&format!("\n{}\n", section.header()));
         }
-        for key in own {
-            let Some(values) = key.given(section, k, machine) else { continue };
+        for key in section_keys {
+            let Some(values) = key.written_values(section, k, machine) else { continue };
             let line = match key.is_vector() {
                 true => format!("{} = {values:?}", key.name),
                 false => format!("{} = {:?}", key.name, values[0]),
             };
             let names = key.names(&section.prefix(k));
-            let given = written.source(&names);
-            let is_said = given.is_some() || key.if_omitted == IfOmitted::Refused;
-            match find_parameter(&names[0], machine).filter(|_| is_said) {
+            let user_source = written.source(&names);
+            let has_comment = user_source.is_some() || key.if_omitted == IfOmitted::Refused;
+            match find_parameter(&names[0], machine).filter(|_| has_comment) {
                 Some(first) => {
-                    let source = given.unwrap_or_else(|| first.source().to_owned());
-                    let said = first.description();
-                    let said = if key.is_vector() { String::new() } else { format!("{said} ") };
-                    text.push_str(&format!("{line:<40} # {said}[{source}]\n"));
+                    let source = user_source.unwrap_or_else(|| first.source().to_owned());
+                    let description = first.description();
+                    let description =
+                        if key.is_vector() { String::new() } else { format!("{description} ") };
+                    text.push_str(&format!("{line:<40} # {description}[{source}]\n"));
                 }
                 None => text.push_str(&format!("{line}\n")),
             }
@@ -510,11 +528,11 @@ mod tests {
 
     #[test]
     fn the_listed_keys_are_those_that_are_read() {
-        let top = |(section, own): (&MachineSection, &Vec<MachineKey>)| match section.name {
+        let top_keys = |(section, own): (&MachineSection, &Vec<MachineKey>)| match section.name {
             "" => own.iter().map(|key| key.name.clone()).collect(),
             name => vec![name.to_owned()],
         };
-        let mut read: BTreeSet<String> = SECTIONS.iter().zip(&*KEYS).flat_map(top).collect();
+        let mut read: BTreeSet<String> = SECTIONS.iter().zip(&*KEYS).flat_map(top_keys).collect();
         read.insert(MOVING_MASS.to_owned());
         assert_eq!(read, MACHINE_KEYS.map(str::to_owned).into());
     }

@@ -1,4 +1,4 @@
-//! Notes on numbers that no washing machine has, which are mostly in another unit. They are
+//! Notes on numbers that no washing machine has, which are mostly in another unit. The numbers are
 //! accepted.
 
 use sweep_engine::config::Draft;
@@ -10,11 +10,12 @@ use crate::model::Washer;
 struct UsualRange {
     /// The least and the greatest magnitude; 0 is always accepted.
     bounds: [f64; 2],
-    /// The units that are used by mistake, each with its size in the parameter's unit.
+    /// The units in which the number is entered by mistake, each with its size in the parameter's
+    /// unit.
     mistaken_units: &'static [(&'static str, f64)],
 }
 
-/// Maximum number of notes that are shown; further ones are counted. Basis: they fit on a screen.
+/// Maximum number of notes that are shown; the others are counted. Basis: they fit on a screen.
 /// Doubling it doubles the longest list.
 const MAX_NOTES: usize = 8;
 
@@ -25,9 +26,9 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
     let written = draft.report.written();
     let mut notes = Vec::new();
     for parameter in MachineParameter::all(machine, spin) {
-        let is_typed =
+        let is_written_once =
             written.contains_key(parameter.name()) && !parameter.target().has_several_numbers();
-        if let Some(value) = parameter.get(machine, spin).filter(|_| is_typed) {
+        if let Some(value) = parameter.get(machine, spin).filter(|_| is_written_once) {
             notes.extend(unusual_note(&parameter, value));
         }
     }
@@ -54,22 +55,22 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
 /// Returns a note if a parameter's value is unusual.
 fn unusual_note(parameter: &MachineParameter, value: f64) -> Option<String> {
     let usual = usual_range(parameter)?;
-    let [least, most] = usual.bounds;
-    let is_usual = |value: f64| value == 0.0 || (least..=most).contains(&value.abs());
+    let [least, greatest] = usual.bounds;
+    let is_usual = |value: f64| value == 0.0 || (least..=greatest).contains(&value.abs());
     if is_usual(value) {
         return None;
     }
     let unit = parameter.unit();
     let name = parameter.name();
     let shown = decimal(value);
-    let range = format!("machines have {} to {}", decimal(least), decimal(most));
-    // With the unit that was meant the number is usual, such as 10 mm for a gap of "10" m.
-    let meant = usual.mistaken_units.iter().find(|(_, size)| is_usual(value * size));
-    let meant = meant.map(|(other, size)| {
+    let range = format!("machines have {} to {}", decimal(least), decimal(greatest));
+    // In the unit that was meant the number is usual, such as 10 mm for a clearance of "10" m.
+    let unit_meant = usual.mistaken_units.iter().find(|(_, size)| is_usual(value * size));
+    let conversion = unit_meant.map(|(other, size)| {
         format!(": {shown} {other} would be {} {unit}", decimal(rounded(value * size)))
     });
-    let meant = meant.unwrap_or_default();
-    Some(format!("unusual: {name} = {shown} {unit}, {range}{meant}"))
+    let conversion = conversion.unwrap_or_default();
+    Some(format!("unusual: {name} = {shown} {unit}, {range}{conversion}"))
 }
 
 /// Returns a number of at most six digits, for a message.
@@ -91,27 +92,29 @@ const INERTIAS: &[(&str, f64)] = &[("kg mm^2", 1e-6), ("g m^2", 1e-3)];
 const TIMES: &[(&str, f64)] = &[("ms", 1e-3)];
 
 /// Returns the usual range of a parameter, if it has one: from the smallest toy to the largest
-/// washer-extractor (some 400 kg of laundry), with a factor of about three on both sides. With a
-/// greater factor grams would pass for kilograms.
+/// washer-extractor (about 400 kg of laundry), widened by a factor of about three on both sides.
+/// With a greater factor grams would be accepted as kilograms.
 fn usual_range(parameter: &MachineParameter) -> Option<UsualRange> {
     let name = parameter.name();
-    let has = |word: &str| name.contains(word);
+    let name_contains = |word: &str| name.contains(word);
     let (bounds, mistaken_units) = match parameter.unit() {
-        "kg" if has("unbalance") => ([1e-6, 100.0], MASSES),
-        "kg" if has("tub") => ([0.3, 1e4], MASSES),
-        "kg" if has("cabinet") => ([1.0, 1e5], MASSES),
+        "kg" if name_contains("unbalance") => ([1e-6, 100.0], MASSES),
+        "kg" if name_contains("tub") => ([0.3, 1e4], MASSES),
+        "kg" if name_contains("cabinet") => ([1.0, 1e5], MASSES),
         "kg" => ([0.1, 3e3], MASSES),
-        "m" if has("clearance") => ([1e-4, 0.3], LENGTHS),
-        "m" if has("softness") => ([1e-7, 0.03], LENGTHS),
+        "m" if name_contains("clearance") => ([1e-4, 0.3], LENGTHS),
+        "m" if name_contains("softness") => ([1e-7, 0.03], LENGTHS),
         "m" => ([0.0, 5.0], LENGTHS),
-        "N/m" if has("bearing") => ([1e5, 1e12], STIFFNESSES),
+        "N/m" if name_contains("bearing") => ([1e5, 1e12], STIFFNESSES),
         "N/m" => ([30.0, 1e9], STIFFNESSES),
         "N s/m" => ([1.0, 1e6], DAMPINGS),
         "N" => ([0.1, 2e4], &[][..]),
         "kg m^2" => ([1e-5, 1e4], INERTIAS),
         "N m/rad" => ([10.0, 1e11], &[][..]),
         "rpm" => ([0.0, 5e3], &[][..]),
-        "s" if parameter.target() == Target::Spin && !has("table") => ([0.05, 7200.0], TIMES),
+        "s" if parameter.target() == Target::Spin && !name_contains("table") => {
+            ([0.05, 7200.0], TIMES)
+        }
         _ => return None,
     };
     Some(UsualRange { bounds, mistaken_units })

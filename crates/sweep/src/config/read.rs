@@ -18,21 +18,22 @@ pub(crate) fn walk_top(washer: &mut Washer, keys: &mut Keys<'_>, input: Option<&
     let path = input.map_or(Path::new(""), |input| &input.path);
     spin::walk(spin, path, keys);
     let key = Key::new("metrics", "further columns of the result").set();
-    let found = keys.words(key, "metric", &Metric::ALL, Metric::name, &mut measures.metrics);
+    let metrics_field =
+        keys.words(key, "metric", &Metric::ALL, Metric::name, &mut measures.metrics);
     measures.stops = machine.stops.len();
     measures.feet = machine.feet.len();
     measures.dampers = machine.dampers.len();
     if let Some(root) = keys.section() {
         grid::check_metrics(&measures.metrics, machine, root);
     }
-    grid::walk_stability(&measures.metrics, found, held_speeds, keys);
+    grid::walk_stability(&measures.metrics, metrics_field, held_speeds, keys);
 }
 
 /// Walks over the criterion in `[reliability]`.
 pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
     let misplaced = "it belongs at the top of the file, before the first [section]";
     keys.misplace(&["metrics"], misplaced);
-    let about = "amplitudes by which the models are compared: largest deviations, the same \
+    let description = "amplitudes by which the models are compared: largest deviations, the same \
                  turn by turn of the drum, or root mean squares";
     let criterion = &mut measures.criterion;
     // A plan with the default criterion omits it, so that its hash stays the same.
@@ -40,7 +41,7 @@ pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
         || keys.is_schema()
         || *criterion != Criterion::default()
     {
-        let key = Key::new("criterion", about).set();
+        let key = Key::new("criterion", description).set();
         let mut word = criterion.name().to_owned();
         keys.key(key, &Form::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
         *criterion = Criterion::named(&word).unwrap_or_default();

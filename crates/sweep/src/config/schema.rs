@@ -13,18 +13,18 @@ pub(crate) fn schema_of_set() -> Value {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
     let machine = with_one_of_each();
     let table = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    let all = [spin, table].map(|spin| {
-        let all = MachineParameter::all(&machine, &spin).into_iter();
-        all.map(|parameter| engine_parameter(parameter, &machine, &spin)).collect::<Vec<_>>()
+    let parameters = [spin, table].map(|spin| {
+        let parameters = MachineParameter::all(&machine, &spin).into_iter();
+        parameters.map(|parameter| engine_parameter(parameter, &machine, &spin)).collect::<Vec<_>>()
     });
     let mut single = Vec::new();
     let mut patterns = Map::new();
-    for parameter in all.iter().flatten() {
+    for parameter in parameters.iter().flatten() {
         let name = &parameter.name;
         let lists = ElementList::all().map(|list| (list.element, list.first));
         let mut lists = lists.chain([("spin_table", 1)]);
-        let rest = |element| name.strip_prefix(element)?.strip_prefix('_');
-        match lists.find_map(|(element, first)| Some((element, first, rest(element)?))) {
+        let suffix_after = |element| name.strip_prefix(element)?.strip_prefix('_');
+        match lists.find_map(|(element, first)| Some((element, first, suffix_after(element)?))) {
             Some((element, first, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
                 let suffix = rest.trim_start_matches(|c: char| c.is_ascii_digit());
                 let number = if first == 1 { "[1-9][0-9]*" } else { "([2-9]|[1-9][0-9]+)" };

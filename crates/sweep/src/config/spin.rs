@@ -13,16 +13,16 @@ use washer_model::{Machine, MachineParameter, Profile, Range, Spin};
 
 use cycle::Joints;
 
-/// Maximum number of rows of a table. Basis: each is a segment of every trajectory, kept in memory
-/// for all points that are prepared together. Doubling it doubles that memory.
+/// Maximum number of rows of a table. Basis: each row is a segment of every trajectory, kept in
+/// memory for all points that are prepared together. Doubling it doubles that memory.
 pub(super) const MAX_ROWS: usize = 20_000;
 
-/// The spin in place of a wrong one, so that axes over its numbers are known.
-pub(crate) const BLANK: Spin =
+/// The spin that replaces an invalid one, so that axes of its parameters are still checked.
+pub(crate) const PLACEHOLDER: Spin =
     Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
 
-/// Returns a description of a profile that is given by a peak and a ramp.
-const fn about_profile(profile: Profile) -> &'static str {
+/// Returns the description of a profile that has a peak and a ramp.
+const fn profile_description(profile: Profile) -> &'static str {
     match profile {
         Profile::Cycloidal => "smooth run-up, then constant",
         Profile::Triangular => "linear up, and as long down",
@@ -36,8 +36,8 @@ const TABLE_PROFILE: &str = "table";
 /// The profile that is read from a file.
 const FILE_PROFILE: &str = "file";
 
-/// The reason for which keys of a file are refused beside another profile.
-const ONLY_FILE: &str = "only the profile \"file\" has it, which needs no `profile`";
+/// The reason why keys of a file are refused with another profile.
+const NEEDS_FILE_PROFILE: &str = "only the profile \"file\" has it, which needs no `profile`";
 
 /// Walks over the section of the grid file at `path`.
 pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
@@ -52,29 +52,29 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
             FILE_PROFILE,
             "a cycle from a file with columns of time and speed; constant after its last row",
         );
-        let all = Profile::ALL.map(|profile| (profile.name(), about_profile(profile)));
-        let set = all.len();
+        let all = Profile::ALL.map(|profile| (profile.name(), profile_description(profile)));
+        let table_index = all.len();
         // The key `file` implies its profile.
         let has_file = keys.section().is_some_and(|section| section.key_at(FILE_PROFILE).is_some());
         let is_default = has_file || keys.is_schema();
         let variants = Variants {
             all: all.into_iter().chain([from_table, from_file]).collect(),
-            default: is_default.then_some(set + 1),
-            set,
+            default: is_default.then_some(table_index + 1),
+            set: table_index,
         };
-        let now = match spin {
+        let current = match spin {
             Spin::Ramped { profile, .. } => *profile as usize,
-            Spin::Table { .. } => set,
+            Spin::Table { .. } => table_index,
         };
         let key = Key::new("profile", "").set();
         let chosen =
-            keys.variants(key, &variants, Some(now), |keys, k| match Profile::ALL.get(k) {
+            keys.variants(key, &variants, Some(current), |keys, k| match Profile::ALL.get(k) {
                 Some(&profile) => walk_ramp(profile, spin, keys),
-                None if k == set => walk_table(spin, keys),
+                None if k == table_index => walk_table(spin, keys),
                 None => walk_file(spin, path, keys),
             });
         if chosen.is_none() && keys.section().is_some() {
-            *spin = BLANK;
+            *spin = PLACEHOLDER;
         }
     });
 }
@@ -83,33 +83,35 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
 fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     let reason = "the file gives times and speeds";
     keys.misplace(&["time_s", "speed_rpm", "peak_rpm", "ramp_s"], reason);
-    let about = "CSV or Parquet file with columns of time and speed and their units, relative to \
+    let description = "CSV or Parquet file with columns of time and speed and their units, \
+                       relative to \
                  this file";
-    let mut named = String::new();
-    let key = Key::new(FILE_PROFILE, about).needed("a CSV or Parquet file of times and speeds");
-    let found = keys.key(key, &Form::Text, &mut named);
-    let about = "straight lines between the rows, or monotone cubics";
+    let mut file_name = String::new();
+    let key =
+        Key::new(FILE_PROFILE, description).needed("a CSV or Parquet file of times and speeds");
+    let file_field = keys.key(key, &Form::Text, &mut file_name);
+    let description = "straight lines between the rows, or monotone cubics";
     let names = Joints::ALL.map(|(_, name)| name);
     let mut word = names[0].to_owned();
-    keys.key(Key::new("joints", about), &Form::Word(&names), &mut word);
-    let (Field::Given(found), Some(report)) = (found, keys.report()) else {
+    keys.key(Key::new("joints", description), &Form::Word(&names), &mut word);
+    let (Field::Given(location), Some(report)) = (file_field, keys.report()) else {
         if keys.section().is_some() {
-            *spin = BLANK;
+            *spin = PLACEHOLDER;
         }
         return;
     };
     let joints = Joints::ALL.into_iter().find(|(_, name)| *name == word);
     let joints = joints.map_or(Joints::Straight, |(joints, _)| joints);
-    *spin = match cycle::read(&beside(path, &named), joints, &found.at, report) {
+    *spin = match cycle::read(&beside(path, &file_name), joints, &location.at, report) {
         Some((time_s, speed_rpm)) => {
             for (column, values) in [("time_s", &time_s), ("speed_rpm", &speed_rpm)] {
                 for k in 0..values.len() {
-                    report.put(format!("spin_{column}[{k}]"), found.at.clone());
+                    report.put(format!("spin_{column}[{k}]"), location.at.clone());
                 }
             }
             Spin::Table { time_s, speed_rpm }
         }
-        None => BLANK,
+        None => PLACEHOLDER,
     };
 }
 
@@ -117,36 +119,37 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
 fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
     let reason = format!("only the profile \"{TABLE_PROFILE}\" has it, not \"{}\"", profile.name());
     keys.misplace(&["time_s", "speed_rpm"], &reason);
-    keys.misplace(&["file", "joints"], ONLY_FILE);
-    let Spin::Ramped { profile: now, peak_rpm, ramp_s } = spin else {
+    keys.misplace(&["file", "joints"], NEEDS_FILE_PROFILE);
+    let Spin::Ramped { profile: spin_profile, peak_rpm, ramp_s } = spin else {
         let title = "the grid's spin is a table, which has no peak and no ramp";
         keys.refuse("profile", title, "expected a grid file with `peak_rpm` and `ramp_s`");
         return;
     };
-    let mut is_right = true;
+    let mut is_valid = true;
     for (key, parameter, expected, value) in [
         ("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm", &mut *peak_rpm),
         ("ramp_s", "spin_ramp_s", "the duration of the run-up in s", &mut *ramp_s),
     ] {
-        if let Ok(parameter) = MachineParameter::find(parameter, &Machine::paper(), &BLANK) {
+        if let Ok(parameter) = MachineParameter::find(parameter, &Machine::paper(), &PLACEHOLDER) {
             let range = parameter.range();
-            let about = describe_parameter(&engine_parameter(parameter, &Machine::paper(), &BLANK));
-            let key = Key::new(key, &about).needed(expected);
-            let found = keys.key(key, &Form::Number(range), value);
-            is_right &= matches!(found, Field::Given(_)) || keys.section().is_none();
+            let description =
+                describe_parameter(&engine_parameter(parameter, &Machine::paper(), &PLACEHOLDER));
+            let key = Key::new(key, &description).needed(expected);
+            let field = keys.key(key, &Form::Number(range), value);
+            is_valid &= matches!(field, Field::Given(_)) || keys.section().is_none();
         }
     }
-    *now = profile;
-    if !is_right {
-        *spin = BLANK;
+    *spin_profile = profile;
+    if !is_valid {
+        *spin = PLACEHOLDER;
     }
 }
 
 /// Walks over the keys of a table of times and speeds.
 fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
     keys.misplace(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
-    keys.misplace(&["file", "joints"], ONLY_FILE);
-    let (mut time_s, mut speed_rpm) = match std::mem::replace(spin, BLANK) {
+    keys.misplace(&["file", "joints"], NEEDS_FILE_PROFILE);
+    let (mut time_s, mut speed_rpm) = match std::mem::replace(spin, PLACEHOLDER) {
         Spin::Table { time_s, speed_rpm } => (time_s, speed_rpm),
         _ => Default::default(),
     };
@@ -156,16 +159,18 @@ fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
     };
     // The range of the speeds is checked with the whole table.
     let speeds = Numbers { range: Range::Within(-1e5, 1e5), read: Range::Any, ..times.clone() };
-    let mut column = |key: &'static str, about: &'static str, numbers, column: &mut Vec<f64>| {
-        let key = Key::new(key, about).needed("an array of numbers");
-        matches!(keys.key(key, &Form::Numbers(numbers), column), Field::Given(_))
-    };
-    let found = [
+    let mut column =
+        |key: &'static str, description: &'static str, numbers, column: &mut Vec<f64>| {
+            let key = Key::new(key, description).needed("an array of numbers");
+            matches!(keys.key(key, &Form::Numbers(numbers), column), Field::Given(_))
+        };
+    let are_given = [
         column("time_s", "increasing times from 0, s", times, &mut time_s),
         column("speed_rpm", "speeds at these times, rpm", speeds, &mut speed_rpm),
     ];
-    if keys.section().is_some() && found != [true; 2] {
-        // Mistakes of the columns are reported; the empty table in their place is not one.
+    if keys.section().is_some() && are_given != [true; 2] {
+        // Mistakes of the columns have been reported; the empty table that replaces them is not a
+        // further one.
         if let Some(report) = keys.report() {
             report.doubt("spin_time_s");
         }

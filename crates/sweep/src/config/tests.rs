@@ -1,8 +1,8 @@
-//! Tests of mistakes with their whole messages, of defaults and precedence, and of arbitrary input.
+//! Tests of whole messages about mistakes, of defaults and precedence, and of arbitrary input.
 //!
-//! Each file of `testdata/broken` is a grid with mistakes, and its snapshot is beside it. A first
-//! line `# args: --set NAME=VALUE ...` has the arguments of the command line. With `--at` the grid
-//! is loaded as a single point.
+//! Each file of `testdata/broken` is a grid with mistakes, and its snapshot is in the same folder.
+//! A first line `# args: --set NAME=VALUE ...` has the arguments of the command line. With `--at`
+//! the grid is loaded as a single point.
 
 mod again;
 mod bounds;
@@ -68,7 +68,7 @@ fn load_with_arguments(path: &Path) -> Result<Plan, Diagnostics> {
     }
 }
 
-/// Loads the text of a grid, written to a folder of its own.
+/// Loads the text of a grid from a file in a temporary folder.
 pub(super) fn load_text(text: impl AsRef<[u8]>, sets: &[&str]) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
@@ -77,7 +77,7 @@ pub(super) fn load_text(text: impl AsRef<[u8]>, sets: &[&str]) -> Result<Plan, S
     load(&path, &sets).map_err(|diagnostics| diagnostics.to_string())
 }
 
-pub(super) const SMALLEST: &str =
+pub(super) const MINIMAL_GRID: &str =
     "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\n";
 
 #[test]
@@ -94,9 +94,9 @@ fn broken_files_are_refused_with_these_messages() {
             let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
             match load_with_arguments(&path) {
                 Ok(_) => accepted.push(name),
-                Err(found) => {
+                Err(mistakes) => {
                     let folder = format!("{}/", testdata().join("broken").display());
-                    insta::assert_snapshot!(name, found.to_string().replace(&folder, ""));
+                    insta::assert_snapshot!(name, mistakes.to_string().replace(&folder, ""));
                 }
             }
         }
@@ -116,7 +116,7 @@ fn every_sweep_of_the_repository_loads() {
 
 #[test]
 fn omitted_keys_have_their_defaults() {
-    let plan = load_text(SMALLEST, &[]).unwrap();
+    let plan = load_text(MINIMAL_GRID, &[]).unwrap();
     assert_eq!(plan.name, "grid");
     assert_eq!(plan.model.machine, Machine::paper());
     assert_eq!(
@@ -136,8 +136,9 @@ fn omitted_keys_have_their_defaults() {
         let method = METHODS.iter().find(|method| method.name == name).unwrap();
         method.with(|setting| if setting.key == "rtol" { rtol } else { atol })
     };
-    let method =
-        |text: &str| load_text(format!("{SMALLEST}[integrator]\n{text}"), &[]).unwrap().integrator;
+    let method = |text: &str| {
+        load_text(format!("{MINIMAL_GRID}[integrator]\n{text}"), &[]).unwrap().integrator
+    };
     assert_eq!(method("method = \"rk4\""), rk4(2e-4));
     assert_eq!(method("method = \"dopri5\""), adaptive("dopri5", 1e-6, 1e-9));
     assert_eq!(method("method = \"additive\"\nrtol = 1e-8"), adaptive("additive", 1e-8, 1e-9));
@@ -148,24 +149,25 @@ fn omitted_keys_have_their_defaults() {
 fn a_starter_grid_is_the_documented_one() {
     let starter = load_text(include_str!("../commands/starter.toml"), &[]).unwrap();
     assert_eq!(starter.points(), 16);
-    let bare = load_text(SMALLEST, &[]).unwrap();
+    let bare = load_text(MINIMAL_GRID, &[]).unwrap();
     assert_eq!((starter.integrator, starter.reliability), (bare.integrator, bare.reliability));
     assert_eq!(starter.model, bare.model);
 }
 
 #[test]
 fn criterion_and_metrics_are_part_of_the_plan_unless_they_are_the_default() {
-    let plain = load_text(SMALLEST, &[]).unwrap();
-    assert_eq!(plain.model.measures, Measures { dampers: 2, ..Measures::default() });
-    let told = load_text(format!("{SMALLEST}[reliability]\ncriterion = \"peak\"\n"), &[]).unwrap();
-    assert_eq!(told.to_json(), plain.to_json());
-    let more = format!(
-        "metrics = [\"static_sag\", \"cabinet_force\"]\n{SMALLEST}[reliability]\ncriterion \
+    let minimal = load_text(MINIMAL_GRID, &[]).unwrap();
+    assert_eq!(minimal.model.measures, Measures { dampers: 2, ..Measures::default() });
+    let explicit =
+        load_text(format!("{MINIMAL_GRID}[reliability]\ncriterion = \"peak\"\n"), &[]).unwrap();
+    assert_eq!(explicit.to_json(), minimal.to_json());
+    let extended = format!(
+        "metrics = [\"static_sag\", \"cabinet_force\"]\n{MINIMAL_GRID}[reliability]\ncriterion \
          = \"rms\"\n"
     );
-    let more = load_text(more, &[]).unwrap();
-    assert_eq!(more.model.measures.metrics, [Metric::StaticSag, Metric::CabinetForce]);
-    let json = more.to_json();
+    let extended = load_text(extended, &[]).unwrap();
+    assert_eq!(extended.model.measures.metrics, [Metric::StaticSag, Metric::CabinetForce]);
+    let json = extended.to_json();
     assert_eq!(json["reliability"]["criterion"], "rms");
     assert_eq!(json["metrics"], serde_json::json!(["static_sag", "cabinet_force"]));
 }
@@ -173,7 +175,8 @@ fn criterion_and_metrics_are_part_of_the_plan_unless_they_are_the_default() {
 #[test]
 fn later_layers_override_earlier_ones() {
     let grid = format!(
-        "{SMALLEST}[set]\ndamping_n_s_per_m = 100\nunbalance_mass_kg = 0.2\nspin_peak_rpm = 600\n"
+        "{MINIMAL_GRID}[set]\ndamping_n_s_per_m = 100\nunbalance_mass_kg = 0.2\n\
+         spin_peak_rpm = 600\n"
     );
     let plan =
         load_text(&grid, &["unbalance_mass_kg=0.3", "damper_2_damping_n_s_per_m=90"]).unwrap();
@@ -201,16 +204,17 @@ fn later_layers_override_earlier_ones() {
 #[test]
 fn a_point_may_lie_between_grid_points() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sweeps/fig12.toml");
-    let at = |at: &[&str]| {
+    let load_at = |assignments: &[&str]| {
         WasherGridInput::file(path.clone(), Vec::new())
-            .load_point(&at.iter().map(|&at| at.to_owned()).collect::<Vec<_>>())
+            .load_point(&assignments.iter().map(|&text| text.to_owned()).collect::<Vec<_>>())
             .map(|(plan, _)| plan)
     };
-    let plan = at(&["damping_n_s_per_m=99.5", "unbalance_mass_kg=0.4", "tub_mass_kg=25"]).unwrap();
+    let plan =
+        load_at(&["damping_n_s_per_m=99.5", "unbalance_mass_kg=0.4", "tub_mass_kg=25"]).unwrap();
     assert_eq!((plan.points(), plan.model.machine.tub.mass_kg), (1, 25.0));
     assert!(plan.model.machine.dampers.iter().all(|damper| damper.damping_n_s_per_m == 99.5));
-    assert_eq!(at(&["unbalance_mass_kg=0.4"]).unwrap_err().count(), 1);
-    assert_eq!(at(&[]).unwrap_err().count(), 2);
+    assert_eq!(load_at(&["unbalance_mass_kg=0.4"]).unwrap_err().count(), 1);
+    assert_eq!(load_at(&[]).unwrap_err().count(), 2);
 }
 
 #[test]
@@ -220,20 +224,20 @@ fn a_written_machine_reads_back_the_same_bits() {
     machine.springs[1].free_length_m = Some(0.1);
     machine.springs.truncate(3);
     machine.dampers.clear();
-    let mut full = super::machine::with_one_of_each();
-    full.springs[2].cubic_n_per_m3 = 2e6;
-    full.dampers[0].friction_n = 45.5;
-    full.dampers[0].friction_linear_speed_m_per_s = Some(0.31);
-    full.dampers[1].friction_speed_m_per_s = 0.02;
-    full.stops[0].direction = [0.0, 0.6, -0.8];
-    full.stops[0].softness_m = 2e-4;
-    full.bushings[0].damping_n_s_per_m = [0.0, 12.0, 12.0];
-    full.bushings[0].cubic_n_per_m3[1] = 5e6;
-    full.further_unbalances[0].radius_m = -0.2;
+    let mut with_all_elements = super::machine::with_one_of_each();
+    with_all_elements.springs[2].cubic_n_per_m3 = 2e6;
+    with_all_elements.dampers[0].friction_n = 45.5;
+    with_all_elements.dampers[0].friction_linear_speed_m_per_s = Some(0.31);
+    with_all_elements.dampers[1].friction_speed_m_per_s = 0.02;
+    with_all_elements.stops[0].direction = [0.0, 0.6, -0.8];
+    with_all_elements.stops[0].softness_m = 2e-4;
+    with_all_elements.bushings[0].damping_n_s_per_m = [0.0, 12.0, 12.0];
+    with_all_elements.bushings[0].cubic_n_per_m3[1] = 5e6;
+    with_all_elements.further_unbalances[0].radius_m = -0.2;
     let corners = [[0.5, -0.45, 0.26], [0.5, -0.45, -0.26], [-0.1, -0.45, 0.01]];
-    full.feet = corners.map(|foot_m| washer_model::Foot { foot_m }).to_vec();
-    full.cabinet = Some(washer_model::Cabinet { mass_kg: 31.5, ..Default::default() });
-    for machine in [machine, Machine::paper(), full] {
+    with_all_elements.feet = corners.map(|foot_m| washer_model::Foot { foot_m }).to_vec();
+    with_all_elements.cabinet = Some(washer_model::Cabinet { mass_kg: 31.5, ..Default::default() });
+    for machine in [machine, Machine::paper(), with_all_elements] {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(
             folder.path().join("machine.toml"),
@@ -241,7 +245,7 @@ fn a_written_machine_reads_back_the_same_bits() {
         )
         .unwrap();
         let grid = folder.path().join("grid.toml");
-        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
         assert_eq!(load(&grid, &[]).unwrap().model.machine, machine);
     }
 }
@@ -252,30 +256,31 @@ fn machine_mistakes(change: impl FnOnce(String) -> String, sets: &[&str]) -> Str
     let file = change(machine_file(&Machine::paper(), &WrittenIn::default()));
     std::fs::write(folder.path().join("machine.toml"), file).unwrap();
     let grid = folder.path().join("grid.toml");
-    std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+    std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
     let sets: Vec<_> = sets.iter().map(|&set| set.to_owned()).collect();
     load(&grid, &sets).map_or_else(|mistakes| mistakes.to_string(), |_| String::new())
 }
 
 #[test]
 fn mistakes_in_elements_are_reported_with_their_place() {
-    let with = |text: &'static str| machine_mistakes(|file| format!("{file}{text}"), &[]);
+    let with_section = |text: &'static str| machine_mistakes(|file| format!("{file}{text}"), &[]);
     let damper = "[[dampers]]\ncabinet_m = [0, -0.3, 0]\ntub_m = [0, -0.1, 0]\n\
                   damping_n_s_per_m = 0\n";
     let damper_mistakes =
         |text: &str| machine_mistakes(|file| format!("{file}{damper}{text}"), &[]);
-    let found = damper_mistakes("friction_n = -40\nfriction_linear_speed_m_per_s = 0.3\n");
-    assert!(found.contains("expected a number, 0 or greater"), "{found}");
-    let found = damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = \"atuo\"\n");
-    assert!(found.contains("did you mean `auto`?"), "{found}");
+    let message = damper_mistakes("friction_n = -40\nfriction_linear_speed_m_per_s = 0.3\n");
+    assert!(message.contains("expected a number, 0 or greater"), "{message}");
+    let message = damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = \"atuo\"\n");
+    assert!(message.contains("did you mean `auto`?"), "{message}");
     assert_eq!(damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n"), "");
-    let found = damper_mistakes("friction_n = 40\nfriction_speed_m_per_s = 0\n");
-    assert!(found.contains("a number from 1e-6 to 1000"), "{found}");
+    let message = damper_mistakes("friction_n = 40\nfriction_speed_m_per_s = 0\n");
+    assert!(message.contains("a number from 1e-6 to 1000"), "{message}");
     assert_eq!(damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = 0.3\n"), "");
 
-    let found =
-        with("[[stops]]\ntub_m = [0.4, 0, 0.2]\nclearance_m = 0.01\nstiffness_n_per_m = 4e4\n");
-    assert!(found.contains("`direction` is missing in"), "{found}");
+    let message = with_section(
+        "[[stops]]\ntub_m = [0.4, 0, 0.2]\nclearance_m = 0.01\nstiffness_n_per_m = 4e4\n",
+    );
+    assert!(message.contains("`direction` is missing in"), "{message}");
     let stop = |direction: &str| {
         let text = format!(
             "[[stops]]\ntub_m = [0.4, 0, 0.2]\ndirection = {direction}\nclearance_m = \
@@ -288,18 +293,18 @@ fn mistakes_in_elements_are_reported_with_their_place() {
     assert_eq!(stop("[0, 3, -4]"), "", "any length is made 1");
 
     let unbalance = "[[further_unbalances]]\nmass_kg = 0.2\nx_m = 0.1\nradius_m = 0\n";
-    let found = machine_mistakes(|file| format!("{file}{unbalance}"), &[]);
-    assert!(found.contains("unbalance 2 is on the drum's axis"), "{found}");
-    assert!(found.contains("radius_m = 0"), "{found}");
-    let found = with("[[bushings]]\ntub_m = [0.4, 0, 0]\nstiffness_n_per_m = 600\n");
-    assert!(found.contains("an array of numbers"), "{found}");
+    let message = machine_mistakes(|file| format!("{file}{unbalance}"), &[]);
+    assert!(message.contains("unbalance 2 is on the drum's axis"), "{message}");
+    assert!(message.contains("radius_m = 0"), "{message}");
+    let message = with_section("[[bushings]]\ntub_m = [0.4, 0, 0]\nstiffness_n_per_m = 600\n");
+    assert!(message.contains("an array of numbers"), "{message}");
 
     // Options set the numbers of elements that exist.
     assert_eq!(machine_mistakes(|file| file, &["friction_n=50"]), "");
-    let found = machine_mistakes(|file| file, &["stop_1_clearance_m=0.01"]);
-    assert!(found.contains("the machine has 0 stops"), "{found}");
-    let found = machine_mistakes(|file| file, &["unbalance_2_mass_kg=0.01"]);
-    assert!(found.contains("the machine has 1 unbalance, numbered from 1"), "{found}");
+    let message = machine_mistakes(|file| file, &["stop_1_clearance_m=0.01"]);
+    assert!(message.contains("the machine has 0 stops"), "{message}");
+    let message = machine_mistakes(|file| file, &["unbalance_2_mass_kg=0.01"]);
+    assert!(message.contains("the machine has 1 unbalance, numbered from 1"), "{message}");
 }
 
 #[test]
@@ -314,7 +319,7 @@ fn a_machine_has_at_most_a_thousand_springs() {
         )
         .unwrap();
         let grid = folder.path().join("grid.toml");
-        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
         load(&grid, &[]).map_err(|mistakes| mistakes.to_string())
     };
     assert_eq!(load_with(1000).unwrap().model.machine.springs.len(), 1000);
@@ -326,29 +331,31 @@ fn the_canonical_plan_distinguishes_plans_and_keeps_every_bit() {
     let json = |grid: &str, sets: &[&str]| load_text(grid, sets).unwrap().to_json().to_string();
     let reordered =
         "[time]\nend_s = 5e1\n[spin]\nramp_s = 50.0\npeak_rpm = 3.5e2\nprofile = \"triangular\"\n";
-    assert_eq!(json(SMALLEST, &[]), json(reordered, &[]));
-    assert_eq!(json(SMALLEST, &[]), json(SMALLEST, &["tub_mass_kg=23.87"]));
-    let odd = 0.1 + 0.2;
+    assert_eq!(json(MINIMAL_GRID, &[]), json(reordered, &[]));
+    assert_eq!(json(MINIMAL_GRID, &[]), json(MINIMAL_GRID, &["tub_mass_kg=23.87"]));
+    let unrounded = 0.1 + 0.2;
     assert_ne!(
-        json(SMALLEST, &["tub_mass_kg=0.3"]),
-        json(SMALLEST, &[&format!("tub_mass_kg={odd}")])
+        json(MINIMAL_GRID, &["tub_mass_kg=0.3"]),
+        json(MINIMAL_GRID, &[&format!("tub_mass_kg={unrounded}")])
     );
-    assert!(json(SMALLEST, &[&format!("tub_mass_kg={odd}")]).contains("0.30000000000000004"));
+    assert!(
+        json(MINIMAL_GRID, &[&format!("tub_mass_kg={unrounded}")]).contains("0.30000000000000004")
+    );
 }
 
 #[test]
 fn a_byte_order_mark_and_windows_line_ends_are_ignored() {
-    let dressed = format!("\u{feff}{}", SMALLEST.replace('\n', "\r\n"));
-    assert_eq!(load_text(dressed, &[]).unwrap(), load_text(SMALLEST, &[]).unwrap());
+    let windows_text = format!("\u{feff}{}", MINIMAL_GRID.replace('\n', "\r\n"));
+    assert_eq!(load_text(windows_text, &[]).unwrap(), load_text(MINIMAL_GRID, &[]).unwrap());
 }
 
 #[test]
 fn files_that_cannot_be_read_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let refusal = |path: &Path| load(path, &[]).unwrap_err().to_string();
-    let missing = refusal(&folder.path().join("missing.toml"));
+    let message = |path: &Path| load(path, &[]).unwrap_err().to_string();
+    let missing = message(&folder.path().join("missing.toml"));
     assert!(missing.contains("missing.toml") && missing.contains("sweep init"), "{missing}");
-    assert!(refusal(folder.path()).contains("cannot read the grid file"));
+    assert!(message(folder.path()).contains("cannot read the grid file"));
     assert!(
         load_text(b"name = \"\xff\"", &[])
             .unwrap_err()
@@ -364,16 +371,12 @@ fn files_that_cannot_be_read_are_refused() {
 #[test]
 fn files_with_many_mistakes_have_short_messages() {
     let lines = (0..100_000).map(|k| format!("k{k}=1\n"));
-    let unknown = load_text(lines.collect::<String>(), &[]).unwrap_err();
-    assert!(unknown.contains("100002 mistakes (100 shown)"), "{}", &unknown[unknown.len() - 200..]);
-    let unknown = load_text("]".repeat(896 << 10), &[]).unwrap_err();
-    assert!(unknown.len() < 10_000, "{}", unknown.len());
-    let repeated = load_text("a = 1\n".repeat(100_000), &[]).unwrap_err();
-    assert!(
-        repeated.contains("100000 mistakes (100 shown)"),
-        "{}",
-        &repeated[repeated.len() - 200..]
-    );
+    let message = load_text(lines.collect::<String>(), &[]).unwrap_err();
+    assert!(message.contains("100002 mistakes (100 shown)"), "{}", &message[message.len() - 200..]);
+    let message = load_text("]".repeat(896 << 10), &[]).unwrap_err();
+    assert!(message.len() < 10_000, "{}", message.len());
+    let message = load_text("a = 1\n".repeat(100_000), &[]).unwrap_err();
+    assert!(message.contains("100000 mistakes (100 shown)"), "{}", &message[message.len() - 200..]);
     let times = "1,".repeat(20_000);
     let speeds = "2,".repeat(20_000);
     let table = format!(
@@ -382,9 +385,9 @@ fn files_with_many_mistakes_have_short_messages() {
     );
     assert!(load_text(table, &[]).unwrap_err().contains("20000 mistakes (100 shown)"));
     let list = format!("values = [{}]", "nan,".repeat(200_000));
-    let axis = format!("{SMALLEST}[[axis]]\nparameter = \"tub_mass_kg\"\n{list}\n");
-    let long = load_text(axis, &[]).unwrap_err();
-    assert!(long.len() < 100_000, "{}", long.len());
+    let axis = format!("{MINIMAL_GRID}[[axis]]\nparameter = \"tub_mass_kg\"\n{list}\n");
+    let message = load_text(axis, &[]).unwrap_err();
+    assert!(message.len() < 100_000, "{}", message.len());
 }
 
 #[test]
@@ -395,29 +398,36 @@ fn the_largest_grid_takes_no_memory() {
              }}\n"
         )
     };
-    let grid =
-        format!("{SMALLEST}{}{}", axis("tub_mass_kg", 1_000_000), axis("shaft_mass_kg", 1_000_000));
+    let grid = format!(
+        "{MINIMAL_GRID}{}{}",
+        axis("tub_mass_kg", 1_000_000),
+        axis("shaft_mass_kg", 1_000_000)
+    );
     let plan = load_text(grid, &[]).unwrap();
     assert_eq!(plan.points(), 1_000_000_000_000);
     assert_eq!(plan.axis_values(plan.points() - 1), [2.0, 2.0]);
-    let most = "18446744073709551615";
-    let grid =
-        format!("{SMALLEST}{}{}", axis("tub_mass_kg", 1_000_000), axis("shaft_mass_kg", 1_000_001));
+    let max_u64 = "18446744073709551615";
+    let grid = format!(
+        "{MINIMAL_GRID}{}{}",
+        axis("tub_mass_kg", 1_000_000),
+        axis("shaft_mass_kg", 1_000_001)
+    );
     assert!(load_text(grid, &[]).unwrap_err().contains("too many grid points"));
-    let grid = format!("{SMALLEST}{}", axis("tub_mass_kg", 1))
-        .replace("count = 1 ", &format!("count = {most} "));
+    let grid = format!("{MINIMAL_GRID}{}", axis("tub_mass_kg", 1))
+        .replace("count = 1 ", &format!("count = {max_u64} "));
     assert!(load_text(grid, &[]).unwrap_err().contains("out of range"));
 }
 
 #[test]
 fn axis_values_keep_the_order_of_the_file() {
-    let grid = format!("{SMALLEST}[[axis]]\nparameter = \"tub_mass_kg\"\nvalues = [3, 1, 0x10]\n");
+    let grid =
+        format!("{MINIMAL_GRID}[[axis]]\nparameter = \"tub_mass_kg\"\nvalues = [3, 1, 0x10]\n");
     let plan = load_text(grid, &[]).unwrap();
     assert_eq!(plan.axes[0].values, AxisValues::List(vec![3.0, 1.0, 16.0]));
 }
 
 /// Texts that mutations insert into a valid grid.
-const PIECES: [&str; 24] = [
+const INSERTIONS: [&str; 24] = [
     "nan",
     "inf",
     "-1",
@@ -444,9 +454,8 @@ const PIECES: [&str; 24] = [
     "99999999999999999999",
 ];
 
-/// Asserts that a text is a plan with possible machines at all corners, or is refused with a
-/// message.
-fn loads_or_explains(text: &[u8]) {
+/// Asserts that a text is a plan with valid machines at all corners, or is refused with a message.
+fn assert_loads_or_explains(text: &[u8]) {
     match load_text(text, &[]) {
         Ok(plan) => {
             for corner in 0..plan.corners() {
@@ -488,19 +497,19 @@ proptest! {
 
     #[test]
     fn any_bytes_load_or_are_explained(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-        loads_or_explains(&bytes);
+        assert_loads_or_explains(&bytes);
     }
 
     #[test]
     fn any_text_loads_or_is_explained(text in "(\\PC|\n){0,200}") {
-        loads_or_explains(text.as_bytes());
+        assert_loads_or_explains(text.as_bytes());
     }
 
     #[test]
     fn any_mutation_of_a_valid_grid_loads_or_is_explained(
         start in 0_usize..5,
         edits in prop::collection::vec(
-            (any::<prop::sample::Index>(), 0_usize..20, 0_usize..PIECES.len(), any::<bool>()),
+            (any::<prop::sample::Index>(), 0_usize..20, 0_usize..INSERTIONS.len(), any::<bool>()),
             1..5,
         ),
     ) {
@@ -508,14 +517,19 @@ proptest! {
             0 => include_str!("../commands/starter.toml").to_owned(),
             k => std::fs::read_to_string(&sweeps()[k]).unwrap(),
         };
-        for (place, cut, piece, insert) in edits {
-            let boundaries: Vec<_> = text.char_indices().map(|(at, _)| at).collect();
+        for (position, deleted, insertion, insert) in edits {
+            let boundaries: Vec<_> = text.char_indices().map(|(index, _)| index).collect();
             if boundaries.is_empty() { break; }
-            let from = *place.get(&boundaries);
-            let to = boundaries.iter().copied().find(|&at| at >= from + cut).unwrap_or(text.len());
-            text.replace_range(from..to, if insert { PIECES[piece] } else { "" });
+            let start_index = *position.get(&boundaries);
+            let end_index = boundaries
+                .iter()
+                .copied()
+                .find(|&index| index >= start_index + deleted)
+                .unwrap_or(text.len());
+            let replacement = if insert { INSERTIONS[insertion] } else { "" };
+            text.replace_range(start_index..end_index, replacement);
         }
-        loads_or_explains(text.as_bytes());
+        assert_loads_or_explains(text.as_bytes());
     }
 
     #[test]
@@ -526,7 +540,7 @@ proptest! {
     ) {
         let name = if known { "damping_n_s_per_m" } else { name.as_str() };
         let set = format!("{name}={value}");
-        if let Err(mistakes) = load_text(SMALLEST, &[&set]) {
+        if let Err(mistakes) = load_text(MINIMAL_GRID, &[&set]) {
             assert!(mistakes.contains("nothing was done"));
         }
     }
@@ -540,14 +554,14 @@ proptest! {
         let mut lines: Vec<String> = machine.lines().map(str::to_owned).collect();
         let line = line % lines.len();
         if let Some((key, rest)) = lines[line].clone().split_once(" = ") {
-            let many = rest.starts_with('[');
-            lines[line] = if many { format!("{key} = [{value:?}, 1.0, \
+            let is_array = rest.starts_with('[');
+            lines[line] = if is_array { format!("{key} = [{value:?}, 1.0, \
                                              1.0]") } else { format!("{key} = {value:?}") };
         }
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("machine.toml"), lines.join("\n")).unwrap();
         let grid = folder.path().join("grid.toml");
-        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
         match load(&grid, &[]) {
             Ok(plan) => assert_eq!(plan.model.machine.violations(), []),
             Err(mistakes) => assert!(mistakes.count() >= 1),
@@ -561,14 +575,14 @@ fn a_design_is_ranges_and_a_number_of_points() {
                 [[axis]]\nparameter = \"bearing_stiffness_n_per_m\"\nrange = { from = 1e6, to = \
                 1e9, spacing = \"log\" }\n";
     let plan =
-        |design: &str| load_text(format!("{SMALLEST}[design]\n{design}\n{axes}"), &[]).unwrap();
+        |design: &str| load_text(format!("{MINIMAL_GRID}[design]\n{design}\n{axes}"), &[]).unwrap();
     let sobol = plan("method = \"sobol\"\npoints = 64\nseed = 3");
     assert_eq!(sobol.design, Some(Design::Spread { rule: DesignRule::Sobol, points: 64, seed: 3 }));
     let latin = plan("method = \"latin_hypercube\"\npoints = 64");
     assert_eq!((latin.points(), latin.to_json()["design"]["seed"].as_u64()), (64, Some(0)));
     assert_ne!(latin.axis_values(0), sobol.axis_values(0));
     assert_eq!(latin.to_json()["axis"][0]["range"].get("count"), None);
-    assert_eq!(load_text(SMALLEST, &[]).unwrap().to_json().get("design"), None);
+    assert_eq!(load_text(MINIMAL_GRID, &[]).unwrap().to_json().get("design"), None);
 }
 
 #[test]
@@ -577,7 +591,7 @@ fn a_plan_with_a_list_depends_on_the_content_of_its_file() {
     let grid = folder.path().join("grid.toml");
     std::fs::write(
         &grid,
-        format!("{SMALLEST}[design]\nmethod = \"list\"\nfile = \"points.csv\"\n"),
+        format!("{MINIMAL_GRID}[design]\nmethod = \"list\"\nfile = \"points.csv\"\n"),
     )
     .unwrap();
     let load_list = |csv: &str| {
@@ -596,9 +610,9 @@ fn a_plan_with_a_list_depends_on_the_content_of_its_file() {
         plan.scenario(1).model.spin,
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 40.0 }
     );
-    let other = load_list(&text.replace("40", "41"));
-    assert_ne!(plan.to_json()["design"]["hash"], other.to_json()["design"]["hash"]);
-    assert_eq!(plan.to_json()["axis"], other.to_json()["axis"]);
+    let changed = load_list(&text.replace("40", "41"));
+    assert_ne!(plan.to_json()["design"]["hash"], changed.to_json()["design"]["hash"]);
+    assert_eq!(plan.to_json()["axis"], changed.to_json()["axis"]);
     let point = WasherGridInput::file(grid, Vec::new())
         .load_point(&["unbalance_mass_kg=0.1".into(), "spin_ramp_s=9".into()])
         .unwrap()

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{
-    ElementList, NoModes, Point, Spin, Target, Violation, decimal,
+    ElementList, ModesError, Point, Spin, Target, Violation, decimal,
     highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, prepare,
 };
 use washer_row::{Criterion, Level};
@@ -19,29 +19,30 @@ use sweep_engine::method::Steps;
 use sweep_engine::plan::{MAX_STEPS, shortest_step_s};
 
 /// Maximum number of turns of the drum in a window for the criterion that compares turns. Basis: 20
-/// minutes at 1000 rpm; their peaks stay in memory for a group of points. Doubling it doubles that
-/// memory.
+/// minutes at 1000 rpm. The peaks of every turn stay in memory for a group of points. Doubling it
+/// doubles that memory.
 const MAX_COMPARED_TURNS: f64 = 20_000.0;
 
-/// Maximum frequency that limits the steps of the additive method, as a share of the machine's
-/// highest, at which a message recommends that method. Basis: below it the highest frequency is due
-/// to stiff bearings or a stiff hinge. Doubling it recommends the method always.
+/// Maximum ratio of the highest frequency that limits the steps of the additive method to the
+/// machine's highest frequency, at which a message recommends that method. Basis: at a lower ratio,
+/// stiff bearings or a stiff hinge cause the highest frequency. Doubling it recommends the method
+/// always.
 const ADDITIVE_HINT_SHARE: f64 = 0.9;
 
 /// Maximum number of elements and of rows of a spin's table that are checked before a run, over all
-/// points. Basis: some seconds of work. Doubling it doubles that time.
+/// points. Basis: their check takes some seconds. Doubling it doubles that time.
 const MAX_CHECKED_ROWS: u64 = 1_000_000_000;
 
-/// Time to count the turns in a row of a spin's table, in units of the time to check a row.
-/// Doubling it halves the number of points that are accepted with the criterion that compares
-/// turns.
+/// Time to count the turns in a row of a spin's table, relative to the time to check a row. Basis:
+/// turns are counted at each time step of a row. Doubling it halves the number of points that are
+/// accepted with the criterion that compares turns.
 const TURN_COUNT_COST: u64 = 50;
 
 /// Refuses impossible machines and spins at the corners of the grid.
 ///
-/// The conditions on inertia and bearings are linear, so a grid that meets them at its corners
-/// meets them everywhere. A spring whose length vanishes only between corners is a failed row of
-/// the run.
+/// The conditions on inertia and bearings are linear, so that a grid which satisfies them at its
+/// corners satisfies them everywhere. If a spring's length vanishes only between corners, a row of
+/// the run fails.
 pub(crate) fn check_scenarios(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
     let mut scenario = plan.scenario_at(&plan.corner(0));
@@ -84,7 +85,8 @@ impl VaryingParts {
         }
     }
 
-    /// Refuses a list of points whose check would take minutes, and returns whether it did.
+    /// Refuses a list of points whose check would take minutes. Returns whether the list was
+    /// refused.
     fn refuse_too_many_points(self, draft: &Draft<'_, Washer>, scenario: &Scenario) -> bool {
         let Washer { machine, spin, .. } = &scenario.model;
         let elements = ElementList::all().map(|list| (list.count)(machine) as u64).sum::<u64>();
@@ -98,17 +100,20 @@ impl VaryingParts {
             + u64::from(self.spin) * rows
             + u64::from(counts_turns) * rows * TURN_COUNT_COST;
         let points = draft.plan.corners();
-        let most = MAX_CHECKED_ROWS / cost_per_point.max(1);
-        if points <= most {
+        let max_points = MAX_CHECKED_ROWS / cost_per_point.max(1);
+        if points <= max_points {
             return false;
         }
         let title = format!(
             "too many points to check: {points}, each with {elements} springs, dampers \
              and the like and a spin of {rows} rows"
         );
-        let at = draft.report.place("axis[0]");
-        draft.report.push(at.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
-            diagnostic.at(&at, format!("expected at most {most} points of this machine and spin"))
+        let axis = draft.report.place("axis[0]");
+        draft.report.push(axis.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
+            diagnostic.at(
+                &location,
+                format!("expected at most {max_points} points of this machine and spin"),
+            )
         }));
         true
     }
@@ -123,15 +128,15 @@ struct CornerCheck<'a> {
 
 impl CornerCheck<'_> {
     /// Checks the parts that are new at a corner. Single numbers were checked as they were read;
-    /// here their combinations are.
+    /// this function checks their combinations.
     fn check_corner(&mut self, scenario: &Scenario, new: VaryingParts) {
         if new.machine {
-            self.violations(scenario.model.machine.joint_violations());
+            self.report_violations(scenario.model.machine.joint_violations());
         }
         if new.spin {
             let violations = scenario.model.spin.joint_violations();
             self.spin_is_sound = violations.is_empty();
-            self.violations(violations);
+            self.report_violations(violations);
         }
         if new.window {
             window(self.draft, scenario, &mut self.reported);
@@ -141,17 +146,17 @@ impl CornerCheck<'_> {
         }
     }
 
-    fn violations(&mut self, found: Vec<Violation>) {
-        for Violation { title, concerns, expected } in found {
-            let is_certain = !concerns.iter().any(|key| self.draft.report.is_doubtful(key));
-            if is_certain && self.reported.insert(concerns.clone()) {
-                refuse(self.draft, title, &concerns, &format!("expected {expected}"));
+    fn report_violations(&mut self, violations: Vec<Violation>) {
+        for Violation { title, parameters, expected } in violations {
+            let is_certain = !parameters.iter().any(|key| self.draft.report.is_doubtful(key));
+            if is_certain && self.reported.insert(parameters.clone()) {
+                refuse(self.draft, title, &parameters, &format!("expected {expected}"));
             }
         }
     }
 }
 
-/// Refuses a window with more turns of the drum than the criterion that compares turns accepts.
+/// Refuses a window with more turns of the drum than the criterion that compares turns permits.
 fn check_turns(
     draft: &Draft<'_, Washer>,
     scenario: &Scenario,
@@ -173,11 +178,11 @@ fn check_turns(
     draft.report.push(Diagnostic::new(title).at(&criterion, expected));
 }
 
-/// Refuses a machine whose highest frequency is too high for the method: for the greatest number of
-/// steps that is accepted, or for the plan's own step. It does nothing if the plan has mistakes.
+/// Refuses a machine whose highest frequency is too high for the method: for the greatest accepted
+/// number of steps, or for the plan's own step. It does nothing if the plan has mistakes.
 pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
-    // `share` is the shortest step that the method takes over the longest stable one.
-    let (step_s, share) = match draft.plan.integrator.steps() {
+    // `step_ratio` is the shortest step that the method takes, relative to the longest stable one.
+    let (step_s, step_ratio) = match draft.plan.integrator.steps() {
         Steps::Fixed(step_s) => (Some(step_s), 1.0),
         Steps::ByError => (None, 1.0),
         Steps::Checked(_) => (None, REFERENCE_SHARE),
@@ -187,28 +192,28 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
     }
     let end_s = draft.plan.end_s;
     let is_too_fast =
-        |frequency: f64| share * RK4_STABILITY_LIMIT / frequency < shortest_step_s(end_s);
+        |frequency: f64| step_ratio * RK4_STABILITY_LIMIT / frequency < shortest_step_s(end_s);
     let is_additive =
         direct(&draft.plan.integrator).is_some_and(|(level, _)| level == Level::Additive);
-    let by_method = if is_additive {
+    let highest_frequency = if is_additive {
         highest_explicit_frequency_rad_per_s
     } else {
         highest_frequency_rad_per_s
     };
-    let frequency = highest_of_corners_rad_per_s(draft, by_method);
+    let frequency = highest_of_corners_rad_per_s(draft, highest_frequency);
     let limit_s = RK4_STABILITY_LIMIT / frequency;
-    let axes = draft.plan.axes.iter().any(|axis| axis.values.len() > 1);
-    let at = if axes { ", at the grid's hardest corner" } else { "" };
+    let has_corners = draft.plan.axes.iter().any(|axis| axis.values.len() > 1);
+    let at_corner = if has_corners { ", at the grid's hardest corner" } else { "" };
     if is_too_fast(frequency) {
-        let steps = end_s / (share * limit_s);
+        let steps = end_s / (step_ratio * limit_s);
         let end_s = decimal(end_s);
         let name = draft.plan.integrator.name();
         let needs = format!("\"{name}\" needs {steps:.1e} steps to {end_s} s");
         let title = format!("the machine is too stiff: {needs}");
         let place =
             ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.place(key));
-        let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
-            diagnostic.at(&at, format!("expected at most {MAX_STEPS:e} steps"))
+        let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
+            diagnostic.at(&location, format!("expected at most {MAX_STEPS:e} steps"))
         });
         let way_out = if is_too_fast(highest_additive_rad_per_s(draft)) {
             ""
@@ -216,7 +221,8 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
             ", or use method = \"additive\", which takes stiff bearings in long steps"
         };
         draft.report.push(refusal.help(format!(
-            "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mistaken mass, \
+            "its highest natural frequency is {frequency:.1e} rad/s{at_corner}: look for a \
+             mistaken mass, \
              moment of inertia or stiffness{way_out}"
         )));
     } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
@@ -232,7 +238,7 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         };
         draft.report.push(refuse_step(draft, title, &expected).help(format!(
             "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural \
-             frequency{at}{way_out}"
+             frequency{at_corner}{way_out}"
         )));
     }
 }
@@ -243,25 +249,26 @@ fn highest_additive_rad_per_s(draft: &Draft<'_, Washer>) -> f64 {
 }
 
 /// Returns the highest natural frequency over the corners, each at its greatest speed. It is mostly
-/// that of the bearings. A machine without equilibrium has none, and its rows fail.
+/// that of the bearings. A machine without equilibrium has none; the run reports it as a failed
+/// row.
 fn highest_of_corners_rad_per_s(
     draft: &Draft<'_, Washer>,
-    highest_rad_per_s: fn(&Point, f64) -> Result<f64, NoModes>,
+    highest_rad_per_s: fn(&Point, f64) -> Result<f64, ModesError>,
 ) -> f64 {
     let plan = &draft.plan;
     let timing = timing(plan);
     let mut highest = 0.0_f64;
     for values in plan.some_corners() {
         let Washer { mut machine, spin, .. } = plan.scenario_at(&values).model;
-        // The steepest slope of friction bounds the frequency: linearised about no motion, and
-        // beyond any free stroke.
+        // The steepest slope of friction bounds the frequency. It holds for a linearisation about
+        // rest, without free strokes.
         for damper in &mut machine.dampers {
             damper.free_stroke_m = 0.0;
             damper.friction_linear_speed_m_per_s.get_or_insert(damper.friction_speed_m_per_s);
         }
         let speed = spin.greatest_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
-            // A machine whose eigenvalues do not converge is left to the run.
+            // The run reports a machine whose eigenvalues do not converge.
             highest = highest.max(highest_rad_per_s(&point, speed).unwrap_or(0.0));
         }
     }

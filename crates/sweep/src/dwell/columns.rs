@@ -12,19 +12,19 @@ use washer_row::{Measures, MetricColumn, Status};
 use super::final_state;
 use crate::engine::Carried;
 
-/// The data of a row: a motion of a point at a held speed, and one of its turns.
+/// The data of a row: a motion of a point at a held speed, and one of the motion's turns.
 pub(crate) struct DwellRow {
     /// All motions of the point at this speed, or the reason why there are none.
     pub(super) found: Result<Arc<Attractors>, Status>,
     /// The number of the motion.
     pub(super) motion: usize,
-    /// The number of the turn among those that are kept; 0 if none are.
+    /// The number of the turn among the turns of which states are stored; 0 if there are none.
     pub(super) turn: usize,
 }
 
 pub(crate) type DwellColumn = ResultColumn<DwellRow>;
 
-/// Number of the kinds of settled motions, which are the first of [`Attractor::KIND_NAMES`].
+/// Number of the kinds of settled motions, which come first in [`Attractor::KIND_NAMES`].
 const SETTLED_KINDS: usize = 5;
 
 /// The statuses of rows.
@@ -50,7 +50,7 @@ impl DwellRow {
     }
 
     /// Returns the motion, if it stayed within the model's range.
-    fn within(&self) -> Option<&Attractor> {
+    fn motion_in_range(&self) -> Option<&Attractor> {
         self.motion().filter(|motion| !matches!(motion.status, AttractorStatus::LeftRange { .. }))
     }
 
@@ -108,19 +108,19 @@ impl DwellRow {
     }
 }
 
-/// Returns a column of counts, which are null if they are not known.
-fn count_column(name: &str, text: &str, count: fn(&DwellRow) -> Option<u64>) -> DwellColumn {
-    ResultColumn::new(name, "1", text, Holds::KnownCount, count)
+/// Returns a column of counts, which are null where they are unknown.
+fn count_column(name: &str, description: &str, count: fn(&DwellRow) -> Option<u64>) -> DwellColumn {
+    ResultColumn::new(name, "1", description, Holds::KnownCount, count)
 }
 
 /// Returns the columns of the amplitudes of both models, by channel.
 fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
-    let numbers: [(&str, &str, fn(&DwellRow) -> Option<&[f64; Channel::ALL.len()]>); 3] = [
+    let amplitude_kinds: [(&str, &str, fn(&DwellRow) -> Option<&[f64; Channel::ALL.len()]>); 3] = [
         (
             MODELS[0],
             "largest deviation from equilibrium over the motion's last turns; null where it left \
              the model's range",
-            |row| Some(&row.within()?.peaks),
+            |row| Some(&row.motion_in_range()?.peaks),
         ),
         (MODELS[1], "the same by the linear model, which repeats every turn", |row| {
             Some(&row.response()?.linear_peaks)
@@ -130,64 +130,66 @@ fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
         }),
     ];
     let mut columns = Vec::new();
-    for (prefix, text, amplitudes) in numbers {
+    for (prefix, description, amplitudes) in amplitude_kinds {
         for &channel in channels {
-            let text = format!("{}: {text}", channel.description());
+            let description = format!("{}: {description}", channel.description());
             let name = format!("{prefix}_{}", channel.name());
             let amplitude = move |row: &DwellRow| Some(amplitudes(row)?[channel.index()]);
-            columns.push(ResultColumn::measured(name, channel.unit(), text, amplitude));
+            columns.push(ResultColumn::measured(name, channel.unit(), description, amplitude));
         }
     }
     columns
 }
 
-/// Returns all columns in order. `with_sections` adds those of states once a turn.
+/// Returns all columns in order. `with_sections` adds those of the states at successive turns.
 pub(crate) fn columns(
     channels: &[Channel],
     measures: &Measures,
     with_sections: bool,
 ) -> Vec<DwellColumn> {
     let motion = |row: &DwellRow| Some(row.motion as u64);
-    let text = "number of the motion at this speed: 0 is the one that the disturbed periodic \
-                response ends in";
-    let mut columns = vec![ResultColumn::new("motion", "1", text, Holds::Count, motion)];
-    let text = "how many starts ended in it; 0 where only a transient did";
-    columns.push(count_column("starts", text, |row| Some(u64::from(row.motion()?.starts))));
-    let text = "how many starts there were: the disturbed periodic responses, then kicks, two \
-                thirds of them along the modes that rock most, the others in random directions, \
-                every other one of the machine at rest";
-    columns.push(count_column("starts_made", text, |row| Some(u64::from(row.found()?.starts))));
-    let text = "smallest kick off the periodic response that led to it; 0: a disturbed periodic \
-                response did; null where only a kick of the machine at rest, a transient or the \
-                last speed's motion did";
+    let description = "number of the motion at this speed: 0 is the one that the disturbed \
+                periodic response ends in";
+    let mut columns = vec![ResultColumn::new("motion", "1", description, Holds::Count, motion)];
+    let description = "how many starts ended in it; 0 where only a transient did";
+    columns.push(count_column("starts", description, |row| Some(u64::from(row.motion()?.starts))));
+    let description = "how many starts there were: the disturbed periodic responses, then kicks, \
+                two thirds of them along the modes that rock most, the others in random \
+                directions, every other one of the machine at rest";
+    columns
+        .push(count_column("starts_made", description, |row| Some(u64::from(row.found()?.starts))));
+    let description = "smallest kick off the periodic response that led to it; 0: a disturbed \
+                periodic response did; null where only a kick of the machine at rest, a \
+                transient or the last speed's motion did";
     columns.push(ResultColumn::measured(
         "least_kick_rad_per_s",
         "rad/s",
-        text,
+        description,
         |row: &DwellRow| row.motion()?.least_kick_rad_per_s,
     ));
-    let text = "periodic: it repeats every turn; periodic_2: every second; periodic_m: every \
-                period_turns; quasi_periodic: two frequencies; chaotic: neighbours part, and eight \
-                trajectories from its states stayed in it for 240 s; null where it did not settle";
+    let description = "periodic: it repeats every turn; periodic_2: every second; periodic_m: \
+                every period_turns; quasi_periodic: two frequencies; chaotic: neighbours part, \
+                and eight trajectories from its states stayed in it for 240 s; null where it \
+                did not settle";
     columns.push(ResultColumn::name(
         "kind",
-        text,
+        description,
         Attractor::KIND_NAMES[..SETTLED_KINDS].to_vec(),
         DwellRow::kind,
     ));
-    let text = "after how many turns it repeats; null where it does not";
-    columns.push(count_column("period_turns", text, DwellRow::period_turns));
+    let description = "after how many turns it repeats; null where it does not";
+    columns.push(count_column("period_turns", description, DwellRow::period_turns));
     columns.extend(channel_columns(channels));
     let is_periodic = |number: &MetricColumn| number.metric.has_periodic_value();
-    for number in measures.model_columns().filter(is_periodic) {
-        let text = format!("{}, over 128 further turns of the motion", number.description());
-        let text = text.replace(" in the window", "");
-        let name = number.column(MODELS[0]);
-        let unit = number.metric.properties().unit;
-        let value = move |row: &DwellRow| number.value(&row.within()?.extra);
-        columns.push(ResultColumn::measured(name, unit, text, value));
+    for column in measures.model_columns().filter(is_periodic) {
+        let description = format!("{}, over 128 further turns of the motion", column.description());
+        let description = description.replace(" in the window", "");
+        let name = column.column(MODELS[0]);
+        let unit = column.metric.properties().unit;
+        let value = move |row: &DwellRow| column.value(&row.motion_in_range()?.extra);
+        columns.push(ResultColumn::measured(name, unit, description, value));
     }
-    let numbers: [(&str, &str, &str, fn(&DwellRow) -> Option<f64>); 7] = [
+    let measured_columns: [(&str, &str, &str, fn(&DwellRow) -> Option<f64>); 7] = [
         (
             "growth_per_s",
             "1/s",
@@ -219,7 +221,7 @@ pub(crate) fn columns(
             "m",
             "least gap between drum and tub over the motion's last turns; negative where they \
              clash",
-            |row| Some(row.within()?.min_gap_m),
+            |row| Some(row.motion_in_range()?.min_gap_m),
         ),
         (
             "threshold_rad_per_s",
@@ -229,22 +231,23 @@ pub(crate) fn columns(
             |row| row.found()?.threshold_rad_per_s,
         ),
     ];
-    for (name, unit, text, value) in numbers {
-        columns.push(ResultColumn::measured(name, unit, text, value));
+    for (name, unit, description, value) in measured_columns {
+        columns.push(ResultColumn::measured(name, unit, description, value));
     }
-    let text = "of a motion that did not settle: whether its largest deviations are within a \
-                factor of two of the periodic response's, which it then comes to or leaves slowly";
-    columns.push(ResultColumn::flag("near_response", text, DwellRow::is_near_response));
-    let text = "mean life of a transient; null of other motions";
-    columns.push(ResultColumn::measured("life_s", "s", text, DwellRow::life_s));
-    let text = "how long its first trajectory was followed";
-    columns.push(ResultColumn::measured("followed_s", "s", text, |row: &DwellRow| {
+    let description = "of a motion that did not settle: whether its largest deviations are \
+                within a factor of two of the periodic response's, which it then comes to or \
+                leaves slowly";
+    columns.push(ResultColumn::flag("near_response", description, DwellRow::is_near_response));
+    let description = "mean life of a transient; null of other motions";
+    columns.push(ResultColumn::measured("life_s", "s", description, DwellRow::life_s));
+    let description = "how long its first trajectory was followed";
+    columns.push(ResultColumn::measured("followed_s", "s", description, |row: &DwellRow| {
         Some(row.motion()?.time_s)
     }));
-    let text = "ok; left_range: it went farther than the model is good for, after followed_s; \
-                not_settled: the largest deviations still change; transient: it wanders as chaos \
-                does, but ends elsewhere after life_s; or why there is no motion";
-    columns.push(ResultColumn::name("status", text, STATUSES.to_vec(), |row: &DwellRow| {
+    let description = "ok; left_range: it went farther than the model is good for, after \
+                followed_s; not_settled: the largest deviations still change; transient: it \
+                wanders as chaos does, but ends elsewhere after life_s; or why there is no motion";
+    columns.push(ResultColumn::name("status", description, STATUSES.to_vec(), |row: &DwellRow| {
         STATUSES.iter().position(|status| *status == row.status())
     }));
     if with_sections {
@@ -253,25 +256,26 @@ pub(crate) fn columns(
     columns
 }
 
-/// Returns the columns of the state from which a machine is taken to the next speed. Chunks have
-/// them, so that an interrupted run can continue.
+/// Returns the columns of the state that the search carries to the next speed. Chunks contain them,
+/// so that an interrupted run can continue.
 pub(super) fn carried_columns() -> impl Iterator<Item = DwellColumn> {
     let bits = |i: usize| move |row: &DwellRow| Some(final_state(row.found()?)?[i].to_bits());
     (0..STATE_LEN)
         .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", Holds::Kept, bits(i)))
 }
 
-/// Returns the state of a known row from which a machine is taken to the next speed.
+/// Returns the state of a known row that the search carries to the next speed.
 pub(super) fn carried_state(known: &Done) -> Carried {
     let cells = known.rows.first()?.last_chunk::<STATE_LEN>()?;
     let state: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
     state?.try_into().ok()
 }
 
-/// Returns the columns of states once a turn.
+/// Returns the columns of states at successive turns.
 fn section_columns() -> Vec<DwellColumn> {
-    let text = "number of the turn among those kept, from 0: what follows is where it ends";
-    let mut columns = vec![count_column("turn", text, |row| row.found().map(|_| row.turn as u64))];
+    let description = "number of the turn among those kept, from 0: what follows is where it ends";
+    let mut columns =
+        vec![count_column("turn", description, |row| row.found().map(|_| row.turn as u64))];
     for i in 0..STATE_LEN {
         let q = i % COORDINATES;
         let unit = if q < 4 { "m" } else { "rad" };
@@ -280,8 +284,8 @@ fn section_columns() -> Vec<DwellColumn> {
             false => (format!("u{}_{unit}_per_s", q + 1), format!("{unit}/s"), "its speed"),
         };
         let value = move |row: &DwellRow| Some(row.motion()?.sections.get(row.turn)?[i]);
-        let text = format!("{description}, where the unbalance is up");
-        columns.push(ResultColumn::measured(name, &unit, text, value));
+        let description = format!("{description}, where the unbalance is up");
+        columns.push(ResultColumn::measured(name, &unit, description, value));
     }
     columns
 }

@@ -21,11 +21,11 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     axes.push("speed_rpm".to_owned());
     let mut kinds: BTreeMap<String, u64> = BTreeMap::new();
     let mut rows = 0_u64;
-    let mut places = 0_u64;
-    // Points and speeds with several motions, and their number.
-    let mut several: Vec<(Vec<f64>, u64)> = Vec::new();
-    // The greatest amplitude by channel, with the kind of the motion, and the point and speed.
-    let mut farthest: [Option<(f64, String, Vec<f64>)>; CHANNELS.len()] = [None, None];
+    let mut point_count = 0_u64;
+    // The points and speeds with several motions, and their number of motions.
+    let mut multiple: Vec<(Vec<f64>, u64)> = Vec::new();
+    // The greatest amplitude of each channel, with the kind of the motion, and the point and speed.
+    let mut greatest: [Option<(f64, String, Vec<f64>)>; CHANNELS.len()] = [None, None];
     let has_turns = file.schema().index_of("turn").is_ok();
     let channels = CHANNELS.map(|name| format!("nonlinear_{name}"));
     let has_kicks = file.schema().index_of("least_kick_rad_per_s").is_ok();
@@ -35,18 +35,19 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     let names = names.chain(channels.iter().map(String::as_str));
     let names: Vec<&str> = names.chain(axes.iter().map(String::as_str)).collect();
     file.each_row(&names, |row| {
-        // A motion is counted by the first of its turns.
+        // Only the first of a motion's turns is counted.
         if has_turns && row.value(3) > 0.0 {
             return Ok(());
         }
         let first_channel = 6 + usize::from(has_kicks);
         let first_axis = first_channel + CHANNELS.len();
-        let place = || (first_axis..names.len()).map(|column| row.value(column)).collect();
+        let point_and_speed =
+            || (first_axis..names.len()).map(|column| row.value(column)).collect();
         let kind_text = row.word(0).or(row.word(1)).unwrap_or_default();
         rows += 1;
         if listed.len() <= MAX_LISTED_MOTIONS {
             listed.push(MotionLine {
-                at: place(),
+                point_and_speed: point_and_speed(),
                 motion: row.value(2),
                 kind_text: kind_text.replace('_', " "),
                 deviations: [0, 1].map(|k| row.value(first_channel + k)),
@@ -56,45 +57,51 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         }
         *kinds.entry(kind_text.to_owned()).or_default() += 1;
         match row.value(2) {
-            0.0 => places += 1,
-            1.0 => several.push((place(), 2)),
-            _ => several.iter_mut().last().into_iter().for_each(|(_, count)| *count += 1),
+            0.0 => point_count += 1,
+            1.0 => multiple.push((point_and_speed(), 2)),
+            _ => multiple.iter_mut().last().into_iter().for_each(|(_, count)| *count += 1),
         }
-        for (column, farthest) in (first_channel..).zip(&mut farthest) {
+        for (column, greatest) in (first_channel..).zip(&mut greatest) {
             let value = row.value(column);
-            if value > farthest.as_ref().map_or(f64::NEG_INFINITY, |(known, ..)| *known) {
-                *farthest = Some((value, kind_text.to_owned(), place()));
+            if value > greatest.as_ref().map_or(f64::NEG_INFINITY, |(known, ..)| *known) {
+                *greatest = Some((value, kind_text.to_owned(), point_and_speed()));
             }
         }
         Ok::<(), FileError>(())
     })?;
-    let list: Vec<String> =
+    let kind_counts: Vec<String> =
         kinds.iter().map(|(kind, count)| format!("{count} {}", kind.replace('_', " "))).collect();
-    let s = if places == 1 { "" } else { "s" };
-    let counted = format!("{rows} at {places} point{s} and speed{s}: {}", list.join(", "));
-    let mut lines = vec![("motions", counted)];
+    let plural = if point_count == 1 { "" } else { "s" };
+    let summary = format!(
+        "{rows} at {point_count} point{plural} and speed{plural}: {}",
+        kind_counts.join(", ")
+    );
+    let mut lines = vec![("motions", summary)];
     if rows as usize <= MAX_LISTED_MOTIONS {
         lines.extend(listed.iter().map(|motion| ("motion", motion.sentence(&axes))));
-        lines.extend(push_sentences(file, &axes, &listed).into_iter().map(|line| ("push", line)));
+        lines.extend(kick_sentences(file, &axes, &listed).into_iter().map(|line| ("push", line)));
     }
-    for (name, farthest) in CHANNELS.iter().zip(&farthest) {
-        if let Some((value, kind, at)) = farthest {
+    for (name, greatest) in CHANNELS.iter().zip(&greatest) {
+        if let Some((value, kind, values)) = greatest {
             let name = name.replace('_', " ");
             let kind = kind.replace('_', " ");
-            let at = places::point_text(&axes, at);
-            lines.push(("farthest", format!("{name} {:.1} mrad, {kind}, at {at}", 1e3 * value)));
+            let point = places::point_text(&axes, values);
+            lines.push(("farthest", format!("{name} {:.1} mrad, {kind}, at {point}", 1e3 * value)));
         }
     }
-    for (at, motions) in &several {
-        lines.push(("several", format!("{motions} motions at {}", places::point_text(&axes, at))));
+    for (values, motions) in &multiple {
+        lines.push((
+            "several",
+            format!("{motions} motions at {}", places::point_text(&axes, values)),
+        ));
     }
     Ok(lines)
 }
 
-/// A motion that has a line.
+/// A motion with a line in the summary.
 struct MotionLine {
     /// The point and the speed.
-    at: Vec<f64>,
+    point_and_speed: Vec<f64>,
     motion: f64,
     /// The kind, or the reason why there is none.
     kind_text: String,
@@ -108,20 +115,21 @@ struct MotionLine {
 
 impl MotionLine {
     fn sentence(&self, axes: &[String]) -> String {
-        let mut text = format!("{} at {}", self.kind_text, places::point_text(axes, &self.at));
+        let mut text =
+            format!("{} at {}", self.kind_text, places::point_text(axes, &self.point_and_speed));
         for (name, value) in CHANNELS.iter().zip(self.deviations) {
             if value.is_finite() {
                 text += &format!(", {} {:.1} mrad", name.replace('_', " "), 1e3 * value);
             }
         }
-        let [ended, made] = self.starts;
-        if made > 0.0 {
-            text += &format!("; from {ended} of {made} starts");
+        let [ended_here, total] = self.starts;
+        if total > 0.0 {
+            text += &format!("; from {ended_here} of {total} starts");
             if self.least_kick == 0.0 {
                 text += ", the disturbed periodic response among them";
             } else if self.least_kick > 0.0 {
                 text += &format!(", the weakest a kick of {:.2} rad/s", self.least_kick);
-            } else if ended > 0.0 {
+            } else if ended_here > 0.0 {
                 text += ", of the machine at rest";
             } else {
                 text += ", where a transient ended";
@@ -130,27 +138,30 @@ impl MotionLine {
         text
     }
 
-    /// Whether the row has a motion.
+    /// Whether the row describes a motion.
     fn is_found(&self) -> bool {
         self.starts[1] > 0.0
     }
 }
 
-/// Returns for each point and speed a sentence on the pushes that lead from motion 0 to another.
-fn push_sentences(file: &ParquetFile, axes: &[String], listed: &[MotionLine]) -> Vec<String> {
+/// Returns for each point and speed a sentence on the kicks that lead from motion 0 to another
+/// motion.
+fn kick_sentences(file: &ParquetFile, axes: &[String], listed: &[MotionLine]) -> Vec<String> {
     let search = file.json(key::DWELL).unwrap_or_default();
-    let Some(hardest) = search["kick_rad_per_s"].as_f64() else { return Vec::new() };
+    let Some(max_kick) = search["kick_rad_per_s"].as_f64() else { return Vec::new() };
     let mut lines = Vec::new();
-    for motions in listed.chunk_by(|a, b| a.at == b.at) {
-        let at = places::point_text(axes, &motions[0].at);
-        let others = motions.iter().filter(|other| other.motion > 0.0);
-        let kicks = others.map(|other| other.least_kick).filter(|kick| kick.is_finite());
+    for motions in listed.chunk_by(|a, b| a.point_and_speed == b.point_and_speed) {
+        let at = places::point_text(axes, &motions[0].point_and_speed);
+        let other_motions = motions.iter().filter(|motion| motion.motion > 0.0);
+        let kicks = other_motions.map(|motion| motion.least_kick).filter(|kick| kick.is_finite());
         if !motions[0].is_found() {
             continue;
         }
         lines.push(match kicks.reduce(f64::min) {
             Some(kick) => format!("a kick of {kick:.2} rad/s leads elsewhere at {at}"),
-            None => format!("no push up to {hardest} rad/s that was tried leads elsewhere at {at}"),
+            None => {
+                format!("no push up to {max_kick} rad/s that was tried leads elsewhere at {at}")
+            }
         });
     }
     lines

@@ -16,7 +16,7 @@ const CORNER_STEP_S: f64 = 2.5e-4;
 
 /// Returns the method of a single trajectory of a model.
 pub(crate) fn reference_method(steps: &StepSelector<'_>, model: ModelKind) -> Method {
-    if model == ModelKind::Nonlinear && steps.are_nonsmooth() {
+    if model == ModelKind::Nonlinear && steps.has_nonsmooth_force() {
         let stable_s = steps.uncapped_step_s(model).unwrap_or(f64::INFINITY);
         return Method::Dop853 { step_s: CORNER_STEP_S.min(0.5 * stable_s) };
     }

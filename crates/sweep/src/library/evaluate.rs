@@ -21,8 +21,8 @@ use sweep_engine::{Error, Job, Progress, RunContext, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::RefinementLevels;
 
-/// An evaluator of a plan's points. The levels of the plan's method are found once, for all
-/// evaluations.
+/// An evaluator of a plan's points. The refinement levels of the plan's method are determined once,
+/// for all evaluations.
 pub struct PlanEvaluator {
     plan: Plan,
     levels: Arc<OnceCell<[RefinementLevels; 2]>>,
@@ -42,9 +42,10 @@ impl PlanEvaluator {
     /// Evaluates the points of a table. The bits of a row do not depend on the other rows; they are
     /// those of a run of the plan with this point.
     ///
-    /// Besides the table and the result some thousand rows are in memory.
+    /// Some thousand rows are in memory in addition to the table and the result.
     ///
     /// # Errors
+    ///
     /// Returns an error if columns or values do not fit the plan's axes, if no threads can be
     /// started, and if `SWEEP_SIMD` names no instruction set of this processor.
     pub fn evaluate(&self, table: &PointTable, effort: Effort<'_>) -> Result<MemoryTable, Error> {
@@ -83,28 +84,28 @@ impl EvaluationTask<'_> {
         let pool = threads::pool(effort.threads()?)?;
         let context = RunContext::new(effort.interrupt);
         let rows = Mutex::new(0..job.points);
-        let next = || {
+        let source = || {
             let row = if context.stopped() { None } else { lock(&rows).next() }?;
             Some((row, (job.axis_values)(row)))
         };
         let last = job.points.saturating_sub(1);
         // A panic is a defect of this program.
-        let defect = |reason| StoreError::Engine { first: 0, last, reason };
+        let engine_error = |reason| StoreError::Engine { first: 0, last, reason };
         let collector = BatchCollector::new(job);
         let progress = Progress::new(effort.progress, job.points, 0);
-        let keep = |outcome| {
+        let sink = |outcome| {
             collector.add(outcome, &context);
             progress.show(context.points_done());
         };
-        let evaluate = || pool.install(|| engine.evaluator.evaluate(&next, &keep, &context));
+        let evaluate = || pool.install(|| engine.evaluator.evaluate(&source, &sink, &context));
         let evaluated = catch_unwind(AssertUnwindSafe(evaluate));
         progress.finish();
         evaluated.map_err(|panic| {
-            defect(format!("the engine panicked: {}", panics::text(panic.as_ref())))
+            engine_error(format!("the engine panicked: {}", panics::text(panic.as_ref())))
         })?;
-        let is_whole = context.points_done() == job.points;
-        let batches = collector.into_batches().map_err(|error| defect(error.to_string()))?;
-        Ok(MemoryTable::from_rows(job, batches, is_whole))
+        let is_complete = context.points_done() == job.points;
+        let batches = collector.into_batches().map_err(|error| engine_error(error.to_string()))?;
+        Ok(MemoryTable::from_rows(job, batches, is_complete))
     }
 }
 
@@ -113,24 +114,24 @@ struct BatchCollector<'a> {
     job: &'a Job<'a>,
     /// The schema of every batch.
     schema: SchemaRef,
-    parts: IncompleteGroups,
+    incomplete: IncompleteGroups,
     batches: Mutex<BTreeMap<u64, Result<RecordBatch, ArrowError>>>,
 }
 
 impl<'a> BatchCollector<'a> {
     fn new(job: &'a Job<'a>) -> Self {
         let schema = job.layout.schema();
-        Self { job, schema, parts: IncompleteGroups::default(), batches: Mutex::default() }
+        Self { job, schema, incomplete: IncompleteGroups::default(), batches: Mutex::default() }
     }
 
-    /// Adds a row, and completes its batch if it is the last one.
+    /// Adds a row, and completes its batch if the row is the last one.
     fn add(&self, outcome: Done, context: &RunContext<'_>) {
         let rows = BATCH_ROWS as u64;
-        let number = outcome.point / rows;
-        let size = rows.min(self.job.points - number * rows);
-        if let Some(outcomes) = self.parts.add(number, size, outcome) {
+        let batch_index = outcome.point / rows;
+        let size = rows.min(self.job.points - batch_index * rows);
+        if let Some(outcomes) = self.incomplete.add(batch_index, size, outcome) {
             let batch = self.batch(outcomes);
-            lock(&self.batches).insert(number, batch);
+            lock(&self.batches).insert(batch_index, batch);
         }
         context.add_points(1);
     }
@@ -149,10 +150,10 @@ impl<'a> BatchCollector<'a> {
 
     /// Returns all batches in order, including incomplete ones.
     fn into_batches(self) -> Result<Vec<RecordBatch>, ArrowError> {
-        let parts = std::mem::take(&mut *lock(&self.parts.0));
+        let incomplete = std::mem::take(&mut *lock(&self.incomplete.0));
         let mut batches = std::mem::take(&mut *lock(&self.batches));
-        for (number, outcomes) in parts {
-            batches.insert(number, self.batch(outcomes));
+        for (batch_index, outcomes) in incomplete {
+            batches.insert(batch_index, self.batch(outcomes));
         }
         batches.into_values().collect()
     }
@@ -176,8 +177,8 @@ mod tests {
         let interrupt = Interrupt::new();
         let effort =
             Effort { threads: Some(2), progress: ProgressMode::None, interrupt: &interrupt };
-        let found = evaluator.all_points().unwrap().in_memory(effort).unwrap();
-        let [first, second] = found.batches() else { panic!("{found:?}") };
+        let table = evaluator.all_points().unwrap().in_memory(effort).unwrap();
+        let [first, second] = table.batches() else { panic!("{table:?}") };
         assert_eq!([first.num_rows(), second.num_rows()], [BATCH_ROWS, 1]);
         assert!(Arc::ptr_eq(&first.schema(), &second.schema()));
     }

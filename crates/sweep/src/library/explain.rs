@@ -20,10 +20,11 @@ pub struct Explained {
 /// Explains the verdict of a point of a grid; `None` if it was interrupted.
 ///
 /// `at` has texts `NAME=VALUE`, which give every axis its value and may set other parameters.
-/// `speeds_rpm` are equally spaced; without them they go from half of the slowest mode's frequency
-/// to the profile's greatest speed.
+/// `speeds_rpm` are equally spaced; by default they go from half of the slowest mode's frequency to
+/// the profile's greatest speed.
 ///
 /// # Errors
+///
 /// Returns an error for mistakes in the grid or the options, if the profile reaches no speed at
 /// which responses are sought, and if the machine has no equilibrium or no modes.
 pub fn explain_point(
@@ -61,21 +62,21 @@ mod tests {
         let text =
             "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\ntime = { end_s = 5 }\n";
         let grid = WasherGridInput::text("grid", text.to_owned(), Vec::new());
-        // This would take minutes.
+        // An explanation at all these speeds would take minutes.
         let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
         let interrupt = Interrupt::new();
         let effort =
             Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
-        let found = std::thread::scope(|scope| {
+        let explanation = std::thread::scope(|scope| {
             let work = scope.spawn(|| explain_point(&grid, &[], Some(&speeds), effort));
             std::thread::sleep(Duration::from_millis(500));
             assert!(!work.is_finished(), "it is too short");
             let raised = Instant::now();
             interrupt.raise(2);
-            let found = work.join().unwrap();
+            let explanation = work.join().unwrap();
             assert!(raised.elapsed() < Duration::from_secs(5), "{:?}", raised.elapsed());
-            found
+            explanation
         });
-        assert!(found.unwrap().is_none());
+        assert!(explanation.unwrap().is_none());
     }
 }

@@ -35,8 +35,8 @@ pub fn fit_tables(
     }
     let cancel = Cancel::Flag(effort.interrupt.flag());
     let work = FitWork { cancel, seen: &|_| {}, output: None, fresh: false };
-    let found = threads::pool(effort.threads()?)?.install(|| fit::fit(cases, options, &work))?;
-    Ok(found.map(|fitted| Explained { found: json!(fitted.report), text: fitted.report.text() }))
+    let fitted = threads::pool(effort.threads()?)?.install(|| fit::fit(cases, options, &work))?;
+    Ok(fitted.map(|fit| Explained { found: json!(fit.report), text: fit.report.text() }))
 }
 
 #[cfg(test)]
@@ -49,7 +49,7 @@ mod tests {
         let interrupt = Interrupt::new();
         let effort =
             || Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
-        let plain = FitOptions {
+        let options = FitOptions {
             free: Vec::new(),
             own: Vec::new(),
             model: "linear".to_owned(),
@@ -63,17 +63,17 @@ mod tests {
         let message = |options: &FitOptions| {
             fit_tables(&grid, Vec::new(), options, effort()).unwrap_err().to_string()
         };
-        assert!(message(&plain).contains("a table or more"));
-        let many = 1_000_000_000;
-        for options in [
-            FitOptions { starts: many, ..plain.clone() },
-            FitOptions { starts: 0, ..plain.clone() },
-            FitOptions { bootstrap: many, ..plain.clone() },
-            FitOptions { draws: many, ..plain.clone() },
+        assert!(message(&options).contains("a table or more"));
+        let too_many = 1_000_000_000;
+        for wrong in [
+            FitOptions { starts: too_many, ..options.clone() },
+            FitOptions { starts: 0, ..options.clone() },
+            FitOptions { bootstrap: too_many, ..options.clone() },
+            FitOptions { draws: too_many, ..options.clone() },
         ] {
-            let refused = options.check().unwrap_err().to_string();
+            let refused = wrong.check().unwrap_err().to_string();
             assert!(refused.contains("a number from"), "{refused}");
         }
-        assert!(plain.check().is_ok());
+        assert!(options.check().is_ok());
     }
 }

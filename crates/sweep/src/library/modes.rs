@@ -20,6 +20,7 @@ use sweep_files::{FileKind, key};
 /// machine is the built-in one.
 ///
 /// # Errors
+///
 /// Returns an error for mistakes in the grid, for speeds that do not increase, and for a machine
 /// without equilibrium or modes.
 pub fn find_modes(
@@ -47,10 +48,11 @@ pub(crate) struct ModesInput {
 }
 
 impl ModesInput {
-    /// Returns the machine of a grid, at the point of `at` if it is not empty. Without a grid it is
-    /// the built-in machine in a run-up to a speed (rpm).
+    /// Returns the machine of a grid, at the point of `at` if that is not empty; without a grid the
+    /// built-in machine in a run-up to a speed (rpm).
     ///
     /// # Errors
+    ///
     /// Returns the mistakes in the grid.
     pub(crate) fn new(
         grid: Option<&WasherGridInput>,
@@ -112,26 +114,26 @@ impl ModeAnalysis {
     /// Returns the modes as JSON.
     pub(crate) fn to_json(&self, name: &str) -> Value {
         let modes = self.modes.iter().enumerate().map(|(k, mode)| {
-            let mut facts = facts(k, mode);
-            let at = |(i, at): (usize, &ModeAtSpeed)| {
-                let mut at = at_speed(self.speeds_rpm[i], at);
+            let mut entry = properties(k, mode);
+            let with_exact = |(i, mode): (usize, &ModeAtSpeed)| {
+                let mut at_speed = at_speed(self.speeds_rpm[i], mode);
                 if let Some(exact) = self.exact.as_ref().and_then(|exact| exact[i][k]) {
-                    at["exact_frequency_rpm"] = exact.frequency_rpm().into();
-                    at["exact_damping_ratio"] = exact.damping_ratio().into();
+                    at_speed["exact_frequency_rpm"] = exact.frequency_rpm().into();
+                    at_speed["exact_damping_ratio"] = exact.damping_ratio().into();
                 }
-                at
+                at_speed
             };
-            facts["at_speed"] = mode.at_speed.iter().enumerate().map(at).collect();
-            facts
+            entry["at_speed"] = mode.at_speed.iter().enumerate().map(with_exact).collect();
+            entry
         });
-        let mut found = json!({ "name": name, "modes": modes.collect::<Value>() });
+        let mut json = json!({ "name": name, "modes": modes.collect::<Value>() });
         if !self.friction_speeds.is_empty() {
-            found["friction_speeds_m_per_s"] = self.friction_speeds.clone().into();
+            json["friction_speeds_m_per_s"] = self.friction_speeds.clone().into();
         }
-        found
+        json
     }
 
-    /// Returns the modes as a table, with the facts of each mode in the metadata.
+    /// Returns the modes as a table, with the properties of each mode in the metadata.
     pub(crate) fn table(&self, ModesInput { name, set, machine, .. }: &ModesInput) -> Table {
         let speeds = &self.speeds_rpm;
         let modes = &self.modes;
@@ -144,43 +146,46 @@ impl ModeAnalysis {
         let names: Vec<String> = modes.iter().map(|mode| mode.motion.to_string()).collect();
         let description = "what moves, at the first resonance or the lowest speed";
         table.words("name", description, rows().map(|(_, mode)| names[mode].as_str()));
-        let mut add =
+        let mut add_column =
             |name: &str, unit: &str, description: &str, value: fn(&ModeAtSpeed) -> f64| {
                 let values = rows().map(|(k, mode)| Some(value(&modes[mode].at_speed[k])));
                 table.numbers(name, unit, description, values);
             };
         let description = "damped natural frequency in cycles per minute, mean over a turn";
-        add("frequency_rpm", "rpm", description, |at| at.frequency_rpm);
-        add("frequency_hz", "Hz", "the same in cycles per second", |at| at.frequency_rpm / 60.0);
+        add_column("frequency_rpm", "rpm", description, |at| at.frequency_rpm);
+        add_column("frequency_hz", "Hz", "the same in cycles per second", |at| {
+            at.frequency_rpm / 60.0
+        });
         let description = "share of critical damping, mean over a turn";
-        add("damping_ratio", "1", description, |at| at.damping_ratio);
+        add_column("damping_ratio", "1", description, |at| at.damping_ratio);
         let description = "real part of the eigenvalue, mean over a turn";
-        add("eigenvalue_re", "1/s", description, |at| at.re_per_s);
+        add_column("eigenvalue_re", "1/s", description, |at| at.re_per_s);
         let description = "imaginary part of the eigenvalue, mean over a turn";
-        add("eigenvalue_im", "rad/s", description, |at| at.im_rad_per_s);
+        add_column("eigenvalue_im", "rad/s", description, |at| at.im_rad_per_s);
         let description = "least damped natural frequency over a turn";
-        add("frequency_min_rpm", "rpm", description, |at| at.least_rpm);
+        add_column("frequency_min_rpm", "rpm", description, |at| at.least_rpm);
         let description = "greatest damped natural frequency over a turn";
-        add("frequency_max_rpm", "rpm", description, |at| at.greatest_rpm);
+        add_column("frequency_max_rpm", "rpm", description, |at| at.greatest_rpm);
         if let Some(exact) = &self.exact {
-            let mut add =
+            let mut add_exact_column =
                 |name: &str, unit: &str, description: &str, value: fn(&FloquetMode) -> f64| {
                     let values = rows().map(|(k, mode)| exact[k][mode].as_ref().map(value));
                     table.numbers(name, unit, description, values);
                 };
             let description = "frequency by the linear model's Floquet exponent over whole turns, \
                                nearest to frequency_rpm; null at standstill";
-            add("exact_frequency_rpm", "rpm", description, FloquetMode::frequency_rpm);
+            add_exact_column("exact_frequency_rpm", "rpm", description, FloquetMode::frequency_rpm);
             let description = "share of critical damping by it";
-            add("exact_damping_ratio", "1", description, FloquetMode::damping_ratio);
+            add_exact_column("exact_damping_ratio", "1", description, FloquetMode::damping_ratio);
         }
         let mut plan = json!({ "name": name, "machine": config::machine_json(machine) });
         if !set.is_empty() {
             plan["set"] = set.clone().into();
         }
         table.metadata(key::PLAN, &plan);
-        let all: Value = modes.iter().enumerate().map(|(k, mode)| facts(k, mode)).collect();
-        table.metadata(key::MODES, &all);
+        let entries: Value =
+            modes.iter().enumerate().map(|(k, mode)| properties(k, mode)).collect();
+        table.metadata(key::MODES, &entries);
         table
     }
 }
@@ -191,7 +196,7 @@ fn exact_at_speeds(
     speeds_rpm: &[f64],
     modes: &[ModeOverSpeed],
 ) -> Result<Vec<Vec<Option<FloquetMode>>>, Error> {
-    let at = |(k, &speed): (usize, &f64)| -> Result<Vec<Option<FloquetMode>>, Error> {
+    let modes_at_speed = |(k, &speed): (usize, &f64)| -> Result<Vec<Option<FloquetMode>>, Error> {
         if speed == 0.0 {
             return Ok(vec![None; modes.len()]);
         }
@@ -204,11 +209,11 @@ fn exact_at_speeds(
         };
         Ok(modes.iter().map(exact).collect())
     };
-    speeds_rpm.iter().enumerate().map(at).collect()
+    speeds_rpm.iter().enumerate().map(modes_at_speed).collect()
 }
 
 /// Returns the name, the participation of motions and the resonances of a mode.
-fn facts(k: usize, mode: &ModeOverSpeed) -> Value {
+fn properties(k: usize, mode: &ModeOverSpeed) -> Value {
     let resonance =
         |resonance: &washer_model::Resonance| at_speed(resonance.speed_rpm, &resonance.mode);
     let motion = &mode.motion;
@@ -225,15 +230,15 @@ fn facts(k: usize, mode: &ModeOverSpeed) -> Value {
     })
 }
 
-fn at_speed(speed_rpm: f64, at: &ModeAtSpeed) -> Value {
-    let coordinates = (0..COORDINATES).map(|i| (format!("q{}", i + 1), json!(at.shape[i])));
+fn at_speed(speed_rpm: f64, mode: &ModeAtSpeed) -> Value {
+    let coordinates = (0..COORDINATES).map(|i| (format!("q{}", i + 1), json!(mode.shape[i])));
     json!({
         "speed_rpm": speed_rpm,
-        "frequency_rpm": at.frequency_rpm,
-        "frequency_min_rpm": at.least_rpm,
-        "frequency_max_rpm": at.greatest_rpm,
-        "damping_ratio": at.damping_ratio,
-        "eigenvalue": [at.re_per_s, at.im_rad_per_s],
+        "frequency_rpm": mode.frequency_rpm,
+        "frequency_min_rpm": mode.least_rpm,
+        "frequency_max_rpm": mode.greatest_rpm,
+        "damping_ratio": mode.damping_ratio,
+        "eigenvalue": [mode.re_per_s, mode.im_rad_per_s],
         "shape": coordinates.collect::<serde_json::Map<_, _>>(),
     })
 }

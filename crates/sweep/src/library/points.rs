@@ -29,22 +29,23 @@ impl PointTable {
         let used: Vec<usize> = (0..schema.fields().len()).filter(is_data).collect();
         let names: Vec<String> = used.iter().map(|k| schema.field(*k).name().clone()).collect();
         let mut columns = Vec::with_capacity(names.len());
-        for (place, k) in used.into_iter().enumerate() {
+        for (position, k) in used.into_iter().enumerate() {
             let field = schema.field(k);
-            let refused = || not_numbers(&names, place, &field.data_type().to_string());
+            let not_a_number = || not_numbers(&names, position, &field.data_type().to_string());
             if !cells::is_number(field.data_type()) {
-                return Err(refused());
+                return Err(not_a_number());
             }
-            // A single batch without nulls is shared, not copied: tables may fill the memory.
+            // A single batch without nulls is shared, not copied, because tables may fill the
+            // memory.
             if let [batch] = batches
-                && let Some(whole) = batch.column(k).as_primitive_opt::<Float64Type>()
-                && whole.null_count() == 0
+                && let Some(column) = batch.column(k).as_primitive_opt::<Float64Type>()
+                && column.null_count() == 0
             {
-                columns.push(whole.clone());
+                columns.push(column.clone());
                 continue;
             }
             let parts = batches.iter().map(|batch| cells::numbers(batch.column(k)));
-            let parts = parts.collect::<Result<Vec<_>, _>>().map_err(|_| refused())?;
+            let parts = parts.collect::<Result<Vec<_>, _>>().map_err(|_| not_a_number())?;
             columns.push(parts.concat().into());
         }
         Ok(Self { names, columns, rows: batches.iter().map(RecordBatch::num_rows).sum() })
@@ -103,7 +104,7 @@ pub(super) struct PointsOnAxes<'a> {
 impl PointsOnAxes<'_> {
     /// Returns the values of the axes at a point.
     pub(super) fn axis_values(&self, point: u64) -> Vec<f64> {
-        // The number of a row always fits into `usize`.
+        // The index of a row always fits into `usize`.
         let row = usize::try_from(point).unwrap_or(usize::MAX);
         let value = |(axis, column): (&crate::plan::Axis, &Option<usize>)| match column {
             Some(column) => self.table.columns[*column].value(row),

@@ -23,23 +23,23 @@ pub struct MemoryTable {
     file: FileContent,
 }
 
-/// The source of a result's file.
+/// The content of a result's file.
 #[derive(Debug)]
 enum FileContent {
-    /// The bytes of the file. A file that was read is kept, because it may be replaced later.
+    /// The bytes of the file, in memory because the file may be replaced later.
     Bytes(Vec<u8>),
-    /// The rows of a run with a number of points, written in the layout of its file.
-    Rows { points: u64, layout: Box<Layout>, is_whole: bool },
+    /// The rows of a run with this number of points, written in the layout of its file.
+    Rows { points: u64, layout: Box<Layout>, is_complete: bool },
 }
 
 impl MemoryTable {
     /// Creates a table from the rows of a job.
-    pub(super) fn from_rows(job: &Job<'_>, batches: Vec<RecordBatch>, is_whole: bool) -> Self {
+    pub(super) fn from_rows(job: &Job<'_>, batches: Vec<RecordBatch>, is_complete: bool) -> Self {
         let plan = job.plan.clone();
         let layout = Box::new(job.layout.clone());
         let kind = layout.kind;
         let schema = layout.schema();
-        let file = FileContent::Rows { points: job.points, layout, is_whole };
+        let file = FileContent::Rows { points: job.points, layout, is_complete };
         Self { kind, plan, schema, batches, file }
     }
 
@@ -64,15 +64,15 @@ impl MemoryTable {
     /// write it.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let file = ParquetFile::open(path)?;
-        let not_ours = || FileError::NotParquet {
+        let foreign_file = || FileError::NotParquet {
             path: path.to_path_buf(),
             reason: "it is no result of this program".to_owned(),
         };
         let plan = file.json(key::PLAN).or_else(|| file.json(key::DIFFERENCES));
-        let plan = plan.ok_or_else(not_ours)?;
-        let kind = file.kind().ok_or_else(not_ours)?;
-        let all = (0..file.schema().fields().len()).collect();
-        let batches = file.batches(all)?.collect::<Result<Vec<_>, _>>()?;
+        let plan = plan.ok_or_else(foreign_file)?;
+        let kind = file.kind().ok_or_else(foreign_file)?;
+        let all_columns = (0..file.schema().fields().len()).collect();
+        let batches = file.batches(all_columns)?.collect::<Result<Vec<_>, _>>()?;
         let schema = SchemaRef::clone(file.schema());
         let file = FileContent::Bytes(file.bytes()?);
         Ok(Self { kind, plan, schema, batches, file })
@@ -109,12 +109,12 @@ impl MemoryTable {
     /// Returns an error if the path has a file of another kind, if the file cannot be written, and
     /// if the evaluation was interrupted.
     pub fn save(&self, path: &Path) -> Result<(), Error> {
-        let FileContent::Rows { points, layout, is_whole } = &self.file else {
+        let FileContent::Rows { points, layout, is_complete } = &self.file else {
             return self.finish(Output::begin(path, self.kind)?);
         };
-        if !is_whole {
-            let given = format!("with {} of {points} rows", self.rows());
-            return Err(Error::option("save", given, "a result that was not interrupted"));
+        if !is_complete {
+            let description = format!("with {} of {points} rows", self.rows());
+            return Err(Error::option("save", description, "a result that was not interrupted"));
         }
         let job = Job {
             plan: self.plan.clone(),
@@ -143,8 +143,8 @@ impl MemoryTable {
     /// # Errors
     /// Returns the errors of [`sweep_plot::render`] and [`Self::save`].
     pub fn draw(&self, output: &Path) -> Result<(), Error> {
-        let shown = Path::new("a temporary folder");
-        let folder = tempfile::tempdir().map_err(FileError::io("make", shown))?;
+        let shown_path = Path::new("a temporary folder");
+        let folder = tempfile::tempdir().map_err(FileError::io("make", shown_path))?;
         let path = folder.path().join("result.parquet");
         self.save(&path)?;
         Ok(render(&path, &PlotOptions::default(), &WasherFigures::default(), output)?)

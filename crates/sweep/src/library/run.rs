@@ -11,11 +11,11 @@ use sweep_engine::{Engine, Error, Job, run as runner};
 #[derive(Debug)]
 pub enum RanToFile {
     /// The run is complete; the table has the rows of its file.
-    Whole(MemoryTable),
-    /// The interrupt was raised. Finished chunks are kept, and another call continues the run.
+    Complete(MemoryTable),
+    /// The interrupt was raised. Finished chunks are stored, and another call continues the run.
     Interrupted {
-        /// The number of rows that are kept.
-        kept: u64,
+        /// The number of stored rows.
+        stored: u64,
         /// The number of all points.
         points: u64,
     },
@@ -28,11 +28,12 @@ pub struct EvaluationTask<'a> {
 }
 
 impl EvaluationTask<'_> {
-    /// Computes the rows into a result file with the bytes of the command's. An interrupted run
-    /// continues. All rows are computed, also in a task of a Slurm array.
+    /// Computes the rows into a result file with the bytes of the command's file. An interrupted
+    /// run continues. All rows are computed, also in a task of a Slurm array.
     ///
     /// # Errors
-    /// Returns the errors of the command. Finished chunks are kept.
+    ///
+    /// Returns the errors of the command. Finished chunks are stored.
     pub fn to_file(
         &self,
         output: &Path,
@@ -51,10 +52,14 @@ impl EvaluationTask<'_> {
         let report = runner::run(&self.engine, &self.job, output, options, effort.interrupt)?;
         report.notes.iter().for_each(|note| tell(note));
         Ok(match report.ended {
-            Ended::Already(..) | Ended::Finished(_) => RanToFile::Whole(MemoryTable::read(output)?),
-            Ended::Interrupted { kept, points, .. } => RanToFile::Interrupted { kept, points },
-            // Without a scheduler's variables a run has no shards.
-            Ended::Shard(..) => RanToFile::Interrupted { kept: 0, points: self.job.points },
+            Ended::Already(..) | Ended::Finished(_) => {
+                RanToFile::Complete(MemoryTable::read(output)?)
+            }
+            Ended::Interrupted { kept: stored, points, .. } => {
+                RanToFile::Interrupted { stored, points }
+            }
+            // A run has shards only if the scheduler's variables are set.
+            Ended::Shard(..) => RanToFile::Interrupted { stored: 0, points: self.job.points },
         })
     }
 }

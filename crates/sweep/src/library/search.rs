@@ -16,11 +16,12 @@ use sweep_engine::store::{Opened, TrialColumns, Trials};
 use sweep_engine::{Error, Job, Table};
 use sweep_files::Output;
 
-/// Traces the boundary of a plan's grid; `None` if the interrupt was raised. With an output, the
-/// trials of an interrupted search are kept beside it, and another call continues from them unless
-/// it is `fresh`.
+/// Traces the boundary of a plan's grid; `None` if the interrupt was raised. If `output` is given,
+/// the trials of an interrupted search are stored in a folder beside it, and another call continues
+/// from them unless it is `fresh`.
 ///
 /// # Errors
+///
 /// Returns an error if the plan has no range to search, if an option is out of bounds, and if the
 /// file cannot be written.
 pub fn find_boundary(
@@ -36,15 +37,16 @@ pub fn find_boundary(
     let task = BoundaryTask::new(plan, options)?;
     let search = |trials| trace(&task, trials, effort);
     let stored = Stored { job: &task.job(), columns: task.trial_columns(), output, fresh };
-    found(stored, search, |found| task.table(found))
+    run_search(stored, search, |traced| task.table(traced))
 }
 
 /// Computes the candidates of a study file; `None` if the interrupt was raised. `sets` has
-/// constants `NAME=VALUE` for its grid. With an output, it writes the file of `sweep optimise`, and
-/// keeps the trials of an interrupted search, from which another call continues unless it is
-/// `fresh`.
+/// constants `NAME=VALUE` for the study's grid. If `output` is given, it writes the file of `sweep
+/// optimise` and stores the trials of an interrupted search, from which another call continues
+/// unless it is `fresh`.
 ///
 /// # Errors
+///
 /// Returns an error for mistakes in the study or its grid file, and if the file cannot be written.
 pub fn optimise_study(
     path: &Path,
@@ -56,10 +58,10 @@ pub fn optimise_study(
     let study = Study::<Washer>::load(path, sets)?;
     let search = |trials| search(&study, trials, effort);
     let stored = Stored { job: &study.job(), columns: trial_columns(&study), output, fresh };
-    found(stored, search, |tried| study_table(&study, tried))
+    run_search(stored, search, |tried| study_table(&study, tried))
 }
 
-/// The output of a search and the trials that it keeps.
+/// The output of a search and the trials that are stored with it.
 struct Stored<'a> {
     job: &'a Job<'a>,
     columns: TrialColumns,
@@ -67,9 +69,9 @@ struct Stored<'a> {
     fresh: bool,
 }
 
-/// Returns the result of a search, with the trials that its output keeps. A finished output is
-/// read.
-fn found<T>(
+/// Runs a search with the trials that its output stores, and returns the result. A finished output
+/// is read instead.
+fn run_search<T>(
     stored: Stored<'_>,
     search: impl FnOnce(Option<Trials>) -> Result<(Option<T>, Option<Trials>), Error>,
     table: impl FnOnce(&T) -> Table,
@@ -83,13 +85,13 @@ fn found<T>(
         Some(Opened::Open(trials)) => Some(trials),
         None => None,
     };
-    let (found, trials) = search(trials)?;
-    let Some(found) = found else { return Ok(None) };
-    let result = MemoryTable::from_table(kind, table(&found))?;
+    let (result, trials) = search(trials)?;
+    let Some(result) = result else { return Ok(None) };
+    let table = MemoryTable::from_table(kind, table(&result))?;
     if let Some(file) = file {
-        result.finish(file)?;
+        table.finish(file)?;
     }
-    // The result is complete, so a folder of trials that cannot be removed is no error.
+    // The result is complete, so that a folder of trials that cannot be removed is not an error.
     let _ = trials.and_then(Trials::complete);
-    Ok(Some(result))
+    Ok(Some(table))
 }

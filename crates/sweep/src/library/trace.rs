@@ -23,18 +23,19 @@ pub struct TraceOptions {
     pub all: bool,
     /// The quantities besides channels, gap and speed.
     pub extras: TraceExtras,
-    /// The initial values of both models that are not those of equilibrium, such as `q5=0.1` (m or
-    /// rad) and `u1=2` (per s).
+    /// The initial values of both models that differ from equilibrium, such as `q5=0.1` (m or rad)
+    /// and `u1=2` (per s).
     pub start: Vec<String>,
 }
 
-/// Returns time histories of both models and a message for each integration that failed, or `None`
-/// if the work was interrupted.
+/// Returns time histories of both models and a message for each integration that failed; `None` if
+/// the work was interrupted.
 ///
-/// `at` has texts `NAME=VALUE`. For one point they give every axis its value, and other parameters
-/// may be set, too; for all points they fix the parameters that they name.
+/// `at` has texts `NAME=VALUE`. For one point they give every axis its value and may set other
+/// parameters; for all points they fix the parameters that they name.
 ///
 /// # Errors
+///
 /// Returns an error for mistakes in the grid or the options, and for a machine without equilibrium.
 pub fn trace_point(
     grid: &WasherGridInput,
@@ -74,7 +75,7 @@ mod tests {
 
     #[test]
     fn an_interrupt_ends_a_trace_and_modes() {
-        // Each of the two would take hours.
+        // Each of the two functions would take hours.
         let text = "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\n\
              time = { end_s = 1e5 }\nintegrator = { method = \"rk4\", step_s = 1e-5 }\n";
         let grid = WasherGridInput::text("grid", text.to_owned(), Vec::new());

@@ -1,4 +1,4 @@
-//! Tests against responses and attractors that independent programs found. The machines are in
+//! Tests of responses and attractors against results of independent programs. The machines are in
 //! `tests/held`.
 
 use lane_ode::{Cancel, Simd};
@@ -17,39 +17,42 @@ fn point(name: &str) -> Point {
     prepare_point(model.machine, model.spin, &timing(&plan)).unwrap()
 }
 
-fn responses_at(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
+fn find_responses_at(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
     let held_speeds: Vec<HeldSpeed<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point, speed_rpm }).collect();
     find_responses(&held_speeds, Cancel::Never)
         .into_iter()
-        .map(|found| found.unwrap_or_default())
+        .map(|responses| responses.unwrap_or_default())
         .collect()
 }
 
 #[test]
 fn a_textbook_machine_has_a_response_at_every_speed() {
     let speeds_rpm = [452.0, 500.0, 532.0, 660.0, 700.0];
-    for (found, rpm) in responses_at(&point("textbook"), &speeds_rpm).iter().zip(speeds_rpm) {
-        assert!(!found.is_empty(), "{rpm} rpm");
+    for (responses, rpm) in
+        find_responses_at(&point("textbook"), &speeds_rpm).iter().zip(speeds_rpm)
+    {
+        assert!(!responses.is_empty(), "{rpm} rpm");
     }
 }
 
-/// A search for the branches between two others must not end on these.
+/// A search for a branch between two others must not converge to the others.
 #[test]
-fn branches_of_a_folded_curve_are_all_found() {
+fn all_branches_of_a_folded_curve_are_found() {
     let speeds_rpm: Vec<f64> = (0..25).map(|k| 144.2 + 0.05 * f64::from(k)).collect();
-    for (found, rpm) in responses_at(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm) {
-        let branches: Vec<u32> = found.iter().map(|response| response.branch).collect();
+    for (responses, rpm) in find_responses_at(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm)
+    {
+        let branches: Vec<u32> = responses.iter().map(|response| response.branch).collect();
         assert_eq!(branches, [2, 3, 4], "{rpm} rpm");
     }
 }
 
-/// The corners of friction make the hinge ring. Its deflection is 7.786 mm by rk4 at 5e-5 s, and
-/// 7.767 mm with capped modes.
+/// The corners of friction excite vibrations of the hinge. Its deflection is 7.786 mm by rk4 at
+/// 5e-5 s, and 7.767 mm with capped modes.
 #[test]
 fn a_response_with_friction_is_found_without_caps() {
-    let found = responses_at(&point("72001_10"), &[264.61]);
-    let drum_m = found[0][0].nonlinear_peaks[Channel::DrumFrontZ.index()];
+    let responses = find_responses_at(&point("72001_10"), &[264.61]);
+    let drum_m = responses[0][0].nonlinear_peaks[Channel::DrumFrontZ.index()];
     assert!((drum_m / 7.786e-3 - 1.0).abs() < 3e-4, "{drum_m}");
 }
 
@@ -58,11 +61,11 @@ fn a_response_with_friction_is_found_without_caps() {
 #[test]
 fn a_saddle_is_no_attractor() {
     let point = point("74002_13");
-    let dwells = [HeldSpeed { point: &point, speed_rpm: 414.0 }];
+    let held_speeds = [HeldSpeed { point: &point, speed_rpm: 414.0 }];
     let starts = StartRule { count: 1, ..StartRule::default() };
-    let found =
-        find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
-    let motion = &found.attractors[0];
+    let result =
+        find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never).remove(0).unwrap();
+    let motion = &result.attractors[0];
     assert_eq!(motion.motion_kind, Some(MotionKind::Periodic { turns: 4 }));
     let yaw_rad = motion.peaks[Channel::TubYaw.index()];
     assert!((yaw_rad / 50.05e-3 - 1.0).abs() < 5e-3, "{yaw_rad}");
@@ -71,33 +74,36 @@ fn a_saddle_is_no_attractor() {
 
 #[test]
 #[ignore = "half a minute"]
-fn chaos_survives_or_is_a_transient() {
+fn chaos_that_does_not_last_is_a_transient() {
     let point = point("74001_8");
-    let dwells = [HeldSpeed { point: &point, speed_rpm: 306.0 }];
-    let found = find_attractors(Simd::best(), &dwells, &[], &StartRule::default(), Cancel::Never);
-    let found = found.into_iter().next().unwrap().unwrap();
-    assert!(found.attractors.iter().all(|motion| motion.motion_kind != Some(MotionKind::Chaotic)));
+    let held_speeds = [HeldSpeed { point: &point, speed_rpm: 306.0 }];
+    let result =
+        find_attractors(Simd::best(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
+    let result = result.into_iter().next().unwrap().unwrap();
+    assert!(result.attractors.iter().all(|motion| motion.motion_kind != Some(MotionKind::Chaotic)));
     let is_transient =
         |state| matches!(state, AttractorStatus::Transient { life_s } if life_s > 0.0);
-    assert!(found.attractors.iter().any(|motion| is_transient(motion.status)));
+    assert!(result.attractors.iter().any(|motion| is_transient(motion.status)));
 }
 
-/// A motion repeats every fourth turn, with amplitudes of 0.1166 and 0.1471 rad. Kicks from the
-/// wide periodic response do not lead to it, but kicks of the machine at rest do.
+/// At this speed there is a motion that repeats every fourth turn, with amplitudes of 0.1166 and
+/// 0.1471 rad. Kicks from the wide periodic response do not lead to it, but kicks of the machine at
+/// rest do.
 #[test]
 #[ignore = "half a minute"]
 fn an_attractor_far_from_the_response_is_found_from_rest() {
     let point = point("74001_11");
-    let dwells = [HeldSpeed { point: &point, speed_rpm: 404.1 }];
-    let found = find_attractors(Simd::best(), &dwells, &[], &StartRule::default(), Cancel::Never);
-    let found = found.into_iter().next().unwrap().unwrap();
+    let held_speeds = [HeldSpeed { point: &point, speed_rpm: 404.1 }];
+    let result =
+        find_attractors(Simd::best(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
+    let result = result.into_iter().next().unwrap().unwrap();
     let is_expected = |motion: &&washer_model::Attractor| {
         motion.motion_kind == Some(MotionKind::Periodic { turns: 4 })
             && (motion.peaks[Channel::TubYaw.index()] / 0.1166 - 1.0).abs() < 0.02
             && (motion.peaks[Channel::TubPitch.index()] / 0.1471 - 1.0).abs() < 0.02
     };
-    let motion = found.attractors.iter().find(is_expected);
-    let motion = motion.unwrap_or_else(|| panic!("{:?}", found.attractors));
+    let motion = result.attractors.iter().find(is_expected);
+    let motion = motion.unwrap_or_else(|| panic!("{:?}", result.attractors));
     assert!(motion.exponent.is_some_and(|exponent| exponent.per_s < 0.0), "{motion:?}");
 }
 
@@ -107,19 +113,19 @@ fn an_attractor_far_from_the_response_is_found_from_rest() {
 fn a_textbook_machine_ends_in_its_response() {
     let point = point("textbook");
     let speeds_rpm = [500.0, 700.0];
-    let dwells: Vec<HeldSpeed<'_>> =
+    let held_speeds: Vec<HeldSpeed<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let starts = StartRule { count: 3, ..StartRule::default() };
-    let all = find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never);
-    for (found, rpm) in all.into_iter().zip(speeds_rpm) {
-        let found = found.unwrap();
-        let motion = &found.attractors[0];
+    let results = find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never);
+    for (result, rpm) in results.into_iter().zip(speeds_rpm) {
+        let result = result.unwrap();
+        let motion = &result.attractors[0];
         assert_eq!(motion.motion_kind, Some(MotionKind::Periodic { turns: 1 }), "{rpm} rpm");
         let yaw = Channel::TubYaw.index();
-        let yaws_rad = found.responses.iter().map(|response| response.nonlinear_peaks[yaw]);
-        let nearest = yaws_rad
+        let yaws_rad = result.responses.iter().map(|response| response.nonlinear_peaks[yaw]);
+        let least_difference = yaws_rad
             .map(|yaw_rad| (yaw_rad / motion.peaks[yaw] - 1.0).abs())
             .fold(f64::INFINITY, f64::min);
-        assert!(nearest < 1e-3, "{rpm} rpm: {nearest}");
+        assert!(least_difference < 1e-3, "{rpm} rpm: {least_difference}");
     }
 }

@@ -1,4 +1,4 @@
-//! The summary of a stability file, with its tongues: runs of speeds at which a response is
+//! The summary of a stability file, with its tongues: ranges of speeds in which a response is
 //! unstable.
 
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use sweep_files::{FileError, ParquetFile};
 pub(crate) struct StabilityRow {
     pub(crate) point: f64,
     /// The values of the point's axes.
-    pub(crate) at: Vec<f64>,
+    pub(crate) axis_values: Vec<f64>,
     pub(crate) speed_rpm: f64,
     /// The growth; not finite if there is no response.
     pub(crate) growth_per_s: f64,
@@ -30,13 +30,13 @@ pub(crate) struct StabilityRow {
     pub(crate) status: String,
 }
 
-/// A run of speeds of one point that are unstable in the same way.
+/// A range of speeds of one point that are unstable in the same way.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TongueRows {
     /// The row of the largest growth.
-    pub(crate) at: StabilityRow,
+    pub(crate) largest_growth: StabilityRow,
     /// The first and the last unstable speed (rpm).
-    pub(crate) from_to_rpm: [f64; 2],
+    pub(crate) end_speeds_rpm: [f64; 2],
 }
 
 /// The counts and lists of a summary.
@@ -47,19 +47,20 @@ pub(crate) struct StabilitySummary {
     points: u64,
     without_response: u64,
     unstable: u64,
-    /// Rows that are stable by their multipliers, but exceed the machine's geometry.
+    /// The number of rows that are stable by their multipliers, but exceed the machine's geometry.
     beyond: u64,
-    /// First rows of their speed that are not on the curve of responses.
+    /// The number of speeds whose first row is not on the curve of responses.
     off_curve: u64,
-    /// Stable rows above an unstable speed of their point, which a run-up passes first.
+    /// The number of stable rows above an unstable speed of their point, which a run-up passes
+    /// first.
     above_tongue: u64,
-    /// Further rows of the same point and speed, which the other counts omit.
+    /// The number of further rows of the same point and speed, which the other counts omit.
     coexisting: u64,
     tongues: Vec<TongueRows>,
-    /// Rows on branches that end at a fold which a machine that runs up reaches.
+    /// The rows on branches that end at a fold which a machine that runs up reaches.
     jumps: Vec<StabilityRow>,
     /// The greatest speed of all rows.
-    fastest_rpm: f64,
+    greatest_speed_rpm: f64,
     last: Option<StabilityRow>,
 }
 
@@ -67,42 +68,46 @@ impl StabilitySummary {
     /// Adds the next row of the file.
     pub(crate) fn add(&mut self, row: StabilityRow) {
         let same_point = self.last.as_ref().is_some_and(|last| last.point == row.point);
-        let is_other = |last: &StabilityRow| same_point && last.speed_rpm == row.speed_rpm;
-        // A machine that runs up is on the first branch at a speed.
-        if self.last.as_ref().is_some_and(is_other) {
+        let is_coexisting = |last: &StabilityRow| same_point && last.speed_rpm == row.speed_rpm;
+        // A machine that runs up is on the branch of the first row at a speed.
+        if self.last.as_ref().is_some_and(is_coexisting) {
             self.coexisting += 1;
             return;
         }
         self.rows += 1;
-        self.fastest_rpm = self.fastest_rpm.max(row.speed_rpm);
+        self.greatest_speed_rpm = self.greatest_speed_rpm.max(row.speed_rpm);
         let end = |row: &StabilityRow| (row.point, row.branch_to_rpm);
         let has_end = row.branch_to_rpm.is_some() && !row.is_off_curve;
         if has_end && self.jumps.last().map(end) != Some(end(&row)) {
             self.jumps.push(row.clone());
         }
-        let follows = same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
+        let continues_tongue =
+            same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
         self.points += u64::from(!same_point);
         self.without_response += u64::from(row.status != "ok");
         self.off_curve += u64::from(row.is_off_curve);
         self.beyond += u64::from(row.growth_per_s <= 0.0 && row.beyond.is_some());
         let is_passed = |tongue: &TongueRows| {
-            tongue.at.point == row.point && tongue.from_to_rpm[1] < row.speed_rpm
+            tongue.largest_growth.point == row.point && tongue.end_speeds_rpm[1] < row.speed_rpm
         };
         let is_stable = row.growth_per_s <= 0.0 && row.beyond.is_none();
         self.above_tongue += u64::from(is_stable && self.tongues.last().is_some_and(is_passed));
         if row.growth_per_s > 0.0 {
             self.unstable += 1;
             match self.tongues.last_mut() {
-                // A tongue ends where the kind changes, even if the next one begins at once.
-                Some(tongue) if follows && tongue.at.kind == row.kind => {
-                    tongue.from_to_rpm[1] = row.speed_rpm;
-                    if row.growth_per_s > tongue.at.growth_per_s {
-                        tongue.at = row.clone();
+                // A tongue ends where the kind changes, even if the next one begins at the same
+                // speed.
+                Some(tongue) if continues_tongue && tongue.largest_growth.kind == row.kind => {
+                    tongue.end_speeds_rpm[1] = row.speed_rpm;
+                    if row.growth_per_s > tongue.largest_growth.growth_per_s {
+                        tongue.largest_growth = row.clone();
                     }
                 }
                 _ => {
-                    self.tongues
-                        .push(TongueRows { at: row.clone(), from_to_rpm: [row.speed_rpm; 2] });
+                    self.tongues.push(TongueRows {
+                        largest_growth: row.clone(),
+                        end_speeds_rpm: [row.speed_rpm; 2],
+                    });
                 }
             }
         }
@@ -143,44 +148,48 @@ impl StabilitySummary {
         for row in &self.jumps {
             let point_prefix = self.point_prefix(row);
             let rpm = row.branch_to_rpm.unwrap_or_default();
-            if rpm > self.fastest_rpm {
+            if rpm > self.greatest_speed_rpm {
                 continue;
             }
             let words = "running up, the response folds back and the motion jumps";
             lines.push(("jump", format!("{point_prefix}at {rpm:.2} rpm, {words}")));
         }
-        // The tongues of a single point are in order of speed, those of several by their growth.
+        // The tongues of a single point are listed in order of speed, those of several points by
+        // growth.
         let mut listed: Vec<&TongueRows> = self.tongues.iter().collect();
         if self.points > 1 {
-            listed.sort_by(|a, b| b.at.growth_per_s.total_cmp(&a.at.growth_per_s));
+            listed.sort_by(|a, b| {
+                b.largest_growth.growth_per_s.total_cmp(&a.largest_growth.growth_per_s)
+            });
         }
         lines.extend(listed.iter().map(|tongue| ("unstable", self.tongue_line(tongue))));
         lines
     }
 
-    /// Returns the point of a row, if there are several.
+    /// Returns the prefix of a line that names a row's point; empty if the file has one point.
     fn point_prefix(&self, row: &StabilityRow) -> String {
         match self.points {
             0 | 1 => String::new(),
-            _ => format!("{}: ", places::point_text(&self.axes, &row.at)),
+            _ => format!("{}: ", places::point_text(&self.axes, &row.axis_values)),
         }
     }
 
     fn tongue_line(&self, tongue: &TongueRows) -> String {
-        let TongueRows { at, from_to_rpm: [from, to] } = tongue;
-        let mut text = self.point_prefix(at);
-        let [speed, first, last] = [at.speed_rpm, *from, *to].map(short);
-        let to = if first == last { String::new() } else { format!(" to {last}") };
+        let TongueRows { largest_growth: row, end_speeds_rpm: [first_rpm, last_rpm] } = tongue;
+        let mut text = self.point_prefix(row);
+        let [speed, first, last] = [row.speed_rpm, *first_rpm, *last_rpm].map(short);
+        let range_end = if first == last { String::new() } else { format!(" to {last}") };
         // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "{first}{to} rpm, {}, up to {:.4} /s at {speed} rpm ({:.1} and {:.1} per minute)",
-            at.kind.replace('_', " "),
-            at.growth_per_s,
-            at.frequency_cpm,
-            at.speed_rpm - at.frequency_cpm
+            "{first}{range_end} rpm, {}, up to {:.4} /s at {speed} rpm ({:.1} and {:.1} per \
+             minute)",
+            row.kind.replace('_', " "),
+            row.growth_per_s,
+            row.frequency_cpm,
+            row.speed_rpm - row.frequency_cpm
         );
-        for (number, name) in &at.modes {
+        for (number, name) in &row.modes {
             let _ = write!(text, "; mode {number}: {name}");
         }
         text
@@ -196,8 +205,8 @@ pub(crate) fn summarise(file: &ParquetFile) -> Result<StabilitySummary, FileErro
     let numbers = ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "branch_to_rpm"];
     let modes = ["mode_1", "mode_2", "mode_1_name", "mode_2_name"];
     let words = ["kind", "status", "beyond", "on_curve"];
-    let own = [&numbers[..], &modes, &words].concat();
-    let names = [&own[..], &axes.iter().map(String::as_str).collect::<Vec<_>>()].concat();
+    let fixed_names = [&numbers[..], &modes, &words].concat();
+    let names = [&fixed_names[..], &axes.iter().map(String::as_str).collect::<Vec<_>>()].concat();
     let mut summary = StabilitySummary { axes: axes.clone(), ..StabilitySummary::default() };
     file.each_row(&names, |row| {
         let [point, speed_rpm, growth_per_s, frequency_cpm, branch_to_rpm] =
@@ -208,7 +217,7 @@ pub(crate) fn summarise(file: &ParquetFile) -> Result<StabilitySummary, FileErro
         let modes = modes.into_iter().filter(|(number, _)| !number.is_nan());
         summary.add(StabilityRow {
             point,
-            at: (own.len()..names.len()).map(|column| row.value(column)).collect(),
+            axis_values: (fixed_names.len()..names.len()).map(|column| row.value(column)).collect(),
             speed_rpm,
             growth_per_s,
             frequency_cpm,
@@ -231,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tongues_are_runs_of_one_point_and_kind() {
+    fn tongues_are_ranges_of_one_point_and_kind() {
         let axes = vec!["unbalance_mass_kg".to_owned()];
         let mut summary = StabilitySummary { axes, ..StabilitySummary::default() };
         let rows = [
@@ -245,12 +254,12 @@ mod tests {
             (1.0, 3.0, 0.1, "fold"),
             (1.0, 4.0, -0.1, "stable"),
         ];
-        // A second row of a speed is another response, which does not count as a speed.
+        // A second row of a speed is another response, which is not counted as a speed.
         for (point, speed_rpm, growth_per_s, kind) in rows {
             let status = if growth_per_s.is_nan() { "no_response" } else { "ok" };
             summary.add(StabilityRow {
                 point,
-                at: vec![0.1 * (point + 1.0)],
+                axis_values: vec![0.1 * (point + 1.0)],
                 speed_rpm,
                 growth_per_s,
                 kind: kind.to_owned(),
@@ -259,15 +268,19 @@ mod tests {
                 ..StabilityRow::default()
             });
         }
-        let found: Vec<_> =
-            summary.tongues.iter().map(|t| (t.from_to_rpm, t.at.speed_rpm)).collect();
+        let tongue_speeds: Vec<_> = summary
+            .tongues
+            .iter()
+            .map(|t| (t.end_speeds_rpm, t.largest_growth.speed_rpm))
+            .collect();
         assert_eq!(
-            found,
+            tongue_speeds,
             [([2.0, 3.0], 3.0), ([4.0, 4.0], 4.0), ([1.0, 1.0], 1.0), ([3.0, 3.0], 3.0)]
         );
         let lines = summary.lines();
-        let all = "2 of 8 rows, 5 not, 1 without a response; 2 points; 1 above an unstable speed: ";
-        assert!(lines[0].1.starts_with(all), "{lines:?}");
+        let counts =
+            "2 of 8 rows, 5 not, 1 without a response; 2 points; 1 above an unstable speed: ";
+        assert!(lines[0].1.starts_with(counts), "{lines:?}");
         assert!(lines[1].1.starts_with("2 of these rows are off the curve"));
         assert!(lines[2].1.starts_with("1 further rows"));
         assert!(lines[3].1.starts_with(
@@ -277,12 +290,12 @@ mod tests {
     }
 
     #[test]
-    fn jumps_are_at_folds_of_the_curve_within_the_speeds() {
+    fn jumps_are_at_folds_of_the_curve_up_to_the_greatest_speed() {
         let mut summary = StabilitySummary::default();
-        for (speed_rpm, ends_rpm, is_off_curve) in
+        for (speed_rpm, fold_rpm, is_off_curve) in
             [(240.0, 245.0, false), (245.0, 248.0, true), (250.0, 260.0, false)]
         {
-            let branch_to_rpm = Some(ends_rpm);
+            let branch_to_rpm = Some(fold_rpm);
             summary.add(StabilityRow {
                 speed_rpm,
                 branch_to_rpm,

@@ -8,8 +8,9 @@ use crate::stability::period_map::TurnSetup;
 use core::f64::consts::TAU;
 use lane_ode::Simd;
 
-/// Separation of a perturbed run after rescaling, as a share of the greatest coordinate. Basis: far
-/// above rounding, and so small that it grows linearly within a turn. Doubling it changes nothing.
+/// Separation of a perturbed run after rescaling, relative to the greatest coordinate. Basis: far
+/// above rounding errors, and small enough to grow linearly within a turn. Doubling it changes
+/// nothing.
 const RESCALED_SEPARATION: f64 = 1e-7;
 
 /// Turns before the measurement, in which the separation aligns with the fastest growing direction.
@@ -40,8 +41,8 @@ impl Exponent {
     }
 }
 
-/// Returns the distance of two states: the greatest over the tub's coordinates (m, rad), of which
-/// each has the difference of its speed added, over the drum's speed.
+/// Returns the distance of two states (m, rad): the maximum over the tub's coordinates of the
+/// difference of the coordinate plus the difference of its speed divided by the drum's speed.
 pub(super) fn distance(setup: &TurnSetup<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
     let speed = setup.speed_rpm * TAU / 60.0;
     let difference = |&i: &usize| {
@@ -51,30 +52,30 @@ pub(super) fn distance(setup: &TurnSetup<'_>, a: &[f64; STATES], b: &[f64; STATE
     TUB.iter().map(difference).fold(0.0, f64::max)
 }
 
-/// Returns the exponents of trajectories from these states on, each with the direction of speeds in
-/// which it is perturbed first; `None` if a run leaves the model's range.
+/// Returns the exponents of trajectories from these states, each with the direction of speeds of
+/// its initial perturbation; `None` if a run leaves the model's range.
 pub(super) fn compute_exponents(
     simd: Simd,
     requests: &[(HeldState<'_>, [f64; COORDINATES])],
 ) -> Vec<Option<Exponent>> {
-    let rescaled: Vec<f64> = requests
+    let initial_separation: Vec<f64> = requests
         .iter()
         .map(|(held, _)| RESCALED_SEPARATION * largest_deviation(held.setup.point, &held.state))
         .collect();
-    // Each run is followed by its perturbed run.
+    // In the list, each run is followed by its perturbed run.
     let mut pairs = Vec::with_capacity(2 * requests.len());
-    for ((held, direction), rescaled) in requests.iter().zip(&rescaled) {
+    for ((held, direction), initial_separation) in requests.iter().zip(&initial_separation) {
         let speed = held.setup.speed_rpm * TAU / 60.0;
         let mut perturbed = *held;
         for i in 0..COORDINATES {
-            perturbed.state[COORDINATES + i] += rescaled * speed * direction[i];
+            perturbed.state[COORDINATES + i] += initial_separation * speed * direction[i];
         }
         pairs.extend([*held, perturbed]);
     }
     let mut parts = vec![[0.0_f64; PARTS]; requests.len()];
     for turn in 0..TRANSIENT_TURNS + PARTS * PART_TURNS {
         let turns = integrate_turns(simd, &pairs, 1);
-        for (k, rescaled) in rescaled.iter().enumerate() {
+        for (k, initial_separation) in initial_separation.iter().enumerate() {
             let (Some(run), Some(perturbed)) = (turns[2 * k].first(), turns[2 * k + 1].first())
             else {
                 parts[k][0] = f64::NAN;
@@ -82,16 +83,16 @@ pub(super) fn compute_exponents(
             };
             let setup = pairs[2 * k].setup;
             let separation = distance(&setup, &run.end, &perturbed.end);
-            if let Some(counted) = turn.checked_sub(TRANSIENT_TURNS) {
-                parts[k][counted / PART_TURNS] += libm::log(separation / rescaled);
+            if let Some(measured_turn) = turn.checked_sub(TRANSIENT_TURNS) {
+                parts[k][measured_turn / PART_TURNS] += libm::log(separation / initial_separation);
             }
             pairs[2 * k].state = run.end;
             pairs[2 * k + 1].state = core::array::from_fn(|i| {
-                run.end[i] + (perturbed.end[i] - run.end[i]) * (rescaled / separation)
+                run.end[i] + (perturbed.end[i] - run.end[i]) * (initial_separation / separation)
             });
         }
     }
-    let found = parts.iter().zip(requests).map(|(parts, (held, _))| {
+    let exponents = parts.iter().zip(requests).map(|(parts, (held, _))| {
         let part_s = PART_TURNS as f64 * held.setup.turn_s();
         let mean = parts.iter().sum::<f64>() / PARTS as f64;
         let squares: f64 = parts.iter().map(|part| (part - mean) * (part - mean)).sum();
@@ -99,5 +100,5 @@ pub(super) fn compute_exponents(
         let exponent = Exponent { per_s: mean / part_s, error_per_s: error / part_s };
         (exponent.per_s.is_finite() && exponent.error_per_s.is_finite()).then_some(exponent)
     });
-    found.collect()
+    exponents.collect()
 }

@@ -9,27 +9,28 @@ const TRIALS_PER_SAMPLE: usize = 2;
 
 /// Number of frequencies that are computed side by side. Basis: the lanes of the widest vectors.
 /// Doubling it changes the time only.
-const AT_ONCE: usize = 8;
+const FREQUENCIES_AT_ONCE: usize = 8;
 
 /// Number of rounds of the ternary search for a line's frequency. Basis: 1e-7 of the first
 /// interval. Doubling it reaches rounding.
 const TERNARY_ROUNDS: usize = 40;
 
 /// Number of multiples of a frequency that are subtracted from a signal. Doubling it leaves a
-/// smaller rest of curves with sharp bends.
+/// smaller residual of curves with sharp bends.
 const HARMONICS: usize = 12;
 
 /// Number of times that all multiples are subtracted. Basis: windowed lines overlap, so that one
-/// pass leaves a part of each. Doubling it leaves a smaller rest.
+/// pass leaves a part of each. Doubling it leaves a smaller residual.
 const SUBTRACTION_PASSES: usize = 4;
 
-/// The strongest line of some signals.
+/// The strongest line in the spectrum of several signals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SpectralLine {
     /// The frequency from 0 to a half, in cycles per sample.
     pub(super) frequency: f64,
-    /// The root mean square of the signals without the line and its multiples, as a share.
-    pub(super) rest: f64,
+    /// The root mean square of the signals without the line and its multiples, relative to that of
+    /// the signals.
+    pub(super) residual: f64,
 }
 
 /// Returns Hann's window at sample `n` of `count`.
@@ -82,8 +83,8 @@ fn powers<const M: usize>(
 pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> {
     let count = signals.first()?.len();
     let windows: Vec<f64> = (0..count).map(|n| window(n, count)).collect();
-    let mut rests = signals.to_vec();
-    for signal in &mut rests {
+    let mut residuals = signals.to_vec();
+    for signal in &mut residuals {
         let [[mean, _]] = fourier_means(signal, &windows, [0.0]);
         signal.iter_mut().for_each(|value| *value -= mean);
     }
@@ -93,24 +94,24 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
         };
         signals.iter().map(square).sum()
     };
-    let whole = squares(&rests);
+    let total_power = squares(&residuals);
     let frequency_at = |trial: usize| 0.5 * trial as f64 / (TRIALS_PER_SAMPLE * count) as f64;
     // The first frequencies belong to the mean's own line.
     let trials: Vec<usize> = (2 * TRIALS_PER_SAMPLE * 2..=TRIALS_PER_SAMPLE * count).collect();
     let mut best = (0.0, *trials.first()?);
-    for trials in trials.chunks(AT_ONCE) {
+    for trials in trials.chunks(FREQUENCIES_AT_ONCE) {
         let frequencies =
-            from_fn::<_, AT_ONCE, _>(|k| frequency_at(trials[k.min(trials.len() - 1)]));
-        let powers = powers(&rests, &windows, frequencies);
-        let found = powers.into_iter().zip(trials.iter().copied());
-        best = found.fold(best, |best, found| if found.0 < best.0 { best } else { found });
+            from_fn::<_, FREQUENCIES_AT_ONCE, _>(|k| frequency_at(trials[k.min(trials.len() - 1)]));
+        let powers = powers(&residuals, &windows, frequencies);
+        let trial_powers = powers.into_iter().zip(trials.iter().copied());
+        best = trial_powers.fold(best, |best, trial| if trial.0 < best.0 { best } else { trial });
     }
     let (_, best) = best;
     let mut low = frequency_at(best - 1);
     let mut high = frequency_at(best + 1).min(0.5);
     for _ in 0..TERNARY_ROUNDS {
         let third = (high - low) / 3.0;
-        let [below, above] = powers(&rests, &windows, [low + third, high - third]);
+        let [below, above] = powers(&residuals, &windows, [low + third, high - third]);
         if below < above {
             low += third;
         } else {
@@ -122,18 +123,18 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
         (0..=HARMONICS).map(|k| Harmonic::new((k as f64 * frequency).fract(), count)).collect();
     for _ in 0..SUBTRACTION_PASSES {
         for harmonic in &harmonics {
-            for signal in &mut rests {
+            for signal in &mut residuals {
                 harmonic.subtract_from(signal, &windows);
             }
         }
     }
-    let rest = (squares(&rests) / whole).sqrt();
-    (rest.is_finite()).then_some(SpectralLine { frequency, rest })
+    let residual = (squares(&residuals) / total_power).sqrt();
+    (residual.is_finite()).then_some(SpectralLine { frequency, residual })
 }
 
 /// A line at a multiple of a frequency.
 struct Harmonic {
-    /// The frequency, less whole cycles per sample.
+    /// The frequency without whole cycles per sample.
     frequency: f64,
     /// The cosine and the sine of the phase at every sample.
     wave: Vec<[f64; 2]>,
@@ -148,7 +149,8 @@ impl Harmonic {
 
     fn subtract_from(&self, signal: &mut [f64], windows: &[f64]) {
         let [[re, im]] = fourier_means(signal, windows, [self.frequency]);
-        // A real signal has a line at the negative frequency, too. The two coincide at 0 and 0.5.
+        // A real signal also has a line at the negative frequency. Both lines coincide at the
+        // frequencies 0 and 0.5.
         let distance = self.frequency.min((self.frequency - 0.5).abs()).min(1.0 - self.frequency);
         let lines = if distance < 1.0 / signal.len() as f64 { 1.0 } else { 2.0 };
         for (value, [cos, sin]) in signal.iter_mut().zip(&self.wave) {
@@ -170,7 +172,7 @@ mod tests {
             phase.cos() / (1.3 - 0.3 * phase.sin())
         });
         let line = find_strongest_line(std::slice::from_ref(&curve)).unwrap();
-        assert!((line.frequency - frequency).abs() < 1e-6 && line.rest < 0.01, "{line:?}");
+        assert!((line.frequency - frequency).abs() < 1e-6 && line.residual < 0.01, "{line:?}");
         let mut x = 0.3;
         let noise: Vec<f64> = signal(&|_| 0.0)
             .into_iter()
@@ -180,6 +182,6 @@ mod tests {
             })
             .collect();
         let line = find_strongest_line(&[noise]).unwrap();
-        assert!(line.rest > 0.3, "{line:?}");
+        assert!(line.residual > 0.3, "{line:?}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::turns::HeldState;
 use crate::coordinates::STATES;
-use crate::stability::monodromy::{StateMatrix, per_unit};
+use crate::stability::monodromy::{StateMatrix, scale_speeds};
 use crate::stability::period_map::{TurnRequest, compute_turns};
 use crate::stability::responses::leading_multiplier;
 use crate::stability::settings::HeldCase;
@@ -17,8 +17,8 @@ pub(super) struct PeriodicOrbit<'c, 'a> {
 
 /// Returns the growth (1/s) of the fastest growing disturbance of each orbit, negative if all
 /// decay: ln |mu| over the period, with mu the largest multiplier of the suspension's motions. The
-/// monodromy matrix is the product of those of the turns. It returns `None` for eigenvalues that
-/// are not finite, and for all orbits once `cancel` is requested.
+/// monodromy matrix is the product of those of the turns. An orbit has `None` if its eigenvalues
+/// are not finite, and all orbits have `None` once `cancel` is requested.
 pub(super) fn growths_per_s(
     orbits: &[PeriodicOrbit<'_, '_>],
     cancel: Cancel<'_>,
@@ -53,7 +53,7 @@ pub(super) fn growths_per_s(
     }
     let growth = |(orbit, matrix): (&PeriodicOrbit<'_, '_>, Option<StateMatrix>)| {
         let setup = &orbit.held.setup;
-        let matrix = per_unit(&matrix?, setup.unit_per_s());
+        let matrix = scale_speeds(&matrix?, setup.unit_per_s());
         let (multiplier, _) = leading_multiplier(orbit.held_case, &matrix)?;
         let period_s = f64::from(orbit.period) * setup.turn_s();
         Some(0.5 * libm::log(multiplier.norm_sqr()) / period_s)
@@ -61,12 +61,12 @@ pub(super) fn growths_per_s(
     orbits.iter().zip(matrices).map(growth).collect()
 }
 
-fn product(last: &StateMatrix, previous: &StateMatrix) -> StateMatrix {
+fn product(left: &StateMatrix, right: &StateMatrix) -> StateMatrix {
     let mut product = [[N(0.0); STATES]; STATES];
     for i in 0..STATES {
         for k in 0..STATES {
             for j in 0..STATES {
-                product[i][j] += last[i][k] * previous[k][j];
+                product[i][j] += left[i][k] * right[k][j];
             }
         }
     }

@@ -7,18 +7,19 @@ use crate::steps::SUSPENSION_MODES;
 use crate::{COORDINATES, Modes, Point};
 
 /// Perturbation of a periodic response in each of the suspension's modes, as a share of its
-/// greatest coordinate. Doubling it leaves an unstable response sooner by ln 2 over the growth.
+/// greatest coordinate. Doubling it makes trajectories leave an unstable response earlier by ln 2
+/// over the growth.
 const PERTURBATION: f64 = 1e-4;
 
-/// Weakest kick as a share of the hardest. Basis: kicks from 0.5 to 6 rad/s by default. Doubling it
+/// Weakest kick, relative to the hardest. Basis: kicks from 0.5 to 6 rad/s by default. Doubling it
 /// misses motions close to the response.
-const LEAST_KICK: f64 = 1.0 / 12.0;
+const MIN_KICK_RATIO: f64 = 1.0 / 12.0;
 
-/// Number of directions of kicks along mode shapes: two modes, and both at once. Doubling it would
-/// need further combinations of modes.
+/// Number of directions of kicks along mode shapes: two modes, and both at once. Doubling it takes
+/// further combinations of modes.
 pub(super) const MODE_DIRECTIONS: usize = 3;
 
-/// Seed of the random directions, for every machine and speed. Another one gives other directions.
+/// Seed of the random directions, for every machine and speed. Another seed gives other directions.
 const DIRECTION_SEED: u64 = 2021;
 
 /// A kick: the number of its direction and its size (rad/s).
@@ -50,8 +51,8 @@ pub(super) fn perturb(point: &Point, frozen_modes: &Modes, state: &[f64; STATES]
 /// the suspension's modes, so that bearings do not ring.
 ///
 /// A kick along mode shapes turns the tub by 1 rad/s: in the two modes that rock most, and in both
-/// at once. A random one has the kinetic energy of the first, and is uniform over the sphere of
-/// that energy: a basin may lie where no mode shape points.
+/// at once. A random kick has the kinetic energy of the first, and a direction that is uniform over
+/// the sphere of this energy, because a basin may lie in none of the directions of mode shapes.
 pub(super) fn kick_directions(point: &Point, frozen_modes: &Modes, random: usize) -> Directions {
     let mut modes: Vec<(usize, f64)> = (0..SUSPENSION_MODES)
         .map(|k| {
@@ -95,29 +96,29 @@ fn normal(numbers: &mut fastrand::Rng) -> f64 {
 }
 
 /// Returns the number of random directions among a number of kicks: every third kick has one.
-pub(super) const fn random_kicks(count: usize) -> usize {
+pub(super) const fn random_kick_count(count: usize) -> usize {
     count / 3
 }
 
-/// Whether a kick is given to the machine at rest: every other one in a random direction is. Kicks
-/// off a response stay in its basin where that is wide; the machine at rest is far from a large
-/// response.
+/// Whether a kick is given to the machine at rest, as is every second kick in a random direction. A
+/// kick from a response stays in the response's basin if that is wide, whereas the machine at rest
+/// is far from a large response.
 pub(super) const fn is_from_rest((direction, _): Kick) -> bool {
     direction >= MODE_DIRECTIONS && (direction - MODE_DIRECTIONS).is_multiple_of(2)
 }
 
 /// Returns a number of kicks up to a size (rad/s): those along mode shapes first, the hardest in
 /// all directions before weaker ones, then random ones, from the hardest to the weakest.
-pub(super) fn kicks(count: usize, greatest_rad_per_s: f64) -> Vec<Kick> {
-    let random = random_kicks(count);
-    let along_modes = count - random;
+pub(super) fn kicks(count: usize, max_kick_rad_per_s: f64) -> Vec<Kick> {
+    let random = random_kick_count(count);
+    let mode_kicks = count - random;
     let size = |level: usize, levels: usize| {
-        let step = if levels > 1 { libm::log(LEAST_KICK) / (levels - 1) as f64 } else { 0.0 };
-        greatest_rad_per_s * libm::exp(step * level as f64)
+        let step = if levels > 1 { libm::log(MIN_KICK_RATIO) / (levels - 1) as f64 } else { 0.0 };
+        max_kick_rad_per_s * libm::exp(step * level as f64)
     };
-    let levels = along_modes.div_ceil(MODE_DIRECTIONS);
+    let levels = mode_kicks.div_ceil(MODE_DIRECTIONS);
     let mut kicks = Vec::with_capacity(count);
-    for k in 0..along_modes {
+    for k in 0..mode_kicks {
         kicks.push((k % MODE_DIRECTIONS, size(k / MODE_DIRECTIONS, levels)));
     }
     for k in 0..random {

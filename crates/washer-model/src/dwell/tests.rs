@@ -7,7 +7,7 @@ use crate::tests::reference::reference;
 use crate::{Channel, InitialDeviation, Method, ModelKind, Spin, Timing, history, prepare};
 use serde_json::{Value, json};
 
-const CHANNEL: [(Channel, &str); 4] = [
+const REFERENCE_CHANNELS: [(Channel, &str); 4] = [
     (Channel::TubFrontY, "tub_front_y_m"),
     (Channel::TubFrontZ, "tub_front_z_m"),
     (Channel::TubYaw, "tub_yaw_rad"),
@@ -34,7 +34,7 @@ fn relative_error(motion: &Attractor, end: &Value) -> f64 {
     let error = |(channel, name): &(Channel, &str)| {
         (motion.peaks[channel.index()] / end[*name].as_f64().unwrap() - 1.0).abs()
     };
-    CHANNEL.iter().map(error).fold(0.0, f64::max)
+    REFERENCE_CHANNELS.iter().map(error).fold(0.0, f64::max)
 }
 
 /// Compares the motions at all points of the reference that a filter by machine and speed selects.
@@ -46,15 +46,15 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
             .as_array()
             .unwrap()
             .iter()
-            .filter(|reference_points| {
-                is_selected(name, reference_points["speed_rpm"].as_f64().unwrap())
+            .filter(|reference_point| {
+                is_selected(name, reference_point["speed_rpm"].as_f64().unwrap())
             })
             .collect();
         let dwells: Vec<HeldSpeed<'_>> = reference_points
             .iter()
-            .map(|reference_points| HeldSpeed {
+            .map(|reference_point| HeldSpeed {
                 point: &point,
-                speed_rpm: reference_points["speed_rpm"].as_f64().unwrap(),
+                speed_rpm: reference_point["speed_rpm"].as_f64().unwrap(),
             })
             .collect();
         let start_time = std::time::Instant::now();
@@ -65,16 +65,17 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
             reference_points.len(),
             start_time.elapsed().as_secs_f64()
         );
-        for (reference_points, found) in reference_points.iter().zip(found) {
+        for (reference_point, found) in reference_points.iter().zip(found) {
             let found = found.unwrap();
-            let speed_rpm = reference_points["speed_rpm"].as_f64().unwrap();
+            let speed_rpm = reference_point["speed_rpm"].as_f64().unwrap();
             let growth = found.responses[0].growth_per_s();
             println!("{name} {speed_rpm}: growth {growth:.4}");
             for motion in &found.attractors {
-                let ends = reference_points["ends"].as_array().unwrap();
+                let ends = reference_point["ends"].as_array().unwrap();
                 let errors = ends.iter().map(|end| relative_error(motion, end));
                 let nearest = errors.fold(f64::INFINITY, f64::min);
-                let peaks = CHANNEL.map(|(channel, _)| 1e3 * motion.peaks[channel.index()]);
+                let peaks =
+                    REFERENCE_CHANNELS.map(|(channel, _)| 1e3 * motion.peaks[channel.index()]);
                 println!(
                     "  {:?} {:?} {} of {} after {:.0} s {peaks:.2?} {:?} error {nearest:.1e}",
                     motion.status,
@@ -85,13 +86,14 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
                     motion.exponent,
                 );
             }
-            check_motions(name, speed_rpm, reference_points, &found);
+            check_motions(name, speed_rpm, reference_point, &found);
         }
     }
 }
 
 fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, found: &Attractors) {
-    // All starts of the reference return to the response there, and its other motion is missing.
+    // In this case all starts of the reference return to the response, and the reference lacks the
+    // other motion.
     if name == "friction_stops" && speed_rpm > 300.0 {
         let yaw_rad = |motion: &Attractor| motion.peaks[Channel::TubYaw.index()];
         assert!(found.attractors.iter().any(|motion| yaw_rad(motion) > 0.13), "{speed_rpm}");
@@ -100,7 +102,8 @@ fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, found: &At
     for end in reference_ends {
         let period = end["period_turns"].as_u64().unwrap();
         let description = json!([name, speed_rpm, end]);
-        // A perturbed start of the reference may still be at the periodic response.
+        // With a small growth, a perturbed start of the reference may still be near the periodic
+        // response.
         let growth = reference_point["growth_per_s"].as_f64().unwrap();
         if growth.abs() < 0.1 && end["start"] == "disturbed" {
             continue;
@@ -112,7 +115,7 @@ fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, found: &At
                 .filter(|motion| motion.motion_kind == Some(MotionKind::Chaotic))
                 .collect();
             assert!(!chaotic_attractors.is_empty(), "{description}");
-            for (channel, name) in CHANNEL {
+            for (channel, name) in REFERENCE_CHANNELS {
                 let expected = end[name].as_f64().unwrap();
                 assert!(
                     chaotic_attractors[0].peaks[channel.index()] > 0.5 * expected,
@@ -201,7 +204,7 @@ fn number_from_env(name: &str, default: u64) -> u64 {
 fn random_motions_continue_unchanged_in_short_steps() {
     let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 35));
     let mut counts = [0; Attractor::KIND_NAMES.len()];
-    let mut worst = [0.0_f64; 3];
+    let mut max_errors = [0.0_f64; 3];
     for number in 0..number_from_env("MACHINES", 12) {
         let kind = (number % 3) as usize;
         let (keys, speed_rpm) = random_machine(number, &mut numbers);
@@ -228,7 +231,7 @@ fn random_motions_continue_unchanged_in_short_steps() {
                 "{number}: {speed_rpm:.1} rpm {:?} {:.0} s, error {error:.1e} {keys}",
                 motion.motion_kind, motion.time_s
             );
-            worst[kind] = worst[kind].max(error);
+            max_errors[kind] = max_errors[kind].max(error);
             if let Some(MotionKind::Periodic { turns }) = motion.motion_kind {
                 let last = states.len() - 1;
                 let yaw = |back: usize| states[last - back][TUB_YAW] - states[last][TUB_YAW];
@@ -237,9 +240,9 @@ fn random_motions_continue_unchanged_in_short_steps() {
             }
         }
     }
-    println!("{:?} {counts:?}, worst {worst:?}", Attractor::KIND_NAMES);
+    println!("{:?} {counts:?}, errors up to {max_errors:?}", Attractor::KIND_NAMES);
     assert!(counts[0] > 0 && counts[1..4].iter().sum::<u32>() > 0);
-    assert!(worst.iter().all(|worst| *worst < 1e-2), "{worst:?}");
+    assert!(max_errors.iter().all(|error| *error < 1e-2), "{max_errors:?}");
 }
 
 /// Kicks in random directions end in motions that the search found, except for at most one in
@@ -285,13 +288,13 @@ fn random_kicks_end_in_motions_that_the_search_found() {
             let peaks = |turns: &[turns::TurnRecord]| -> [f64; CHANNELS] {
                 core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))
             };
-            let place = format!("machine {number}, kick {kick}, {speed_rpm:.2} rpm {keys}");
+            let description = format!("machine {number}, kick {kick}, {speed_rpm:.2} rpm {keys}");
             if turned.len() < turns {
                 settled += 1;
-                let left =
+                let has_left_range =
                     |motion: &Attractor| matches!(motion.status, AttractorStatus::LeftRange { .. });
-                if !found.attractors.iter().any(left) {
-                    missed.push(format!("{place}: leaves the range"));
+                if !found.attractors.iter().any(has_left_range) {
+                    missed.push(format!("{description}: leaves the range"));
                 }
                 continue;
             }
@@ -310,7 +313,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
                 are_close(&motion.peaks, &last, share)
             };
             if !found.attractors.iter().any(is_this_motion) {
-                missed.push(format!("{place}: {last:.4?}"));
+                missed.push(format!("{description}: {last:.4?}"));
             }
         }
     }
@@ -346,8 +349,8 @@ fn continue_in_short_steps(
             states.push(instant.deviations);
         }
         if k >= TURNS / 2 * SAMPLES {
-            for (peak, at) in peaks.iter_mut().zip(instant.channels) {
-                *peak = peak.max(at.abs());
+            for (peak, value) in peaks.iter_mut().zip(instant.channels) {
+                *peak = peak.max(value.abs());
             }
         }
     }

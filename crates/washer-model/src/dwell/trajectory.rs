@@ -36,7 +36,7 @@ const PERIOD_TOLERANCE: f64 = 1e-4;
 /// same largest deviations. Doubling it takes more motions with two frequencies for periodic ones.
 const WIDE_PERIOD_TOLERANCE: f64 = 1e-3;
 
-/// Factor of the tolerance by which shorter periods must fail. Basis: a disturbance that changes
+/// Factor of the tolerance with which no shorter period may fit. Basis: a disturbance that changes
 /// sign with every period and decays slowly looks like twice the period; test
 /// `slow_decay_is_not_taken_for_a_doubled_period`. Doubling it delays the end of motions of several
 /// turns.
@@ -56,7 +56,7 @@ const MIN_DECREASE: f64 = 1e-3;
 const STEADY_TOLERANCE: f64 = 3e-3;
 
 /// Maximum relative difference of the largest deviations of two windows for which a Lyapunov
-/// exponent is computed. Basis: windows of chaotic motions differ by that much. Doubling it
+/// exponent is computed. Basis: windows of chaotic motions differ by up to this. Doubling it
 /// computes exponents of motions that still grow.
 const CHAOS_WINDOW_TOLERANCE: f64 = 0.4;
 
@@ -64,25 +64,27 @@ const CHAOS_WINDOW_TOLERANCE: f64 = 0.4;
 /// one is computed after twice the turns. Doubling it delays the detection of chaos.
 const WINDOWS_BEFORE_EXPONENT: usize = 4;
 
-/// Maximum rest of the spectrum without the strongest line and its multiples, as a share, for a
-/// motion with two frequencies. Doubling it takes more motions with three frequencies for such.
-const MAX_SPECTRUM_REST: f64 = 0.1;
+/// Maximum residual of the spectrum without the strongest line and its multiples, as a share, for a
+/// motion with two frequencies. Doubling it accepts more motions with three frequencies.
+const MAX_SPECTRUM_RESIDUAL: f64 = 0.1;
 
 /// Tolerance of a period, as a share of the motion's size, with which a motion with a positive
-/// exponent passes from one motion to another. Basis: chaotic motions repeat less well. Doubling it
-/// finds less chaos.
+/// exponent counts as passing from one motion to another. Basis: chaotic motions repeat less
+/// accurately. Doubling it finds less chaos.
 const PASSING_PERIOD_TOLERANCE: f64 = 0.05;
 
-/// Maximum rest of the spectrum, as a share, with which a motion with a positive exponent passes
-/// from one motion to another. Basis: chaotic motions have more. Doubling it finds less chaos.
-const PASSING_SPECTRUM_REST: f64 = 0.3;
+/// Maximum residual of the spectrum, as a share, with which a motion with a positive exponent
+/// counts as passing from one motion to another. Basis: chaotic motions have larger residuals.
+/// Doubling it finds less chaos.
+const PASSING_SPECTRUM_RESIDUAL: f64 = 0.3;
 
-/// Distance from an unstable orbit, as a share of its size, below which no motion has settled.
-/// Doubling it delays motions that are close to an unstable orbit.
+/// Distance from an unstable orbit, as a share of the orbit's size, below which no motion counts as
+/// settled. Doubling it delays motions that are close to an unstable orbit.
 const CLOSE_ORBIT_DISTANCE: f64 = 1e-2;
 
-/// Distance from an unstable orbit, as a share of its size, below which a motion that departs from
-/// the orbit has not settled. Doubling it delays large motions about an unstable orbit.
+/// Distance from an unstable orbit, as a share of the orbit's size, below which a motion that
+/// departs from the orbit does not count as settled. Doubling it delays large motions about an
+/// unstable orbit.
 const NEAR_ORBIT_DISTANCE: f64 = 0.5;
 
 /// Minimum ratio of the distances from an unstable orbit in two successive windows with which a
@@ -95,8 +97,9 @@ const DEPARTURE_RATIO: f64 = 1.02;
 /// halves the rate of escape that is detected with the same probability.
 const SURVIVAL_S: f64 = 240.0;
 
-/// Number of trajectories from states of a chaotic motion. Basis: that of [`SURVIVAL_S`]. Doubling
-/// it halves the rate of escape that is detected with the same probability.
+/// Number of trajectories from states of a chaotic motion. Basis: the probability that
+/// [`SURVIVAL_S`] states. Doubling it halves the rate of escape that is detected with the same
+/// probability.
 const SURVIVOR_COUNT: usize = 8;
 
 /// The computation that a trajectory needs next.
@@ -121,23 +124,23 @@ pub(super) struct HeldTrajectory<'a> {
     turns: Vec<TurnRecord>,
     /// The number of turns so far.
     turn_count: usize,
-    /// The number of turns after which the trajectory ends in any case.
+    /// The number of turns after which the trajectory ends even if it has not settled.
     max_turns: usize,
     pub(super) next_computation: NextComputation,
     /// The number of turns before which no further exponent is computed.
     next_exponent_turn: usize,
     exponent: Option<Exponent>,
-    state: AttractorStatus,
-    settled: Option<MotionKind>,
+    status: AttractorStatus,
+    motion_kind: Option<MotionKind>,
 }
 
 impl<'a> HeldTrajectory<'a> {
     pub(super) fn new(
         held: HeldState<'a>,
         unstable_orbits: Vec<Vec<[f64; STATES]>>,
-        longest_s: f64,
+        max_time_s: f64,
     ) -> Self {
-        let windows = (longest_s / held.setup.turn_s() / WINDOW_TURNS as f64).ceil().max(2.0);
+        let windows = (max_time_s / held.setup.turn_s() / WINDOW_TURNS as f64).ceil().max(2.0);
         Self {
             held,
             unstable_orbits,
@@ -147,8 +150,8 @@ impl<'a> HeldTrajectory<'a> {
             next_computation: NextComputation::Turns,
             next_exponent_turn: 0,
             exponent: None,
-            state: AttractorStatus::NotSettled,
-            settled: None,
+            status: AttractorStatus::NotSettled,
+            motion_kind: None,
         }
     }
 
@@ -160,7 +163,7 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Whether the motion is chaotic, unless survivors show that it is a transient.
     pub(super) fn is_chaotic(&self) -> bool {
-        self.settled == Some(MotionKind::Chaotic)
+        self.motion_kind == Some(MotionKind::Chaotic)
     }
 
     /// Returns [`SURVIVOR_COUNT`] equally spaced states of the last turns.
@@ -176,8 +179,8 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Marks the motion as a transient with a mean life (s).
     pub(super) fn mark_transient(&mut self, life_s: f64) {
-        self.state = AttractorStatus::Transient { life_s };
-        self.settled = None;
+        self.status = AttractorStatus::Transient { life_s };
+        self.motion_kind = None;
     }
 
     /// Returns the integrated time (s).
@@ -187,7 +190,7 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Whether the trajectory has settled or left the model's range.
     pub(super) fn has_ended(&self) -> bool {
-        self.settled.is_some() || matches!(self.state, AttractorStatus::LeftRange { .. })
+        self.motion_kind.is_some() || matches!(self.status, AttractorStatus::LeftRange { .. })
     }
 
     /// Adds the next [`BLOCK_TURNS`] turns and chooses the next computation. Fewer turns mean that
@@ -196,7 +199,7 @@ impl<'a> HeldTrajectory<'a> {
         self.turn_count += turns.len();
         if turns.len() < BLOCK_TURNS {
             let time_s = (self.turn_count + 1) as f64 * self.turn_s();
-            self.state = AttractorStatus::LeftRange { time_s };
+            self.status = AttractorStatus::LeftRange { time_s };
             self.next_computation = NextComputation::Nothing;
             self.turns.extend(turns);
             return;
@@ -234,8 +237,8 @@ impl<'a> HeldTrajectory<'a> {
                 if self.remaining_change(period) < REMAINING_TOLERANCE {
                     self.next_computation = NextComputation::Multipliers(period);
                 }
-            } else if let Some(quasi_periodic) = self.find_two_frequencies(MAX_SPECTRUM_REST) {
-                self.settle(quasi_periodic);
+            } else if let Some(quasi_periodic) = self.find_two_frequencies(MAX_SPECTRUM_RESIDUAL) {
+                self.end_settled(quasi_periodic);
             } else if may_compute_exponent {
                 self.next_computation = NextComputation::Exponent;
             }
@@ -254,7 +257,7 @@ impl<'a> HeldTrajectory<'a> {
         match growth_per_s {
             Some(per_s) if per_s <= 0.0 => {
                 self.exponent = Some(Exponent { per_s, error_per_s: 0.0 });
-                return self.settle(MotionKind::Periodic { turns: period });
+                return self.end_settled(MotionKind::Periodic { turns: period });
             }
             Some(_) => {
                 let orbit = self.turns.iter().rev().take(period as usize).map(|turn| turn.end);
@@ -267,30 +270,30 @@ impl<'a> HeldTrajectory<'a> {
         }
     }
 
-    /// Adds the largest Lyapunov exponent. A motion with a positive one is chaotic unless it passes
-    /// from one motion to another, near which it almost repeats or has few lines.
+    /// Adds the largest Lyapunov exponent. A motion with a positive exponent is chaotic, unless it
+    /// passes from one motion to another; near these it almost repeats or has few lines.
     pub(super) fn add_exponent(&mut self, exponent: Option<Exponent>) {
         self.next_computation = NextComputation::Turns;
         self.exponent = exponent;
         self.next_exponent_turn = 2 * self.turn_count;
         let is_passing = self.period(PASSING_PERIOD_TOLERANCE).is_some()
-            || self.find_two_frequencies(PASSING_SPECTRUM_REST).is_some();
+            || self.find_two_frequencies(PASSING_SPECTRUM_RESIDUAL).is_some();
         let is_positive = exponent.is_some_and(|exponent| exponent.is_positive());
         if is_positive && !is_passing {
-            self.settle(MotionKind::Chaotic);
+            self.end_settled(MotionKind::Chaotic);
         } else if !is_positive
             && self.has_steady_peaks(WINDOW_TURNS, STEADY_TOLERANCE)
             && let Some(quasi_periodic) = self.find_two_frequencies(f64::INFINITY)
         {
-            self.settle(quasi_periodic);
+            self.end_settled(quasi_periodic);
         } else if self.turn_count >= self.max_turns {
             self.next_computation = NextComputation::Nothing;
         }
     }
 
-    fn settle(&mut self, settled: MotionKind) {
-        self.state = AttractorStatus::Ok;
-        self.settled = Some(settled);
+    fn end_settled(&mut self, motion_kind: MotionKind) {
+        self.status = AttractorStatus::Ok;
+        self.motion_kind = Some(motion_kind);
         self.next_computation = NextComputation::Nothing;
     }
 
@@ -306,15 +309,15 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Returns the motion in which the trajectory ended.
     pub(super) fn attractor(&self) -> Attractor {
-        let turn_count = match self.settled {
+        let turn_count = match self.motion_kind {
             Some(MotionKind::Periodic { .. }) => PERIOD_TEST_TURNS,
             Some(MotionKind::QuasiPeriodic { .. }) => WINDOW_TURNS,
             Some(MotionKind::Chaotic) | None => 2 * WINDOW_TURNS,
         };
         let turns = &self.turns[self.turns.len().saturating_sub(turn_count)..];
         Attractor {
-            status: self.state,
-            motion_kind: self.settled,
+            status: self.status,
+            motion_kind: self.motion_kind,
             starts: 1,
             peaks: peaks(turns),
             min_gap_m: turns.iter().map(|turn| turn.min_gap_m).fold(f64::INFINITY, f64::min),
@@ -371,7 +374,8 @@ impl<'a> HeldTrajectory<'a> {
         (1..=MAX_PERIOD_TURNS).find(repeats).map(|period| period as u32)
     }
 
-    /// Returns [`Self::period`], if shorter periods fail by [`SHORTER_PERIOD_FACTOR`].
+    /// Returns [`Self::period`], if no shorter period fits with the tolerance times
+    /// [`SHORTER_PERIOD_FACTOR`].
     fn unambiguous_period(&self, tolerance: f64) -> Option<u32> {
         let period = self.period(tolerance)?;
         (self.period(SHORTER_PERIOD_FACTOR * tolerance) == Some(period)).then_some(period)
@@ -394,13 +398,13 @@ impl<'a> HeldTrajectory<'a> {
         last * ratio / (1.0 - ratio) / largest_deviation(self.held.setup.point, &self.held.state)
     }
 
-    /// Returns a motion with two frequencies, if the rest of the spectrum of yaw and pitch once a
-    /// turn is below a share.
-    fn find_two_frequencies(&self, max_rest: f64) -> Option<MotionKind> {
+    /// Returns a motion with two frequencies, if the residual of the spectrum of yaw and pitch once
+    /// a turn is below `max_residual`.
+    fn find_two_frequencies(&self, max_residual: f64) -> Option<MotionKind> {
         let signal = |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end[i]).collect() };
         let line = find_strongest_line(&[signal(TUB_YAW), signal(TUB_PITCH)])?;
         let frequency_cpm = line.frequency * self.held.setup.speed_rpm;
-        (line.rest < max_rest).then_some(MotionKind::QuasiPeriodic { frequency_cpm })
+        (line.residual < max_residual).then_some(MotionKind::QuasiPeriodic { frequency_cpm })
     }
 }
 
@@ -409,7 +413,7 @@ fn peaks(turns: &[TurnRecord]) -> [f64; CHANNELS] {
     core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))
 }
 
-/// Whether largest deviations agree to a share of the larger in every channel.
+/// Whether largest deviations agree in every channel, to a share of the larger one.
 pub(super) fn are_close(a: &[f64; CHANNELS], b: &[f64; CHANNELS], share: f64) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= share * a.max(*b))
 }

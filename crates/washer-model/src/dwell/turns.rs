@@ -31,8 +31,8 @@ pub(super) struct TurnRecord {
 }
 
 /// Integrates a number of turns from each state. A trajectory that leaves the model's range has
-/// fewer. Trajectories share lanes of `simd` or of a narrower instruction set, and do not depend on
-/// each other.
+/// fewer records. Trajectories share lanes of `simd` or of a narrower instruction set, and do not
+/// depend on each other.
 pub(super) fn integrate_turns(
     simd: Simd,
     held_states: &[HeldState<'_>],
@@ -63,7 +63,7 @@ pub(super) fn record_turns(
     map_in_batches(held_states, |held| (held.setup.batch_key(), false), integrate_batch)
 }
 
-/// The integration of turns from states whose rows are of one kind.
+/// The integration of turns from states with the same batch key.
 struct HeldTurnsKernel<'a> {
     held_states: &'a [HeldState<'a>],
     turns: usize,
@@ -118,7 +118,7 @@ fn integrate_lanes<T: Lane>(
         let in_range = T::bits(model.in_range(&states[0]));
         for (lane, held) in held_states.iter().enumerate() {
             let (records, _) = &mut results[first_result + lane];
-            // A trajectory that has left the range has no further records.
+            // A trajectory that has left the range gets no further records.
             if in_range >> lane & 1 == 1 && records.len() == finished_turns {
                 let radial_m = recorder.max_radial_squared.0.get(lane).sqrt();
                 records.push(TurnRecord {

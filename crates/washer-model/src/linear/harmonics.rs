@@ -7,7 +7,7 @@ use lane_ode::{N, Real};
 pub(crate) const HARMONICS: usize = 5;
 
 /// The sampling angles 2 pi k / 5 of a polynomial of harmonics 0 to 2, by cosine and sine.
-pub(crate) const SAMPLES: [(f64, f64); HARMONICS] = [
+pub(crate) const SAMPLE_ANGLES: [(f64, f64); HARMONICS] = [
     (1.0, 0.0),
     (0.309_016_994_374_947_45, 0.951_056_516_295_153_5),
     (-0.809_016_994_374_947_5, 0.587_785_252_292_473_1),
@@ -15,13 +15,13 @@ pub(crate) const SAMPLES: [(f64, f64); HARMONICS] = [
     (0.309_016_994_374_947_45, -0.951_056_516_295_153_5),
 ];
 
-/// Computes the coefficients of 1, cos, sin, cos 2, sin 2 from values at [`SAMPLES`] (a discrete
-/// Fourier transform).
+/// Computes the coefficients of 1, cos, sin, cos 2, sin 2 from values at [`SAMPLE_ANGLES`] (a
+/// discrete Fourier transform).
 pub(crate) fn harmonic_coefficients(values: [f64; HARMONICS]) -> [f64; HARMONICS] {
     let mut c = [0.0; HARMONICS];
     for (k, value) in values.into_iter().enumerate() {
-        let (cos, sin) = SAMPLES[k];
-        let (cos_2, sin_2) = SAMPLES[2 * k % HARMONICS];
+        let (cos, sin) = SAMPLE_ANGLES[k];
+        let (cos_2, sin_2) = SAMPLE_ANGLES[2 * k % HARMONICS];
         for (c, basis) in c.iter_mut().zip([0.5, cos, sin, cos_2, sin_2]) {
             *c = (0.4 * value).mul_add(basis, *c);
         }
@@ -61,7 +61,7 @@ pub(crate) const SPIN_COS_2: usize = 13;
 pub(crate) const SPIN_SIN_2: usize = 14;
 /// The index of theta''.
 pub(crate) const ACCELERATION: usize = 15;
-/// The number of functions.
+/// The number of functions of the spin.
 pub(crate) const FUNCTIONS: usize = 16;
 
 /// Computes all functions at an instant. The model page (section 5) derives the pairs of theta'^2
@@ -69,7 +69,7 @@ pub(crate) const FUNCTIONS: usize = 16;
 #[inline(always)]
 pub(crate) fn spin_functions<T: Real>(spin: &SpinState<T>) -> [N<T>; FUNCTIONS] {
     let SpinState { sin, cos, sin_2, cos_2, speed, acceleration, .. } = *spin;
-    let squared = (speed * speed).v();
+    let speed_squared = (speed * speed).v();
     let mut f = [sin.lit(1.0); FUNCTIONS];
     f[COS] = cos;
     f[SIN] = sin;
@@ -80,11 +80,11 @@ pub(crate) fn spin_functions<T: Real>(spin: &SpinState<T>) -> [N<T>; FUNCTIONS] 
     f[SPEED_SIN] = (speed * sin).v();
     f[SPEED_COS_2] = (speed * cos_2).v();
     f[SPEED_SIN_2] = (speed * sin_2).v();
-    f[SPIN] = squared;
-    f[SPIN_COS] = squared * cos + acceleration * sin;
-    f[SPIN_SIN] = squared * sin - acceleration * cos;
-    f[SPIN_COS_2] = squared * cos_2 + acceleration * sin_2;
-    f[SPIN_SIN_2] = squared * sin_2 - acceleration * cos_2;
+    f[SPIN] = speed_squared;
+    f[SPIN_COS] = speed_squared * cos + acceleration * sin;
+    f[SPIN_SIN] = speed_squared * sin - acceleration * cos;
+    f[SPIN_COS_2] = speed_squared * cos_2 + acceleration * sin_2;
+    f[SPIN_SIN_2] = speed_squared * sin_2 - acceleration * cos_2;
     f[ACCELERATION] = acceleration;
     f
 }

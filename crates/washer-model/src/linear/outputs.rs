@@ -7,13 +7,13 @@
 use crate::channel::{CHANNELS, Channel, channels};
 use crate::coordinates::{
     COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH,
-    TUB_Y, TUB_YAW, TUB_Z, with_unit_derivative,
+    TUB_Y, TUB_YAW, TUB_Z, with_derivative,
 };
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::sparse::{FurtherTerms, sparse_sums};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
-use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
+use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL_COMPONENTS};
 use core::array::from_fn;
 use lane_ode::{Lane, N, OutOfLine, Real, Sample};
 
@@ -21,24 +21,29 @@ use lane_ode::{Lane, N, OutOfLine, Real, Sample};
 /// equilibrium.
 const COLUMNS: usize = COORDINATES + 1;
 /// The column of the value at equilibrium.
-const AT_REST: usize = COORDINATES;
+const REST_COLUMN: usize = COORDINATES;
 
 /// The number of outputs: every channel, then the two components of the radial distance.
-const OUTPUTS: usize = CHANNELS + RADIAL;
+const OUTPUTS: usize = CHANNELS + RADIAL_COMPONENTS;
 
 /// The sampling angles 2 pi k / 3 of harmonics 0 and 1, by cosine and sine.
-const SAMPLES: [(f64, f64); 3] =
+const SAMPLE_ANGLES: [(f64, f64); 3] =
     [(1.0, 0.0), (-0.5, 0.866_025_403_784_438_6), (-0.5, -0.866_025_403_784_438_6)];
 
 /// Returns the index of a part of an output (part 0: steady, 1: cosine, 2: sine of theta) among the
-/// terms of `outputs` outputs. Steady parts come first. Only the outputs in `turning` have the
-/// other parts.
-const fn entry(output: usize, part: usize, turning: &[usize], outputs: usize) -> usize {
+/// terms of `outputs` outputs. Steady parts come first. Only the outputs in `harmonic_outputs` have
+/// the other parts.
+const fn entry_index(
+    output: usize,
+    part: usize,
+    harmonic_outputs: &[usize],
+    outputs: usize,
+) -> usize {
     if part == 0 {
         return output;
     }
     let mut index = 0;
-    while turning[index] != output {
+    while harmonic_outputs[index] != output {
         index += 1;
     }
     outputs + 2 * index + part - 1
@@ -50,7 +55,7 @@ macro_rules! expand {
         $(, turning cos [$($cos:ident)+] sin [$($sin:ident)+] rest [$($part:literal)+])?;
     )+) => {
         /// The channels with harmonics of theta.
-        const TURNING: &[usize] = &[$($(turns!($name $($part)+),)?)+];
+        const HARMONIC_CHANNELS: &[usize] = &[$($(turns!($name $($part)+),)?)+];
 
         /// The entries of the channels' parts of order zero.
         const CHANNELS_AT_REST: &[usize] =
@@ -75,21 +80,21 @@ macro_rules! turns {
 channels!(expand);
 
 /// The number of entries of the channels' terms.
-const CHANNEL_ENTRIES: usize = CHANNELS + 2 * TURNING.len();
+const CHANNEL_ENTRIES: usize = CHANNELS + 2 * HARMONIC_CHANNELS.len();
 
 const fn channel_entry(channel: Channel, part: usize) -> usize {
-    entry(channel.index(), part, TURNING, CHANNELS)
+    entry_index(channel.index(), part, HARMONIC_CHANNELS, CHANNELS)
 }
 
 /// The components of the radial distance that have harmonics of theta, which are both.
-const RADIAL_TURNING: [usize; RADIAL] = [0, 1];
+const HARMONIC_RADIAL: [usize; RADIAL_COMPONENTS] = [0, 1];
 /// The number of entries of the radial distance's terms.
-const RADIAL_ENTRIES: usize = 3 * RADIAL;
+const RADIAL_ENTRIES: usize = 3 * RADIAL_COMPONENTS;
 /// The entries of the radial distance's parts of order zero, which are all.
 const RADIAL_AT_REST: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
 
 const fn radial_entry(component: usize, part: usize) -> usize {
-    entry(component, part, &RADIAL_TURNING, RADIAL)
+    entry_index(component, part, &HARMONIC_RADIAL, RADIAL_COMPONENTS)
 }
 
 sparse_sums! {
@@ -124,30 +129,30 @@ impl<T: Lane> LinearOutputs<T> {
     pub(crate) fn channels(&self, motion: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
         let mut sums = [[motion.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
         self.channels.sum(&motion.coordinates, &mut sums);
-        add_at_rest(&mut sums, CHANNELS_AT_REST, &self.channels_at_rest);
+        add_rest_values(&mut sums, CHANNELS_AT_REST, &self.channels_at_rest);
         if !self.further_channels.is_empty() {
             self.further_channels.add(&motion.columns(), &mut sums);
         }
-        motion.combine_harmonics::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
+        motion.combine_harmonics::<CHANNEL_ENTRIES, CHANNELS>(sums, HARMONIC_CHANNELS)
     }
 
     /// Computes the position of the drum's front centre relative to the tub axis, along t2 and t3.
     #[inline(always)]
-    pub(crate) fn radial(&self, motion: &LinearMotion<T>) -> [Sample<T>; RADIAL] {
+    pub(crate) fn radial(&self, motion: &LinearMotion<T>) -> [Sample<T>; RADIAL_COMPONENTS] {
         let mut sums = [[motion.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
         self.radial.sum(&motion.coordinates, &mut sums);
-        add_at_rest(&mut sums, &RADIAL_AT_REST, &self.radial_at_rest);
+        add_rest_values(&mut sums, &RADIAL_AT_REST, &self.radial_at_rest);
         if !self.further_radial.is_empty() {
             self.further_radial.add(&motion.columns(), &mut sums);
         }
-        motion.combine_harmonics::<RADIAL_ENTRIES, RADIAL>(sums, &RADIAL_TURNING)
+        motion.combine_harmonics::<RADIAL_ENTRIES, RADIAL_COMPONENTS>(sums, &HARMONIC_RADIAL)
     }
 }
 
-/// Adds the parts of order zero, which are constant in the drum's frame; the spin gives them time
-/// derivatives.
+/// Adds the parts of order zero to the sums' values. These parts are constant in the drum's frame;
+/// the products with cosine and sine of theta have time derivatives.
 #[inline(always)]
-fn add_at_rest<T: Real, const ENTRIES: usize, const K: usize>(
+fn add_rest_values<T: Real, const ENTRIES: usize, const K: usize>(
     sums: &mut [[N<T>; 3]; ENTRIES],
     entries: &[usize],
     at_rest: &[N<T>; K],
@@ -168,12 +173,12 @@ pub(crate) struct LinearMotion<T> {
 }
 
 impl<T: Real> LinearMotion<T> {
-    /// Computes the functions at an instant; `motion` holds deviations from equilibrium.
+    /// Computes the motion at an instant from deviations from equilibrium.
     #[inline(always)]
     pub(crate) fn new(spin: &SpinState<T>, motion: &MovingCoordinates<T>) -> Self {
         let zero = spin.sin.lit(0.0);
-        let n = spin.speed;
-        let nn = (spin.speed * spin.speed).v();
+        let speed = spin.speed;
+        let speed_squared = (spin.speed * spin.speed).v();
         let acceleration = spin.acceleration;
         let mut coordinates = [[zero; 3]; COORDINATES];
         for j in 0..COORDINATES {
@@ -181,8 +186,16 @@ impl<T: Real> LinearMotion<T> {
         }
         Self {
             coordinates,
-            cos: [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)],
-            sin: [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin],
+            cos: [
+                spin.cos,
+                -(speed * spin.sin).v(),
+                -(acceleration * spin.sin + speed_squared * spin.cos),
+            ],
+            sin: [
+                spin.sin,
+                (speed * spin.cos).v(),
+                acceleration * spin.cos - speed_squared * spin.sin,
+            ],
         }
     }
 
@@ -200,20 +213,20 @@ impl<T: Real> LinearMotion<T> {
     fn combine_harmonics<const ENTRIES: usize, const M: usize>(
         &self,
         mut sums: [[N<T>; 3]; ENTRIES],
-        turning: &[usize],
+        harmonic_outputs: &[usize],
     ) -> [Sample<T>; M] {
         let zero = self.cos[0].lit(0.0);
         let mut entry = M;
-        for &output in turning {
+        for &output in harmonic_outputs {
             for harmonic in [&self.cos, &self.sin] {
-                let product = product(harmonic, &sums[entry]);
+                let product = multiply_derivatives(harmonic, &sums[entry]);
                 entry += 1;
                 for derivative in 0..3 {
                     sums[output][derivative] += product[derivative];
                 }
             }
         }
-        let mut outputs = [Sample::still(zero, zero); M];
+        let mut outputs = [Sample::constant(zero, zero); M];
         for i in 0..M {
             let [value, slope, curvature] = sums[i];
             outputs[i] = Sample { value, slope, curvature };
@@ -222,9 +235,9 @@ impl<T: Real> LinearMotion<T> {
     }
 }
 
-/// Computes a product with its two derivatives.
+/// Computes a product with its first two time derivatives.
 #[inline(always)]
-fn product<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
+fn multiply_derivatives<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
     let slope = a[0] * b[1] + a[1] * b[0];
     let curvature = a[0] * b[2] + (a[2] * b[0] + 2.0 * (a[1] * b[1]).v());
     [(a[0] * b[0]).v(), slope, curvature]
@@ -246,16 +259,16 @@ impl<T: Lane> OutOfLine for LineariseOutputs<'_, T> {
         let dual_bodies = bodies.constant();
         let zeros = [zero.constant(); COORDINATES];
         let mut samples = [[[zero; COLUMNS]; OUTPUTS]; 3];
-        for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
+        for (k, (cos, sin)) in SAMPLE_ANGLES.into_iter().enumerate() {
             let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero, zero).constant();
             for j in 0..COORDINATES {
                 let motion =
-                    MovingCoordinates { q: with_unit_derivative(q, j, 1.0), u: zeros, a: zeros };
+                    MovingCoordinates { q: with_derivative(q, j, 1.0), u: zeros, a: zeros };
                 let axes = Axes::new(&spin, &motion);
                 let channels = axes.channels(&dual_bodies, &motion);
                 let radial = axes.radial(&dual_bodies, &motion);
                 for (output, y) in channels.iter().chain(&radial).enumerate() {
-                    samples[k][output][AT_REST] = N(y.value.0.value);
+                    samples[k][output][REST_COLUMN] = N(y.value.0.value);
                     samples[k][output][j] = N(y.value.0.slope);
                 }
             }
@@ -271,7 +284,7 @@ impl<T: Lane> OutOfLine for LineariseOutputs<'_, T> {
 /// Computes the coefficients of one lane from samples at three angles.
 fn select_lane_coefficients(
     samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3],
-    skewed: bool,
+    is_skewed: bool,
 ) -> LinearOutputs<f64> {
     let mut channels = [[0.0; COORDINATES]; CHANNEL_ENTRIES];
     let mut channels_at_rest = [0.0; CHANNEL_ENTRIES];
@@ -282,20 +295,20 @@ fn select_lane_coefficients(
             let values = samples.map(|sample| sample[output][column].0);
             let mean = (values[0] + values[1] + values[2]) / 3.0;
             let cos = (2.0 * values[0] - values[1] - values[2]) / 3.0;
-            let sin = (values[1] - values[2]) * 2.0 * SAMPLES[1].1 / 3.0;
+            let sin = (values[1] - values[2]) * 2.0 * SAMPLE_ANGLES[1].1 / 3.0;
             // Channels are deviations from their values at theta = 0, where the cosine is 1.
-            let steady = if column == AT_REST && output < CHANNELS { -cos } else { mean };
+            let steady = if column == REST_COLUMN && output < CHANNELS { -cos } else { mean };
             for (part, coefficient) in [steady, cos, sin].into_iter().enumerate() {
                 let (entry, terms, at_rest) = if output >= CHANNELS {
                     let entry = radial_entry(output - CHANNELS, part);
                     (entry, &mut radial[..], &mut radial_at_rest[..])
-                } else if part == 0 || TURNING.contains(&output) {
-                    let entry = entry(output, part, TURNING, CHANNELS);
+                } else if part == 0 || HARMONIC_CHANNELS.contains(&output) {
+                    let entry = entry_index(output, part, HARMONIC_CHANNELS, CHANNELS);
                     (entry, &mut channels[..], &mut channels_at_rest[..])
                 } else {
                     continue;
                 };
-                if column == AT_REST {
+                if column == REST_COLUMN {
                     at_rest[entry] = coefficient;
                 } else {
                     terms[entry][column] = coefficient;
@@ -303,7 +316,7 @@ fn select_lane_coefficients(
             }
         }
     }
-    let [further_channels, further_radial] = if skewed {
+    let [further_channels, further_radial] = if is_skewed {
         [
             select_further_terms(
                 &channels,
@@ -331,7 +344,8 @@ fn select_lane_coefficients(
     }
 }
 
-/// Selects the terms of entries that neither the table's `places` nor the entries `at_rest` name.
+/// Selects the terms that are neither at the table's positions nor in the rest column of the
+/// entries `at_rest`.
 fn select_further_terms<const ENTRIES: usize>(
     slopes: &[[f64; COORDINATES]; ENTRIES],
     values: &[f64; ENTRIES],
@@ -341,7 +355,7 @@ fn select_further_terms<const ENTRIES: usize>(
     let all_coefficients: [[f64; COLUMNS]; ENTRIES] = from_fn(|entry| {
         from_fn(|column| slopes[entry].get(column).copied().unwrap_or(values[entry]))
     });
-    let at_rest = at_rest.iter().map(|entry| (*entry, AT_REST));
+    let at_rest = at_rest.iter().map(|entry| (*entry, REST_COLUMN));
     let table_entries: Vec<_> = table_positions.iter().copied().chain(at_rest).collect();
     FurtherTerms::select_coefficients(&all_coefficients, &table_entries)
 }

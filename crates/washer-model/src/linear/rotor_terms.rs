@@ -16,21 +16,21 @@ use lane_ode::{Lane, N};
 /// The number of the rotor's rows.
 pub(crate) const ROWS: usize = 6;
 /// The number of the rotor's rotations.
-pub(crate) const TURNS: usize = 4;
+pub(crate) const ROTATIONS: usize = 4;
 
 /// The first entry of the partial velocities.
 const ARM: usize = 0;
 /// The first entry of the force.
-const FORCE: usize = ARM + 2 * TURNS;
+const FORCE: usize = ARM + 2 * ROTATIONS;
 /// The first entry of the stiffness.
 const STIFFNESS: usize = FORCE + ROWS;
 /// The first entry of the damping.
-const DAMPING: usize = STIFFNESS + ROWS * TURNS;
+const DAMPING: usize = STIFFNESS + ROWS * ROTATIONS;
 
 /// The number of entries of all arrays of the rotor except the inertia.
-pub(crate) const ENTRIES: usize = DAMPING + ROWS * TURNS;
+pub(crate) const ENTRIES: usize = DAMPING + ROWS * ROTATIONS;
 /// The number of entries of the inertia's lower triangle.
-pub(crate) const INERTIA_ENTRIES: usize = TURNS * (TURNS + 1) / 2;
+pub(crate) const INERTIA_ENTRIES: usize = ROTATIONS * (ROTATIONS + 1) / 2;
 
 /// Returns the entry of the inertia about the mass centre, for `row` not less than `column`.
 pub(crate) const fn inertia(row: usize, column: usize) -> usize {
@@ -55,12 +55,12 @@ pub(crate) const fn depends_on_rotation(row: usize, column: usize) -> bool {
 
 /// Returns the entry of the stiffness matrix.
 pub(crate) const fn stiffness(row: usize, column: usize) -> usize {
-    STIFFNESS + row * TURNS + column
+    STIFFNESS + row * ROTATIONS + column
 }
 
 /// Returns the entry of the damping and gyroscopic matrix.
 pub(crate) const fn damping(row: usize, column: usize) -> usize {
-    DAMPING + row * TURNS + column
+    DAMPING + row * ROTATIONS + column
 }
 
 lane_struct! {
@@ -76,7 +76,7 @@ lane_struct! {
 }
 
 impl<T: Lane> RotorCoefficients<T> {
-    /// Computes the inertia's entries at the functions of an instant.
+    /// Computes the inertia's entries from the functions of the spin at an instant.
     #[inline(always)]
     pub(crate) fn sum_inertia(
         &self,
@@ -87,7 +87,8 @@ impl<T: Lane> RotorCoefficients<T> {
         self.further_inertia.add(functions, sums);
     }
 
-    /// Computes all other entries at the functions of an instant.
+    /// Computes the entries of arms, force, stiffness and damping from the functions of the spin at
+    /// an instant.
     #[inline(always)]
     pub(crate) fn sum_others(&self, functions: &[N<T>; FUNCTIONS], sums: &mut [N<T>; ENTRIES]) {
         self.others.sum(functions, sums);
@@ -96,11 +97,11 @@ impl<T: Lane> RotorCoefficients<T> {
 }
 
 impl RotorCoefficients<f64> {
-    /// Selects the terms of a machine from all coefficients. Only a `skewed` drum has further ones.
+    /// Selects the terms of a machine from all coefficients. Only a skewed drum has further terms.
     pub(crate) fn select_coefficients(
         inertia: &[[f64; FUNCTIONS]; INERTIA_ENTRIES],
         others: &[[f64; FUNCTIONS]; ENTRIES],
-        skewed: bool,
+        is_skewed: bool,
     ) -> Self {
         let mut terms = Self {
             inertia: InertiaTerms::select_coefficients(inertia),
@@ -108,7 +109,7 @@ impl RotorCoefficients<f64> {
             further_inertia: FurtherTerms::NONE,
             further_others: FurtherTerms::NONE,
         };
-        if skewed {
+        if is_skewed {
             terms.further_inertia =
                 FurtherTerms::select_coefficients(inertia, &InertiaTerms::POSITIONS);
             terms.further_others =
@@ -117,8 +118,9 @@ impl RotorCoefficients<f64> {
         terms
     }
 
-    /// Evaluates the inertia's entries and all others at the functions of an instant.
-    pub(crate) fn at(
+    /// Evaluates the inertia's entries and all other entries from the functions of the spin at an
+    /// instant.
+    pub(crate) fn evaluate(
         &self,
         functions: &[N<f64>; FUNCTIONS],
     ) -> ([N<f64>; INERTIA_ENTRIES], [N<f64>; ENTRIES]) {
@@ -132,9 +134,9 @@ impl RotorCoefficients<f64> {
 
 /// Returns the partial velocities of the mass centre.
 #[inline(always)]
-pub(crate) fn arms<T: Copy>(entries: &[N<T>; ENTRIES]) -> [[N<T>; 2]; TURNS] {
-    let mut arms = [[entries[0]; 2]; TURNS];
-    for r in 0..TURNS {
+pub(crate) fn arms<T: Copy>(entries: &[N<T>; ENTRIES]) -> [[N<T>; 2]; ROTATIONS] {
+    let mut arms = [[entries[0]; 2]; ROTATIONS];
+    for r in 0..ROTATIONS {
         arms[r] = [entries[arm(r, 0)], entries[arm(r, 1)]];
     }
     arms
@@ -156,7 +158,7 @@ sparse_sums! {
 }
 
 sparse_sums! {
-    /// The coefficients of all other terms.
+    /// The coefficients of the terms of arms, force, stiffness and damping.
     RotorTerms: FUNCTIONS => ENTRIES;
     arm(0, 1) => ONE COS SIN;
     arm(1, 0) => ONE COS;

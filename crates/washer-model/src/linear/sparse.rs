@@ -1,17 +1,17 @@
 //! Sparse linear combinations whose pattern is known at compile time.
 //!
-//! Most coefficients of the linear model vanish for every machine. A table in the source lists
-//! those that do not. It compiles to code without loops, indices or branches: one multiplication
-//! per term.
+//! Most coefficients of the linear model vanish for every machine. A table in the source lists the
+//! others. The table compiles to code without loops, indices or branches: one multiplication per
+//! term.
+
+use crate::lanes::{InLanes, ToDual};
+use lane_ode::{Dual, Lane, N, OutOfLine, Real};
 
 /// Declares a set of coefficients, and the entries as sums of coefficients times functions:
 /// `entry => function function ...;`.
 ///
-/// Entries that the table lacks keep their values. `Name<f64>` has the coefficients of one machine,
-/// `Name<T>` those of one machine per lane.
-use crate::lanes::{InLanes, ToDual};
-use lane_ode::{Dual, Lane, N, OutOfLine, Real};
-
+/// Sums of entries without a row in the table keep their values. `Name<f64>` has the coefficients
+/// of one machine, `Name<T>` those of one machine per lane.
 macro_rules! sparse_sums {
     (
         $(#[$doc:meta])*
@@ -64,7 +64,7 @@ macro_rules! sparse_sums {
 }
 pub(crate) use sparse_sums;
 
-/// The coefficients of terms that the compile-time table does not have, by entry, then function.
+/// The coefficients of terms that are missing in the compile-time table, by entry, then function.
 /// The list is empty if all of them are 0, as for most machines.
 #[derive(Clone, Debug)]
 pub(crate) struct FurtherTerms<T> {
@@ -96,7 +96,6 @@ impl FurtherTerms<f64> {
 }
 
 impl<T> FurtherTerms<T> {
-    /// Returns whether there are no coefficients.
     #[inline(always)]
     pub(crate) fn is_empty(&self) -> bool {
         self.coefficients.is_empty()
@@ -104,7 +103,7 @@ impl<T> FurtherTerms<T> {
 }
 
 impl<T: Lane> FurtherTerms<T> {
-    /// Adds these terms to sums that have the table's terms.
+    /// Adds the further terms to the sums of the table's terms.
     #[inline(always)]
     pub(crate) fn add<V: Summand<T>, const FUNCTIONS: usize, const ENTRIES: usize>(
         &self,
@@ -118,8 +117,8 @@ impl<T: Lane> FurtherTerms<T> {
     }
 }
 
-/// The addition of further terms. A lane whose machine lacks a term adds 0, so its result does not
-/// depend on the machines in the other lanes.
+/// The addition of further terms. A lane whose machine lacks a term adds 0, so that its result does
+/// not depend on the machines in other lanes.
 struct AddFurtherTerms<'a, T, V, const FUNCTIONS: usize, const ENTRIES: usize> {
     coefficients: &'a [N<T>],
     functions: &'a [V; FUNCTIONS],
@@ -148,17 +147,17 @@ impl<T: Lane> InLanes<T> for FurtherTerms<T> {
     type SingleLane = FurtherTerms<f64>;
 
     #[inline(always)]
-    fn splat(zero: N<T>, one: &FurtherTerms<f64>) -> Self {
-        Self { zero: zero.lit(0.0), coefficients: Vec::splat(zero, &one.coefficients) }
+    fn splat(zero: N<T>, single: &FurtherTerms<f64>) -> Self {
+        Self { zero: zero.lit(0.0), coefficients: Vec::splat(zero, &single.coefficients) }
     }
 
     /// Overwrites a lane. An empty list counts as a list of zeros.
     #[inline(always)]
-    fn set_lane(&mut self, lane: usize, one: &FurtherTerms<f64>) {
-        let count = self.coefficients.len().max(one.coefficients.len());
+    fn set_lane(&mut self, lane: usize, single: &FurtherTerms<f64>) {
+        let count = self.coefficients.len().max(single.coefficients.len());
         self.coefficients.resize(count, self.zero);
         for k in 0..count {
-            let coefficient = one.coefficients.get(k).copied().unwrap_or(N(0.0));
+            let coefficient = single.coefficients.get(k).copied().unwrap_or(N(0.0));
             self.coefficients[k].set_lane(lane, &coefficient);
         }
     }
@@ -178,7 +177,7 @@ impl<T: Real> ToDual for FurtherTerms<T> {
     }
 }
 
-/// Returns the next coefficient.
+/// Returns the coefficient at a position, and advances the position.
 #[inline(always)]
 pub(crate) fn take_next<T: Copy>(coefficients: &[N<T>], position: &mut usize) -> N<T> {
     *position += 1;

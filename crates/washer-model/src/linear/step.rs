@@ -6,7 +6,7 @@
 //! earlier, so that few operations wait for the accelerations of the stage before.
 
 use crate::COORDINATES;
-use crate::coordinates::{HINGE_PITCH, HINGE_YAW, ROTOR_TURNS, STATES, TUB};
+use crate::coordinates::{HINGE_PITCH, HINGE_YAW, ROTOR_ROTATIONS, STATES, TUB};
 use crate::lanes::lane_struct;
 use crate::linear::rotor_terms::{
     self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients,
@@ -34,7 +34,7 @@ lane_struct! {
         /// The lower triangle of the bearings' deflections by the tub's accelerations under loads.
         tub_compliance: [[N<T>; 4]; 4],
         tub_axis: [[N<T>; 2]; 2],
-        rotor_per_mass: N<T>,
+        rotor_inverse_mass: N<T>,
         rotor_axis: [[N<T>; 2]; 2],
         /// The bearings' stiffness in one direction: force by offset, force by tilt, moment by
         /// tilt.
@@ -46,18 +46,18 @@ lane_struct! {
 
 impl StepConstants<f64> {
     /// Computes the constants of a machine.
-    pub(crate) fn new(b: &Bodies<f64>, c: &Constants<f64>) -> Self {
+    pub(crate) fn new(bodies: &Bodies<f64>, linear: &Constants<f64>) -> Self {
         let zero = N(0.0);
-        let inertia = LdltFactors::new(c.tub_inertia);
+        let inertia = LdltFactors::new(linear.tub_inertia);
         // Computes the tub's accelerations from forces and torques about its mass centre and from
         // loads on its axis.
         let accelerations_under = |[y, z, yaw, pitch]: [N<f64>; 4], load: [N<f64>; 4]| {
             let floating = FloatingChain {
-                per_mass: c.tub_per_mass,
+                inverse_mass: linear.tub_inverse_mass,
                 force: [y, z],
                 drift: [zero; 2],
-                arm: c.tub_arm,
-                axis: c.tub_axis,
+                arm: linear.tub_arm,
+                axis: linear.tub_axis,
                 axis_drift: [zero; 2],
                 torque: [yaw, pitch],
             };
@@ -70,31 +70,33 @@ impl StepConstants<f64> {
             tub_per_speed: [[zero; 4]; 4],
             tub_per_load: [[zero; 4]; 4],
             tub_compliance: [[zero; 4]; 4],
-            tub_axis: c.tub_axis,
-            rotor_per_mass: c.rotor_per_mass,
-            rotor_axis: c.rotor_axis,
+            tub_axis: linear.tub_axis,
+            rotor_inverse_mass: linear.rotor_inverse_mass,
+            rotor_axis: linear.rotor_axis,
             bearing_stiffness: [
-                b.front_stiffness + b.rear_stiffness,
-                b.front_stiffness * b.bearing_front + b.rear_stiffness * b.bearing_rear,
-                b.front_stiffness * (b.bearing_front * b.bearing_front)
-                    + b.rear_stiffness * (b.bearing_rear * b.bearing_rear),
+                bodies.front_stiffness + bodies.rear_stiffness,
+                bodies.front_stiffness * bodies.bearing_front
+                    + bodies.rear_stiffness * bodies.bearing_rear,
+                bodies.front_stiffness * (bodies.bearing_front * bodies.bearing_front)
+                    + bodies.rear_stiffness * (bodies.bearing_rear * bodies.bearing_rear),
             ],
-            bearing_compliance: b.bearing_compliance(),
+            bearing_compliance: bodies.bearing_compliance(),
         };
         for column in 0..4 {
             let force_by_column = |matrix: &[[N<f64>; 4]; 4]| matrix.map(|row| -row[column]);
-            let mut reaction = [zero; 4];
-            reaction[column] = N(-1.0);
-            let by_position = accelerations_under(force_by_column(&c.tub_stiffness), [zero; 4]);
-            let by_speed = accelerations_under(force_by_column(&c.tub_damping), [zero; 4]);
-            let by_load = accelerations_under([zero; 4], reaction);
+            let mut unit_reaction = [zero; 4];
+            unit_reaction[column] = N(-1.0);
+            let by_position =
+                accelerations_under(force_by_column(&linear.tub_stiffness), [zero; 4]);
+            let by_speed = accelerations_under(force_by_column(&linear.tub_damping), [zero; 4]);
+            let by_load = accelerations_under([zero; 4], unit_reaction);
             for row in 0..4 {
                 constants.tub_per_position[row][column] = by_position[row];
                 constants.tub_per_speed[row][column] = by_speed[row];
                 constants.tub_per_load[row][column] = by_load[row];
             }
             let deflection =
-                constants.deflection(&in_coordinate_order(&by_load, &[zero; 2], &[zero; 4]));
+                constants.deflection(&to_coordinate_order(&by_load, &[zero; 2], &[zero; 4]));
             for row in 0..4 {
                 constants.tub_compliance[row][column] = deflection[row];
             }
@@ -141,13 +143,13 @@ struct BearingArrays<T> {
     system_inverse: Symmetric4<T>,
     /// The factor of the deflection, w^2 + theta'^2, with w the cap of the bearings' modes.
     per_deflection: N<T>,
-    rotor: RotorPerLoad<T>,
+    rotor: RotorLoadResponse<T>,
 }
 
-/// The accelerations of the rotor by loads of its axis: of its midpoint (y, z), and of its
+/// The accelerations of the rotor per unit of load on its axis: of the midpoint (y, z), and of the
 /// rotations.
 #[derive(Clone, Copy)]
-struct RotorPerLoad<T> {
+struct RotorLoadResponse<T> {
     translation: [[N<T>; 4]; 2],
     rotation: [[N<T>; 4]; 4],
 }
@@ -167,7 +169,7 @@ impl<T: Lane> RotorArrays<T> {
         let bearings = BearingArrays {
             system_inverse: zero_matrix,
             per_deflection: zero,
-            rotor: RotorPerLoad { translation: [[zero; 4]; 2], rotation: [[zero; 4]; 4] },
+            rotor: RotorLoadResponse { translation: [[zero; 4]; 2], rotation: [[zero; 4]; 4] },
         };
         let mut rotor = Self { entries: [zero; ENTRIES], inverse_inertia: zero_matrix, bearings };
         rotor.update(constants, coupling, terms, spin, hinge_mass);
@@ -209,7 +211,8 @@ impl<T: Lane> RotorArrays<T> {
         if let Coupling::MassScaled(scaling) = coupling {
             let cap_squared = scaling.bearings_squared;
             let arms = entry::arms(&self.entries);
-            let (rotor, compliance) = RotorPerLoad::new(constants, &self.inverse_inertia, &arms);
+            let (rotor, compliance) =
+                RotorLoadResponse::new(constants, &self.inverse_inertia, &arms);
             let system = bearing_system(constants, cap_squared, &compliance);
             self.bearings = BearingArrays {
                 system_inverse: Symmetric4(system).inverse(),
@@ -220,27 +223,27 @@ impl<T: Lane> RotorArrays<T> {
     }
 }
 
-impl<T: Lane> RotorPerLoad<T> {
-    /// Computes these accelerations and the rotor's compliance C, from the inverse of the rotor's
-    /// inertia and the partial velocities of its mass centre.
+impl<T: Lane> RotorLoadResponse<T> {
+    /// Computes the accelerations per unit of load and the rotor's compliance C, from the inverse
+    /// of the rotor's inertia and the partial velocities of its mass centre.
     #[inline(always)]
     fn new(
-        c: &StepConstants<T>,
+        constants: &StepConstants<T>,
         inverse: &Symmetric4<T>,
         arm: &[[N<T>; 2]; 4],
     ) -> (Self, Symmetric4<T>) {
-        let zero = c.rotor_per_mass.lit(0.0);
-        let axis = &c.rotor_axis;
+        let zero = constants.rotor_inverse_mass.lit(0.0);
+        let axis = &constants.rotor_axis;
         let mut rotation = [[zero; 4]; 4];
         for row in 0..4 {
-            let by_yaw = inverse.at(row, 0);
-            let by_pitch = inverse.at(row, 1);
+            let by_yaw = inverse.entry(row, 0);
+            let by_pitch = inverse.entry(row, 1);
             // The partial velocity by the yaw has no y component.
             let mut by_force =
                 [zero - by_pitch * arm[1][0], zero - by_yaw * arm[0][1] - by_pitch * arm[1][1]];
             for r in 2..4 {
                 for i in 0..2 {
-                    by_force[i] -= inverse.at(row, r) * arm[r][i];
+                    by_force[i] -= inverse.entry(row, r) * arm[r][i];
                 }
             }
             let by_moment =
@@ -249,8 +252,8 @@ impl<T: Lane> RotorPerLoad<T> {
         }
         // The rotor's compliance C: the accelerations of its midpoint and axis per unit of load.
         let mut compliance = [[zero; 4]; 4];
-        compliance[0][0] = c.rotor_per_mass;
-        compliance[1][1] = c.rotor_per_mass;
+        compliance[0][0] = constants.rotor_inverse_mass;
+        compliance[1][1] = constants.rotor_inverse_mass;
         for r in 0..4 {
             if r > 0 {
                 compliance[0][0] -= arm[r][0] * rotation[r][0];
@@ -269,22 +272,27 @@ impl<T: Lane> RotorPerLoad<T> {
         let mut translation = [[zero; 4]; 2];
         for i in 0..2 {
             for column in 0..4 {
-                translation[i][column] = compliance.at(i, column);
+                translation[i][column] = compliance.entry(i, column);
             }
         }
         (Self { translation, rotation }, compliance)
     }
 }
 
-/// Computes the lower triangle of w^2 K^-1 + C, with the compliance C of both halves, from the
-/// rotor's C.
+/// Computes the lower triangle of w^2 K^-1 + C from the rotor's part of C, where C is the
+/// compliance of both halves.
 #[inline(always)]
 fn bearing_system<T: Lane>(
-    c: &StepConstants<T>,
+    constants: &StepConstants<T>,
     cap_squared: N<T>,
     rotor: &Symmetric4<T>,
 ) -> [[N<T>; 4]; 4] {
-    mass_scaled_system(cap_squared, c.bearing_compliance, &c.tub_compliance, &rotor.0)
+    mass_scaled_system(
+        cap_squared,
+        constants.bearing_compliance,
+        &constants.tub_compliance,
+        &rotor.0,
+    )
 }
 
 impl<T: Lane> BearingArrays<T> {
@@ -303,25 +311,25 @@ impl<T: Lane> BearingArrays<T> {
 /// Computes the accelerations du/dt at deviations `q` from equilibrium and speeds `u`.
 #[inline(always)]
 pub(crate) fn accelerations<T: Lane>(
-    c: &StepConstants<T>,
+    constants: &StepConstants<T>,
     coupling: &Coupling<T>,
-    rotor_at: &RotorArrays<T>,
+    rotor_arrays: &RotorArrays<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
-    let deflection = c.deflection(q);
+    let deflection = constants.deflection(q);
     match coupling {
         Coupling::Springs => {
-            let load = c.spring_load(&deflection);
-            HalfAccelerations::new(c, rotor_at, Some(load), q, u).in_order()
+            let load = constants.spring_load(&deflection);
+            HalfAccelerations::new(constants, rotor_arrays, Some(load), q, u).to_coordinates()
         }
         Coupling::MassScaled(_) => {
-            let bearings = &rotor_at.bearings;
-            let mut halves = HalfAccelerations::new(c, rotor_at, None, q, u);
-            let second_derivative = c.deflection(&halves.in_order());
+            let bearings = &rotor_arrays.bearings;
+            let mut halves = HalfAccelerations::new(constants, rotor_arrays, None, q, u);
+            let second_derivative = constants.deflection(&halves.to_coordinates());
             let reaction = bearings.reaction(&deflection, &second_derivative);
-            halves.add_bearing_reaction(c, &bearings.rotor, &reaction);
-            halves.in_order()
+            halves.add_bearing_reaction(constants, &bearings.rotor, &reaction);
+            halves.to_coordinates()
         }
     }
 }
@@ -332,7 +340,7 @@ pub(crate) fn accelerations<T: Lane>(
 /// equilibrium and speeds `u`.
 #[inline(always)]
 pub(crate) fn solve_implicit_stage<T: Lane>(
-    c: &StepConstants<T>,
+    constants: &StepConstants<T>,
     terms: &RotorCoefficients<T>,
     flexure_stiffness: N<T>,
     spin: &SpinState<T>,
@@ -341,35 +349,37 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     g: N<T>,
 ) -> [N<T>; STATES] {
     // The coordinates at r + g k without the term g^2 a.
-    let mut coordinate_change = *q;
+    let mut predicted_coordinates = *q;
     for i in 0..COORDINATES {
-        coordinate_change[i] = r[i] + g * r[COORDINATES + i];
+        predicted_coordinates[i] = r[i] + g * r[COORDINATES + i];
     }
     let g_squared = (g * g).v();
     let hinge_mass = HingeMass {
         inertia: (g_squared * flexure_stiffness).v(),
         torque: [
-            (flexure_stiffness * (q[HINGE_YAW] - coordinate_change[HINGE_YAW])).v(),
-            (flexure_stiffness * (q[HINGE_PITCH] - coordinate_change[HINGE_PITCH])).v(),
+            (flexure_stiffness * (q[HINGE_YAW] - predicted_coordinates[HINGE_YAW])).v(),
+            (flexure_stiffness * (q[HINGE_PITCH] - predicted_coordinates[HINGE_PITCH])).v(),
         ],
         torque_per_speed: g.lit(0.0),
     };
-    let rotor_at = RotorArrays::new(c, &Coupling::Springs, terms, spin, Some(hinge_mass));
-    let mut halves = HalfAccelerations::new(c, &rotor_at, None, q, u);
-    let arms = entry::arms(&rotor_at.entries);
-    let (by_load, compliance) = RotorPerLoad::new(c, &rotor_at.inverse_inertia, &arms);
-    let per_g_squared = g_squared.recip();
-    let deflection = c.deflection(&coordinate_change);
-    let mut right_hand_side = c.deflection(&halves.in_order());
+    let rotor_arrays =
+        RotorArrays::new(constants, &Coupling::Springs, terms, spin, Some(hinge_mass));
+    let mut halves = HalfAccelerations::new(constants, &rotor_arrays, None, q, u);
+    let arms = entry::arms(&rotor_arrays.entries);
+    let (by_load, compliance) =
+        RotorLoadResponse::new(constants, &rotor_arrays.inverse_inertia, &arms);
+    let inverse_g_squared = g_squared.recip();
+    let deflection = constants.deflection(&predicted_coordinates);
+    let mut right_hand_side = constants.deflection(&halves.to_coordinates());
     for i in 0..4 {
-        right_hand_side[i] += per_g_squared * deflection[i];
+        right_hand_side[i] += inverse_g_squared * deflection[i];
     }
     // The system is solved by elimination, because determinants overflow in idle lanes, whose g is
     // almost zero.
-    let reaction =
-        LdltFactors::new(bearing_system(c, per_g_squared, &compliance)).solve(right_hand_side);
-    halves.add_bearing_reaction(c, &by_load, &reaction);
-    let a = halves.in_order();
+    let reaction = LdltFactors::new(bearing_system(constants, inverse_g_squared, &compliance))
+        .solve(right_hand_side);
+    halves.add_bearing_reaction(constants, &by_load, &reaction);
+    let a = halves.to_coordinates();
     let mut k = *r;
     for i in 0..COORDINATES {
         k[i] = r[COORDINATES + i] + g * a[i];
@@ -389,34 +399,34 @@ impl<T: Lane> HalfAccelerations<T> {
     /// Computes the accelerations, under a load of the bearings on the shaft if one is given.
     #[inline(always)]
     fn new(
-        c: &StepConstants<T>,
-        rotor_at: &RotorArrays<T>,
+        constants: &StepConstants<T>,
+        rotor_arrays: &RotorArrays<T>,
         load: Option<[N<T>; 4]>,
         q: &[N<T>; COORDINATES],
         u: &[N<T>; COORDINATES],
     ) -> Self {
         let mut tub = [q[0]; 4];
         for row in 0..4 {
-            tub[row] = (c.tub_per_position[row][0] * q[TUB[0]]).v();
+            tub[row] = (constants.tub_per_position[row][0] * q[TUB[0]]).v();
             for column in 1..4 {
-                tub[row] += c.tub_per_position[row][column] * q[TUB[column]];
+                tub[row] += constants.tub_per_position[row][column] * q[TUB[column]];
             }
         }
-        let e = &rotor_at.entries;
+        let e = &rotor_arrays.entries;
         let arm = entry::arms(e);
         let mut rotor = [q[0]; ROWS];
         for row in 0..ROWS {
             rotor[row] = e[entry::force(row)];
             for column in 0..4 {
                 if entry::depends_on_rotation(row, column) {
-                    rotor[row] -= e[entry::stiffness(row, column)] * q[ROTOR_TURNS[column]];
+                    rotor[row] -= e[entry::stiffness(row, column)] * q[ROTOR_ROTATIONS[column]];
                 }
             }
         }
         if let Some(load) = load {
             for row in 0..4 {
                 for column in 0..4 {
-                    tub[row] += c.tub_per_load[row][column] * load[column];
+                    tub[row] += constants.tub_per_load[row][column] * load[column];
                 }
             }
             let [force_y, force_z, moment_y, moment_z] = load;
@@ -426,7 +436,7 @@ impl<T: Lane> HalfAccelerations<T> {
                 }
                 rotor[2 + r] -= arm[r][1] * force_z;
             }
-            let axis = &c.rotor_axis;
+            let axis = &constants.rotor_axis;
             rotor[2] += axis[0][1] * moment_z;
             rotor[3] = rotor[3] + axis[1][0] * moment_y + axis[1][1] * moment_z;
             rotor[0] += force_y;
@@ -434,18 +444,22 @@ impl<T: Lane> HalfAccelerations<T> {
         }
         for row in 0..4 {
             for column in 0..4 {
-                tub[row] += c.tub_per_speed[row][column] * u[TUB[column]];
+                tub[row] += constants.tub_per_speed[row][column] * u[TUB[column]];
             }
         }
         for row in 0..ROWS {
             for column in 0..4 {
                 if entry::depends_on_rotation(row, column) {
-                    rotor[row] -= e[entry::damping(row, column)] * u[ROTOR_TURNS[column]];
+                    rotor[row] -= e[entry::damping(row, column)] * u[ROTOR_ROTATIONS[column]];
                 }
             }
         }
-        let rotation = rotor_at.inverse_inertia.times(&[rotor[2], rotor[3], rotor[4], rotor[5]]);
-        let mut midpoint = [(rotor[0] * c.rotor_per_mass).v(), (rotor[1] * c.rotor_per_mass).v()];
+        let rotation =
+            rotor_arrays.inverse_inertia.times(&[rotor[2], rotor[3], rotor[4], rotor[5]]);
+        let mut midpoint = [
+            (rotor[0] * constants.rotor_inverse_mass).v(),
+            (rotor[1] * constants.rotor_inverse_mass).v(),
+        ];
         for r in 0..4 {
             if r > 0 {
                 midpoint[0] -= arm[r][0] * rotation[r];
@@ -459,31 +473,31 @@ impl<T: Lane> HalfAccelerations<T> {
     #[inline(always)]
     fn add_bearing_reaction(
         &mut self,
-        c: &StepConstants<T>,
-        rotor: &RotorPerLoad<T>,
-        on_tub: &[N<T>; 4],
+        constants: &StepConstants<T>,
+        rotor: &RotorLoadResponse<T>,
+        tub_load: &[N<T>; 4],
     ) {
         for column in 0..4 {
             for row in 0..4 {
-                self.tub[row] -= c.tub_per_load[row][column] * on_tub[column];
-                self.rotation[row] -= rotor.rotation[row][column] * on_tub[column];
+                self.tub[row] -= constants.tub_per_load[row][column] * tub_load[column];
+                self.rotation[row] -= rotor.rotation[row][column] * tub_load[column];
             }
             for i in 0..2 {
-                self.midpoint[i] -= rotor.translation[i][column] * on_tub[column];
+                self.midpoint[i] -= rotor.translation[i][column] * tub_load[column];
             }
         }
     }
 
     #[inline(always)]
-    fn in_order(&self) -> [N<T>; COORDINATES] {
-        in_coordinate_order(&self.tub, &self.midpoint, &self.rotation)
+    fn to_coordinates(&self) -> [N<T>; COORDINATES] {
+        to_coordinate_order(&self.tub, &self.midpoint, &self.rotation)
     }
 }
 
 /// Arranges the accelerations of the tub, of the rotor's midpoint and of the rotor's rotations in
 /// the order of the coordinates.
 #[inline(always)]
-fn in_coordinate_order<T: Copy>(
+fn to_coordinate_order<T: Copy>(
     tub: &[N<T>; 4],
     midpoint: &[N<T>; 2],
     rotation: &[N<T>; 4],

@@ -9,7 +9,7 @@ pub(crate) struct Symmetric4<T>(pub(crate) [[N<T>; 4]; 4]);
 impl<T: Real> Symmetric4<T> {
     /// Returns entry (row, column) of either triangle.
     #[inline(always)]
-    pub(crate) fn at(&self, row: usize, column: usize) -> N<T> {
+    pub(crate) fn entry(&self, row: usize, column: usize) -> N<T> {
         if row < column { self.0[column][row] } else { self.0[row][column] }
     }
 
@@ -18,23 +18,23 @@ impl<T: Real> Symmetric4<T> {
     pub(crate) fn times(&self, v: &[N<T>; 4]) -> [N<T>; 4] {
         let mut product = *v;
         for row in 0..4 {
-            product[row] = (self.at(row, 0) * v[0]).v();
+            product[row] = (self.entry(row, 0) * v[0]).v();
             for column in 1..4 {
-                product[row] += self.at(row, column) * v[column];
+                product[row] += self.entry(row, column) * v[column];
             }
         }
         product
     }
 
-    /// Inverts a positive definite matrix by 2x2 blocks, with M = [A, B^T; B, D] and the Schur
-    /// complement S = D - B A^-1 B^T. Two divisions make a shorter chain of dependent operations
-    /// than four pivots.
+    /// Returns the inverse of a positive definite matrix by 2x2 blocks, with M = [A, B^T; B, D] and
+    /// the Schur complement S = D - B A^-1 B^T. Two divisions make a shorter chain of dependent
+    /// operations than four pivots.
     #[inline(always)]
     pub(crate) fn inverse(&self) -> Self {
         let m = &self.0;
         let zero = m[0][0].lit(0.0);
         let mut inverse = [[zero; 4]; 4];
-        let a = inverse_2([m[0][0], m[1][0], m[1][1]]);
+        let a = invert_2x2([m[0][0], m[1][0], m[1][1]]);
         // W = B A^-1
         let mut w = [[zero; 2]; 2];
         for i in 0..2 {
@@ -48,7 +48,7 @@ impl<T: Real> Symmetric4<T> {
             s[1] -= w[1][j] * m[2][j];
             s[2] -= w[1][j] * m[3][j];
         }
-        let s = inverse_2(s);
+        let s = invert_2x2(s);
         // Z = S^-1 W
         let mut z = [[zero; 2]; 2];
         for i in 0..2 {
@@ -67,11 +67,11 @@ impl<T: Real> Symmetric4<T> {
     }
 }
 
-/// Inverts a symmetric 2x2 matrix, given and returned by its entries (0, 0), (1, 0) and (1, 1).
+/// Inverts a symmetric 2x2 matrix; matrix and inverse have the entries (0, 0), (1, 0) and (1, 1).
 #[inline(always)]
-fn inverse_2<T: Real>([a, b, d]: [N<T>; 3]) -> [N<T>; 3] {
-    let per_determinant = (a * d - (b * b).v()).recip();
-    [(d * per_determinant).v(), -(b * per_determinant).v(), (a * per_determinant).v()]
+fn invert_2x2<T: Real>([a, b, d]: [N<T>; 3]) -> [N<T>; 3] {
+    let inverse_determinant = (a * d - (b * b).v()).recip();
+    [(d * inverse_determinant).v(), -(b * inverse_determinant).v(), (a * inverse_determinant).v()]
 }
 
 #[cfg(test)]
@@ -82,7 +82,7 @@ mod tests {
     fn the_inverse_times_the_matrix_is_the_identity() {
         let mut random = fastrand::Rng::with_seed(7);
         for _ in 0..100 {
-            // G G^T + 0.1 is positive definite and not nearly singular.
+            // The matrix G G^T + 0.1 is positive definite and far from singular.
             let g: [[f64; 4]; 4] =
                 core::array::from_fn(|_| core::array::from_fn(|_| random.f64() - 0.5));
             let matrix = Symmetric4(core::array::from_fn(|i| {
@@ -93,7 +93,7 @@ mod tests {
             }));
             let inverse = matrix.inverse();
             for j in 0..4 {
-                let column = core::array::from_fn(|i| inverse.at(i, j));
+                let column = core::array::from_fn(|i| inverse.entry(i, j));
                 for (i, entry) in matrix.times(&column).into_iter().enumerate() {
                     let expected = if i == j { 1.0 } else { 0.0 };
                     assert!((entry.0 - expected).abs() < 1e-12, "({i}, {j}): {}", entry.0);

@@ -6,24 +6,25 @@ use lane_ode::{N, Real};
 use crate::Machine;
 use crate::lanes::lane_struct;
 
-/// The greatest number of feet.
-pub(crate) const FEET: usize = 4;
+/// The greatest number of feet of a cabinet.
+pub(crate) const MAX_FEET: usize = 4;
 
 /// The number of components of a load on the cabinet: the force along c1, c2 and c3 (N), then the
 /// moment about O (N m).
-pub(crate) const LOAD: usize = 6;
+pub(crate) const LOAD_COMPONENTS: usize = 6;
 
-/// A number added to the sum of the feet's loads (N), by which other numbers are divided. Basis:
-/// negligible beside any load. Doubling it changes nothing.
-const SMALL_LOAD_N: f64 = 1e-9;
+/// The load added to the sum of the feet's loads (N), so that divisions by the sum are finite if no
+/// foot carries a load. Basis: negligible against any load. Doubling it changes nothing.
+const REGULARISING_LOAD_N: f64 = 1e-9;
 
-/// The least arm at which the floor takes a moment (m). Basis: the radius of a foot's pad, at which
-/// a single loaded foot takes it. Doubling it halves the force that a moment takes from that foot.
+/// The minimum lever arm (m) at which the floor's friction balances a moment about the vertical.
+/// Basis: the radius of a foot's pad, by which a single loaded foot balances such a moment.
+/// Doubling it halves the friction that a moment needs at a single loaded foot.
 const MIN_ARM_M: f64 = 0.01;
 
-/// The least determinant of the feet's second moments, relative to the square of their trace, below
-/// which the feet are in a line. Basis: far below that of any cabinet, far above rounding. Doubling
-/// it refuses feet that are 1.4 times as far from a line.
+/// The determinant of the matrix of the feet's second moments, relative to the square of the trace,
+/// up to which the feet count as being in a line. Basis: far below the value of any cabinet, far
+/// above rounding. Doubling it refuses feet that are up to 1.4 times as far from a line.
 const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 
 /// The distribution of loads on the cabinet over its feet.
@@ -39,16 +40,16 @@ pub(crate) struct Feet {
 }
 
 lane_struct! {
-    /// The coefficients of the distribution. Entries beyond the last foot repeat the place of the
-    /// first and carry nothing.
+    /// The coefficients of the distribution. Entries beyond the last foot repeat the position of
+    /// the first foot and carry no load.
     #[derive(Clone, Copy, Debug)]
     LoadDistribution {
-        /// The vertical load of each foot by the cabinet's own weight (N).
-        own_loads: [N<T>; FEET],
+        /// The vertical load of each foot by the weight of the cabinet (N).
+        weight_loads: [N<T>; MAX_FEET],
         /// The vertical load of each foot per component of a load on the cabinet.
-        shares: [[N<T>; LOAD]; FEET],
+        loads_per_component: [[N<T>; LOAD_COMPONENTS]; MAX_FEET],
         /// The position of each foot along c1 and c3 (m).
-        positions: [[N<T>; 2]; FEET],
+        positions: [[N<T>; 2]; MAX_FEET],
         /// The coefficient of friction.
         friction: N<T>,
         /// The weight of the cabinet (N).
@@ -62,7 +63,7 @@ impl Feet {
     pub(crate) fn new(machine: &Machine) -> Option<Self> {
         let cabinet = machine.cabinet?;
         let count = machine.feet.len();
-        if !(3..=FEET).contains(&count) {
+        if !(3..=MAX_FEET).contains(&count) {
             return None;
         }
         let mean = |axis: usize| {
@@ -76,26 +77,26 @@ impl Feet {
             .collect();
         let sum = |term: fn(&[f64; 2]) -> f64| positions.iter().map(term).sum::<f64>();
         let [xx, xz, zz] = [sum(|p| p[0] * p[0]), sum(|p| p[0] * p[1]), sum(|p| p[1] * p[1])];
-        let det = xx * zz - xz * xz;
-        let span = xx + zz;
-        if det.is_nan() || det <= COLLINEARITY_TOLERANCE * span * span {
+        let determinant = xx * zz - xz * xz;
+        let trace = xx + zz;
+        if determinant.is_nan() || determinant <= COLLINEARITY_TOLERANCE * trace * trace {
             return None;
         }
         let weight_n = cabinet.mass_kg * machine.gravity_m_per_s2;
         let [centre_x, _, centre_z] = cabinet.centre_m;
-        let mut own_loads = [N(0.0); FEET];
-        let mut shares = [[N(0.0); LOAD]; FEET];
+        let mut weight_loads = [N(0.0); MAX_FEET];
+        let mut loads_per_component = [[N(0.0); LOAD_COMPONENTS]; MAX_FEET];
         for (k, [x, z]) in positions.into_iter().enumerate() {
-            // The foot's shares of the sum of loads, and of their first moments about the feet's
-            // mean position.
+            // The load of this foot per unit of the sum of all loads, and per unit of their first
+            // moments about the feet's mean position.
             let per_sum = 1.0 / count as f64;
-            let per_x = (zz * x - xz * z) / det;
-            let per_z = (xx * z - xz * x) / det;
-            own_loads[k] =
+            let per_x = (zz * x - xz * z) / determinant;
+            let per_z = (xx * z - xz * x) / determinant;
+            weight_loads[k] =
                 N(weight_n * (per_sum + per_x * (centre_x - mean_x) + per_z * (centre_z - mean_z)));
-            // The sum of loads is -F_y, their first moments in x and z are -M_z - y F_x and M_x - y
-            // F_z.
-            shares[k] = [
+            // The sum of the feet's loads is -F_y, the first moments of the loads in x and z are
+            // -M_z - y F_x and M_x - y F_z.
+            loads_per_component[k] = [
                 -per_x * mean_y,
                 per_x * mean_x + per_z * mean_z - per_sum,
                 -per_z * mean_y,
@@ -105,46 +106,53 @@ impl Feet {
             ]
             .map(N);
         }
-        let place = |k: usize| machine.feet[if k < count { k } else { 0 }].foot_m;
-        let positions = core::array::from_fn(|k| [place(k)[0], place(k)[2]].map(N));
+        let foot_position = |k: usize| machine.feet[if k < count { k } else { 0 }].foot_m;
+        let positions = core::array::from_fn(|k| [foot_position(k)[0], foot_position(k)[2]].map(N));
         let friction = N(cabinet.friction);
         let weight = N(weight_n);
         Some(Self {
             count,
-            distribution: LoadDistribution { own_loads, shares, positions, friction, weight },
+            distribution: LoadDistribution {
+                weight_loads,
+                loads_per_component,
+                positions,
+                friction,
+                weight,
+            },
         })
     }
 
     /// Returns the vertical loads of the feet (N) under a load on the cabinet.
-    pub(crate) fn loads_n(&self, load: &[f64; LOAD]) -> Vec<f64> {
+    pub(crate) fn loads_n(&self, load: &[f64; LOAD_COMPONENTS]) -> Vec<f64> {
         let foot_load_n = |k: usize| {
-            let shares = self.distribution.shares[k].iter().zip(load);
-            self.distribution.own_loads[k].0
-                + shares.map(|(share, load)| share.0 * load).sum::<f64>()
+            let loads_per_component = self.distribution.loads_per_component[k].iter().zip(load);
+            self.distribution.weight_loads[k].0
+                + loads_per_component.map(|(share, load)| share.0 * load).sum::<f64>()
         };
         (0..self.count).map(foot_load_n).collect()
     }
 
     /// Returns the margin against slipping (N) under a load on the cabinet.
-    pub(crate) fn slip_margin_n(&self, load: &[f64; LOAD]) -> f64 {
-        let [along_x, along_y, along_z, ..] = *load;
+    pub(crate) fn slip_margin_n(&self, load: &[f64; LOAD_COMPONENTS]) -> f64 {
+        let [force_x, force_y, force_z, ..] = *load;
         let LoadDistribution { friction: N(friction), weight: N(weight_n), .. } = self.distribution;
-        friction * (weight_n - along_y) - (along_x * along_x + along_z * along_z).sqrt()
+        friction * (weight_n - force_y) - (force_x * force_x + force_z * force_z).sqrt()
     }
 
-    /// Returns the margin against walking (N) under a load on the cabinet: against slipping,
+    /// Returns the margin against walking (N) under a load on the cabinet; walking is slipping,
     /// turning or both.
-    pub(crate) fn walk_margin_n(&self, load: &[f64; LOAD]) -> f64 {
-        let mut foot_loads = [N(0.0); FEET];
-        for (foot_loads, load_n) in foot_loads.iter_mut().zip(self.loads_n(load)) {
-            *foot_loads = N(load_n);
+    pub(crate) fn walk_margin_n(&self, load: &[f64; LOAD_COMPONENTS]) -> f64 {
+        let mut foot_loads = [N(0.0); MAX_FEET];
+        for (foot_load, load_n) in foot_loads.iter_mut().zip(self.loads_n(load)) {
+            *foot_load = N(load_n);
         }
         self.slip_margin_n(load)
             - turning_force_n(&self.distribution.positions, &foot_loads, &load.map(N)).0
     }
 
-    /// Returns the vertical loads of the feet (N) before the machine sags.
-    pub(crate) fn at_rest_n(&self, machine: &Machine) -> Vec<f64> {
+    /// Returns the vertical loads of the feet (N) under the weight of the machine at rest, with all
+    /// bodies at their positions before the machine sags.
+    pub(crate) fn rest_loads_n(&self, machine: &Machine) -> Vec<f64> {
         let bodies = [
             (machine.tub.mass_kg, machine.tub.centre_x_m),
             (machine.shaft.mass_kg, machine.shaft.centre_x_m),
@@ -161,44 +169,45 @@ impl Feet {
     }
 }
 
-/// Returns the part of the margin against slipping (N) that a load's moment about the vertical
-/// uses.
+/// Returns the part of the margin against slipping (N) that a load's moment about the vertical uses
+/// up.
 ///
 /// The cabinet stays in place if the floor force of each foot is within the foot's friction. The
-/// feet share the horizontal force in proportion to their loads, which balances it with a moment
-/// about the centre of the loads left over. Forces across the arms from that centre, in proportion
-/// to load and arm, balance the moment and have no resultant. The sum of both is greatest, relative
-/// to the load, at the foot with the longest arm.
+/// feet share the horizontal force in proportion to their loads; this leaves a moment about the
+/// centre of the loads. Forces across the arms from that centre, in proportion to load and arm,
+/// balance the moment and have no resultant. The sum of the magnitudes of both forces, relative to
+/// the foot's load, is greatest at the foot with the longest arm.
 #[inline(always)]
 pub(crate) fn turning_force_n<T: Real>(
-    positions: &[[N<T>; 2]; FEET],
-    foot_loads: &[N<T>; FEET],
-    load: &[N<T>; LOAD],
+    positions: &[[N<T>; 2]; MAX_FEET],
+    foot_loads: &[N<T>; MAX_FEET],
+    load: &[N<T>; LOAD_COMPONENTS],
 ) -> N<T> {
     let zero = load[0].lit(0.0);
-    let mut sum = load[0].lit(SMALL_LOAD_N);
+    let mut total_load = load[0].lit(REGULARISING_LOAD_N);
     let mut moments = [zero; 2];
-    let mut carrying_loads = *foot_loads;
-    for k in 0..FEET {
-        // A foot that would lift has no friction.
-        carrying_loads[k] = foot_loads[k].where_less(zero, zero, foot_loads[k]);
-        sum += carrying_loads[k];
-        moments[0] += carrying_loads[k] * positions[k][0];
-        moments[1] += carrying_loads[k] * positions[k][1];
+    let mut positive_loads = *foot_loads;
+    for k in 0..MAX_FEET {
+        // A foot with a negative load would lift, and has no friction.
+        positive_loads[k] = foot_loads[k].where_less(zero, zero, foot_loads[k]);
+        total_load += positive_loads[k];
+        moments[0] += positive_loads[k] * positions[k][0];
+        moments[1] += positive_loads[k] * positions[k][1];
     }
-    let [x, z] = [moments[0] / sum, moments[1] / sum];
-    let mut second_moment = load[0].lit(SMALL_LOAD_N);
+    let centre = [moments[0] / total_load, moments[1] / total_load];
+    let mut second_moment = load[0].lit(REGULARISING_LOAD_N);
     let mut max_squared_arm = zero;
-    for k in 0..FEET {
-        let [arm_x, arm_z] = [positions[k][0] - x, positions[k][1] - z];
-        let squared = arm_x * arm_x + arm_z * arm_z;
-        second_moment += carrying_loads[k] * squared;
-        max_squared_arm = max_squared_arm.where_less(squared, squared, max_squared_arm);
+    for k in 0..MAX_FEET {
+        let [arm_x, arm_z] = [positions[k][0] - centre[0], positions[k][1] - centre[1]];
+        let squared_arm = arm_x * arm_x + arm_z * arm_z;
+        second_moment += positive_loads[k] * squared_arm;
+        max_squared_arm = max_squared_arm.where_less(squared_arm, squared_arm, max_squared_arm);
     }
     let max_arm_m = max_squared_arm.sqrt();
-    let least = (load[0].lit(MIN_ARM_M) * max_arm_m * sum).v();
-    let moment = load[4] - (z * load[0] - x * load[2]);
-    moment.abs() * max_arm_m * sum / second_moment.where_less(least, least, second_moment)
+    let min_second_moment = (load[0].lit(MIN_ARM_M) * max_arm_m * total_load).v();
+    let moment = load[4] - (centre[1] * load[0] - centre[0] * load[2]);
+    moment.abs() * max_arm_m * total_load
+        / second_moment.where_less(min_second_moment, min_second_moment, second_moment)
 }
 
 #[cfg(test)]
@@ -215,7 +224,7 @@ mod tests {
     }
 
     /// Computes the force and the moment about O that remain after adding the floor's forces.
-    fn residual(machine: &Machine, load: &[f64; LOAD]) -> [f64; LOAD] {
+    fn residual(machine: &Machine, load: &[f64; LOAD_COMPONENTS]) -> [f64; LOAD_COMPONENTS] {
         let feet = Feet::new(machine).unwrap();
         let cross = |a: [f64; 3], b: [f64; 3]| {
             [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
@@ -227,8 +236,8 @@ mod tests {
             forces.push((foot.foot_m, [-share * load[0], load_n, -share * load[2]]));
         }
         let mut sum = *load;
-        for (at, force) in forces {
-            let moment = cross(at, force);
+        for (position, force) in forces {
+            let moment = cross(position, force);
             for i in 0..3 {
                 sum[i] += force[i];
                 sum[3 + i] += moment[i];
@@ -237,99 +246,116 @@ mod tests {
         sum
     }
 
-    const CORNERS: [[f64; 3]; 4] =
+    const CORNER_FEET: [[f64; 3]; 4] =
         [[0.5, -0.5, 0.25], [0.5, -0.5, -0.25], [-0.1, -0.5, 0.25], [-0.1, -0.5, -0.25]];
 
     #[test]
     fn loads_of_feet_balance_forces_and_moments() {
         let load = [30.0, -350.0, 40.0, 12.0, 5.0, -70.0];
-        for feet in [&CORNERS[..], &[[0.5, -0.5, 0.2], [0.45, -0.5, -0.3], [-0.1, -0.5, 0.1]]] {
+        for feet in [&CORNER_FEET[..], &[[0.5, -0.5, 0.2], [0.45, -0.5, -0.3], [-0.1, -0.5, 0.1]]] {
             let machine = machine_on(feet);
             let residual = residual(&machine, &load);
-            // The moment about the vertical (component 4) is balanced by friction, not by these
-            // loads.
+            // The moment about the vertical (component 4) is balanced by friction, not by the
+            // vertical loads.
             for i in [0, 1, 2, 3, 5] {
                 assert!(residual[i].abs() < 1e-10, "{i}: {}", residual[i]);
             }
         }
     }
 
-    // The floor's forces, foot by foot, balance the load. The margin is zero where the first of
-    // them, with its two parts added by magnitude, reaches the friction of its foot.
+    // The floor's forces on all feet balance the load. The margin is zero when, at one foot, the
+    // sum of the magnitudes of the force's two parts (see [`turning_force_n`]) equals the foot's
+    // friction.
     #[test]
     fn a_margin_against_walking_keeps_every_foot_within_its_friction() {
-        let mut decided = 0;
-        for feet in [&CORNERS[..], &[[0.5, -0.5, 0.2], [0.45, -0.5, -0.3], [-0.1, -0.5, 0.1]]] {
+        let mut turning_cases = 0;
+        for feet in [&CORNER_FEET[..], &[[0.5, -0.5, 0.2], [0.45, -0.5, -0.3], [-0.1, -0.5, 0.1]]] {
             let machine = machine_on(feet);
-            let feet_of = Feet::new(&machine).unwrap();
+            let distribution = Feet::new(&machine).unwrap();
             for seed in 0..200_u32 {
-                let draw = |k: u32| f64::from((seed * 7919 + k * 104_729) % 2003) / 1001.5 - 1.0;
-                let load =
-                    [60.0 * draw(1), -350.0 + 90.0 * draw(2), 60.0 * draw(3), 12.0 * draw(4)];
-                let load = [load[0], load[1], load[2], load[3], 160.0 * draw(5), -70.0];
-                let loads_n = feet_of.loads_n(&load);
-                let all_n: f64 = loads_n.iter().sum();
+                let random = |k: u32| f64::from((seed * 7919 + k * 104_729) % 2003) / 1001.5 - 1.0;
+                let load = [
+                    60.0 * random(1),
+                    -350.0 + 90.0 * random(2),
+                    60.0 * random(3),
+                    12.0 * random(4),
+                ];
+                let load = [load[0], load[1], load[2], load[3], 160.0 * random(5), -70.0];
+                let loads_n = distribution.loads_n(&load);
+                let total_n: f64 = loads_n.iter().sum();
                 if loads_n.iter().any(|n| *n < 1.0) {
                     continue;
                 }
                 let mean = |axis: usize| {
                     let moments = feet.iter().zip(&loads_n).map(|(foot, n)| foot[axis] * n);
-                    moments.sum::<f64>() / all_n
+                    moments.sum::<f64>() / total_n
                 };
                 let arms: Vec<[f64; 2]> =
                     feet.iter().map(|foot| [foot[0] - mean(0), foot[2] - mean(2)]).collect();
                 let second_moment: f64 =
                     arms.iter().zip(&loads_n).map(|([x, z], n)| n * (x * x + z * z)).sum();
-                let about = |force: [f64; 2], at: [f64; 2]| at[1] * force[0] - at[0] * force[1];
-                let moment = load[4] - about([load[0], load[2]], [mean(0), mean(2)]);
+                let moment_about = |force: [f64; 2], position: [f64; 2]| {
+                    position[1] * force[0] - position[0] * force[1]
+                };
+                let moment = load[4] - moment_about([load[0], load[2]], [mean(0), mean(2)]);
                 let mut sum = [0.0; 2];
-                let mut moment_held = 0.0;
-                let mut most = 0.0_f64;
+                let mut friction_moment = 0.0;
+                let mut max_friction_ratio = 0.0_f64;
                 for (([x, z], foot), n) in arms.iter().zip(feet).zip(&loads_n) {
-                    let [shared, turned] = [n / all_n, moment * n / second_moment];
-                    let force = [-load[0] * shared - turned * z, -load[2] * shared + turned * x];
+                    let [load_share, turning_factor] = [n / total_n, moment * n / second_moment];
+                    let force = [
+                        -load[0] * load_share - turning_factor * z,
+                        -load[2] * load_share + turning_factor * x,
+                    ];
                     sum = [sum[0] + force[0], sum[1] + force[1]];
-                    moment_held += about(force, [foot[0], foot[2]]);
+                    friction_moment += moment_about(force, [foot[0], foot[2]]);
                     assert!(
-                        (0.4 * n - force[0].hypot(force[1])) / n * all_n
-                            >= feet_of.walk_margin_n(&load) - 1e-9
+                        (0.4 * n - force[0].hypot(force[1])) / n * total_n
+                            >= distribution.walk_margin_n(&load) - 1e-9
                     );
-                    let both = load[0].hypot(load[2]) * shared + turned.abs() * x.hypot(*z);
-                    most = most.max(both / n);
+                    let added_magnitudes =
+                        load[0].hypot(load[2]) * load_share + turning_factor.abs() * x.hypot(*z);
+                    max_friction_ratio = max_friction_ratio.max(added_magnitudes / n);
                 }
                 assert!((sum[0] + load[0]).abs() < 1e-9 && (sum[1] + load[2]).abs() < 1e-9);
-                assert!((moment_held + load[4]).abs() < 1e-9, "{moment_held} for {}", load[4]);
-                let margin_n = (0.4 - most) * all_n;
-                let found_n = feet_of.walk_margin_n(&load);
-                assert!((found_n - margin_n).abs() < 1e-6, "{found_n} for {margin_n}");
-                assert!(found_n <= feet_of.slip_margin_n(&load));
-                decided += i32::from((found_n < 0.0) != (feet_of.slip_margin_n(&load) < 0.0));
+                assert!(
+                    (friction_moment + load[4]).abs() < 1e-9,
+                    "{friction_moment} for {}",
+                    load[4]
+                );
+                let expected_n = (0.4 - max_friction_ratio) * total_n;
+                let computed_n = distribution.walk_margin_n(&load);
+                assert!((computed_n - expected_n).abs() < 1e-6, "{computed_n} for {expected_n}");
+                assert!(computed_n <= distribution.slip_margin_n(&load));
+                turning_cases +=
+                    i32::from((computed_n < 0.0) != (distribution.slip_margin_n(&load) < 0.0));
             }
         }
-        assert!(decided > 20, "{decided} turn before they slip");
+        assert!(turning_cases > 20, "{turning_cases} turn before they slip");
     }
 
     #[test]
-    fn a_single_loaded_foot_takes_moments_at_the_radius_of_its_pad() {
-        let feet = Feet::new(&machine_on(&CORNERS)).unwrap();
-        let mut alone = 0;
+    fn a_single_loaded_foot_balances_moments_at_the_radius_of_its_pad() {
+        let feet = Feet::new(&machine_on(&CORNER_FEET)).unwrap();
+        let mut single_foot_cases = 0;
         for tilt_n_m in (0..200).map(f64::from) {
             let load = [20.0, 400.0, 30.0, 50.0, 25.0, -tilt_n_m];
-            let carrying = feet.loads_n(&load).iter().filter(|n| **n > 0.0).count();
-            let taken_n = feet.slip_margin_n(&load) - feet.walk_margin_n(&load);
-            assert!((0.0..1e4).contains(&taken_n), "{taken_n} N with {carrying} feet");
-            alone += i32::from(carrying == 1);
+            let loaded_feet = feet.loads_n(&load).iter().filter(|n| **n > 0.0).count();
+            let turning_n = feet.slip_margin_n(&load) - feet.walk_margin_n(&load);
+            assert!((0.0..1e4).contains(&turning_n), "{turning_n} N with {loaded_feet} feet");
+            single_foot_cases += i32::from(loaded_feet == 1);
         }
-        assert!(alone > 0);
+        assert!(single_foot_cases > 0);
     }
 
     #[test]
-    fn at_rest_feet_carry_the_weight() {
-        let machine = machine_on(&CORNERS);
-        let loads_n = Feet::new(&machine).unwrap().at_rest_n(&machine);
+    fn feet_carry_the_weight_at_rest() {
+        let machine = machine_on(&CORNER_FEET);
+        let loads_n = Feet::new(&machine).unwrap().rest_loads_n(&machine);
         let weight_n = 9.81 * (30.0 + 23.87 + 4.34 + 3.64 + 0.4);
         assert!((loads_n.iter().sum::<f64>() - weight_n).abs() < 1e-9, "{loads_n:?}");
-        // The cabinet's centre is towards c3, so that the feet there carry more.
+        // The cabinet's mass centre is offset towards c3, so that the first and the third foot
+        // carry more.
         assert!(loads_n[0] > loads_n[1] && loads_n[2] > loads_n[3], "{loads_n:?}");
     }
 
@@ -337,6 +363,6 @@ mod tests {
     fn feet_in_a_line_are_refused() {
         let line = [[0.0, -0.5, 0.0], [0.1, -0.5, 0.1], [0.3, -0.5, 0.3]];
         assert!(Feet::new(&machine_on(&line)).is_none());
-        assert!(Feet::new(&machine_on(&CORNERS[..2])).is_none());
+        assert!(Feet::new(&machine_on(&CORNER_FEET[..2])).is_none());
     }
 }

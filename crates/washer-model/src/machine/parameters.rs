@@ -22,36 +22,36 @@ use table::{LISTS, TABLE};
 pub struct MachineParameter {
     name: Cow<'static, str>,
     row: &'static ParameterRow,
-    /// The index of the element, from 0; 0 for a number that is not of a list.
+    /// The index of the element, from 0; 0 for a number that does not belong to a list.
     index: usize,
 }
 
 /// The greatest coordinate of a point on a machine, and of a motion, m. Basis: larger than any
-/// washing machine, smaller than millimetres taken for metres. Doubling it accepts twice as large
-/// machines.
+/// washing machine, smaller than coordinates in millimetres read as metres. Doubling it accepts
+/// machines twice as large.
 pub(crate) const MAX_COORDINATE_M: f64 = 10.0;
 
-/// The target of a parameter.
+/// The object that has the number, or the numbers, of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// A number of the machine.
     Machine,
-    /// A number of the cabinet, which not every machine has.
+    /// A number of the cabinet, which machines may lack.
     Cabinet,
-    /// A number of both bearings, by the name after `bearing_front_` and `bearing_rear_`.
+    /// The number of both bearings with this name after `bearing_front_` and `bearing_rear_`.
     Bearings(&'static str),
-    /// A number of every spring, by the name after `spring_1_`.
+    /// The number of every spring with this name after `spring_1_`.
     Springs(&'static str),
-    /// A number of every damper, by the name after `damper_1_`.
+    /// The number of every damper with this name after `damper_1_`.
     Dampers(&'static str),
     /// A number of the spin's profile, or of a point of the spin's table.
     Spin,
     /// An edge of the window (0: the beginning, 1: the end), which neither machine nor spin holds:
-    /// [`MachineParameter::get`] finds nothing and [`MachineParameter::set`] writes nothing.
+    /// [`MachineParameter::get`] returns `None` and [`MachineParameter::set`] does nothing.
     Window(usize),
 }
 
-/// A row of the table.
+/// A row of the table: the properties of a parameter, which elements of a list share.
 #[derive(Debug)]
 struct ParameterRow {
     /// The name, or the part of the name after `spring_1_` and the like.
@@ -60,20 +60,20 @@ struct ParameterRow {
     description: &'static str,
     source: &'static str,
     range: Range,
-    /// The value where a machine file leaves the number out, if it may.
+    /// The value if a machine file leaves the number out; `None` if the number is required.
     default_value: Option<f64>,
-    /// The rule for the value where a file with a data sheet's numbers leaves it out.
+    /// The rule for the value if a file with a data sheet's numbers leaves the number out.
     assumption: Option<Assumption>,
     target: Target,
-    get: Get,
-    set: Set,
+    get: Getter,
+    set: Setter,
 }
 
-/// A function that reads the number of an element.
-type Get = fn(&Machine, &Spin, usize) -> Option<f64>;
+/// A function that reads a number; the last argument is the element's index.
+type Getter = fn(&Machine, &Spin, usize) -> Option<f64>;
 
-/// A function that writes the number of an element.
-type Set = fn(&mut Machine, &mut Spin, usize, f64);
+/// A function that writes a number; the third argument is the element's index.
+type Setter = fn(&mut Machine, &mut Spin, usize, f64);
 
 /// A list of the machine's elements, which is an array of tables in machine files, or the points of
 /// a spin's table.
@@ -83,11 +83,11 @@ pub struct ElementList {
     pub name: &'static str,
     /// The beginning of the parameters' names, before the number and the row's name.
     pub element: &'static str,
-    /// The number of the first element.
+    /// The number of the first element in parameters' names: 2 for unbalances, else 1.
     pub first: usize,
     /// The function that returns the number of elements of a machine.
     pub count: fn(&Machine) -> usize,
-    /// The function that gives a machine a number of elements, with default values.
+    /// The function that replaces a machine's elements by a number of elements with default values.
     pub fill: fn(&mut Machine, usize),
     rows: &'static [&'static [ParameterRow]],
 }
@@ -98,8 +98,8 @@ impl ElementList {
         LISTS.iter().filter(|list| !list.name.is_empty())
     }
 
-    fn count_in(&self, machine: &Machine, spin: &Spin) -> usize {
-        if self.name.is_empty() { table_points(spin) } else { (self.count)(machine) }
+    fn element_count(&self, machine: &Machine, spin: &Spin) -> usize {
+        if self.name.is_empty() { table_point_count(spin) } else { (self.count)(machine) }
     }
 
     fn rows(&self) -> impl Iterator<Item = &'static ParameterRow> {
@@ -113,12 +113,12 @@ impl ElementList {
 }
 
 impl Target {
-    /// Returns whether the target is several numbers.
+    /// Returns whether the parameter writes several numbers.
     pub const fn has_several_numbers(self) -> bool {
         matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
     }
 
-    /// Checks that machine and spin have a number that is not of a list.
+    /// Checks that machine and spin have the number of a parameter that does not belong to a list.
     fn check_exists(self, machine: &Machine, spin: &Spin) -> Result<(), UnknownParameter> {
         match self {
             Self::Spin if matches!(spin, Spin::Table { .. }) => {
@@ -151,15 +151,15 @@ impl MachineParameter {
     /// by element.
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
         let exists = |row: &&ParameterRow| row.target.check_exists(machine, spin).is_ok();
-        let single = TABLE.iter().filter(exists).map(Self::from_row);
-        let numbered = LISTS.iter().flat_map(|list| {
-            (0..list.count_in(machine, spin))
+        let single_parameters = TABLE.iter().filter(exists).map(Self::from_row);
+        let list_parameters = LISTS.iter().flat_map(|list| {
+            (0..list.element_count(machine, spin))
                 .flat_map(move |k| list.rows().map(move |row| list.parameter(row, k)))
         });
-        single.chain(numbered).collect()
+        single_parameters.chain(list_parameters).collect()
     }
 
-    /// Returns the parameter of a name.
+    /// Returns the parameter with a name.
     ///
     /// # Errors
     /// A name that the table does not have, or a number that the machine or the spin does not have.
@@ -173,7 +173,7 @@ impl MachineParameter {
                     .rows()
                     .find(|row| row.name == rest)
                     .ok_or_else(UnknownParameter::strange)?;
-                let count = list.count_in(machine, spin);
+                let count = list.element_count(machine, spin);
                 return match number.checked_sub(list.first) {
                     Some(k) if k < count => Ok(list.parameter(row, k)),
                     _ => {
@@ -203,7 +203,6 @@ impl MachineParameter {
         self.row.unit
     }
 
-    /// Returns the description.
     pub fn description(&self) -> &'static str {
         self.row.description
     }
@@ -224,17 +223,16 @@ impl MachineParameter {
         }
     }
 
-    /// Returns the value where a machine file leaves the number out, if it may.
+    /// Returns the value if a machine file leaves the number out; `None` if the number is required.
     pub fn default_value(&self) -> Option<f64> {
         self.row.default_value
     }
 
-    /// Returns the rule for the value where a file with a data sheet's numbers leaves it out.
+    /// Returns the rule for the value if a file with a data sheet's numbers leaves the number out.
     pub fn assumption(&self) -> Option<&'static Assumption> {
         self.row.assumption.as_ref()
     }
 
-    /// Returns the target.
     pub fn target(&self) -> Target {
         self.row.target
     }
@@ -273,7 +271,7 @@ impl MachineParameter {
     }
 }
 
-/// Returns a noun in the form for a count.
+/// Returns a noun in the singular or the plural, by a count.
 fn plural(noun: &str, count: usize) -> String {
     match (noun, count) {
         (_, 1) => noun.to_owned(),
@@ -283,7 +281,7 @@ fn plural(noun: &str, count: usize) -> String {
 }
 
 /// Returns the number of points of a spin's table.
-fn table_points(spin: &Spin) -> usize {
+fn table_point_count(spin: &Spin) -> usize {
     match spin {
         Spin::Table { time_s, speed_rpm } => time_s.len().min(speed_rpm.len()),
         Spin::Ramped { .. } => 0,
@@ -294,26 +292,26 @@ fn table_points(spin: &Spin) -> usize {
 /// `"tub_x_m"`. It refuses `spring_02_`, so that each number has one name.
 fn split_numbered<'a>(name: &'a str, element: &str) -> Option<(usize, &'a str)> {
     let (digits, rest) = name.strip_prefix(element)?.strip_prefix('_')?.split_once('_')?;
-    let canonical = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
-    let number: usize = if canonical { digits.parse().ok()? } else { return None };
+    let is_canonical = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
+    let number: usize = if is_canonical { digits.parse().ok()? } else { return None };
     Some((number, rest))
 }
 
-/// Returns the value that all items share.
+/// Returns the value that all items share; `None` if items differ or are missing.
 fn common_value<T>(items: &[T], value: fn(&T) -> f64) -> Option<f64> {
     let first = value(items.first()?);
     items.iter().all(|item| value(item).to_bits() == first.to_bits()).then_some(first)
 }
 
 impl Spring {
-    /// Returns the distance between the given ends, before the machine sags, m.
+    /// Returns the distance between the given ends before the machine sags (m).
     pub fn given_length_m(&self) -> f64 {
         distance_m(self.cabinet_m, self.tub_m)
     }
 }
 
 impl Damper {
-    /// Returns the distance between the given ends, before the machine sags, m.
+    /// Returns the distance between the given ends before the machine sags (m).
     pub fn given_length_m(&self) -> f64 {
         distance_m(self.cabinet_m, self.tub_m)
     }

@@ -8,7 +8,7 @@ use crate::lanes::lane_struct;
 use core::f64::consts::TAU;
 use lane_ode::{Lane, N, Real, trig};
 
-/// The speed of the drum over time, as a user describes it. Speeds are in rpm, times in s.
+/// The prescribed speed of the drum over time. Speeds are in rpm, times in s.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Spin {
     /// A profile with a ramp to a peak.
@@ -43,7 +43,8 @@ sweep_parameter::named! {
 }
 
 lane_struct! {
-    /// The spin at an instant, as the equations read it.
+    /// The spin at an instant: sines and cosines of the angle theta and of 2 theta, speed and
+    /// acceleration.
     #[derive(Clone, Copy, Debug)]
     SpinState {
         sin,
@@ -73,10 +74,10 @@ lane_struct! {
     /// A segment of a spin profile over which one formula holds:
     /// turns = turns_at_start + a t + b t^2 + c (cos(2 pi f t) - 1), t from the segment's start.
     #[derive(Clone, Copy, Debug)]
-    SpinLanes {
+    SpinSegmentLanes {
         /// The start time; a segment ends where the next one starts.
         start_s,
-        /// The fractional part of the turns made before.
+        /// The fractional part of the turns made before the segment.
         turns_at_start,
         /// The coefficient a.
         turns_per_s,
@@ -90,9 +91,9 @@ lane_struct! {
 }
 
 /// A segment of one machine's spin.
-pub(crate) type SpinStretch = SpinLanes<f64>;
+pub(crate) type SpinSegment = SpinSegmentLanes<f64>;
 
-impl SpinStretch {
+impl SpinSegment {
     /// Returns the segment of a drum at constant speed, with its unbalance up at time 0.
     pub(crate) fn steady(speed_rpm: f64) -> Self {
         Self { turns_per_s: N(speed_rpm / 60.0), ..Self::at_rest(0.0, 0.0) }
@@ -110,41 +111,41 @@ impl SpinStretch {
 }
 
 impl Spin {
-    /// Returns the profile as segments in order of time, the first from 0.
-    pub(crate) fn stretches(&self) -> Vec<SpinStretch> {
+    /// Returns the spin as segments in order of time; the first starts at 0.
+    pub(crate) fn segments(&self) -> Vec<SpinSegment> {
         let per_s = |rpm: f64| rpm / 60.0;
         match self {
             Self::Ramped { profile: Profile::Cycloidal, peak_rpm, ramp_s } => {
                 let peak = per_s(*peak_rpm);
                 // Eq. 42 integrated: theta = w (t^2 / 2T + T (cos(2 pi t / T) - 1) / 4 pi^2).
-                let up = SpinStretch {
+                let ramp = SpinSegment {
                     turns_per_s2: N(peak / (2.0 * ramp_s)),
                     wave_turns: N(peak * ramp_s / (TAU * TAU)),
                     wave_hz: N(1.0 / ramp_s),
-                    ..SpinStretch::at_rest(0.0, 0.0)
+                    ..SpinSegment::at_rest(0.0, 0.0)
                 };
-                let turns = up.turns_at_start.0 + fractional_turns_of_ramp(0.0, peak, *ramp_s);
-                let level =
-                    SpinStretch { turns_per_s: N(peak), ..SpinStretch::at_rest(*ramp_s, turns) };
-                vec![up, level]
+                let turns = ramp.turns_at_start.0 + ramp_fractional_turns(0.0, peak, *ramp_s);
+                let plateau =
+                    SpinSegment { turns_per_s: N(peak), ..SpinSegment::at_rest(*ramp_s, turns) };
+                vec![ramp, plateau]
             }
             Self::Ramped { profile: Profile::Triangular, peak_rpm, ramp_s } => {
-                linear_stretches(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm)), (2.0 * ramp_s, 0.0)])
+                linear_segments(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm)), (2.0 * ramp_s, 0.0)])
             }
             Self::Ramped { profile: Profile::Ramp, peak_rpm, ramp_s } => {
-                linear_stretches(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm))])
+                linear_segments(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm))])
             }
             Self::Table { time_s, speed_rpm } => {
                 let points: Vec<_> =
                     time_s.iter().zip(speed_rpm).map(|(&t, &rpm)| (t, per_s(rpm))).collect();
-                linear_stretches(&points)
+                linear_segments(&points)
             }
         }
     }
 
     /// Returns the greatest speed from 0 to `end_s`, rad/s.
     pub fn greatest_speed_rad_per_s(&self, end_s: f64) -> f64 {
-        let starts: Vec<f64> = self.stretches().iter().map(|stretch| stretch.start_s.0).collect();
+        let starts: Vec<f64> = self.segments().iter().map(|segment| segment.start_s.0).collect();
         let times_s = starts.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);
         self.speeds_rpm(times_s).map(f64::abs).fold(0.0, f64::max) * TAU / 60.0
     }
@@ -160,19 +161,19 @@ impl Spin {
     }
 
     fn at(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = SpinState<f64>> {
-        let stretches = self.stretches();
-        times_s.into_iter().map(move |t_s| stretches[stretch_at(&stretches, t_s)].at(N(t_s)))
+        let segments = self.segments();
+        times_s.into_iter().map(move |t_s| segments[segment_index(&segments, t_s)].at(N(t_s)))
     }
 }
 
-/// Returns the index of the segment that contains a time; before all segments, that of the first.
-pub(crate) fn stretch_at(stretches: &[SpinStretch], t_s: f64) -> usize {
-    stretches.partition_point(|stretch| stretch.start_s.0 <= t_s).saturating_sub(1)
+/// Returns the index of the segment that contains a time; 0 for times before all segments.
+pub(crate) fn segment_index(segments: &[SpinSegment], t_s: f64) -> usize {
+    segments.partition_point(|segment| segment.start_s.0 <= t_s).saturating_sub(1)
 }
 
-/// Returns the fractional part of the turns of a ramp between two speeds (1/s).
-fn fractional_turns_of_ramp(from: f64, to: f64, duration_s: f64) -> f64 {
-    let mean = 0.5 * (from + to);
+/// Returns the fractional part of the turns made in a ramp between two speeds (turns/s).
+fn ramp_fractional_turns(start_speed: f64, end_speed: f64, duration_s: f64) -> f64 {
+    let mean = 0.5 * (start_speed + end_speed);
     let turns = mean * duration_s;
     // The rounding error of the product is added to the fractional part, because it is too small to
     // change the whole product.
@@ -180,23 +181,23 @@ fn fractional_turns_of_ramp(from: f64, to: f64, duration_s: f64) -> f64 {
 }
 
 /// Returns the segments between points (s, turns/s), with constant speed beyond the last.
-fn linear_stretches(points: &[(f64, f64)]) -> Vec<SpinStretch> {
+fn linear_segments(points: &[(f64, f64)]) -> Vec<SpinSegment> {
     let mut turns = 0.0;
-    let mut stretches = Vec::with_capacity(points.len());
+    let mut segments = Vec::with_capacity(points.len());
     for (i, &(start_s, speed)) in points.iter().enumerate() {
-        let mut stretch =
-            SpinStretch { turns_per_s: N(speed), ..SpinStretch::at_rest(start_s, turns) };
+        let mut segment =
+            SpinSegment { turns_per_s: N(speed), ..SpinSegment::at_rest(start_s, turns) };
         if let Some(&(end_s, end_speed)) = points.get(i + 1) {
-            stretch.turns_per_s2 = N(0.5 * (end_speed - speed) / (end_s - start_s));
-            turns += fractional_turns_of_ramp(speed, end_speed, end_s - start_s);
+            segment.turns_per_s2 = N(0.5 * (end_speed - speed) / (end_s - start_s));
+            turns += ramp_fractional_turns(speed, end_speed, end_s - start_s);
             turns -= turns.round_ties_even();
         }
-        stretches.push(stretch);
+        segments.push(segment);
     }
-    stretches
+    segments
 }
 
-impl SpinStretch {
+impl SpinSegment {
     fn at_rest(start_s: f64, turns_at_start: f64) -> Self {
         let zero = N(0.0);
         Self {
@@ -210,7 +211,7 @@ impl SpinStretch {
     }
 }
 
-impl<T: Lane> SpinLanes<T> {
+impl<T: Lane> SpinSegmentLanes<T> {
     /// Computes the spin at a time.
     #[inline(always)]
     pub(crate) fn at(&self, t_s: N<T>) -> SpinState<T> {
@@ -231,7 +232,7 @@ impl<T: Lane> SpinLanes<T> {
         let mut turn_rate = slope + bt;
         let mut turn_acceleration = self.turns_per_s2 + self.turns_per_s2;
         let zero = t.lit(0.0);
-        // Only cycloidal ramps have a wave; without one in any lane its terms are zero.
+        // Only cycloidal ramps have the term of the cosine, which is skipped if no lane has it.
         if T::bits(zero.0.less(self.wave_hz.0)) != 0 {
             let phase = (self.wave_hz * t).v();
             let (sin, cos) = trig::sin_cos_turns(phase);

@@ -1,17 +1,18 @@
 //! Checks of machines and spins. One pass finds every violation and names its parameters, so that a
 //! report can point at the places where the numbers were written.
 
-use crate::machine::feet::{FEET, Feet};
+use crate::machine::feet::{Feet, MAX_FEET};
 use crate::{Machine, MachineParameter, Range, Spin, decimal};
 
 /// The least distance between the ends of a spring or damper, and between the bearings, m. Basis:
-/// far below any machine's, far above rounding of directions. Doubling it changes nothing.
+/// far below the distances of any machine, far above rounding errors of directions. Doubling it
+/// changes nothing.
 const MIN_DISTANCE_M: f64 = 1e-6;
 
 /// The range of times of a spin table, s.
-const TIMES: Range = Range::NonNegative;
-/// The range of speeds of a spin table, rpm; that of `spin_peak_rpm`.
-const SPEEDS: Range = Range::Within(-1e5, 1e5);
+const TABLE_TIMES: Range = Range::NonNegative;
+/// The range of speeds of a spin table, rpm, which is also the range of `spin_peak_rpm`.
+const TABLE_SPEEDS: Range = Range::Within(-1e5, 1e5);
 
 /// A reason why a machine or a spin is impossible.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -19,9 +20,9 @@ const SPEEDS: Range = Range::Within(-1e5, 1e5);
 pub struct Violation {
     /// The violation, in a sentence.
     pub title: String,
-    /// The parameters concerned, or `spin_time_s[3]` and the like in a spin's table. Empty where a
-    /// whole element is missing.
-    pub concerns: Vec<String>,
+    /// The names of the parameters that violate it, or of entries of a spin's table such as
+    /// `spin_time_s[3]`. Empty if a whole element is missing.
+    pub parameters: Vec<String>,
     /// The values that are accepted.
     pub expected: String,
 }
@@ -29,36 +30,36 @@ pub struct Violation {
 impl Violation {
     fn new(
         title: String,
-        concerns: impl IntoIterator<Item = String>,
+        parameters: impl IntoIterator<Item = String>,
         expected: impl Into<String>,
     ) -> Self {
-        Self { title, concerns: concerns.into_iter().collect(), expected: expected.into() }
+        Self { title, parameters: parameters.into_iter().collect(), expected: expected.into() }
     }
 }
 
-/// Describes the violation of a number of feet.
-fn describe_feet(count: usize, has_cabinet: bool) -> String {
+/// Returns the title of the violation of a machine whose feet cannot be used.
+fn feet_title(count: usize, has_cabinet: bool) -> String {
     match count {
         _ if !has_cabinet => "feet without a cabinet".to_owned(),
-        3..=FEET => format!("the cabinet's {count} feet are in a line and do not hold it"),
+        3..=MAX_FEET => format!("the cabinet's {count} feet are in a line and do not hold it"),
         _ => format!("the cabinet stands on {count} feet, and loads are computed for 3 or 4"),
     }
 }
 
-/// Describes the violation of the lengths of a spin table.
-fn describe_table(times: usize, speeds: usize) -> String {
+/// Returns the title of the violation of a spin table with different numbers of times and speeds.
+fn table_title(times: usize, speeds: usize) -> String {
     match (times, speeds) {
         (0, 0) => "the spin table is empty".to_owned(),
         _ => format!("the spin table has {times} times but {speeds} speeds"),
     }
 }
 
-/// Returns the names of a vector's components.
-fn components(before: &str, after: &str) -> [String; 3] {
-    ["x", "y", "z"].map(|axis| format!("{before}{axis}{after}"))
+/// Returns the names of the parameters of a vector's components.
+fn component_names(prefix: &str, suffix: &str) -> [String; 3] {
+    ["x", "y", "z"].map(|axis| format!("{prefix}{axis}{suffix}"))
 }
 
-/// Formats a computed number for a message with 13 digits, without rounding errors.
+/// Formats a computed number with 13 digits, so that its rounding errors do not show in messages.
 fn format_rounded(value: f64) -> String {
     decimal(format!("{value:.12e}").parse().unwrap_or(value))
 }
@@ -68,17 +69,18 @@ impl Machine {
     pub fn violations(&self) -> Vec<Violation> {
         // A table without points has no parameters, so that only the machine is checked.
         let no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
-        let mut violations = out_of_range(self, &no_spin);
+        let mut violations = range_violations(self, &no_spin);
         let mut joint_violations = self.joint_violations();
-        // A violation of several numbers is not reported if one of them is out of range by itself.
+        // A violation of several numbers is not reported if one of these numbers is out of its
+        // range.
         let is_out_of_range =
-            |name: &String| violations.iter().any(|violation| violation.concerns.contains(name));
-        joint_violations.retain(|violation| !violation.concerns.iter().any(is_out_of_range));
+            |name: &String| violations.iter().any(|violation| violation.parameters.contains(name));
+        joint_violations.retain(|violation| !violation.parameters.iter().any(is_out_of_range));
         violations.append(&mut joint_violations);
         violations
     }
 
-    /// Returns the violations by combinations of numbers, each of which is in its range.
+    /// Returns the violations by combinations of numbers, even if each number is in its range.
     pub fn joint_violations(&self) -> Vec<Violation> {
         let mut joint_violations = Vec::new();
         for (body, moments_kg_m2) in [
@@ -86,20 +88,20 @@ impl Machine {
             ("shaft", self.shaft.inertia_kg_m2),
             ("drum", self.drum.inertia_kg_m2),
         ] {
-            let greatest =
+            let largest =
                 (1..3).fold(0, |g, i| if moments_kg_m2[i] > moments_kg_m2[g] { i } else { g });
             let sum: f64 = moments_kg_m2.iter().sum();
             // A thin disc reaches equality, which rounding must not violate.
-            if moments_kg_m2[greatest] > (sum - moments_kg_m2[greatest]) * (1.0 + 1e-9) {
-                let ii = 11 * (greatest + 1);
-                let moment = decimal(moments_kg_m2[greatest]);
-                let others = format_rounded(sum - moments_kg_m2[greatest]);
+            if moments_kg_m2[largest] > (sum - moments_kg_m2[largest]) * (1.0 + 1e-9) {
+                let axes = 11 * (largest + 1);
+                let moment = decimal(moments_kg_m2[largest]);
+                let others = format_rounded(sum - moments_kg_m2[largest]);
                 joint_violations.push(Violation::new(
                     format!(
-                        "no rigid body has the {body}'s inertia: I{ii} = {moment} exceeds the \
+                        "no rigid body has the {body}'s inertia: I{axes} = {moment} exceeds the \
                          other two's sum, {others}"
                     ),
-                    [11, 22, 33].map(|ii| format!("{body}_inertia_{ii}_kg_m2")),
+                    [11, 22, 33].map(|axes| format!("{body}_inertia_{axes}_kg_m2")),
                     "each moment at most the sum of the other two",
                 ));
             }
@@ -110,7 +112,7 @@ impl Machine {
             if length_m < MIN_DISTANCE_M {
                 let number = k + 1;
                 let length_m = format_rounded(length_m);
-                let end = |end: &str| components(&format!("{element}_{number}_{end}_"), "_m");
+                let end = |end: &str| component_names(&format!("{element}_{number}_{end}_"), "_m");
                 joint_violations.push(Violation::new(
                     format!(
                         "the ends of {element} {number} are {length_m} m apart: it has no direction"
@@ -125,7 +127,7 @@ impl Machine {
                 let number = k + 1;
                 joint_violations.push(Violation::new(
                     format!("stop {number} has no direction"),
-                    components(&format!("stop_{number}_direction_"), ""),
+                    component_names(&format!("stop_{number}_direction_"), ""),
                     "the way from the tub to the stop, such as [0, 0, 1]; any length but 0 is made \
                      1",
                 ));
@@ -136,25 +138,25 @@ impl Machine {
             Some(feet) => {
                 let first_y_m = self.feet[0].foot_m[1];
                 for (k, foot) in self.feet.iter().enumerate() {
-                    let higher_m = foot.foot_m[1] - first_y_m;
-                    if higher_m.abs() > MIN_DISTANCE_M {
+                    let height_difference_m = foot.foot_m[1] - first_y_m;
+                    if height_difference_m.abs() > MIN_DISTANCE_M {
                         let number = k + 1;
-                        let by_m = format_rounded(higher_m.abs());
-                        let direction = if higher_m > 0.0 { "higher" } else { "lower" };
+                        let distance_m = format_rounded(height_difference_m.abs());
+                        let direction = if height_difference_m > 0.0 { "higher" } else { "lower" };
                         joint_violations.push(Violation::new(
-                            format!("foot {number} stands {by_m} m {direction} than foot 1"),
+                            format!("foot {number} stands {distance_m} m {direction} than foot 1"),
                             [format!("foot_{number}_y_m")],
                             "one height for all feet: the second number of foot_m",
                         ));
                     }
                 }
-                let loads_n = feet.at_rest_n(self).into_iter().enumerate();
-                let lifted = loads_n.filter(|(_, load_n)| *load_n <= 0.0);
-                joint_violations.extend(lifted.map(|(k, load_n)| {
+                let loads_n = feet.rest_loads_n(self).into_iter().enumerate();
+                let lifted_feet = loads_n.filter(|(_, load_n)| *load_n <= 0.0);
+                joint_violations.extend(lifted_feet.map(|(k, load_n)| {
                     let number = k + 1;
                     Violation::new(
                         format!("foot {number} lifts at rest: it would carry {load_n:.1} N"),
-                        components(&format!("foot_{number}_"), "_m"),
+                        component_names(&format!("foot_{number}_"), "_m"),
                         "feet around the mass centre of cabinet and machine together",
                     )
                 }));
@@ -167,9 +169,10 @@ impl Machine {
                         "a section [cabinet] with mass_kg, centre_m and friction, or no [[feet]]"
                     }
                 };
-                let feet = (1..=count).flat_map(|foot| components(&format!("foot_{foot}_"), "_m"));
+                let feet =
+                    (1..=count).flat_map(|foot| component_names(&format!("foot_{foot}_"), "_m"));
                 joint_violations.push(Violation::new(
-                    describe_feet(count, has_cabinet),
+                    feet_title(count, has_cabinet),
                     feet,
                     expected,
                 ));
@@ -211,9 +214,9 @@ impl Machine {
     }
 }
 
-/// Returns the violations of single numbers. Parameters of several numbers are checked part by
-/// part.
-fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
+/// Returns the violations of single numbers. Parameters of several numbers are skipped, because
+/// each of their numbers has a parameter of its own.
+fn range_violations(machine: &Machine, spin: &Spin) -> Vec<Violation> {
     let check = |parameter: MachineParameter| {
         let name = parameter.name();
         let value = parameter.get(machine, spin)?;
@@ -232,23 +235,24 @@ impl Spin {
     pub fn violations(&self) -> Vec<Violation> {
         match self {
             Self::Table { .. } => self.joint_violations(),
-            Self::Ramped { .. } => out_of_range(&Machine::paper(), self),
+            Self::Ramped { .. } => range_violations(&Machine::paper(), self),
         }
     }
 
-    /// Returns the violations by combinations of a table's numbers. Those of a profile are
-    /// independent.
+    /// Returns the violations by combinations of a table's numbers. The numbers of a profile do not
+    /// depend on each other.
     pub fn joint_violations(&self) -> Vec<Violation> {
         let Self::Table { time_s, speed_rpm } = self else { return Vec::new() };
         let mut violations = Vec::new();
         if time_s.len() != speed_rpm.len() || time_s.is_empty() {
             violations.push(Violation::new(
-                describe_table(time_s.len(), speed_rpm.len()),
+                table_title(time_s.len(), speed_rpm.len()),
                 ["spin_speed_rpm", "spin_time_s"].map(str::to_owned),
                 "as many speeds as times, at least one of each",
             ));
         }
-        for (column, values, range) in [("time_s", time_s, TIMES), ("speed_rpm", speed_rpm, SPEEDS)]
+        for (column, values, range) in
+            [("time_s", time_s, TABLE_TIMES), ("speed_rpm", speed_rpm, TABLE_SPEEDS)]
         {
             let out_of_range_values =
                 values.iter().enumerate().filter(|(_, value)| !range.contains(**value));
@@ -269,7 +273,7 @@ impl Spin {
             }));
         }
         if let Some(&time_s) = time_s.first()
-            && TIMES.contains(time_s)
+            && TABLE_TIMES.contains(time_s)
             && time_s != 0.0
         {
             violations.push(Violation::new(
@@ -280,8 +284,8 @@ impl Spin {
         }
         for (k, pair) in time_s.windows(2).enumerate() {
             if let &[before_s, time_s] = pair
-                && TIMES.contains(before_s)
-                && TIMES.contains(time_s)
+                && TABLE_TIMES.contains(before_s)
+                && TABLE_TIMES.contains(time_s)
                 && time_s <= before_s
             {
                 violations.push(Violation::new(
@@ -366,7 +370,7 @@ mod tests {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 1.0, ramp_s: 1.0 };
         let violations = machine.violations();
         assert_eq!(violations.len(), 3, "{violations:?}");
-        for name in violations.iter().flat_map(|violation| &violation.concerns) {
+        for name in violations.iter().flat_map(|violation| &violation.parameters) {
             assert!(MachineParameter::find(name, &machine, &spin).is_ok(), "{name}");
         }
     }

@@ -8,13 +8,14 @@
 
 use crate::modes::modal_assurance;
 use crate::modes::shape::motion;
-use crate::{COORDINATES, Mode, ModeMotion, Modes, NoModes, Point, modes};
+use crate::{COORDINATES, Mode, ModeMotion, Modes, ModesError, Point, modes};
 use core::f64::consts::TAU;
 use lane_ode::Cancel;
 
 /// The number of angles over which frequencies are averaged. Basis: twelve suffice for the mean
-/// over harmonics 1 and 2 of theta; with 36 the least and the greatest frequency are within 1 -
-/// cos(pi / 36), or 0.4 %, of the variation. Doubling it reduces that to 0.1 %.
+/// over harmonics 1 and 2 of theta; with 36 the errors of the least and of the greatest frequency
+/// are below 1 - cos(pi / 36), or 0.4 %, of the variation. Doubling it reduces these errors to 0.1
+/// %.
 const ANGLES: usize = 36;
 
 /// The least MAC at which two shapes count as those of one mode. Basis: the usual threshold of
@@ -23,17 +24,17 @@ const ANGLES: usize = 36;
 const MIN_ASSURANCE: f64 = 0.9;
 
 /// The greatest number of halvings of an interval. Basis: the two modes of a shaft without a
-/// preferred direction are indistinguishable, however short the interval is. Doubling it takes up
-/// to 64 times as long for them.
+/// preferred direction are indistinguishable in intervals of any length. Doubling it takes up to 64
+/// times as long for such modes.
 const MAX_HALVINGS: u32 = 6;
 
 /// The tolerance of a resonance speed (rpm). Basis: far below any printed digit. Doubling it saves
 /// less than a step.
-const RESONANCE_RPM: f64 = 1e-6;
+const RESONANCE_TOLERANCE_RPM: f64 = 1e-6;
 
 /// The greatest number of steps of the search for a resonance. Basis: bisection alone needs 30.
 /// Doubling it changes nothing.
-const MAX_SEARCH: usize = 60;
+const MAX_SEARCH_STEPS: usize = 60;
 
 /// A mode at a speed, averaged over a turn of theta.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,12 +78,12 @@ pub struct ModeOverSpeed {
 /// modes are in the order of their magnitude |s| at the lowest speed.
 ///
 /// # Errors
-/// [`NoModes`] at any of the speeds.
-pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>, NoModes> {
+/// [`ModesError`] at any of the speeds.
+pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>, ModesError> {
     Ok(campbell_until(point, speeds_rpm, Cancel::Never)?.unwrap_or_default())
 }
 
-/// Follows every mode as [`campbell`] does, until `stop` returns true at a speed; then `None`.
+/// Follows every mode as [`campbell`] does; returns `None` once `cancel` is requested.
 ///
 /// # Errors
 /// The errors of [`campbell`].
@@ -90,7 +91,7 @@ pub fn campbell_until(
     point: &Point,
     speeds_rpm: &[f64],
     cancel: Cancel<'_>,
-) -> Result<Option<Vec<ModeOverSpeed>>, NoModes> {
+) -> Result<Option<Vec<ModeOverSpeed>>, ModesError> {
     let Some(&lowest) = speeds_rpm.first() else { return Ok(Some(Vec::new())) };
     let mut modes_at_speeds = Vec::with_capacity(speeds_rpm.len());
     let mut current = modes(point, 0.0, rad_per_s(lowest))?;
@@ -135,33 +136,34 @@ fn rad_per_s(rpm: f64) -> f64 {
     rpm * TAU / 60.0
 }
 
-/// Returns the modes at `to` in the order of those at `from`.
+/// Returns the modes at `to`, in the order of the modes `start` at `from`.
 fn follow_modes(
     start: &Modes,
     from: f64,
     to: f64,
-    modes_at: &dyn Fn(f64) -> Result<Modes, NoModes>,
-) -> Result<Modes, NoModes> {
+    modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
+) -> Result<Modes, ModesError> {
     follow_halving(start, from, to, modes_at, modes_at(to)?, MAX_HALVINGS)
 }
 
-/// Follows modes, and halves the interval at most `halvings` times.
+/// Returns the modes `end` in the order of the modes `start`, and halves the interval at most
+/// `halvings` times.
 fn follow_halving(
     start: &Modes,
     from: f64,
     to: f64,
-    modes_at: &dyn Fn(f64) -> Result<Modes, NoModes>,
+    modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
     end: Modes,
     halvings: u32,
-) -> Result<Modes, NoModes> {
+) -> Result<Modes, ModesError> {
     let (order, assurance) = match_modes(start, &end);
     if assurance >= MIN_ASSURANCE || halvings == 0 {
         return Ok(Modes { modes: order.map(|k| end.modes[k]), ..end });
     }
     let midpoint = 0.5 * (from + to);
-    let bracket_rpm =
+    let midpoint_modes =
         follow_halving(start, from, midpoint, modes_at, modes_at(midpoint)?, halvings - 1)?;
-    follow_halving(&bracket_rpm, midpoint, to, modes_at, end, halvings - 1)
+    follow_halving(&midpoint_modes, midpoint, to, modes_at, end, halvings - 1)
 }
 
 /// Returns for each mode of `start` the index of the mode of `end` that continues it, and the least
@@ -190,7 +192,7 @@ fn average_over_turn(
     point: &Point,
     speed_rpm: f64,
     start: &Modes,
-) -> Result<[ModeAtSpeed; COORDINATES], NoModes> {
+) -> Result<[ModeAtSpeed; COORDINATES], ModesError> {
     let speed = rad_per_s(speed_rpm);
     let mut turn = vec![start.clone()];
     for k in 1..ANGLES {
@@ -200,9 +202,10 @@ fn average_over_turn(
     }
     let rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
     Ok(core::array::from_fn(|mode| {
-        let all = turn.iter().map(|modes| &modes.modes[mode]);
-        let mean = |value: fn(&Mode) -> f64| all.clone().map(value).sum::<f64>() / ANGLES as f64;
-        let frequencies = all.clone().map(|mode| mode.im_rad_per_s);
+        let turn_modes = turn.iter().map(|modes| &modes.modes[mode]);
+        let mean =
+            |value: fn(&Mode) -> f64| turn_modes.clone().map(value).sum::<f64>() / ANGLES as f64;
+        let frequencies = turn_modes.clone().map(|mode| mode.im_rad_per_s);
         let re_per_s = mean(|mode| mode.re_per_s);
         let im_rad_per_s = mean(|mode| mode.im_rad_per_s);
         ModeAtSpeed {
@@ -219,28 +222,29 @@ fn average_over_turn(
 
 /// Finds the speed between two at which the mode's frequency equals the speed, by the Illinois
 /// method (M. Dowell, P. Jarratt, BIT 11 (1971) 168), which keeps the root bracketed. Returns
-/// `None` for a change of sign by a jump, where a motion becomes or ceases to be overdamped.
+/// `None` if the difference changes its sign by a jump, because the motion becomes or ceases to be
+/// overdamped.
 fn find_resonance(
     point: &Point,
     mode: usize,
     from: &Modes,
     [start, end]: [f64; 2],
     [mut low_excess, mut high_excess]: [f64; 2],
-) -> Result<Option<Resonance>, NoModes> {
+) -> Result<Option<Resonance>, ModesError> {
     let mut low = start;
     let mut high = end;
     let mut side = 0;
-    for _ in 0..MAX_SEARCH {
+    for _ in 0..MAX_SEARCH_STEPS {
         let speed_rpm = (low * high_excess - high * low_excess) / (high_excess - low_excess);
         let end_modes =
             follow_modes(from, start, speed_rpm, &|rpm| modes(point, 0.0, rad_per_s(rpm)))?;
         let resonance =
             Resonance { speed_rpm, mode: average_over_turn(point, speed_rpm, &end_modes)?[mode] };
         let excess = resonance.mode.frequency_rpm - speed_rpm;
-        if excess.abs() < RESONANCE_RPM {
+        if excess.abs() < RESONANCE_TOLERANCE_RPM {
             return Ok(Some(resonance));
         }
-        if high - low < RESONANCE_RPM {
+        if high - low < RESONANCE_TOLERANCE_RPM {
             break;
         }
         if (excess > 0.0) == (high_excess > 0.0) {

@@ -36,11 +36,10 @@ pub enum Movement {
     Mixed,
 }
 
-/// The movement with the greatest share of a mode shape, if that is more than half of its energy,
-/// and the shares of its kinetic energy in the motions of the machine as one rigid body.
+/// The dominant movement of a mode shape, which has more than half of the energy, and the shares of
+/// the kinetic energy in the motions of the machine as one rigid body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModeMotion {
-    /// The movement with the greatest share.
     pub movement: Movement,
     /// The plane of the movement.
     pub plane: MotionPlane,
@@ -54,7 +53,7 @@ pub struct ModeMotion {
     pub pitch: f64,
 }
 
-/// Returns the names of movements, each in every plane.
+/// Expands to the names of movements, each in every plane.
 macro_rules! motion_names {
     ($($movement:literal)*) => {
         [$(
@@ -95,14 +94,14 @@ const PLANE_SHARE: f64 = 0.6;
 
 /// The share of a mode's energy that a movement has to exceed to name the mode. Basis: only one
 /// movement can have more than half. Doubling it names no mode.
-const MAJORITY: f64 = 0.5;
+const MAJORITY_SHARE: f64 = 0.5;
 
 /// The coordinates of motions in the horizontal plane: q2 and q4 along c3; q5, q7 and q9 about c2.
 const HORIZONTAL: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
 
 /// The coordinates of the motions as one rigid body: along c2, along c3, about c2, about c3. The
 /// drum has none, because its angles are relative to the shaft.
-const RIGID: [[usize; 2]; 4] =
+const RIGID_PAIRS: [[usize; 2]; 4] =
     [[TUB_Y, SHAFT_Y], [TUB_Z, SHAFT_Z], [TUB_YAW, SHAFT_YAW], [TUB_PITCH, SHAFT_PITCH]];
 
 /// Returns the movement with the greatest share of a shape of unit modal mass, if that movement has
@@ -114,16 +113,16 @@ pub(crate) fn motion(
 ) -> ModeMotion {
     let shares = rigid_shares(mass, shape);
     let [vertical_translation, horizontal_translation, yaw, pitch] = shares;
-    let movement = if shares.iter().sum::<f64>() < 1.0 - MAJORITY {
+    let movement = if shares.iter().sum::<f64>() < 1.0 - MAJORITY_SHARE {
         relative_movement(point, shape)
     } else {
         rigid_movement(shares)
     };
-    let mut in_plane = [[0.0; 2]; COORDINATES];
+    let mut horizontal_part = [[0.0; 2]; COORDINATES];
     for i in HORIZONTAL {
-        in_plane[i] = shape[i];
+        horizontal_part[i] = shape[i];
     }
-    let horizontal = mass_inner_product(mass, &in_plane, &in_plane)[0];
+    let horizontal = mass_inner_product(mass, &horizontal_part, &horizontal_part)[0];
     let plane = if horizontal > PLANE_SHARE {
         MotionPlane::Horizontal
     } else if horizontal < 1.0 - PLANE_SHARE {
@@ -134,35 +133,35 @@ pub(crate) fn motion(
     ModeMotion { movement, plane, vertical_translation, horizontal_translation, yaw, pitch }
 }
 
-/// Returns the rigid movement that has the greatest of these shares, in the order of [`RIGID`], and
-/// more than half of the energy.
+/// Returns the rigid movement that has the greatest of these shares, in the order of
+/// [`RIGID_PAIRS`], and more than half of the energy.
 fn rigid_movement([vertical, horizontal, yaw, pitch]: [f64; 4]) -> Movement {
     let is_translation = vertical.max(horizontal) > yaw.max(pitch);
-    if is_translation && vertical + horizontal > MAJORITY {
+    if is_translation && vertical + horizontal > MAJORITY_SHARE {
         Movement::Translation
-    } else if !is_translation && yaw + pitch > MAJORITY {
+    } else if !is_translation && yaw + pitch > MAJORITY_SHARE {
         Movement::Rocking
     } else {
         Movement::Mixed
     }
 }
 
-/// Computes the shares of a shape's energy in the rigid motions, in the order of [`RIGID`].
+/// Computes the shares of a shape's energy in the rigid motions, in the order of [`RIGID_PAIRS`].
 /// Rotations are made orthogonal to the translations, so that they are about the mass centre.
 fn rigid_shares(
     mass: &[[f64; COORDINATES]; COORDINATES],
     shape: &[[f64; 2]; COORDINATES],
 ) -> [f64; 4] {
-    let mut basis: Vec<[[f64; 2]; COORDINATES]> = Vec::with_capacity(RIGID.len());
-    for coordinates in RIGID {
+    let mut basis: Vec<[[f64; 2]; COORDINATES]> = Vec::with_capacity(RIGID_PAIRS.len());
+    for coordinates in RIGID_PAIRS {
         let mut rigid = [[0.0; 2]; COORDINATES];
         for i in coordinates {
             rigid[i][0] = 1.0;
         }
         for other in &basis {
-            let along = mass_inner_product(mass, other, &rigid)[0];
+            let projection = mass_inner_product(mass, other, &rigid)[0];
             for i in 0..COORDINATES {
-                rigid[i][0] -= along * other[i][0];
+                rigid[i][0] -= projection * other[i][0];
             }
         }
         let scale = mass_inner_product(mass, &rigid, &rigid)[0].sqrt();
@@ -211,7 +210,8 @@ mod tests {
             ([0.4, 0.4, 0.1, 0.1], Movement::Translation),
             ([0.0, 0.3, 0.65, 0.0], Movement::Rocking),
             ([0.05, 0.1, 0.42, 0.42], Movement::Rocking),
-            // The greatest single share belongs to another movement than the majority.
+            // The greatest single share and the majority of the shares belong to different
+            // movements.
             ([0.45, 0.0, 0.29, 0.26], Movement::Mixed),
             ([0.0, 0.45, 0.29, 0.2], Movement::Mixed),
             ([0.3, 0.25, 0.42, 0.0], Movement::Mixed),
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn names_of_random_machines_follow_the_shares() {
         let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
-        let seed = std::env::var("SEED").map_or(clock.as_secs(), |it| it.parse().unwrap());
+        let seed = std::env::var("SEED").map_or(clock.as_secs(), |text| text.parse().unwrap());
         println!("SEED={seed}");
         let mut numbers = fastrand::Rng::with_seed(seed);
         let mut translations = 0;
@@ -236,7 +236,7 @@ mod tests {
             let mut factor = || 0.4 * 6.0_f64.powf(numbers.f64());
             machine.tub.mass_kg *= factor();
             machine.tub.centre_x_m *= factor();
-            machine.tub.inertia_kg_m2 = machine.tub.inertia_kg_m2.map(|it| it * factor());
+            machine.tub.inertia_kg_m2 = machine.tub.inertia_kg_m2.map(|moment| moment * factor());
             for spring in &mut machine.springs {
                 spring.stiffness_n_per_m *= factor();
             }
@@ -244,9 +244,9 @@ mod tests {
             let timing = crate::Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
             let points = crate::prepare(lane_ode::Simd::best(), &[(machine, spin)], &timing);
             let Some(Ok(point)) = points.into_iter().next() else { continue };
-            let found = crate::modes::modes(&point, 0.0, 10.0).unwrap();
-            for mode in &found.modes[..4] {
-                let motion = motion(&point, &found.mass, &mode.shape);
+            let modes = crate::modes::modes(&point, 0.0, 10.0).unwrap();
+            for mode in &modes.modes[..4] {
+                let motion = motion(&point, &modes.mass, &mode.shape);
                 let translation = motion.vertical_translation.max(motion.horizontal_translation);
                 let rocking = motion.yaw.max(motion.pitch);
                 match motion.movement {
@@ -259,7 +259,7 @@ mod tests {
                         rockings += 1;
                     }
                     Movement::Mixed => {
-                        assert!(translation.max(rocking) <= MAJORITY, "{motion:?}");
+                        assert!(translation.max(rocking) <= MAJORITY_SHARE, "{motion:?}");
                         mixed += 1;
                     }
                     _ => {}

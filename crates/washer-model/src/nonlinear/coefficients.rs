@@ -16,8 +16,8 @@ impl Coefficients<f64> {
         Self { bodies: Bodies::new(machine), elements: Elements::new(machine) }
     }
 
-    /// Returns the coefficients that the linear model linearises, with viscous damping in place of
-    /// friction.
+    /// Returns the coefficients from which the linear model is derived, with viscous damping in
+    /// place of friction.
     pub(crate) fn with_viscous_friction(&self) -> Self {
         Self { bodies: self.bodies, elements: self.elements.with_viscous_friction() }
     }
@@ -28,15 +28,16 @@ lane_struct! {
     #[derive(Clone, Copy, Debug)]
     Bodies {
         gravity: N<T>,
-        tub_mass: N<T>, tub_per_mass: N<T>, tub_centre: N<T>, tub_i11: N<T>, tub_i22: N<T>,
+        tub_mass: N<T>, tub_inverse_mass: N<T>, tub_centre: N<T>, tub_i11: N<T>, tub_i22: N<T>,
         tub_i33: N<T>,
         shaft_i11: N<T>, shaft_i22: N<T>, shaft_i33: N<T>,
         /// The mass of shaft, drum and unbalance.
-        rotor_mass: N<T>, rotor_per_mass: N<T>,
-        /// The tub's and the rotor's shares of the total mass.
-        tub_share: N<T>, rotor_share: N<T>,
-        /// The position of the rotor's mass centre from P_S: `along_shaft * s1 + drum_share * rho`.
-        along_shaft: N<T>, drum_share: N<T>,
+        rotor_mass: N<T>, rotor_inverse_mass: N<T>,
+        /// The masses of tub and rotor as shares of the total mass.
+        tub_mass_share: N<T>, rotor_mass_share: N<T>,
+        /// The position of the rotor's mass centre from P_S: `shaft_centre_offset * s1 +
+        /// drum_mass_share * rho`.
+        shaft_centre_offset: N<T>, drum_mass_share: N<T>,
         /// The vector rho from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0)
         /// where all unbalances are in the plane of d1 and d2.
         rho_1: N<T>, rho_2: N<T>, rho_3: N<T>,
@@ -45,7 +46,8 @@ lane_struct! {
         mu_l: N<T>,
         /// mu l^2.
         mu_l2: N<T>,
-        /// The inertia about the hinge of the drum, and of a reduced mass mu at rho, in drum axes.
+        /// The inertia about the hinge of the drum and of a reduced mass mu at rho together, in
+        /// drum axes.
         drum_i11: N<T>, drum_i22: N<T>, drum_i33: N<T>, drum_i12: N<T>, drum_i13: N<T>,
         drum_i23: N<T>,
         /// True if a drum has an unbalance outside the plane of d1 and d2. Otherwise `rho_3`,
@@ -91,31 +93,31 @@ impl Bodies<f64> {
         let [mut i12, mut i13, mut i23] = [0.0; 3];
         for unbalance in machine.unbalances() {
             let m_u = unbalance.mass_kg;
-            let total = m_d + m_u;
+            let total_mass = m_d + m_u;
             let dx = unbalance.x_m - x_d;
             let [y, z] = unbalance.position_m();
-            let dr = y - e;
+            let dy = y - e;
             let dz = z - e_3;
-            let reduced = m_u * m_d / total;
-            i11 += reduced * dr * dr;
-            i11 += reduced * dz * dz;
-            i22 += reduced * dx * dx;
-            i22 += reduced * dz * dz;
-            i33 += reduced * (dr * dr + dx * dx);
-            i12 -= reduced * dx * dr;
-            i13 -= reduced * dx * dz;
-            i23 -= reduced * dr * dz;
-            x_d += m_u / total * dx;
-            e += m_u / total * dr;
-            e_3 += m_u / total * dz;
-            m_d = total;
+            let reduced_mass = m_u * m_d / total_mass;
+            i11 += reduced_mass * dy * dy;
+            i11 += reduced_mass * dz * dz;
+            i22 += reduced_mass * dx * dx;
+            i22 += reduced_mass * dz * dz;
+            i33 += reduced_mass * (dy * dy + dx * dx);
+            i12 -= reduced_mass * dx * dy;
+            i13 -= reduced_mass * dx * dz;
+            i23 -= reduced_mass * dy * dz;
+            x_d += m_u / total_mass * dx;
+            e += m_u / total_mass * dy;
+            e_3 += m_u / total_mass * dz;
+            m_d = total_mass;
         }
         let is_skewed = [e_3, i13, i23].iter().any(|moment| *moment != 0.0);
         let rho_1 = x_d - drum.hinge_x_m;
         let rho_2 = e;
         let rho_3 = e_3;
-        // Shaft and drum about their common mass centre: the vector between their own centres moves
-        // like the arm of the reduced mass mu.
+        // Shaft and drum about their common mass centre: the relative motion of their own mass
+        // centres has the reduced mass mu.
         let m_s = shaft.mass_kg;
         let rotor_mass = m_s + m_d;
         let mu = m_s * m_d / rotor_mass;
@@ -124,11 +126,11 @@ impl Bodies<f64> {
         let rear = bearings.rear_x_m;
         let k_f = bearings.front_stiffness_n_per_m;
         let k_r = bearings.rear_stiffness_n_per_m;
-        let span = front - rear;
+        let bearing_distance = front - rear;
         Self {
             gravity: N(machine.gravity_m_per_s2),
             tub_mass: N(tub.mass_kg),
-            tub_per_mass: N(1.0 / tub.mass_kg),
+            tub_inverse_mass: N(1.0 / tub.mass_kg),
             tub_centre: N(tub.centre_x_m),
             tub_i11: N(tub.inertia_kg_m2[0]),
             tub_i22: N(tub.inertia_kg_m2[1]),
@@ -137,11 +139,11 @@ impl Bodies<f64> {
             shaft_i22: N(shaft.inertia_kg_m2[1]),
             shaft_i33: N(shaft.inertia_kg_m2[2]),
             rotor_mass: N(rotor_mass),
-            rotor_per_mass: N(1.0 / rotor_mass),
-            tub_share: N(tub.mass_kg / (tub.mass_kg + rotor_mass)),
-            rotor_share: N(rotor_mass / (tub.mass_kg + rotor_mass)),
-            along_shaft: N((m_s * shaft.centre_x_m + m_d * drum.hinge_x_m) / rotor_mass),
-            drum_share: N(m_d / rotor_mass),
+            rotor_inverse_mass: N(1.0 / rotor_mass),
+            tub_mass_share: N(tub.mass_kg / (tub.mass_kg + rotor_mass)),
+            rotor_mass_share: N(rotor_mass / (tub.mass_kg + rotor_mass)),
+            shaft_centre_offset: N((m_s * shaft.centre_x_m + m_d * drum.hinge_x_m) / rotor_mass),
+            drum_mass_share: N(m_d / rotor_mass),
             rho_1: N(rho_1),
             rho_2: N(rho_2),
             rho_3: N(rho_3),
@@ -159,9 +161,15 @@ impl Bodies<f64> {
             bearing_rear: N(bearings.rear_x_m),
             front_stiffness: N(bearings.front_stiffness_n_per_m),
             rear_stiffness: N(bearings.rear_stiffness_n_per_m),
-            bearing_force_compliance: N((rear * rear / k_f + front * front / k_r) / (span * span)),
-            bearing_mixed_compliance: N((-rear / k_f - front / k_r) / (span * span)),
-            bearing_moment_compliance: N((1.0 / k_f + 1.0 / k_r) / (span * span)),
+            bearing_force_compliance: N(
+                (rear * rear / k_f + front * front / k_r) / (bearing_distance * bearing_distance)
+            ),
+            bearing_mixed_compliance: N(
+                (-rear / k_f - front / k_r) / (bearing_distance * bearing_distance)
+            ),
+            bearing_moment_compliance: N(
+                (1.0 / k_f + 1.0 / k_r) / (bearing_distance * bearing_distance)
+            ),
             tub_front: N(tub.front_x_m),
             drum_hinge: N(drum.hinge_x_m),
             hinge_to_front: N(drum.front_x_m - drum.hinge_x_m),

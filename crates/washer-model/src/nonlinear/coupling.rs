@@ -52,14 +52,14 @@ impl<T: Real> Deflection<T> {
 }
 
 /// The speed of the backward whirl for which the hinge's scaled mass is exact, relative to the
-/// drum's speed. Basis: motions with twice the period of a turn whirl at this speed, and a capped
-/// hinge disturbs them most. Doubling it makes a backward whirl at the drum's speed exact instead.
-pub(crate) const BACKWARD_SHARE: f64 = 0.5;
+/// drum's speed. Basis: motions with twice the period of a turn whirl at this speed, and capping
+/// the hinge changes these motions most. Doubling it makes a backward whirl at the drum's speed
+/// exact instead.
+pub(crate) const BACKWARD_WHIRL_RATIO: f64 = 0.5;
 
 /// The model of the bearings.
 #[derive(Clone, Copy)]
 pub(crate) enum Coupling<T> {
-    /// Springs.
     Springs,
     /// Springs with scaled mass, so that no mode of the bearings is faster than a cap.
     MassScaled(CapCoefficients<T>),
@@ -81,16 +81,16 @@ lane_struct! {
         /// The square of the bearings' cap, rad^2/s^2.
         bearings_squared,
         /// The reciprocal square of the hinge's cap; 0 if the hinge is not capped.
-        per_hinge_squared,
+        inverse_hinge_squared,
     }
 }
 
 impl CapCoefficients<f64> {
     fn new(caps: &Caps) -> Self {
-        let hinge = caps.hinge_rad_per_s.unwrap_or(f64::INFINITY);
+        let hinge_cap = caps.hinge_rad_per_s.unwrap_or(f64::INFINITY);
         Self {
             bearings_squared: N(caps.bearings_rad_per_s * caps.bearings_rad_per_s),
-            per_hinge_squared: N(1.0 / (hinge * hinge)),
+            inverse_hinge_squared: N(1.0 / (hinge_cap * hinge_cap)),
         }
     }
 }
@@ -128,7 +128,8 @@ impl<T: Lane> Coupling<T> {
     /// Creates springs, or springs with mass scaled to caps.
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, caps: Option<&Caps>) -> Self {
-        // Not `Option::map_or`: its closure would be compiled without the kernel's instruction set.
+        // This is not `Option::map_or`, whose closure would be compiled without the kernel's
+        // instruction set.
         let Some(caps) = caps else { return Self::Springs };
         Self::MassScaled(CapCoefficients::splat(zero, &CapCoefficients::new(caps)))
     }
@@ -140,8 +141,8 @@ impl<T: Lane> Coupling<T> {
         }
     }
 
-    /// Computes the hinge's scaled mass, if modes are capped. `sag_9` and `sag_10` are the hinge's
-    /// angles at rest.
+    /// Computes the terms of the hinge's scaled mass, if modes are capped. `sag_9` and `sag_10` are
+    /// the hinge's angles at rest.
     #[inline(always)]
     pub(crate) fn hinge_mass(
         &self,
@@ -150,21 +151,22 @@ impl<T: Lane> Coupling<T> {
         [sag_9, sag_10]: [N<T>; 2],
     ) -> Option<HingeMass<T>> {
         let Self::MassScaled(scaling) = self else { return None };
-        let inertia = (scaling.per_hinge_squared * flexure_stiffness).v();
-        let sag_torque = (BACKWARD_SHARE * (inertia * (spin.speed * spin.speed).v()).v()).v();
+        let inertia = (scaling.inverse_hinge_squared * flexure_stiffness).v();
+        let sag_torque = (BACKWARD_WHIRL_RATIO * (inertia * (spin.speed * spin.speed).v()).v()).v();
         Some(HingeMass {
             inertia,
             torque: [
                 (sag_torque * (spin.cos * sag_9 + spin.sin * sag_10)).v(),
                 (sag_torque * (spin.cos * sag_10 - spin.sin * sag_9)).v(),
             ],
-            torque_per_speed: ((1.0 + BACKWARD_SHARE) * (inertia * spin.speed).v()).v(),
+            torque_per_speed: ((1.0 + BACKWARD_WHIRL_RATIO) * (inertia * spin.speed).v()).v(),
         })
     }
 
-    /// Computes the accelerations du/dt of both halves, which are given without the bearings'
-    /// forces, at the spin speed theta' = `speed`. `sag` is the part of the deflection that does
-    /// not turn with the drum. `linear/step.rs` computes the accelerations of the linear model.
+    /// Computes the accelerations du/dt of both halves at the spin speed theta' = `speed`. The
+    /// arguments `tub` and `rotor` do not contain the bearings' forces. `sag` is the part of the
+    /// deflection that does not turn with the drum. `linear/step.rs` computes the accelerations of
+    /// the linear model.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
@@ -175,7 +177,7 @@ impl<T: Lane> Coupling<T> {
         (tub, tub_inertia): (&FloatingChain<T, 2>, &LdltFactors<T, 2>),
         (rotor, rotor_inertia): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
     ) -> [N<T>; COORDINATES] {
-        let on_shaft = match self {
+        let shaft_load = match self {
             Self::Springs => deflection.load_on_shaft(bodies),
             Self::MassScaled(scaling) => {
                 let tub_response = tub.response(tub_inertia);
@@ -185,7 +187,7 @@ impl<T: Lane> Coupling<T> {
                 mass_scaled_load(bodies, squares, deflection, sag, &tub_response, &rotor_response)
             }
         };
-        accelerations_under_load((tub, tub_inertia), (rotor, rotor_inertia), &on_shaft)
+        accelerations_under_load((tub, tub_inertia), (rotor, rotor_inertia), &shaft_load)
     }
 }
 
@@ -194,10 +196,10 @@ impl<T: Lane> Coupling<T> {
 pub(crate) fn accelerations_under_load<T: Real>(
     (tub, tub_inertia): (&FloatingChain<T, 2>, &LdltFactors<T, 2>),
     (rotor, rotor_inertia): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
-    on_shaft: &AxisLoad<T>,
+    shaft_load: &AxisLoad<T>,
 ) -> [N<T>; COORDINATES] {
-    let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia, &on_shaft.reaction());
-    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_inertia, on_shaft);
+    let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia, &shaft_load.reaction());
+    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_inertia, shaft_load);
     [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
 }
 
@@ -237,12 +239,12 @@ pub(crate) fn mass_scaled_load<T: Real>(
 ) -> AxisLoad<T> {
     let system =
         mass_scaled_system(cap_squared, b.bearing_compliance(), &tub.compliance, &rotor.compliance);
-    let both_squared = cap_squared + speed_squared;
+    let sum_of_squares = cap_squared + speed_squared;
     let d = deflection.as_vector();
     let sag = sag.as_vector();
     let mut load = d;
     for i in 0..4 {
-        load[i] = tub.free[i] - (both_squared * d[i] + rotor.free[i]) + speed_squared * sag[i];
+        load[i] = tub.free[i] - (sum_of_squares * d[i] + rotor.free[i]) + speed_squared * sag[i];
     }
     let [force_y, force_z, moment_y, moment_z] = LdltFactors::new(system).solve(load);
     AxisLoad { force: [force_y, force_z], moment: [moment_y, moment_z] }

@@ -1,9 +1,9 @@
-//! Force elements between cabinet and tub. Each force law is written once, for the equations and
-//! for the forces that a trace reports (section 3 of the model page).
+//! Force elements between cabinet and tub. Each force law is written once, and serves the equations
+//! of motion and the forces in traces (section 3 of the model page).
 //!
 //! The force law ([`ForceLaw`]) of a spring or a damper is a function of the line between its ends
 //! ([`ElementLine`]), which chooses the unit of force. Stops ([`StopCoefficients`]) and bushings
-//! ([`BushingCoefficients`]) have force laws of a tub point's motion. A new kind of element is a
+//! ([`BushingCoefficients`]) have force laws of a tub point's motion. A new kind of element takes a
 //! structure with a force law, a field of [`Elements`], and a line in [`OptionalForces`].
 
 pub(crate) mod bounds;
@@ -30,7 +30,7 @@ lane_struct! {
         has_friction: InAnyLane<T>,
         /// True if a machine has optional forces: cubic springs, friction, stops or bushings.
         /// Without them the equations skip their evaluation.
-        has_optional: InAnyLane<T>,
+        has_optional_forces: InAnyLane<T>,
     }
 }
 
@@ -38,7 +38,7 @@ impl Elements<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
         let has_cubic_springs = machine.springs.iter().any(|spring| spring.cubic_n_per_m3 != 0.0);
         let has_friction = machine.dampers.iter().any(Damper::has_optional_force);
-        let has_optional = has_cubic_springs
+        let has_optional_forces = has_cubic_springs
             || has_friction
             || !machine.stops.is_empty()
             || !machine.bushings.is_empty();
@@ -49,21 +49,20 @@ impl Elements<f64> {
             bushings: machine.bushings.iter().map(BushingCoefficients::new).collect(),
             has_cubic_springs: InAnyLane::new(has_cubic_springs),
             has_friction: InAnyLane::new(has_friction),
-            has_optional: InAnyLane::new(has_optional),
+            has_optional_forces: InAnyLane::new(has_optional_forces),
         }
     }
 
-    /// Whether a force is not smooth, as those of friction and stops. Steps must not be longer than
-    /// the corner of such a force is wide.
-    pub(crate) fn are_nonsmooth(&self) -> bool {
-        let is_nonsmooth = |damper: &DamperCoefficients<f64>| {
-            damper.friction.0 != 0.0 || damper.has_step_of_damping()
+    /// Whether an element has a force with a corner, such as friction or a stop. Steps have to
+    /// resolve the width of the corner.
+    pub(crate) fn has_nonsmooth_force(&self) -> bool {
+        let has_corner = |damper: &DamperCoefficients<f64>| {
+            damper.friction.0 != 0.0 || damper.has_damping_step()
         };
-        !self.stops.is_empty() || self.dampers.iter().any(is_nonsmooth)
+        !self.stops.is_empty() || self.dampers.iter().any(has_corner)
     }
 
-    /// Centres the free strokes of dampers about their lengths at the equilibrium `q`, to which
-    /// they settle.
+    /// Centres the free strokes of dampers about their lengths at the equilibrium `q`.
     pub(crate) fn centre_free_strokes(&mut self, q: &[f64; COORDINATES]) {
         let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
         for index in 0..self.dampers.len() {
@@ -72,19 +71,20 @@ impl Elements<f64> {
         }
     }
 
-    /// Sets the speed amplitude at which the linear model takes a damper's friction.
+    /// Sets the equivalent viscous damping of a damper's friction, by the speed amplitude of the
+    /// motion.
     pub(crate) fn linearise_friction(&mut self, damper: usize, speed_m_per_s: f64) {
         let damper = &mut self.dampers[damper];
-        damper.viscous = N(equivalent_damping(damper.friction.0, speed_m_per_s));
+        damper.equivalent_damping = N(equivalent_damping(damper.friction.0, speed_m_per_s));
     }
 
-    /// Returns the elements that the linear model linearises: friction is replaced by equivalent
-    /// viscous damping, which dissipates the same energy in a cycle. Friction beyond a free stroke
-    /// stays, so that its tangent at rest is taken.
+    /// Returns the elements from which the linear model is derived: friction is replaced by
+    /// equivalent viscous damping, which dissipates the same energy in a cycle. Friction beyond a
+    /// free stroke is kept, and linearised by its tangent at rest.
     pub(crate) fn with_viscous_friction(&self) -> Self {
         let mut elements = self.clone();
         for damper in elements.dampers.iter_mut().filter(|damper| !damper.has_free_stroke()) {
-            damper.damping += damper.viscous;
+            damper.damping += damper.equivalent_damping;
             damper.friction = N(0.0);
         }
         elements
@@ -100,7 +100,7 @@ impl<T: Lane> Elements<T> {
         let mut load = ([zero; 3], [zero; 3]);
         add_forces(&mut load, &self.springs, tub, false);
         add_forces(&mut load, &self.dampers, tub, false);
-        if self.has_optional.holds() {
+        if self.has_optional_forces.holds() {
             // The copy lets `load` stay in registers if there are no optional forces.
             let mut load_copy = load;
             let motion = *tub;
@@ -116,8 +116,8 @@ impl<T: Lane> Elements<T> {
 }
 
 impl<T: Lane> Elements<T> {
-    /// Computes the depth of a stop's tub point (m; the stop is open below zero), and the stop's
-    /// force (N).
+    /// Computes the depth (m) of a stop's tub point, which is negative while the stop is open, and
+    /// the stop's force (N).
     #[inline(always)]
     pub(crate) fn stop(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let stop = &self.stops[index];
@@ -136,8 +136,8 @@ impl<T: Lane> Elements<T> {
     }
 }
 
-/// The evaluation of optional forces. Coefficients of zero add zeros, so that no machine's bits
-/// depend on the machines in the other lanes.
+/// The evaluation of optional forces. A machine without such forces adds zeros, so that its results
+/// do not depend on the machines in other lanes.
 struct OptionalForces<'a, T> {
     elements: &'a Elements<T>,
     tub: &'a TubMotion<T>,
@@ -159,11 +159,11 @@ impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
         for stop in &elements.stops {
             let point = tub.point(&stop.tub);
             let force = scale(-stop.force(&point), stop.direction);
-            add_force(load, &stop.tub, &tub.tilt.in_frame_axes(&force));
+            add_force(load, &stop.tub, &tub.tilt.to_frame_axes(&force));
         }
         for bushing in &elements.bushings {
             let force = bushing.force(&tub.point(&bushing.tub));
-            add_force(load, &bushing.tub, &tub.tilt.in_frame_axes(&force));
+            add_force(load, &bushing.tub, &tub.tilt.to_frame_axes(&force));
         }
     }
 }
@@ -222,20 +222,20 @@ lane_struct! {
         /// The square of the speed v_s below which friction fades.
         speed_squared: N<T>,
         /// The equivalent viscous damping of the linear model (N s/m).
-        viscous: N<T>,
+        equivalent_damping: N<T>,
         /// The damping beyond the free stroke.
         outer_damping: N<T>,
-        /// The length at rest, about which the stroke is free.
+        /// The length at rest, which is the centre of the free stroke.
         rest_length: N<T>,
         /// The numbers 1 / (2 s) and s / 2 for a free stroke s. Without a free stroke they are 0
         /// and -1, so that friction always acts in full.
-        half_per_stroke: N<T>,
+        half_inverse_stroke: N<T>,
         half_stroke: N<T>,
         /// The square of the length sigma over which forces beyond the free stroke set in; 0
         /// without a free stroke.
         softness_squared: N<T>,
         /// True if a damper has a free stroke or outer damping.
-        has_stage: InAnyLane<T>,
+        has_second_stage: InAnyLane<T>,
     }
 }
 
@@ -254,9 +254,9 @@ fn equivalent_damping(friction_n: f64, speed_m_per_s: f64) -> f64 {
 
 impl DamperCoefficients<f64> {
     fn new(damper: &Damper) -> Self {
-        // `preparation.rs` replaces the default by the speed of the motion.
+        // `preparation.rs` replaces the default by the speed amplitude of the linear motion.
         let speed_m_per_s =
-            damper.friction_linear_speed_m_per_s.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S);
+            damper.friction_linear_speed_m_per_s.unwrap_or(Damper::INITIAL_LINEAR_SPEED_M_PER_S);
         let stroke_m = damper.free_stroke_m;
         let softness_m = damper.free_stroke_softness_m;
         let has_stroke = stroke_m != 0.0;
@@ -265,37 +265,39 @@ impl DamperCoefficients<f64> {
             damping: N(damper.damping_n_s_per_m),
             friction: N(damper.friction_n),
             speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
-            viscous: N(equivalent_damping(damper.friction_n, speed_m_per_s)),
+            equivalent_damping: N(equivalent_damping(damper.friction_n, speed_m_per_s)),
             outer_damping: N(damper.outer_damping_n_s_per_m),
             rest_length: N(damper.given_length_m()),
-            half_per_stroke: N(if has_stroke { 0.5 / stroke_m } else { 0.0 }),
+            half_inverse_stroke: N(if has_stroke { 0.5 / stroke_m } else { 0.0 }),
             half_stroke: N(if has_stroke { 0.5 * stroke_m } else { -1.0 }),
             softness_squared: N(if has_stroke { softness_m * softness_m } else { 0.0 }),
-            has_stage: InAnyLane::new(has_stroke || damper.outer_damping_n_s_per_m != 0.0),
+            has_second_stage: InAnyLane::new(has_stroke || damper.outer_damping_n_s_per_m != 0.0),
         }
     }
 
     /// Returns whether friction and outer damping act beyond a free stroke only.
     fn has_free_stroke(&self) -> bool {
-        self.half_per_stroke.0 != 0.0
+        self.half_inverse_stroke.0 != 0.0
     }
 
     /// Returns whether damping sets in at the end of a free stroke.
-    fn has_step_of_damping(&self) -> bool {
+    fn has_damping_step(&self) -> bool {
         self.has_free_stroke() && self.outer_damping.0 != 0.0
     }
 }
 
 impl<T: Real> DamperCoefficients<T> {
     /// Returns the share of friction and outer damping that acts at a length (m): a smooth step
-    /// from 0 within the free stroke to 1 beyond it.
+    /// from 0 within the free stroke to 1 beyond the stroke.
     #[inline(always)]
     fn engagement(&self, length: N<T>) -> N<T> {
         let elongation = length - self.rest_length;
-        // (x^2 - s^2) / (2 s) is about |x| - s at the end of the stroke, and smooth at its middle.
-        let beyond = (self.half_per_stroke * (elongation * elongation).v()).v() - self.half_stroke;
-        let width = (beyond * beyond + self.softness_squared).sqrt();
-        (0.5 * (1.0 + beyond / width)).v()
+        // The function (x^2 - s^2) / (2 s) approximates |x| - s near the ends of the stroke, and is
+        // smooth at x = 0.
+        let excess =
+            (self.half_inverse_stroke * (elongation * elongation).v()).v() - self.half_stroke;
+        let width = (excess * excess + self.softness_squared).sqrt();
+        (0.5 * (1.0 + excess / width)).v()
     }
 }
 
@@ -328,7 +330,8 @@ impl StopCoefficients<f64> {
 }
 
 impl<T: Real> StopCoefficients<T> {
-    /// Returns the depth of the tub point beyond the clearance (m). The stop is open below zero.
+    /// Returns the depth of the tub point beyond the clearance (m), which is negative while the
+    /// stop is open.
     #[inline(always)]
     pub(crate) fn depth(&self, point: &PointMotion<T>) -> N<T> {
         dot(&point.displacement, &self.direction) - self.clearance
@@ -338,7 +341,7 @@ impl<T: Real> StopCoefficients<T> {
     /// the depth delta, w = sqrt(delta^2 + s^2) and the speed v along the direction.
     #[inline(always)]
     pub(crate) fn force(&self, point: &PointMotion<T>) -> N<T> {
-        self.force_at(self.depth(point), self.speed(point))
+        self.force_at_depth(self.depth(point), self.speed(point))
     }
 
     /// Returns the tub point's speed along the stop's direction (m/s).
@@ -349,7 +352,7 @@ impl<T: Real> StopCoefficients<T> {
 
     /// Returns the repulsive force (N) at a depth (m) and a speed (m/s).
     #[inline(always)]
-    fn force_at(&self, depth: N<T>, speed: N<T>) -> N<T> {
+    fn force_at_depth(&self, depth: N<T>, speed: N<T>) -> N<T> {
         let w = (depth * depth + self.softness_squared).sqrt();
         let contact = (0.5 * (1.0 + depth / w)).v();
         (contact * (self.stiffness * w + self.damping * speed)).v()
@@ -393,7 +396,7 @@ impl<T: Real> BushingCoefficients<T> {
     }
 }
 
-/// The displacement of a tub point from its place before loading, and its velocity, in cabinet
+/// The displacement of a tub point from its position before loading, and its velocity, in cabinet
 /// axes.
 pub(crate) struct PointMotion<T> {
     pub(crate) displacement: Vec3<T>,
@@ -416,14 +419,15 @@ pub(crate) trait ElementLine<T> {
     fn friction_force(&self, force: N<T>, speed_squared: N<T>) -> N<T>;
 }
 
-/// The force law of an element between two points. Forces are positive where they drive the ends
-/// apart, in the line's unit.
+/// The force law of an element between two points. Positive forces drive the ends apart; the unit
+/// of force is that of the line.
 pub(crate) trait ForceLaw<T> {
     /// Returns the ends of the element.
     fn ends(&self) -> &Ends<T>;
-    /// Returns the linear force along the line, which elements of every machine have.
+    /// Returns the linear force along the line.
     fn force<L: ElementLine<T>>(&self, line: &L) -> N<T>;
-    /// Returns the optional force.
+    /// Returns the optional force along the line: that of a cubic spring, of friction or of outer
+    /// damping.
     fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T>;
 }
 
@@ -462,7 +466,7 @@ impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
     #[inline(always)]
     fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
         let friction = line.friction_force(self.friction, self.speed_squared);
-        if self.has_stage.holds() {
+        if self.has_second_stage.holds() {
             let force = friction + line.damping_force(self.outer_damping);
             return -(self.engagement(line.length()) * force).v();
         }
@@ -511,18 +515,18 @@ impl<T: Real> TubMotion<T> {
 
     /// Transforms a vector from tub axes to cabinet axes.
     #[inline(always)]
-    pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
-        self.tilt.in_cabinet_axes(v)
+    pub(crate) fn to_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+        self.tilt.to_cabinet_axes(v)
     }
 
     /// Computes the motion of a tub point, given in tub axes from P_T.
     #[inline(always)]
     fn point(&self, tub: &Vec3<T>) -> PointMotion<T> {
-        let mut displacement = subtract(self.tilt.in_cabinet_axes(tub), tub);
+        let mut displacement = subtract(self.tilt.to_cabinet_axes(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
         let velocity =
-            self.tilt.in_cabinet_axes(&add_cross_product(&self.velocity, &self.rate, tub));
+            self.tilt.to_cabinet_axes(&add_cross_product(&self.velocity, &self.rate, tub));
         PointMotion { displacement, velocity }
     }
 }
@@ -616,7 +620,8 @@ impl<T: Real> ElementLine<T> for CabinetLine<T> {
     }
 }
 
-/// Adds the forces of elements and their moments, either the linear or the optional ones.
+/// Adds the forces of elements and their moments: the optional forces if `is_optional`, else the
+/// linear ones.
 #[inline(always)]
 fn add_forces<T: Real, E: ForceLaw<T>>(
     load: &mut (Vec3<T>, Vec3<T>),

@@ -9,7 +9,7 @@
 
 use crate::coordinates::{
     COORDINATES, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
-    with_unit_derivative,
+    with_derivative,
 };
 use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
@@ -18,27 +18,27 @@ use crate::nonlinear::floating::LdltFactors;
 use crate::nonlinear::{Halves, coupled_halves};
 use lane_ode::{Lane, N, OutOfLine};
 
-/// The greatest number of Newton steps. Basis: twice the number of undamped ones. Doubling it costs
-/// time for machines without an equilibrium.
+/// The greatest number of Newton steps. Basis: twice the number of undamped steps. Doubling it
+/// costs time for machines without an equilibrium.
 const MAX_ITERATIONS: usize = 120;
 /// The iteration from which steps are damped. Basis: half of all iterations.
 /// Doubling it delays the equilibria of machines whose stops open and close in turn, between which
 /// undamped steps cycle.
-const DAMPED_FROM: usize = 60;
+const FIRST_DAMPED_ITERATION: usize = 60;
 /// The factor of a damped step. Basis: below 1, so that a cycle of two iterations contracts.
 /// Doubling it would lengthen the steps instead.
 const DAMPING_FACTOR: f64 = 0.6;
 /// The greatest step in any coordinate (m, rad). Basis: short against the machine, so that a soft
-/// machine does not turn over on the way. Doubling it halves the number of steps of machines that
-/// sag far.
+/// machine does not turn over between two iterations. Doubling it halves the number of steps of
+/// machines that sag far.
 const MAX_STEP: f64 = 0.1;
 /// The tolerance of the last step (m, rad). Basis: Newton's method squares the error, so that only
 /// rounding remains. Doubling it changes nothing.
 const STEP_TOLERANCE: f64 = 1e-12;
 /// The least shift that is added to a stiffness matrix that is not positive definite (N/m, N
-/// m/rad); the shift is raised tenfold until the sum is. Vertical springs, for example, have no
-/// stiffness sideways before they carry load. Basis: small against any suspension's stiffness.
-/// Doubling it changes the path, not the equilibrium.
+/// m/rad); the shift is raised tenfold until the sum is positive definite. Vertical springs, for
+/// example, have no stiffness sideways before they carry load. Basis: small against any
+/// suspension's stiffness. Doubling it changes the path, not the equilibrium.
 const MIN_SHIFT: f64 = 10.0;
 /// The greatest shift (N/m, N m/rad). Basis: far above any suspension's stiffness, so that a
 /// machine that needs a greater one has no equilibrium. Doubling it costs a fraction of an
@@ -61,7 +61,7 @@ impl<T: Lane> OutOfLine for SolveEquilibrium<'_, T> {
 }
 
 /// Returns the equilibrium coordinates, and a mask of the lanes in which an equilibrium was found.
-/// Its stiffness matrix is positive definite there.
+/// The stiffness matrix at an equilibrium is positive definite.
 #[inline(always)]
 pub(crate) fn solve_equilibrium<T: Lane>(
     zero: N<T>,
@@ -77,7 +77,7 @@ pub(crate) fn solve_equilibrium<T: Lane>(
         let mut stiffness = [[zero; COORDINATES]; COORDINATES];
         let mut force = [zero; COORDINATES];
         for j in 0..COORDINATES {
-            let forces = static_forces(&machine, &with_unit_derivative(&q, j, 1.0));
+            let forces = static_forces(&machine, &with_derivative(&q, j, 1.0));
             for i in 0..COORDINATES {
                 stiffness[i][j] = N(forces[i].0.slope.neg());
                 force[i] = N(forces[i].0.value);
@@ -85,7 +85,7 @@ pub(crate) fn solve_equilibrium<T: Lane>(
             stiffness[j][j] += shift;
         }
         let factors = LdltFactors::new(stiffness);
-        let is_stable = factors.is_positive();
+        let is_stable = factors.positive_definite_lanes();
         let step = factors.solve(force);
         let mut largest_step = zero;
         for component in &step {
@@ -93,7 +93,8 @@ pub(crate) fn solve_equilibrium<T: Lane>(
         }
         let scale =
             largest_step.where_less(zero.lit(MAX_STEP), one, zero.lit(MAX_STEP) / largest_step);
-        let scale = if iteration < DAMPED_FROM { scale } else { (scale * DAMPING_FACTOR).v() };
+        let scale =
+            if iteration < FIRST_DAMPED_ITERATION { scale } else { (scale * DAMPING_FACTOR).v() };
         let unfinished = !(solved_lanes | unsolvable_lanes);
         for lane in (0..T::LANES).filter(|lane| unfinished >> lane & 1 == 1) {
             let current_shift = shift.0.get(lane);
@@ -126,8 +127,9 @@ const RIGID_MOTIONS: [(&str, [usize; 2], &str); 4] = [
 ];
 
 /// Returns the least stable motion of tub and drum together at coordinates `q`, with its stiffness
-/// and unit, if any stiffness is negative. The stiffnesses of translations are compared relative to
-/// the greatest of them, and those of rotations likewise.
+/// and unit, if any stiffness is negative. Stiffnesses of translations are compared relative to the
+/// greatest stiffness of a translation, those of rotations relative to the greatest stiffness of a
+/// rotation.
 #[inline(never)]
 pub(crate) fn unstable_motion(
     machine: &Coefficients<f64>,
@@ -136,17 +138,19 @@ pub(crate) fn unstable_motion(
     let machine = machine.constant();
     let q = q.map(N);
     let stiffness = RIGID_MOTIONS.map(|(_, coordinates, _)| {
-        let stiffness_along = |along: usize| {
-            let forces = static_forces(&machine, &with_unit_derivative(&q, along, 1.0));
+        let stiffness_by = |column: usize| {
+            let forces = static_forces(&machine, &with_derivative(&q, column, 1.0));
             coordinates.iter().map(|&i| -forces[i].0.slope).sum::<f64>()
         };
-        coordinates.into_iter().map(stiffness_along).sum::<f64>()
+        coordinates.into_iter().map(stiffness_by).sum::<f64>()
     });
-    let greatest = |kind: &[f64]| kind.iter().fold(0.0_f64, |most, k| most.max(k.abs()));
-    let scales = [greatest(&stiffness[..2]), greatest(&stiffness[2..])];
-    let shares = (0..RIGID_MOTIONS.len()).map(|k| (k, stiffness[k] / scales[k / 2]));
-    let (least, _) =
-        shares.filter(|(_, share)| *share < 0.0).min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let largest =
+        |stiffnesses: &[f64]| stiffnesses.iter().fold(0.0_f64, |largest, k| largest.max(k.abs()));
+    let scales = [largest(&stiffness[..2]), largest(&stiffness[2..])];
+    let relative_stiffnesses = (0..RIGID_MOTIONS.len()).map(|k| (k, stiffness[k] / scales[k / 2]));
+    let (least, _) = relative_stiffnesses
+        .filter(|(_, relative)| *relative < 0.0)
+        .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
     let (motion, _, unit) = RIGID_MOTIONS[least];
     Some((motion, stiffness[least], unit))
 }
@@ -182,7 +186,7 @@ mod tests {
         let weight_n = (23.87 + 4.34 + 4.04) * 9.81;
         let sag_m = -(q[0].0 + 0.2068 * q[5].0);
         assert!((sag_m - weight_n / 32_000.0).abs() < 1e-5, "{sag_m} m in the springs' mid-plane");
-        for force in static_forces(&coefficients.constant(), &with_unit_derivative(&q, 0, 0.0)) {
+        for force in static_forces(&coefficients.constant(), &with_derivative(&q, 0, 0.0)) {
             assert!(force.0.value.abs() < 1e-5, "{} N or N m left", force.0.value);
         }
     }
@@ -203,10 +207,10 @@ mod tests {
             }];
             let (q, solved_lanes) = solve_equilibrium(N(0.0), &Coefficients::new(&machine));
             assert_eq!(solved_lanes & 1, 1, "{stiffness_n_per_m:e}");
-            let lower_m = -(q[0].0 + 0.3 * q[5].0.sin() - 0.2 * (q[5].0.cos() - 1.0));
-            let into_m = lower_m - 0.005;
+            let lowering_m = -(q[0].0 + 0.3 * q[5].0.sin() - 0.2 * (q[5].0.cos() - 1.0));
+            let depth_m = lowering_m - 0.005;
             // The stop carries about the weight, 320 N, and a part of the springs' moment.
-            assert!(into_m > -1e-4 && into_m * stiffness_n_per_m < 400.0, "{lower_m}");
+            assert!(depth_m > -1e-4 && depth_m * stiffness_n_per_m < 400.0, "{lowering_m}");
         }
     }
 
@@ -223,7 +227,7 @@ mod tests {
         let (q, solved_lanes) = solve_equilibrium(N(0.0), &coefficients);
         assert_eq!(solved_lanes & 1, 0);
         let (motion, stiffness, _) = unstable_motion(&coefficients, &q.map(|q| q.0)).unwrap();
-        // The springs stand before O, so that yaw moves them sideways.
+        // The springs are in front of O, so that yaw moves them sideways.
         assert_eq!(motion, "round the vertical (yaw)");
         assert!(stiffness < 0.0, "{stiffness}");
     }

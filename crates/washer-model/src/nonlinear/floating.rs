@@ -23,7 +23,7 @@ pub(crate) struct AxisResponse<T> {
 #[derive(Clone, Copy)]
 pub(crate) struct FloatingChain<T, const R: usize> {
     /// The reciprocal of the chain's mass.
-    pub(crate) per_mass: N<T>,
+    pub(crate) inverse_mass: N<T>,
     /// The force on the chain along y and z.
     pub(crate) force: [N<T>; 2],
     /// The acceleration of the mass centre relative to the bearing midpoint at constant speeds, y
@@ -40,7 +40,7 @@ pub(crate) struct FloatingChain<T, const R: usize> {
 }
 
 impl<T: Real, const R: usize> FloatingChain<T, R> {
-    /// Adds forces on the axis.
+    /// Adds a load on the axis.
     #[inline(always)]
     pub(crate) fn apply(&mut self, load: &AxisLoad<T>) {
         (self.force, self.torque) = self.with_load(load);
@@ -59,7 +59,7 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
         }
     }
 
-    /// Returns force and torques together with forces on the axis.
+    /// Returns the sums of the chain's force and torques and those of a load on the axis.
     #[inline(always)]
     fn with_load(&self, load: &AxisLoad<T>) -> ([N<T>; 2], [N<T>; R]) {
         let [moment_y, moment_z] = load.moment;
@@ -79,52 +79,52 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
     /// `inertia` holds the factors of J.
     #[inline(always)]
     pub(crate) fn response(&self, inertia: &LdltFactors<T, R>) -> AxisResponse<T> {
-        let zero = self.per_mass.lit(0.0);
+        let zero = self.inverse_mass.lit(0.0);
         // The rows of G: the torques that `apply` adds per unit of force and moment, which by
         // virtual work are also the motions of the axis per unit of rotation.
-        let mut half = [[zero; 4]; R];
+        let mut torques_per_load = [[zero; 4]; R];
         for r in 0..R {
-            half[r][0] = -self.arm[r][0];
-            half[r][1] = -self.arm[r][1];
+            torques_per_load[r][0] = -self.arm[r][0];
+            torques_per_load[r][1] = -self.arm[r][1];
         }
         for r in 0..2 {
-            half[r][2] = self.axis[r][0];
-            half[r][3] = self.axis[r][1];
+            torques_per_load[r][2] = self.axis[r][0];
+            torques_per_load[r][3] = self.axis[r][1];
         }
-        let mut start = self.torque;
+        let mut torque = self.torque;
         // With J = L D L^T, C = 1/m + (L^-1 G)^T D^-1 (L^-1 G): one triangular solve serves both
         // sides.
         for j in 0..R {
             for i in j + 1..R {
-                let l = inertia.lower_entry(i, j);
-                start[i] -= l * start[j];
+                let lower = inertia.lower_entry(i, j);
+                torque[i] -= lower * torque[j];
                 for k in 0..4 {
-                    half[i][k] -= l * half[j][k];
+                    torques_per_load[i][k] -= lower * torques_per_load[j][k];
                 }
             }
         }
         let mut free = [
-            self.force[0] * self.per_mass - self.drift[0],
-            self.force[1] * self.per_mass - self.drift[1],
+            self.force[0] * self.inverse_mass - self.drift[0],
+            self.force[1] * self.inverse_mass - self.drift[1],
             self.axis_drift[0],
             self.axis_drift[1],
         ];
         let mut compliance = [[zero; 4]; 4];
-        compliance[0][0] = self.per_mass;
-        compliance[1][1] = self.per_mass;
+        compliance[0][0] = self.inverse_mass;
+        compliance[1][1] = self.inverse_mass;
         for r in 0..R {
             for i in 0..4 {
-                let weighted = (half[r][i] * inertia.reciprocal_pivot(r)).v();
-                free[i] += weighted * start[r];
+                let weighted = (torques_per_load[r][i] * inertia.reciprocal_pivot(r)).v();
+                free[i] += weighted * torque[r];
                 for j in 0..=i {
-                    compliance[i][j] += weighted * half[r][j];
+                    compliance[i][j] += weighted * torques_per_load[r][j];
                 }
             }
         }
         AxisResponse { free, compliance }
     }
 
-    /// Computes the accelerations under forces on the axis: those of the bearing midpoint along y
+    /// Computes the accelerations under a load on the axis: those of the bearing midpoint along y
     /// and z, then those of the rotations. `inertia` holds the factors of J.
     #[inline(always)]
     pub(crate) fn accelerations(
@@ -134,8 +134,10 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
     ) -> ([N<T>; 2], [N<T>; R]) {
         let (force, torque) = self.with_load(load);
         let rotation = inertia.solve(torque);
-        let mut translation =
-            [force[0] * self.per_mass - self.drift[0], force[1] * self.per_mass - self.drift[1]];
+        let mut translation = [
+            force[0] * self.inverse_mass - self.drift[0],
+            force[1] * self.inverse_mass - self.drift[1],
+        ];
         for r in 0..R {
             if r > 0 {
                 translation[0] -= self.arm[r][0] * rotation[r];
@@ -150,8 +152,8 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
     #[inline(always)]
     pub(crate) fn generalised_forces(&self) -> ([N<T>; 2], [N<T>; R]) {
         let midpoint = [
-            self.force[0] - self.drift[0] / self.per_mass,
-            self.force[1] - self.drift[1] / self.per_mass,
+            self.force[0] - self.drift[0] / self.inverse_mass,
+            self.force[1] - self.drift[1] / self.inverse_mass,
         ];
         let mut rotation = self.torque;
         for r in 0..R {
@@ -177,13 +179,13 @@ impl<T: Real, const R: usize> LdltFactors<T, R> {
             for i in j + 1..R {
                 let l = (a[i][j] * pivot).v();
                 for k in j + 1..=i {
-                    // Row i still has the column before its division by the pivot; for the rows
-                    // above, the upper triangle has it.
-                    let unscaled = if k == i { a[i][j] } else { a[j][k] };
-                    a[i][k] -= l * unscaled;
+                    // Entries of column j before the division by the pivot: row i still has its
+                    // own, and the upper triangle has those of the rows between j and i.
+                    let undivided = if k == i { a[i][j] } else { a[j][k] };
+                    a[i][k] -= l * undivided;
                 }
-                // The strict upper triangle keeps the column before its division, for the rows
-                // below.
+                // The strict upper triangle keeps the column before its division by the pivot, for
+                // the following rows.
                 a[j][i] = a[i][j];
                 a[i][j] = l;
             }
@@ -206,7 +208,7 @@ impl<T: Real, const R: usize> LdltFactors<T, R> {
 
     /// Returns a mask of the lanes whose matrix is positive definite.
     #[inline(always)]
-    pub(crate) fn is_positive(&self) -> u32
+    pub(crate) fn positive_definite_lanes(&self) -> u32
     where
         T: Lane,
     {

@@ -6,7 +6,7 @@ use crate::nonlinear::coefficients::Bodies;
 use lane_ode::{N, Real};
 
 lane_struct! {
-    /// The resultant of forces (y, z; cabinet axes) on points of a body's axis.
+    /// The resultant of forces on points of a body's axis (y and z components in cabinet axes).
     #[derive(Clone, Copy, Debug)]
     AxisLoad {
         /// The sum of the forces.
@@ -84,31 +84,31 @@ const SMALL_SIN_SQUARED: f64 = 1.0 / 1024.0;
 /// Computes phi / sin phi from sin^2 phi and cos phi, for phi up to pi/2 and beyond.
 #[inline(always)]
 fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
-    let mut short = sin_squared.lit(ASIN_SERIES[4]);
+    let mut short_series = sin_squared.lit(ASIN_SERIES[4]);
     for k in (0..4).rev() {
-        short = short * sin_squared + ASIN_SERIES[k];
+        short_series = short_series * sin_squared + ASIN_SERIES[k];
     }
     let bound = sin_squared.lit(SMALL_SIN_SQUARED);
     let is_small = sin_squared.0.less(bound.0);
     // The sine decreases again beyond pi/2, so that the sign of the cosine is tested too.
-    let is_ahead = cos.lit(0.0).0.less(cos.0);
-    if T::all(is_small) && T::all(is_ahead) {
-        return short;
+    let is_cos_positive = cos.lit(0.0).0.less(cos.0);
+    if T::all(is_small) && T::all(is_cos_positive) {
+        return short_series;
     }
-    let long = phi_over_sin_by_quarters(sin_squared, cos);
-    N(T::select(is_ahead, T::select(is_small, short.0, long.0), long.0))
+    let by_quarters = phi_over_sin_by_quarters(sin_squared, cos);
+    N(T::select(is_cos_positive, T::select(is_small, short_series.0, by_quarters.0), by_quarters.0))
 }
 
 /// Computes phi / sin phi from the quarter angle: with s = sin^2(phi/4) it is (asin sqrt(s) /
 /// sqrt(s)) / (cos(phi/4) cos(phi/2)).
 #[inline(always)]
 fn phi_over_sin_by_quarters<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
-    let half = 0.5 * (sin_squared / (1.0 + cos));
-    let cos_half_squared = 1.0 - half.v();
-    let quarter = (0.5 * (half.v() / (1.0 + cos_half_squared.sqrt()))).v();
-    let mut series = quarter.lit(ASIN_SERIES[21]);
+    let sin_half_squared = 0.5 * (sin_squared / (1.0 + cos));
+    let cos_half_squared = 1.0 - sin_half_squared.v();
+    let sin_quarter_squared = (0.5 * (sin_half_squared.v() / (1.0 + cos_half_squared.sqrt()))).v();
+    let mut series = sin_quarter_squared.lit(ASIN_SERIES[21]);
     for k in (0..21).rev() {
-        series = series * quarter + ASIN_SERIES[k];
+        series = series * sin_quarter_squared + ASIN_SERIES[k];
     }
-    series / ((1.0 - quarter) * cos_half_squared).v().sqrt()
+    series / ((1.0 - sin_quarter_squared) * cos_half_squared).v().sqrt()
 }

@@ -1,5 +1,5 @@
-//! The frame of a body whose axis is tilted by yaw and pitch, as tub and shaft are (Table 1, first
-//! two angles).
+//! The frame of a body whose axis is tilted by yaw and pitch: of the tub, or of the shaft without
+//! its spin (Table 1 of the paper, first two angles).
 //!
 //! The frame is R = Ry(yaw) Rz(pitch), with the columns a1 (the axis), a2 and a3. Vectors are in
 //! frame axes, or in cabinet axes where a name ends in `_c`.
@@ -101,7 +101,7 @@ impl<T: Real> Tilt<T> {
 
     /// Transforms a vector from frame axes to cabinet axes. a3 is (sin yaw, 0, cos yaw).
     #[inline(always)]
-    pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+    pub(crate) fn to_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
         let [a1, a2] = [&self.axis_c, &self.second_c];
         [
             a1[0] * v[0] + (a2[0] * v[1] + self.sin_yaw * v[2]),
@@ -112,12 +112,12 @@ impl<T: Real> Tilt<T> {
 
     /// Transforms a vector from cabinet axes to frame axes.
     #[inline(always)]
-    pub(crate) fn in_frame_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+    pub(crate) fn to_frame_axes(&self, v: &Vec3<T>) -> Vec3<T> {
         [dot(&self.axis_c, v), dot(&self.second_c, v), self.sin_yaw * v[0] + self.cos_yaw * v[2]]
     }
 
-    /// Computes the frame's angular velocity, and its angular acceleration and the second
-    /// derivative of its axis at constant generalised speeds.
+    /// Computes the frame's angular velocity, and at constant generalised speeds the frame's
+    /// angular acceleration and the second derivative of its axis.
     #[inline(always)]
     pub(crate) fn motion_at_constant_speeds(
         &self,
@@ -153,7 +153,7 @@ pub(crate) struct TiltMotion<T> {
     pub(crate) rate: Vec3<T>,
     /// The angular acceleration about a1.
     pub(crate) acceleration_x: N<T>,
-    /// The angular acceleration about a2; that about a3 is zero.
+    /// The angular acceleration about a2. The angular acceleration about a3 is zero.
     pub(crate) acceleration_y: N<T>,
     /// The second derivative of a1.
     pub(crate) axis_acceleration: Vec3<T>,

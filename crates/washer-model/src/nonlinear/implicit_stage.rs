@@ -4,8 +4,8 @@
 //! A stage solves k = f(q, u) + f_springs(r + g k) for its derivative k = (u, a), where r is the
 //! known part of the state and g the implicit coefficient times the step. At the stage's end u =
 //! r_u + g a and q = r_q + g r_u + g^2 a. The springs are linearised about a nearby state. This
-//! leaves J + g^2 K_D for the hinge's inertia and one 4x4 system for the bearings' load, which is
-//! that of section 4.3 of the model page with 1 / g for both caps.
+//! leaves the hinge's inertia J + g^2 K_D and a 4x4 system for the bearings' load, which is the
+//! system of section 4.3 of the model page with 1 / g for both caps.
 
 use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
 use crate::machine::spin::SpinState;
@@ -58,9 +58,9 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     let tub_response = tub.response(&tub_factors);
     let rotor_response = rotor.response(&rotor_factors);
     let squares = (g_squared.recip(), zero);
-    let on_shaft =
+    let shaft_load =
         mass_scaled_load(b, squares, &deflection, &no_sag, &tub_response, &rotor_response);
-    let a = accelerations_under_load((tub, &tub_factors), (rotor, &rotor_factors), &on_shaft);
+    let a = accelerations_under_load((tub, &tub_factors), (rotor, &rotor_factors), &shaft_load);
     let mut k = *r;
     for i in 0..COORDINATES {
         k[i] = r[COORDINATES + i] + g * a[i];

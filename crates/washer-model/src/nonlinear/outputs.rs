@@ -14,7 +14,7 @@ use crate::nonlinear::{from_shaft_axes, hinge_to_shaft_axes, to_shaft_axes};
 use lane_ode::{N, Real, Sample};
 
 /// The number of components of the radial distance between drum and tub.
-pub(crate) const RADIAL: usize = 2;
+pub(crate) const RADIAL_COMPONENTS: usize = 2;
 
 /// Coordinates (m, rad) with first and second time derivatives.
 pub(crate) struct MovingCoordinates<T> {
@@ -27,7 +27,7 @@ pub(crate) struct MovingCoordinates<T> {
 struct MovingVector<T> {
     value: Vec3<T>,
     rate: Vec3<T>,
-    second: Vec3<T>,
+    acceleration: Vec3<T>,
 }
 
 /// The points whose motions are channels.
@@ -37,7 +37,7 @@ struct ChannelPoints<T> {
     total_centre: MovingVector<T>,
 }
 
-/// The motion of one channel.
+/// Expands to the motion of one channel.
 macro_rules! channel_motion {
     ($points:ident, $motion:ident, [point $point:ident $axis:literal]) => {
         component(&$points.$point, $axis)
@@ -73,7 +73,7 @@ fn combine_moving_vectors<T: Real>(
     MovingVector {
         value: linear_combination(j, &a.value, k, &b.value),
         rate: linear_combination(j, &a.rate, k, &b.rate),
-        second: linear_combination(j, &a.second, k, &b.second),
+        acceleration: linear_combination(j, &a.acceleration, k, &b.acceleration),
     }
 }
 
@@ -82,7 +82,7 @@ fn combine_moving_vectors<T: Real>(
 pub(crate) struct Axes<T> {
     tub: Tilt<T>,
     /// The angular velocity and acceleration of the tub, in tub axes.
-    tub_turn: [Vec3<T>; 2],
+    tub_rates: [Vec3<T>; 2],
     tub_axis: MovingVector<T>,
     shaft_axis: MovingVector<T>,
     /// The drum's axes d1 and d2.
@@ -114,7 +114,7 @@ impl<T: Real> Axes<T> {
         let u10 = u[HINGE_PITCH];
         let [ex, ey, ez] =
             [c9 * omega_s[0] - s9 * omega_s[2], omega_s[1] + u9, s9 * omega_s[0] + c9 * omega_s[2]];
-        let turn = [
+        let drum_rates = [
             [ex, ey, ez + u10],
             [
                 c9 * alpha_s[0] - s9 * alpha_s[2] + (u10 * ey - u9 * ez),
@@ -125,12 +125,12 @@ impl<T: Real> Axes<T> {
         let (s10, c10) = q[HINGE_PITCH].sin_cos();
         let zero = s9.lit(0.0);
         Self {
-            tub_turn: [tub_motion.rate, angular_acceleration(&tub, &tub_motion, motion, TUB_YAW)],
+            tub_rates: [tub_motion.rate, angular_acceleration(&tub, &tub_motion, motion, TUB_YAW)],
             tub_axis: moving_axis(&tub, &tub_motion, motion, TUB_YAW),
             shaft_axis: moving_axis(&shaft, &shaft_motion, motion, SHAFT_YAW),
             drum: [
-                moving_drum_vector(&shaft, spin, (s9, c9), &turn, &[c10, s10, zero]),
-                moving_drum_vector(&shaft, spin, (s9, c9), &turn, &[-s10, c10, zero]),
+                moving_drum_vector(&shaft, spin, (s9, c9), &drum_rates, &[c10, s10, zero]),
+                moving_drum_vector(&shaft, spin, (s9, c9), &drum_rates, &[-s10, c10, zero]),
             ],
             tub,
         }
@@ -143,21 +143,25 @@ impl<T: Real> Axes<T> {
         &self,
         b: &Bodies<T>,
         motion: &MovingCoordinates<T>,
-    ) -> [Sample<T>; RADIAL] {
+    ) -> [Sample<T>; RADIAL_COMPONENTS] {
         let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let drum_front = self.drum_front(b, motion);
-        let [omega, alpha] = &self.tub_turn;
-        let apart = self.tub.in_frame_axes(&subtract(drum_front.value, &tub_front.value));
-        let velocity = self.tub.in_frame_axes(&subtract(drum_front.rate, &tub_front.rate));
-        let acceleration = self.tub.in_frame_axes(&subtract(drum_front.second, &tub_front.second));
+        let [omega, alpha] = &self.tub_rates;
+        let separation = self.tub.to_frame_axes(&subtract(drum_front.value, &tub_front.value));
+        let relative_velocity = self.tub.to_frame_axes(&subtract(drum_front.rate, &tub_front.rate));
+        let relative_acceleration =
+            self.tub.to_frame_axes(&subtract(drum_front.acceleration, &tub_front.acceleration));
         // Derivatives in the rotating frame of the tub.
-        let rate = add_cross_product(&velocity, &apart, omega);
-        let second = add_cross_product(
-            &add_cross_product(&acceleration, &apart, alpha),
-            &add(velocity, &rate),
+        let rate = add_cross_product(&relative_velocity, &separation, omega);
+        let acceleration = add_cross_product(
+            &add_cross_product(&relative_acceleration, &separation, alpha),
+            &add(relative_velocity, &rate),
             omega,
         );
-        [sample(apart[1], rate[1], second[1]), sample(apart[2], rate[2], second[2])]
+        [
+            sample(separation[1], rate[1], acceleration[1]),
+            sample(separation[2], rate[2], acceleration[2]),
+        ]
     }
 
     /// Computes positions (m) and angles (rad) in the order of [`Channel::ALL`].
@@ -171,20 +175,28 @@ impl<T: Real> Axes<T> {
         let tub_centre = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_centre);
         let drum_front = self.drum_front(b, motion);
         let mut rho = combine_moving_vectors(b.rho_1, &self.drum[0], b.rho_2, &self.drum[1]);
-        let one = b.tub_share.lit(1.0);
+        let one = b.tub_mass_share.lit(1.0);
         if b.is_skewed.holds() {
             rho = combine_moving_vectors(
                 one,
                 &rho,
                 b.rho_3,
-                &moving_cross(&self.drum[0], &self.drum[1]),
+                &moving_cross_product(&self.drum[0], &self.drum[1]),
             );
         }
-        let rotor_centre =
-            combine_moving_vectors(b.along_shaft, &self.shaft_axis, b.drum_share, &rho);
+        let rotor_centre = combine_moving_vectors(
+            b.shaft_centre_offset,
+            &self.shaft_axis,
+            b.drum_mass_share,
+            &rho,
+        );
         let rotor_centre = moving_point(motion, SHAFT_Y, &rotor_centre, one);
-        let total_centre =
-            combine_moving_vectors(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
+        let total_centre = combine_moving_vectors(
+            b.tub_mass_share,
+            &tub_centre,
+            b.rotor_mass_share,
+            &rotor_centre,
+        );
         channel_motions(&ChannelPoints { tub_front, drum_front, total_centre }, motion)
     }
 
@@ -197,10 +209,10 @@ impl<T: Real> Axes<T> {
     }
 }
 
-/// Computes the squared distance of the drum's front centre from the tub axis. The distance itself
-/// is not smooth at zero.
+/// Computes the squared distance of the drum's front centre from the tub axis. The distance is not
+/// smooth at zero, unlike its square.
 #[inline(always)]
-pub(crate) fn squared_distance<T: Real>([y, z]: &[Sample<T>; RADIAL]) -> Sample<T> {
+pub(crate) fn squared_distance<T: Real>([y, z]: &[Sample<T>; RADIAL_COMPONENTS]) -> Sample<T> {
     sample(
         y.value * y.value + z.value * z.value,
         (2.0 * (y.value * y.slope + z.value * z.slope)).v(),
@@ -218,7 +230,7 @@ fn sample<T>(value: N<T>, slope: N<T>, curvature: N<T>) -> Sample<T> {
 
 #[inline(always)]
 fn component<T: Real>(vector: &MovingVector<T>, i: usize) -> Sample<T> {
-    sample(vector.value[i], vector.rate[i], vector.second[i])
+    sample(vector.value[i], vector.rate[i], vector.acceleration[i])
 }
 
 /// Computes the angular acceleration of a frame tilted by coordinate `yaw` and the next one, in
@@ -226,66 +238,76 @@ fn component<T: Real>(vector: &MovingVector<T>, i: usize) -> Sample<T> {
 #[inline(always)]
 fn angular_acceleration<T: Real>(
     tilt: &Tilt<T>,
-    at: &TiltMotion<T>,
+    tilt_motion: &TiltMotion<T>,
     motion: &MovingCoordinates<T>,
     yaw: usize,
 ) -> Vec3<T> {
     let [yaw, pitch] = [motion.a[yaw], motion.a[yaw + 1]];
-    [at.acceleration_x + yaw * tilt.sin_pitch, at.acceleration_y + yaw * tilt.cos_pitch, pitch]
+    [
+        tilt_motion.acceleration_x + yaw * tilt.sin_pitch,
+        tilt_motion.acceleration_y + yaw * tilt.cos_pitch,
+        pitch,
+    ]
 }
 
 /// Computes the motion of the axis of a frame tilted by coordinate `yaw` and the next one.
 #[inline(always)]
 fn moving_axis<T: Real>(
     tilt: &Tilt<T>,
-    at: &TiltMotion<T>,
+    tilt_motion: &TiltMotion<T>,
     MovingCoordinates { u, a, .. }: &MovingCoordinates<T>,
     yaw: usize,
 ) -> MovingVector<T> {
     let rates = [u[yaw], u[yaw + 1]];
-    let seconds = [a[yaw], a[yaw + 1]];
+    let accelerations = [a[yaw], a[yaw + 1]];
     let zero = rates[0].lit(0.0);
     let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
     let by_pitch = &tilt.second_c;
-    let at_constant_speeds = tilt.in_cabinet_axes(&at.axis_acceleration);
-    let by_accelerations = linear_combination(seconds[0], &by_yaw, seconds[1], by_pitch);
+    let at_constant_speeds = tilt.to_cabinet_axes(&tilt_motion.axis_acceleration);
+    let by_accelerations =
+        linear_combination(accelerations[0], &by_yaw, accelerations[1], by_pitch);
     MovingVector {
         value: tilt.axis_c,
         rate: linear_combination(rates[0], &by_yaw, rates[1], by_pitch),
-        second: add(at_constant_speeds, &by_accelerations),
+        acceleration: add(at_constant_speeds, &by_accelerations),
     }
 }
 
-/// Computes the motion of a vector that is fixed in the drum and given in axes E. `turn` holds the
-/// drum's angular velocity and acceleration in axes E.
+/// Computes the motion of a vector that is fixed in the drum and given in axes E. `drum_rates`
+/// holds the drum's angular velocity and acceleration in axes E.
 #[inline(always)]
 fn moving_drum_vector<T: Real>(
     shaft: &Tilt<T>,
     spin: &SpinState<T>,
     hinge: (N<T>, N<T>),
-    turn: &[Vec3<T>; 2],
+    drum_rates: &[Vec3<T>; 2],
     v: &Vec3<T>,
 ) -> MovingVector<T> {
     let zero = v[0].lit(0.0);
-    let still = [zero; 3];
-    let rate = add_cross_product(&still, &turn[0], v);
-    let second = add_cross_product(&add_cross_product(&still, &turn[1], v), &turn[0], &rate);
+    let zeros = [zero; 3];
+    let rate = add_cross_product(&zeros, &drum_rates[0], v);
+    let acceleration =
+        add_cross_product(&add_cross_product(&zeros, &drum_rates[1], v), &drum_rates[0], &rate);
     MovingVector {
         value: drum_to_cabinet_axes(shaft, spin, hinge, v),
         rate: drum_to_cabinet_axes(shaft, spin, hinge, &rate),
-        second: drum_to_cabinet_axes(shaft, spin, hinge, &second),
+        acceleration: drum_to_cabinet_axes(shaft, spin, hinge, &acceleration),
     }
 }
 
 /// Computes the motion of the cross product of two moving vectors.
 #[inline(always)]
-fn moving_cross<T: Real>(a: &MovingVector<T>, b: &MovingVector<T>) -> MovingVector<T> {
+fn moving_cross_product<T: Real>(a: &MovingVector<T>, b: &MovingVector<T>) -> MovingVector<T> {
     let zero = [a.value[0].lit(0.0); 3];
     let value = add_cross_product(&zero, &a.value, &b.value);
     let rate = add_cross_product(&add_cross_product(&zero, &a.rate, &b.value), &a.value, &b.rate);
     let mixed = add_cross_product(&zero, &a.rate, &b.rate);
-    let second = add_cross_product(&add(mixed, &mixed), &a.second, &b.value);
-    MovingVector { value, rate, second: add_cross_product(&second, &a.value, &b.second) }
+    let acceleration = add_cross_product(&add(mixed, &mixed), &a.acceleration, &b.value);
+    MovingVector {
+        value,
+        rate,
+        acceleration: add_cross_product(&acceleration, &a.value, &b.acceleration),
+    }
 }
 
 /// Transforms a vector from the hinge's axes E to cabinet axes.
@@ -296,28 +318,28 @@ fn drum_to_cabinet_axes<T: Real>(
     (s9, c9): (N<T>, N<T>),
     v: &Vec3<T>,
 ) -> Vec3<T> {
-    shaft.in_cabinet_axes(&from_shaft_axes(spin, &hinge_to_shaft_axes(s9, c9, v)))
+    shaft.to_cabinet_axes(&from_shaft_axes(spin, &hinge_to_shaft_axes(s9, c9, v)))
 }
 
-/// Computes the motion of the point at `distance` along an axis from a bearing midpoint. Coordinate
-/// `first` is the midpoint's displacement along c2 and the next one that along c3; midpoints do not
-/// move along c1.
+/// Computes the motion of the point at `distance` along an axis from a bearing midpoint.
+/// `coordinate` is the index of the midpoint's displacement along c2, which the displacement along
+/// c3 follows; midpoints do not move along c1.
 #[inline(always)]
 fn moving_point<T: Real>(
     motion: &MovingCoordinates<T>,
-    first: usize,
+    coordinate: usize,
     axis: &MovingVector<T>,
     distance: N<T>,
 ) -> MovingVector<T> {
     let mut vector = MovingVector {
         value: scale(distance, axis.value),
         rate: scale(distance, axis.rate),
-        second: scale(distance, axis.second),
+        acceleration: scale(distance, axis.acceleration),
     };
     for i in 0..2 {
-        vector.value[1 + i] += motion.q[first + i];
-        vector.rate[1 + i] += motion.u[first + i];
-        vector.second[1 + i] += motion.a[first + i];
+        vector.value[1 + i] += motion.q[coordinate + i];
+        vector.rate[1 + i] += motion.u[coordinate + i];
+        vector.acceleration[1 + i] += motion.a[coordinate + i];
     }
     vector
 }

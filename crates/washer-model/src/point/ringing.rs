@@ -1,14 +1,14 @@
 //! Bounds the swing of hinge and bearings after jumps of the drum's acceleration.
 //!
 //! A jump of the acceleration is a jump of the loads of everything that turns with the drum:
-//! unbalances, and bodies that their own weight holds off the spin axis. Every method follows the
+//! unbalances, and bodies that their own weight holds off the spin axis. Every method resolves the
 //! slow modes. Hinge and bearings have no damping of their own, so that they swing about their new
-//! deflection from then on. Steps longer than the periods do not resolve this swing, and two runs
+//! deflection after the jump. Steps longer than the periods do not resolve this swing. Two runs
 //! with such steps lose the same part of it, so that their comparison does not show the error.
 //!
-//! The static deflection under the jump bounds the swing, without eigenvalues. The machine is free
-//! meanwhile, because its suspension is slow: the load is that of the linear model (Eq. 41) less
-//! what accelerates the machine as a rigid body (inertia relief).
+//! The static deflection under the jump bounds the swing, without eigenvalues. The suspension is
+//! slow, so that the machine is taken as free: the load is that of the linear model (Eq. 41) less
+//! the part that accelerates the machine as a rigid body (inertia relief).
 
 use core::f64::consts::PI;
 
@@ -19,7 +19,7 @@ use crate::coordinates::{
     HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW,
     TUB_Z,
 };
-use crate::machine::spin::SpinStretch;
+use crate::machine::spin::SpinSegment;
 use crate::{COORDINATES, Channel, Machine, Matrices};
 
 /// The greatest swing of an undamped body after a jump of its load, as a multiple of the static
@@ -27,17 +27,19 @@ use crate::{COORDINATES, Channel, Machine, Matrices};
 const SWING_FACTOR: f64 = 2.0;
 
 /// The coordinates of the tub, and of the shaft in the same order.
-const RIGID: [[usize; 2]; 4] =
+const RIGID_PAIRS: [[usize; 2]; 4] =
     [[TUB_Y, SHAFT_Y], [TUB_Z, SHAFT_Z], [TUB_YAW, SHAFT_YAW], [TUB_PITCH, SHAFT_PITCH]];
 
 /// The coordinates that deflect bearings and hinge while the tub stands still.
-const ELASTIC: [usize; 6] = [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
+const ELASTIC_COORDINATES: [usize; 6] =
+    [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
 
 /// The angles (rad) of the unbalance at which loads are computed. A load turns with the drum or is
 /// fixed in direction, so that four angles include its greatest components along both axes.
 const ANGLES_RAD: [f64; 4] = [0.0, 0.5 * PI, PI, 1.5 * PI];
 
-/// The deflections of the free machine.
+/// The deflections of the machine without its suspension: of the fronts of drum and tub, and the
+/// tub's angle.
 #[derive(Clone, Copy, Debug, Default)]
 struct FrontDeflection {
     drum_front_m: f64,
@@ -64,17 +66,17 @@ pub(crate) struct Ringing {
 }
 
 /// Returns the sum of all jumps of the drum's acceleration before `end_s` (rad/s^2).
-pub(crate) fn jumps_rad_per_s2(stretches: &[SpinStretch], end_s: f64) -> f64 {
+pub(crate) fn jump_sum_rad_per_s2(spin_segments: &[SpinSegment], end_s: f64) -> f64 {
     let mut previous_rad_per_s2 = 0.0;
     let mut sum = 0.0;
-    for (i, stretch) in stretches.iter().enumerate() {
-        let start_s = stretch.start_s.0;
+    for (i, spin_segment) in spin_segments.iter().enumerate() {
+        let start_s = spin_segment.start_s.0;
         if start_s >= end_s {
             break;
         }
-        sum += (stretch.acceleration_rad_per_s2(start_s) - previous_rad_per_s2).abs();
-        if let Some(next) = stretches.get(i + 1) {
-            previous_rad_per_s2 = stretch.acceleration_rad_per_s2(next.start_s.0);
+        sum += (spin_segment.acceleration_rad_per_s2(start_s) - previous_rad_per_s2).abs();
+        if let Some(next) = spin_segments.get(i + 1) {
+            previous_rad_per_s2 = spin_segment.acceleration_rad_per_s2(next.start_s.0);
         }
     }
     sum
@@ -89,7 +91,7 @@ pub enum UnresolvedModes {
     Bearings,
 }
 
-/// The swing of the numbers that a row takes from a motion.
+/// The swing of the quantities that a row reports of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
     /// The swing of each channel (m, rad), in the order of [`Channel::ALL`].
@@ -99,12 +101,12 @@ pub struct Swing {
 }
 
 impl Ringing {
-    /// Computes the deflections under jumps of the drum's acceleration with this sum (rad/s^2).
-    /// `matrices_at` returns the linear model's matrices at an angle (rad) and an acceleration
-    /// (rad/s^2) of the drum at rest.
+    /// Computes the deflections under jumps of the drum's acceleration whose sum is
+    /// `jump_sum_rad_per_s2`. `matrices_at` returns the linear model's matrices at an angle (rad)
+    /// and an acceleration (rad/s^2) of the drum at rest.
     pub(crate) fn new(
         machine: &Machine,
-        jumps_rad_per_s2: f64,
+        jump_sum_rad_per_s2: f64,
         matrices_at: impl Fn(f64, f64) -> Matrices,
     ) -> Self {
         let mut ringing = Self {
@@ -112,13 +114,13 @@ impl Ringing {
             hinge_and_bearings: FrontDeflection::default(),
         };
         for angle_rad in ANGLES_RAD {
-            let still = matrices_at(angle_rad, 0.0);
-            let accelerated = matrices_at(angle_rad, jumps_rad_per_s2);
+            let at_rest = matrices_at(angle_rad, 0.0);
+            let accelerated = matrices_at(angle_rad, jump_sum_rad_per_s2);
             let load: [f64; COORDINATES] =
-                core::array::from_fn(|i| accelerated.force[i] - still.force[i]);
-            // A system without a solution lacks springs of bearings or hinge, and no level is
-            // stable for such a machine.
-            let Some(free) = FreeMachine::new(&still) else { continue };
+                core::array::from_fn(|i| accelerated.force[i] - at_rest.force[i]);
+            // The system has no solution if bearings or hinge have no stiffness; no level is stable
+            // for such a machine.
+            let Some(free) = FreeMachine::new(&at_rest) else { continue };
             let Some(elastic) = free.static_deflection(&load) else { continue };
             let mut bearings = elastic;
             bearings[HINGE_YAW] = 0.0;
@@ -130,8 +132,7 @@ impl Ringing {
         ringing
     }
 
-    /// Returns the greatest swing of each channel and of the gap, by the modes that are not
-    /// resolved.
+    /// Returns the greatest swing of each channel and of the gap in the unresolved modes.
     pub(crate) fn swing(&self, unresolved: UnresolvedModes) -> Swing {
         let deflection = match unresolved {
             UnresolvedModes::HingeAndBearings => self.hinge_and_bearings,
@@ -162,8 +163,8 @@ struct FreeMachine<'a> {
 impl<'a> FreeMachine<'a> {
     /// Creates the free machine; `None` if it has no mass.
     fn new(matrices: &'a Matrices) -> Option<Self> {
-        let rigid_mass = RIGID.map(|row| {
-            RIGID.map(|column| {
+        let rigid_mass = RIGID_PAIRS.map(|row| {
+            RIGID_PAIRS.map(|column| {
                 let sum = |i: usize| matrices.mass[i][column[0]] + matrices.mass[i][column[1]];
                 N(sum(row[0]) + sum(row[1]))
             })
@@ -172,7 +173,7 @@ impl<'a> FreeMachine<'a> {
     }
 
     /// Returns the product of the mass matrix and a vector of coordinates.
-    fn mass_times(&self, vector: &[f64; COORDINATES]) -> [f64; COORDINATES] {
+    fn multiply_mass(&self, vector: &[f64; COORDINATES]) -> [f64; COORDINATES] {
         self.matrices
             .mass
             .map(|row| row.iter().zip(vector).map(|(entry, value)| entry * value).sum())
@@ -180,10 +181,10 @@ impl<'a> FreeMachine<'a> {
 
     /// Returns the rigid-body acceleration a under a load f: (S' M S) a = S' f.
     fn rigid_motion(&self, load: &[f64; COORDINATES]) -> [f64; COORDINATES] {
-        let force = RIGID.map(|[tub, shaft]| N(load[tub] + load[shaft]));
+        let force = RIGID_PAIRS.map(|[tub, shaft]| N(load[tub] + load[shaft]));
         let accelerations = self.rigid_mass.solve(&force);
         let mut rigid = [0.0; COORDINATES];
-        for ([tub, shaft], acceleration) in RIGID.into_iter().zip(accelerations) {
+        for ([tub, shaft], acceleration) in RIGID_PAIRS.into_iter().zip(accelerations) {
             rigid[tub] = acceleration.0;
             rigid[shaft] = acceleration.0;
         }
@@ -193,21 +194,22 @@ impl<'a> FreeMachine<'a> {
     /// Returns the static deflection of bearings and hinge under a load (N, N m), relative to the
     /// tub; `None` if a spring is missing.
     fn static_deflection(&self, load: &[f64; COORDINATES]) -> Option<[f64; COORDINATES]> {
-        let inertial = self.mass_times(&self.rigid_motion(load));
-        let stiffness = ELASTIC.map(|i| ELASTIC.map(|j| N(self.matrices.stiffness[i][j])));
-        let relieved = ELASTIC.map(|i| N(load[i] - inertial[i]));
-        let solution = Lu::new(stiffness)?.solve(&relieved);
+        let inertia_load = self.multiply_mass(&self.rigid_motion(load));
+        let stiffness = ELASTIC_COORDINATES
+            .map(|i| ELASTIC_COORDINATES.map(|j| N(self.matrices.stiffness[i][j])));
+        let relieved_load = ELASTIC_COORDINATES.map(|i| N(load[i] - inertia_load[i]));
+        let solution = Lu::new(stiffness)?.solve(&relieved_load);
         let mut deflection = [0.0; COORDINATES];
-        for (i, value) in ELASTIC.into_iter().zip(solution) {
+        for (i, value) in ELASTIC_COORDINATES.into_iter().zip(solution) {
             deflection[i] = value.0;
         }
         Some(deflection)
     }
 
-    /// Returns the deflections if bearings and hinge deflect by `elastic`. The tub moves against
-    /// shaft and drum so that momentum is conserved.
+    /// Returns the deflections of the free machine if bearings and hinge deflect by `elastic`. The
+    /// tub moves in the opposite direction, so that momentum is conserved.
     fn deflection(&self, machine: &Machine, elastic: &[f64; COORDINATES]) -> FrontDeflection {
-        let rigid = self.rigid_motion(&self.mass_times(elastic));
+        let rigid = self.rigid_motion(&self.multiply_mass(elastic));
         let drum = &machine.drum;
         let tub_m = rigid[TUB_Y].hypot(rigid[TUB_Z]);
         let tub_rad = rigid[TUB_YAW].hypot(rigid[TUB_PITCH]);

@@ -9,7 +9,7 @@ use super::snapshots::Snapshots;
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::whole_turn_cuts_s;
-use crate::nonlinear::outputs::{RADIAL, squared_distance};
+use crate::nonlinear::outputs::{RADIAL_COMPONENTS, squared_distance};
 use crate::{ModelKind, Point, Reading, Recorders};
 use lane_ode::{IntervalPeaks, Lane, N, OutOfLine, Sample, SquareIntegrals, TimeAbove};
 
@@ -33,13 +33,13 @@ pub(crate) struct Substeps {
 }
 
 impl Substeps {
-    /// Returns into how many parts each step is divided: one if steps are short because the
-    /// bearings limit them, else [`LONG_STEP_SUBSTEPS`].
+    /// Creates the division of steps: into one part if steps are short because the bearings limit
+    /// them, else into [`LONG_STEP_SUBSTEPS`] parts.
     pub(crate) const fn new(are_short: bool) -> Self {
         Self { count: if are_short { 1 } else { LONG_STEP_SUBSTEPS } }
     }
 
-    /// Returns into how many parts the steps of a method are divided.
+    /// Creates the division of the steps of a method.
     pub(crate) fn for_method(method: &Method) -> Self {
         match method {
             Method::Rk4 { .. } => Self::new(true),
@@ -58,7 +58,7 @@ pub(crate) struct ActiveRecorders<T> {
     square_integrals: SquareIntegrals<T, CHANNELS>,
     turn_peaks: IntervalPeaks<T, CHANNELS>,
     loads: Option<Loads<T>>,
-    /// The time with a gap below zero.
+    /// The time for which the gap is negative.
     clash_time: TimeAbove<T>,
     clearance_squared: N<T>,
     snapshots: Option<Snapshots<T>>,
@@ -77,7 +77,8 @@ impl<T: Lane> ActiveRecorders<T> {
         point: &Point,
         count: usize,
     ) -> Option<Self> {
-        // Not `bool::then`: its closure would be compiled without the kernel's instruction set.
+        // This is not `bool::then`, whose closure would be compiled without the kernel's
+        // instruction set.
         if !recorders.need_all_states() {
             return None;
         }
@@ -101,7 +102,7 @@ impl<T: Lane> ActiveRecorders<T> {
         self.clash_time.reset(lane);
         self.clearance_squared.0.set(lane, clearance_m * clearance_m);
         if self.recorders.turns {
-            self.turn_peaks.reset(lane, &whole_turn_cuts_s(&point.stretches, point.window_s()));
+            self.turn_peaks.reset(lane, &whole_turn_cuts_s(&point.spin_segments, point.window_s()));
         }
         if let Some(loads) = &mut self.loads {
             loads.set_point(lane, point);
@@ -111,15 +112,16 @@ impl<T: Lane> ActiveRecorders<T> {
         }
     }
 
-    /// Ends a lane's trajectory, that of point `index`. A failed trajectory leaves no readings.
-    pub(crate) fn finish(&mut self, lane: usize, index: usize, point: &Point, failed: bool) {
+    /// Ends the trajectory in a lane and stores the readings of its point, which has the index
+    /// `index`. A failed trajectory has no readings.
+    pub(crate) fn finish(&mut self, lane: usize, index: usize, point: &Point, has_failed: bool) {
         let recorders = self.recorders;
         let turns = if recorders.turns { self.turn_peaks.finish(lane) } else { Vec::new() };
         let snapshots = match &mut self.snapshots {
             Some(snapshots) => snapshots.finish(lane),
             None => Vec::new(),
         };
-        if failed {
+        if has_failed {
             return;
         }
         let [from_s, to_s] = point.window_s();
@@ -140,7 +142,7 @@ impl<T: Lane> ActiveRecorders<T> {
     }
 }
 
-/// A state with its outputs, which is passed to the recorders.
+/// A state and its outputs, which are passed to the recorders.
 pub(crate) struct ObservedState<'a, T: Lane> {
     pub(crate) recorders: &'a mut ActiveRecorders<T>,
     /// The end and the length (s) of the step that ends at the state; `None` at the start of a
@@ -148,7 +150,7 @@ pub(crate) struct ObservedState<'a, T: Lane> {
     pub(crate) step: Option<(N<T>, N<T>)>,
     pub(crate) x: &'a [N<T>; STATES],
     pub(crate) dx: &'a [N<T>; STATES],
-    pub(crate) radial: &'a [Sample<T>; RADIAL],
+    pub(crate) radial: &'a [Sample<T>; RADIAL_COMPONENTS],
     pub(crate) channels: &'a [Sample<T>; CHANNELS],
     /// The lanes that are inside their windows.
     pub(crate) lanes_in_window: T::Mask,

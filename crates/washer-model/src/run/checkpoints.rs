@@ -6,25 +6,25 @@ use crate::{COORDINATES, Point};
 
 /// The number of coordinates that are compared. The last two, the hinge's, are left out: the hinge
 /// rings with little damping, mostly without effect on any output.
-const COMPARED: usize = COORDINATES - 2;
+const COMPARED_COORDINATES: usize = COORDINATES - 2;
 
 impl Point {
     /// Computes the separation of two runs of the nonlinear model at their common checkpoints.
     /// Returns for each instant (s) the greatest difference of any coordinate except the hinge's,
     /// relative to the greatest deviation of this coordinate from equilibrium in the whole run `b`.
     pub fn separations(&self, a: &Checkpoints, b: &Checkpoints) -> Vec<(f64, f64)> {
-        let mut greatest = [0.0_f64; COMPARED];
+        let mut largest_deviations = [0.0_f64; COMPARED_COORDINATES];
         for checkpoint in b {
-            for (i, greatest) in greatest.iter_mut().enumerate() {
-                *greatest = greatest.max((checkpoint.coordinates[i] - self.equilibrium[i]).abs());
+            for (i, largest) in largest_deviations.iter_mut().enumerate() {
+                *largest = largest.max((checkpoint.coordinates[i] - self.equilibrium[i]).abs());
             }
         }
         let separation = |((a, b), segment): ((&Checkpoint, &Checkpoint), &PlannedSegment)| {
-            let share = |i: usize| {
+            let relative_difference = |i: usize| {
                 let difference = (a.coordinates[i] - b.coordinates[i]).abs();
-                if difference == 0.0 { 0.0 } else { difference / greatest[i] }
+                if difference == 0.0 { 0.0 } else { difference / largest_deviations[i] }
             };
-            (segment.end_s, (0..COMPARED).map(share).fold(0.0, f64::max))
+            (segment.end_s, (0..COMPARED_COORDINATES).map(relative_difference).fold(0.0, f64::max))
         };
         a.iter().zip(b).zip(&*self.segments).map(separation).collect()
     }

@@ -3,7 +3,7 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::machine::spin::{SpinStretch, stretch_at};
+use crate::machine::spin::{SpinSegment, segment_index};
 use crate::nonlinear::coupling::Coupling;
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::{COORDINATES, ModelKind, Point};
@@ -18,9 +18,9 @@ pub const STATE_LEN: usize = STATES;
 pub struct PointEquations {
     model: EitherModel,
     at_rest: [f64; STATES],
-    stretches: Arc<[SpinStretch]>,
-    /// The index of the stretch of the spin at the last call.
-    stretch: usize,
+    spin_segments: Arc<[SpinSegment]>,
+    /// The index of the spin segment at the last call.
+    spin_segment: usize,
 }
 
 /// A model over plain numbers and over dual numbers.
@@ -48,7 +48,7 @@ impl PointEquations {
                 <Linear<f64> as LaneModel<f64>>::at_rest(point),
             ),
         };
-        Self { model, at_rest, stretches: Arc::clone(&point.stretches), stretch: 0 }
+        Self { model, at_rest, spin_segments: Arc::clone(&point.spin_segments), spin_segment: 0 }
     }
 
     /// Returns the state at rest in static equilibrium, from which trajectories start.
@@ -59,12 +59,12 @@ impl PointEquations {
     /// Returns the times (s) at which the spin's acceleration, and therefore f, may jump. An
     /// integrator should end steps there.
     pub fn kinks_s(&self) -> impl Iterator<Item = f64> + '_ {
-        self.stretches.iter().skip(1).map(|stretch| stretch.start_s.0)
+        self.spin_segments.iter().skip(1).map(|spin_segment| spin_segment.start_s.0)
     }
 
     /// Computes f at time `t_s`; at a kink, its limit from the right.
     pub fn derivative(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [f64; STATE_LEN] {
-        self.select_stretch(t_s);
+        self.select_spin_segment(t_s);
         match &self.model {
             EitherModel::Nonlinear(models) => {
                 Simd::one_lane(DerivativeKernel { model: &models.model, t_s, x })
@@ -77,13 +77,13 @@ impl PointEquations {
 
     /// Computes the Jacobian of f with respect to the state, by rows, exact to rounding.
     pub fn jacobian(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [[f64; STATE_LEN]; STATE_LEN] {
-        self.select_stretch(t_s);
+        self.select_spin_segment(t_s);
         let partials = match &self.model {
             EitherModel::Nonlinear(models) => {
-                Simd::one_lane(JacobianKernel { dual: &models.dual_model, t_s, x })
+                Simd::one_lane(JacobianKernel { dual_model: &models.dual_model, t_s, x })
             }
             EitherModel::Linear(models) => {
-                Simd::one_lane(JacobianKernel { dual: &models.dual_model, t_s, x })
+                Simd::one_lane(JacobianKernel { dual_model: &models.dual_model, t_s, x })
             }
         };
         let mut rows = [[0.0; STATES]; STATES];
@@ -104,7 +104,7 @@ impl PointEquations {
         t_s: f64,
         x: &[f64; STATE_LEN],
     ) -> ([f64; CHANNELS], [f64; CHANNELS]) {
-        self.select_stretch(t_s);
+        self.select_spin_segment(t_s);
         match &self.model {
             EitherModel::Nonlinear(models) => {
                 Simd::one_lane(ChannelKernel { model: &models.model, t_s, x })
@@ -115,18 +115,21 @@ impl PointEquations {
         }
     }
 
-    /// Gives the models the stretch of the spin at a time.
-    fn select_stretch(&mut self, t_s: f64) {
-        let is_before =
-            |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s.0);
-        if is_before(self.stretch + 1) && (self.stretch == 0 || !is_before(self.stretch)) {
+    /// Sets the spin segment of the models to that of a time.
+    fn select_spin_segment(&mut self, t_s: f64) {
+        let is_before = |k: usize| {
+            self.spin_segments.get(k).is_none_or(|spin_segment| t_s < spin_segment.start_s.0)
+        };
+        if is_before(self.spin_segment + 1)
+            && (self.spin_segment == 0 || !is_before(self.spin_segment))
+        {
             return;
         }
-        self.stretch = stretch_at(&self.stretches, t_s);
-        let stretch = &self.stretches[self.stretch];
+        self.spin_segment = segment_index(&self.spin_segments, t_s);
+        let spin_segment = &self.spin_segments[self.spin_segment];
         match &mut self.model {
-            EitherModel::Nonlinear(models) => models.set_spin(stretch),
-            EitherModel::Linear(models) => models.set_spin(stretch),
+            EitherModel::Nonlinear(models) => models.set_spin(spin_segment),
+            EitherModel::Linear(models) => models.set_spin(spin_segment),
         }
     }
 }
@@ -139,13 +142,13 @@ impl<M: LaneModel<f64>, J: LaneModel<Dual<f64>>> Differentiable<M, J> {
         })
     }
 
-    fn set_spin(&mut self, stretch: &SpinStretch) {
-        self.model.set_spin(0, stretch);
-        self.dual_model.set_spin(0, stretch);
+    fn set_spin(&mut self, spin_segment: &SpinSegment) {
+        self.model.set_spin(0, spin_segment);
+        self.dual_model.set_spin(0, spin_segment);
     }
 }
 
-/// The computation of f.
+/// The kernel that computes f.
 struct DerivativeKernel<'a, M> {
     model: &'a M,
     t_s: f64,
@@ -161,9 +164,9 @@ impl<M: LaneModel<f64>> OutOfLine for DerivativeKernel<'_, M> {
     }
 }
 
-/// The computation of the Jacobian of f by automatic differentiation.
+/// The kernel that computes the Jacobian of f by automatic differentiation.
 struct JacobianKernel<'a, J> {
-    dual: &'a J,
+    dual_model: &'a J,
     t_s: f64,
     x: &'a [f64; STATES],
 }
@@ -173,12 +176,12 @@ impl<J: LaneModel<Dual<f64>>> OutOfLine for JacobianKernel<'_, J> {
     #[inline(always)]
     fn run(self) -> Partials<COORDINATES> {
         let mut partials = Partials::zero();
-        partials.find(0.0, self.dual, self.t_s, &self.x.map(N));
+        partials.compute(0.0, self.dual_model, self.t_s, &self.x.map(N));
         partials
     }
 }
 
-/// The computation of the channels and their rates.
+/// The kernel that computes the channels and their rates.
 struct ChannelKernel<'a, M> {
     model: &'a M,
     t_s: f64,

@@ -3,12 +3,13 @@
 //! The trajectory is the one whose peaks [`simulate`](crate::simulate) records, with the same bits
 //! in every step: steps do not end at the requested instants, at which states are interpolated.
 //! Inside a step the state is the method's dense output, or for RK4 the cubic Hermite polynomial of
-//! the states and slopes at both ends. It has order 4 like the method: the relative error is at
-//! most (h w)^4 / 384 for a motion of frequency w, or 1e-9 at 1200 rpm and a step of 2e-4 s.
+//! the states and slopes at both ends. The polynomial has order 4 like the method: the relative
+//! error is at most (h w)^4 / 384 for a motion of frequency w, or 1e-9 at 1200 rpm and a step of
+//! 2e-4 s.
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::machine::spin::stretch_at;
+use crate::machine::spin::segment_index;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared_distance;
 use crate::run::method::{
@@ -16,7 +17,7 @@ use crate::run::method::{
     coupling_for_method, start_segment,
 };
 use crate::run::model::{LaneModel, Linear, Nonlinear};
-use crate::run::snapshots::share_of_step;
+use crate::run::snapshots::position_in_step;
 use crate::run::suspension::forces;
 use crate::{COORDINATES, Forces, Method, ModelKind, Point};
 use core::marker::PhantomData;
@@ -62,27 +63,27 @@ pub struct InitialDeviation {
     pub speeds: [f64; COORDINATES],
 }
 
-/// Integrates one model at one point, and returns its states at 0, `every_s`, 2 `every_s` and so on
-/// to the end of the run.
+/// Integrates one model at one point, and returns its states at 0, `interval_s`, 2 `interval_s` and
+/// so on to the end of the run.
 pub fn history<'a>(
     model: ModelKind,
     method: &Method,
     point: &'a Point,
     start: &InitialDeviation,
-    every_s: f64,
+    interval_s: f64,
 ) -> History<'a> {
     let end_s = point.segments.last().map_or(0.0, |segment| segment.end_s);
-    let times_s = (0..instant_count(end_s, every_s)).map(|k| k as f64 * every_s).collect();
+    let times_s = (0..instant_count(end_s, interval_s)).map(|k| k as f64 * interval_s).collect();
     let requests = [HistoryRequest { point, method: *method, start: *start, times_s }];
-    let sampled = integrate(model, &requests, Cancel::Never).pop().unwrap_or_default();
+    let samples = integrate(model, &requests, Cancel::Never).pop().unwrap_or_default();
     let [request] = requests;
-    History::new(model, request, sampled)
+    History::new(model, request, samples)
 }
 
-/// Returns the number of instants from 0 to `end_s` at intervals of `every_s`.
-pub fn instant_count(end_s: f64, every_s: f64) -> usize {
+/// Returns the number of instants from 0 to `end_s` at intervals of `interval_s`.
+pub fn instant_count(end_s: f64, interval_s: f64) -> usize {
     // Rounding may make the quotient slightly less than a whole number.
-    1 + (end_s / every_s * (1.0 + 1e-12)).floor() as usize
+    1 + (end_s / interval_s * (1.0 + 1e-12)).floor() as usize
 }
 
 /// A request for the history of a trajectory.
@@ -99,8 +100,8 @@ pub struct HistoryRequest<'a> {
 
 /// Integrates one model at several points. If the method of all is RK4, as many points as there are
 /// lanes are integrated at once. The bits of a history do not depend on the other points. Histories
-/// end early once `stop` has returned true, which is called at least every
-/// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps.
+/// end early once `cancel` is requested, which is polled at least every
+/// [`CANCEL_POLL_STEPS`](lane_ode::CANCEL_POLL_STEPS) steps.
 pub fn histories<'a>(
     model: ModelKind,
     requests: Vec<HistoryRequest<'a>>,
@@ -115,8 +116,8 @@ pub fn histories<'a>(
         if batch.is_empty() {
             return histories;
         }
-        let sampled = integrate(model, &batch, cancel);
-        for (request, states) in batch.into_iter().zip(sampled) {
+        let samples = integrate(model, &batch, cancel);
+        for (request, states) in batch.into_iter().zip(samples) {
             histories.push(History::new(model, request, states));
         }
     }
@@ -139,7 +140,7 @@ fn integrate(
     }
 }
 
-/// Integrates a single request in one lane by any method, or several ones in lanes by RK4.
+/// Integrates a single request in one lane by any method, or several requests in lanes by RK4.
 fn integrate_family<F: ModelFamily>(
     requests: &[HistoryRequest<'_>],
     cancel: Cancel<'_>,
@@ -166,9 +167,9 @@ impl<F: ModelFamily> StepperVisitor<F> for SampleHistories<'_, F, ()> {
 }
 
 impl<'a> History<'a> {
-    fn new(model: ModelKind, request: HistoryRequest<'a>, sampled: SampledStates) -> Self {
+    fn new(model: ModelKind, request: HistoryRequest<'a>, samples: SampledStates) -> Self {
         let HistoryRequest { point, times_s, .. } = request;
-        let SampledStates { states, failure } = sampled;
+        let SampledStates { states, failure } = samples;
         Self { failure, point, model, times_s, states }
     }
 
@@ -177,7 +178,7 @@ impl<'a> History<'a> {
         self.states.len()
     }
 
-    /// Returns whether there are no instants. Every history has its start.
+    /// Returns whether there are no instants, which is never the case: the start is one.
     pub fn is_empty(&self) -> bool {
         self.states.is_empty()
     }
@@ -218,20 +219,20 @@ fn outputs<M: LaneModel<f64>>(
     state: &[f64; STATES],
 ) -> ([[f64; CHANNELS]; 3], f64) {
     let mut model = M::splat(N(0.0), point, Coupling::Springs);
-    model.set_spin(0, &point.stretches[stretch_at(&point.stretches, time_s)]);
+    model.set_spin(0, &point.spin_segments[segment_index(&point.spin_segments, time_s)]);
     let forcing = model.forcing(N(time_s));
     let state = state.map(N);
     let derivative = model.derivative(&forcing, &state);
     let (radial, channels) = model.observe(&forcing, &state, &derivative, true);
     let gap_m = point.machine.bodies.clearance.0 - squared_distance(&radial).value.0.sqrt();
-    let channels = channels.unwrap_or([Sample::still(N(f64::NAN), N(f64::NAN)); CHANNELS]);
+    let channels = channels.unwrap_or([Sample::constant(N(f64::NAN), N(f64::NAN)); CHANNELS]);
     let values = channels.map(|sample| sample.value.0);
     let rates = channels.map(|sample| sample.slope.0);
     let accelerations = channels.map(|sample| sample.curvature.0);
     ([values, rates, accelerations], gap_m)
 }
 
-/// The states at the instants, up to a failure.
+/// The states at the requested instants, up to a failure.
 #[derive(Default)]
 struct SampledStates {
     states: Vec<[f64; STATES]>,
@@ -254,7 +255,7 @@ impl<F: ModelFamily, S: Stepper> Kernel for SampleHistories<'_, F, S> {
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut task = SamplingTask::<T, F::OnLanes<T>>::new(N(zero), self.requests, self.cancel);
         self.stepper.integrate(zero, &mut task);
-        task.sampled
+        task.samples
     }
 }
 
@@ -267,7 +268,8 @@ impl<F: ModelFamily, S: Stepper> OutOfLine for SampleHistories<'_, F, S> {
     }
 }
 
-/// The integration of one trajectory in each lane, which samples the states at its instants.
+/// The integration of one trajectory in each lane, which samples the states at the requested
+/// instants.
 struct SamplingTask<'a, T, M> {
     model: M,
     zero: N<T>,
@@ -275,7 +277,7 @@ struct SamplingTask<'a, T, M> {
     cancel: Cancel<'a>,
     /// The index of each lane's segment, once the lane has started.
     segments: [Option<usize>; MAX_LANES],
-    sampled: Vec<SampledStates>,
+    samples: Vec<SampledStates>,
 }
 
 impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
@@ -294,8 +296,8 @@ impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
             }
             SampledStates { states: vec![start], failure: None }
         };
-        let sampled = requests.iter().map(initial_state_only).collect();
-        Self { model, zero, requests, cancel, segments: [None; MAX_LANES], sampled }
+        let samples = requests.iter().map(initial_state_only).collect();
+        Self { model, zero, requests, cancel, segments: [None; MAX_LANES], samples }
     }
 }
 
@@ -311,26 +313,26 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
     fn next_segment(
         &mut self,
         lane: usize,
-        ended: SegmentEnd,
+        segment_end: SegmentEnd,
         x: &mut [N<T>; STATES],
     ) -> Option<Segment> {
         // Lanes without a request keep the initial state of the last one.
         let index = lane.min(self.requests.len() - 1);
         let HistoryRequest { point, method, .. } = &self.requests[index];
-        let sampled = &mut self.sampled[index];
-        let next_segment_index = match ended {
+        let samples = &mut self.samples[index];
+        let next_segment_index = match segment_end {
             SegmentEnd::Idle if index < lane => point.segments.len(),
             SegmentEnd::Idle => 0,
             SegmentEnd::Completed(_) => self.segments[lane].map_or(0, |segment| segment + 1),
             SegmentEnd::Failed { reason, time_s, .. } => {
-                sampled.failure = Some((reason, time_s));
+                samples.failure = Some((reason, time_s));
                 point.segments.len()
             }
         };
         let segment = point.segments.get(next_segment_index);
         if next_segment_index == 0 || segment.is_none() {
             // An idle lane has a state at which the model is defined.
-            for (x, start) in x.iter_mut().zip(sampled.states[0]) {
+            for (x, start) in x.iter_mut().zip(samples.states[0]) {
                 x.0.set(lane, start);
             }
         }
@@ -347,26 +349,26 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
         // If a step leaves the range of the model, the states inside it are meaningless too.
         let in_range = T::bits(self.model.in_range(step.after));
         loop {
-            let mut share = self.zero;
-            let mut reached = [false; MAX_LANES];
+            let mut position = self.zero;
+            let mut is_reached = [false; MAX_LANES];
             for (lane, request) in self.requests.iter().enumerate() {
                 let end_s = step.end_s.0.get(lane);
                 let length_s = step.length_s.0.get(lane);
-                let next_time_s = request.times_s.get(self.sampled[lane].states.len());
+                let next_time_s = request.times_s.get(self.samples[lane].states.len());
                 if let Some(time_s) = next_time_s
                     && in_range >> lane & 1 == 1
-                    && let Some(at) = share_of_step(*time_s, end_s, length_s)
+                    && let Some(lane_position) = position_in_step(*time_s, end_s, length_s)
                 {
-                    reached[lane] = true;
-                    share.0.set(lane, at);
+                    is_reached[lane] = true;
+                    position.0.set(lane, lane_position);
                 }
             }
-            if reached == [false; MAX_LANES] {
+            if is_reached == [false; MAX_LANES] {
                 return;
             }
-            let states = step.at(share);
-            for lane in (0..self.requests.len()).filter(|&lane| reached[lane]) {
-                self.sampled[lane].states.push(states.map(|x| x.0.get(lane)));
+            let states = step.interpolate(position);
+            for lane in (0..self.requests.len()).filter(|&lane| is_reached[lane]) {
+                self.samples[lane].states.push(states.map(|x| x.0.get(lane)));
             }
         }
     }

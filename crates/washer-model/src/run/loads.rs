@@ -6,7 +6,7 @@
 use super::suspension::{dual, forces, load_on_cabinet_axes, tub_with_deviation};
 use crate::coordinates::{STATES, TUB};
 use crate::lanes::{InLanes as _, ToDual as _};
-use crate::machine::feet::{FEET, LOAD, LoadDistribution, turning_force_n};
+use crate::machine::feet::{LOAD_COMPONENTS, LoadDistribution, MAX_FEET, turning_force_n};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::{Vec3, dot};
 use crate::run::model::tub_samples;
@@ -42,8 +42,8 @@ sweep_parameter::named! {
 /// The gauges in use, in the order of [`Gauge::ALL`].
 pub(crate) type Gauges = [bool; Gauge::ALL.len()];
 
-/// A reference that is greater than all loads (N). Recorders find only greatest values, so that the
-/// least load is the reference less the greatest distance below it.
+/// A reference that is greater than all loads (N). Peaks record only greatest values, so that the
+/// least load is the reference less the greatest difference of reference and load.
 ///
 /// Basis: a power of two, so that differences from it keep most digits of loads. Doubling it loses
 /// one binary digit.
@@ -56,9 +56,9 @@ const REFERENCE_N: f64 = 1_048_576.0;
 const ROOT_SUMMAND_N2: f64 = 1e-18;
 
 /// The index of the margin against slipping, after the loads of the feet.
-const SLIP: usize = FEET;
+const SLIP_INDEX: usize = MAX_FEET;
 /// The index of the margin against walking, after that against slipping.
-const WALK: usize = FEET + 1;
+const WALK_INDEX: usize = MAX_FEET + 1;
 
 /// The first-order expansion of a quantity in the tub's coordinates and speeds about equilibrium.
 #[derive(Clone, Copy)]
@@ -82,7 +82,7 @@ impl<T: Lane> TubExpansion<T> {
     }
 
     #[inline(always)]
-    fn at(&self, tub: &[Sample<T>; 4]) -> N<Dual<T>> {
+    fn evaluate(&self, tub: &[Sample<T>; 4]) -> N<Dual<T>> {
         let mut value = self.value_at_rest;
         let mut slope = self.value_at_rest.lit(0.0);
         for k in 0..4 {
@@ -112,7 +112,7 @@ impl LoadSelection {
     /// Returns the number of load components: the load on the cabinet, depth and force of each
     /// stop, and the speed of each damper.
     fn component_count(self) -> usize {
-        LOAD + 2 * self.stops + self.dampers
+        LOAD_COMPONENTS + 2 * self.stops + self.dampers
     }
 
     /// Computes the load components by the elements' force laws. Returns the force on the tub.
@@ -124,20 +124,21 @@ impl LoadSelection {
         components: &mut [N<T>],
     ) -> Vec3<T> {
         let no_force = [tub.midpoint[0].lit(0.0); 3];
-        let mut on_tub = (no_force, no_force);
+        let mut tub_load = (no_force, no_force);
         if self.force || self.feet {
-            on_tub = elements.load_on_tub(tub);
+            tub_load = elements.load_on_tub(tub);
         }
         if self.feet {
-            components[..LOAD].copy_from_slice(&load_on_cabinet_axes(tub, &on_tub));
+            components[..LOAD_COMPONENTS].copy_from_slice(&load_on_cabinet_axes(tub, &tub_load));
         }
         for k in 0..self.stops {
-            [components[LOAD + 2 * k], components[LOAD + 2 * k + 1]] = elements.stop(k, tub);
+            [components[LOAD_COMPONENTS + 2 * k], components[LOAD_COMPONENTS + 2 * k + 1]] =
+                elements.stop(k, tub);
         }
         for k in 0..self.dampers {
-            components[LOAD + 2 * self.stops + k] = elements.damper_motion(k, tub)[1];
+            components[LOAD_COMPONENTS + 2 * self.stops + k] = elements.damper_motion(k, tub)[1];
         }
-        on_tub.0
+        tub_load.0
     }
 }
 
@@ -150,7 +151,7 @@ enum LoadLaws<T> {
 }
 
 impl<T: Lane> LoadLaws<T> {
-    /// Puts a point into one lane.
+    /// Sets the point of one lane.
     fn set_point(&mut self, lane: usize, point: &Point, selection: LoadSelection) {
         let (force, components) = match self {
             Self::Nonlinear(elements) => return elements.set_lane(lane, &point.machine.elements),
@@ -167,7 +168,8 @@ impl<T: Lane> LoadLaws<T> {
             );
             components
         };
-        let force_at = |state: &[f64; STATES]| forces(point, ModelKind::Linear, state).cabinet_n;
+        let cabinet_force_at =
+            |state: &[f64; STATES]| forces(point, ModelKind::Linear, state).cabinet_n;
         for k in 0..4 {
             let [coordinate, speed] = [TUB[k], COORDINATES + TUB[k]];
             let slopes = components_by(coordinate).into_iter().zip(components_by(speed));
@@ -175,9 +177,9 @@ impl<T: Lane> LoadLaws<T> {
                 component.set(lane, by_coordinate.value, k, by_coordinate.slope, by_speed.slope);
             }
             if selection.force {
-                let rest = force_at(&[0.0; STATES]);
+                let rest = cabinet_force_at(&[0.0; STATES]);
                 let [at_unit_coordinate, at_unit_speed] =
-                    [coordinate, speed].map(|state| force_at(&unit(state)));
+                    [coordinate, speed].map(|state| cabinet_force_at(&unit(state)));
                 for i in 0..3 {
                     let by_coordinate = at_unit_coordinate[i] - rest[i];
                     let by_speed = at_unit_speed[i] - rest[i];
@@ -197,17 +199,18 @@ struct StopRecord<T> {
 
 /// The recorder of loads, over lanes.
 ///
-/// Loads have no second derivative here. Between the ends of a long step the motion is therefore
-/// interpolated, and the loads are evaluated at the ends of a few parts of the step.
+/// Loads are recorded by values and slopes, without second derivatives. Within a long step the
+/// motion is therefore interpolated, and loads are evaluated at the ends of a few parts of the
+/// step.
 pub(crate) struct Loads<T> {
     selection: LoadSelection,
     laws: LoadLaws<T>,
-    /// The load components at the present instant.
+    /// The load components at the last instant.
     components: Vec<N<Dual<T>>>,
     /// The square of the force on the cabinet.
     force_squared: Peaks<T, 1>,
     /// The distances of the feet's loads, and of the two margins, below [`REFERENCE_N`].
-    below_reference: Peaks<T, { FEET + 2 }>,
+    below_reference: Peaks<T, { MAX_FEET + 2 }>,
     distribution: Option<LoadDistribution<T>>,
     stops: Vec<StopRecord<T>>,
     /// The speed of each damper, if dampers are recorded.
@@ -229,25 +232,26 @@ impl<T: Lane> Loads<T> {
         substeps: u32,
     ) -> Option<Self> {
         let [_, force, element_gauges @ ..] = gauges;
-        let with_elements = element_gauges != [false; Gauge::ALL.len() - 2];
-        if !with_elements && !force {
+        let records_elements = element_gauges != [false; Gauge::ALL.len() - 2];
+        if !records_elements && !force {
             return None;
         }
         let elements = &point.machine.elements;
-        let with_dampers = gauges[Gauge::DamperSpeed as usize];
+        let records_dampers = gauges[Gauge::DamperSpeed as usize];
         let selection = LoadSelection {
             force,
-            feet: with_elements && point.feet.is_some(),
-            stops: if with_elements { elements.stops.len() } else { 0 },
-            dampers: if with_dampers { elements.dampers.len() } else { 0 },
+            feet: records_elements && point.feet.is_some(),
+            stops: if records_elements { elements.stops.len() } else { 0 },
+            dampers: if records_dampers { elements.dampers.len() } else { 0 },
         };
-        // Not `Option::map`: its closure would be compiled without the kernel's instruction set.
+        // This is not `Option::map`, whose closure would be compiled without the kernel's
+        // instruction set.
         let laws = match model {
             ModelKind::Nonlinear => LoadLaws::Nonlinear(Elements::splat(zero.constant(), elements)),
             ModelKind::Linear => {
-                let none = TubExpansion::new(zero);
-                let components = vec![none; selection.component_count()];
-                LoadLaws::Linear { force: [none; 3], components }
+                let zero_expansion = TubExpansion::new(zero);
+                let components = vec![zero_expansion; selection.component_count()];
+                LoadLaws::Linear { force: [zero_expansion; 3], components }
             }
         };
         let mut stops = Vec::with_capacity(selection.stops);
@@ -267,7 +271,7 @@ impl<T: Lane> Loads<T> {
             distribution,
             stops,
             speeds: vec![Peaks::new(zero); selection.dampers],
-            previous_tub: [Sample::still(zero, zero); 4],
+            previous_tub: [Sample::constant(zero, zero); 4],
             substeps,
         };
         for lane in 0..T::LANES {
@@ -293,11 +297,11 @@ impl<T: Lane> Loads<T> {
         }
     }
 
-    /// Returns the numbers of a gauge in one lane, which has this point: one for each part, or a
-    /// single one.
+    /// Returns the values of a gauge for the point in one lane: one for each element of the
+    /// machine, or a single one.
     pub(crate) fn gauge(&self, gauge: Gauge, lane: usize, point: &Point) -> Vec<f64> {
-        let greatest = |peaks: &Peaks<T, 1>| peaks.lane(lane)[0];
-        let least = |indices: core::ops::Range<usize>| {
+        let max_value = |peaks: &Peaks<T, 1>| peaks.lane(lane)[0];
+        let min_loads = |indices: core::ops::Range<usize>| {
             let indices = if self.distribution.is_some() { indices } else { 0..0 };
             self.below_reference.lane(lane)[indices]
                 .iter()
@@ -306,13 +310,13 @@ impl<T: Lane> Loads<T> {
         };
         match gauge {
             Gauge::ClashTime => Vec::new(),
-            Gauge::CabinetForce => vec![greatest(&self.force_squared).sqrt()],
-            Gauge::StopForce => self.stops.iter().map(|stop| greatest(&stop.force)).collect(),
+            Gauge::CabinetForce => vec![max_value(&self.force_squared).sqrt()],
+            Gauge::StopForce => self.stops.iter().map(|stop| max_value(&stop.force)).collect(),
             Gauge::StopContact => self.stops.iter().map(|stop| stop.contact.lane(lane)).collect(),
-            Gauge::FootLoad => least(0..point.feet.as_ref().map_or(0, |feet| feet.count)),
-            Gauge::SlipMargin => least(SLIP..WALK),
-            Gauge::WalkMargin => least(WALK..WALK + 1),
-            Gauge::DamperSpeed => self.speeds.iter().map(greatest).collect(),
+            Gauge::FootLoad => min_loads(0..point.feet.as_ref().map_or(0, |feet| feet.count)),
+            Gauge::SlipMargin => min_loads(SLIP_INDEX..WALK_INDEX),
+            Gauge::WalkMargin => min_loads(WALK_INDEX..WALK_INDEX + 1),
+            Gauge::DamperSpeed => self.speeds.iter().map(max_value).collect(),
         }
     }
 
@@ -328,22 +332,22 @@ impl<T: Lane> Loads<T> {
     ) {
         let tub_now = tub_samples(x, dx);
         let substeps = if step.is_some() { self.substeps } else { 1 };
-        let share = 1.0 / f64::from(substeps);
+        let substep_share = 1.0 / f64::from(substeps);
         // The end of the step is in the same loop as the other instants, so that the force laws are
         // compiled once.
         for substep in 1..=substeps {
             let mut tub = tub_now;
             let mut step_s = None;
             if let Some((_, length_s)) = step {
-                step_s = Some((share * length_s).v());
+                step_s = Some((substep_share * length_s).v());
                 if substep < substeps {
                     for k in 0..4 {
-                        let share_of_step = share * f64::from(substep);
-                        tub[k] = Sample::between(
+                        let position = substep_share * f64::from(substep);
+                        tub[k] = Sample::interpolate(
                             &self.previous_tub[k],
                             &tub_now[k],
                             length_s,
-                            share_of_step,
+                            position,
                         );
                     }
                 }
@@ -364,7 +368,7 @@ impl<T: Lane> Loads<T> {
     ) {
         let Self { selection, laws, components, .. } = self;
         let zero = tub[0].value.lit(0.0);
-        let mut force_squared = Sample::still(zero, zero);
+        let mut force_squared = Sample::constant(zero, zero);
         match laws {
             LoadLaws::Nonlinear(elements) => {
                 let mut q = [tub[0].value.constant(); 4];
@@ -380,14 +384,14 @@ impl<T: Lane> Loads<T> {
             }
             LoadLaws::Linear { force, components: expansions } => {
                 for expansion in force {
-                    let N(dual) = expansion.at(tub);
+                    let N(dual) = expansion.evaluate(tub);
                     let force = N(dual.value);
                     let rate = N(dual.slope);
                     force_squared.value += force * force;
                     force_squared.slope += (2.0 * force).v() * rate;
                 }
                 for (component, expansion) in components.iter_mut().zip(expansions) {
-                    *component = expansion.at(tub);
+                    *component = expansion.evaluate(tub);
                 }
             }
         }
@@ -398,7 +402,8 @@ impl<T: Lane> Loads<T> {
             let below_reference = distances_below_reference(distribution, &self.components);
             record_peaks(&mut self.below_reference, step_s, &below_reference, lanes_in_window);
         }
-        let (stops, damper_speeds) = self.components[LOAD..].split_at(2 * self.stops.len());
+        let (stops, damper_speeds) =
+            self.components[LOAD_COMPONENTS..].split_at(2 * self.stops.len());
         for (record, depth_and_force) in self.stops.iter_mut().zip(stops.chunks(2)) {
             let depth = sample(depth_and_force[0]);
             let force = sample(depth_and_force[1]);
@@ -420,28 +425,30 @@ impl<T: Lane> Loads<T> {
 fn distances_below_reference<T: Lane>(
     distribution: &LoadDistribution<T>,
     components: &[N<Dual<T>>],
-) -> [Sample<T>; FEET + 2] {
+) -> [Sample<T>; MAX_FEET + 2] {
     let distribution = distribution.constant();
     let reference = components[0].lit(REFERENCE_N);
-    let mut load = [reference; LOAD];
-    load.copy_from_slice(&components[..LOAD]);
-    let mut below_reference = [sample(reference); FEET + 2];
-    let mut foot_loads = distribution.own_loads;
-    for k in 0..FEET {
-        for i in 0..LOAD {
-            foot_loads[k] += distribution.shares[k][i] * load[i];
+    let mut load = [reference; LOAD_COMPONENTS];
+    load.copy_from_slice(&components[..LOAD_COMPONENTS]);
+    let mut below_reference = [sample(reference); MAX_FEET + 2];
+    let mut foot_loads = distribution.weight_loads;
+    for k in 0..MAX_FEET {
+        for i in 0..LOAD_COMPONENTS {
+            foot_loads[k] += distribution.loads_per_component[k][i] * load[i];
         }
         below_reference[k] = sample(reference - foot_loads[k]);
     }
-    let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(ROOT_SUMMAND_N2);
-    let slip_margin = distribution.friction * (distribution.weight - load[1]) - squared.sqrt();
+    let force_squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(ROOT_SUMMAND_N2);
+    let slip_margin =
+        distribution.friction * (distribution.weight - load[1]) - force_squared.sqrt();
     let walk_margin = slip_margin - turning_force_n(&distribution.positions, &foot_loads, &load);
-    below_reference[SLIP] = sample(reference - slip_margin);
-    below_reference[WALK] = sample(reference - walk_margin);
+    below_reference[SLIP_INDEX] = sample(reference - slip_margin);
+    below_reference[WALK_INDEX] = sample(reference - walk_margin);
     below_reference
 }
 
-/// Passes samples to their peaks, after a step of a length (s) or at the start of a segment.
+/// Passes samples to their peaks: after a step of length `step_s`, or at the start of a segment if
+/// it is `None`.
 #[inline(always)]
 fn record_peaks<T: Lane, const M: usize>(
     peaks: &mut Peaks<T, M>,

@@ -16,8 +16,8 @@ pub enum Method {
     /// Classical Runge-Kutta of order 4.
     Rk4 { step_s: f64 },
     /// The model's formula ([`Formula::for_model`]) for the machine with scaled mass at the
-    /// bearings, and at the hinge if that has a cap, so that none of their modes is faster than its
-    /// cap (section 4.3 of the model page).
+    /// bearings, and at the hinge if the hinge has a cap, which keeps the frequencies of their
+    /// modes below the caps (section 4.3 of the model page).
     Capped { step_s: f64, caps: Caps },
     /// Dormand and Prince's formula of order 8 with fixed steps, without caps. The linear model
     /// uses RK4 instead.
@@ -30,8 +30,8 @@ pub enum Method {
 }
 
 sweep_parameter::named! {
-    /// The method of a row's numbers, with the refinement level if modes are capped. The position
-    /// in this list is the code in unfinished files, so that new methods are added at the end.
+    /// The method of a row's numbers, with the refinement level if modes are capped. Unfinished
+    /// files store the position in this list, so that new methods are added at the end.
     #[derive(Default)]
     pub enum Level {
         /// Capped bearing modes, the longest stable steps.
@@ -80,7 +80,7 @@ pub enum MethodNumbers<'a> {
     Tolerance(&'a mut Tolerance),
 }
 
-/// A function that is generic over the stepper, and so is compiled once for each of them.
+/// A function that is generic over the stepper, and is therefore compiled once for each stepper.
 pub(crate) trait StepperVisitor<F: ModelFamily>: Sized {
     type Output;
     fn visit<S: Stepper>(self, stepper: S) -> Self::Output;
@@ -121,7 +121,7 @@ impl Method {
         matches!(self, Self::Dopri5(_) | Self::Additive(_))
     }
 
-    /// Calls a function with the stepper of this method.
+    /// Calls a visitor with the stepper of this method.
     pub(crate) fn visit_stepper<F: ModelFamily, V: StepperVisitor<F>>(
         &self,
         visitor: V,
@@ -153,7 +153,7 @@ pub(crate) fn start_segment<T: Lane, M: LaneModel<T>>(
     point: &Point,
     segment: &PlannedSegment,
 ) -> Segment {
-    model.set_spin(lane, &point.stretches[segment.stretch]);
+    model.set_spin(lane, &point.spin_segments[segment.spin_segment]);
     let step_s = match method.numbers_mut() {
         MethodNumbers::Step(step_s) | MethodNumbers::Capped(step_s, _) => *step_s,
         MethodNumbers::Tolerance(_) => FIRST_STEP_S,

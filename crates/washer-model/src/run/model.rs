@@ -7,13 +7,13 @@ use crate::linear::outputs::{LinearMotion, LinearOutputs};
 use crate::linear::rotor_terms::RotorCoefficients;
 use crate::linear::step::{self, RotorArrays, StepConstants};
 use crate::machine::parameters::MAX_COORDINATE_M;
-use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
+use crate::machine::spin::{SpinSegment, SpinSegmentLanes, SpinState};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::implicit_stage::solve_implicit_stage;
-use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
+use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL_COMPONENTS};
 use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, SemiImplicit, System};
@@ -23,16 +23,16 @@ use lane_ode::{Lane, N, Sample, SemiImplicit, System};
 pub(crate) trait LaneModel<T: Lane>: SemiImplicit<T, STATES> {
     /// Creates the model with the same point in every lane.
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self;
-    /// Puts a point into one lane.
+    /// Sets the point of one lane.
     fn set_point(&mut self, lane: usize, point: &Point);
-    /// Puts a stretch of its spin into one lane.
-    fn set_spin(&mut self, lane: usize, stretch: &SpinStretch);
-    /// Puts other caps into one lane.
+    /// Sets the spin segment of one lane.
+    fn set_spin(&mut self, lane: usize, spin_segment: &SpinSegment);
+    /// Sets the caps of one lane.
     fn set_caps(&mut self, lane: usize, caps: &Caps);
     /// Returns the state at rest, from which trajectories start.
     fn at_rest(point: &Point) -> [f64; STATES];
-    /// Adds the forces with corners at a state to a list, if the model has any.
-    fn corner_forces(&self, _x: &[N<T>; STATES], _forces: &mut Vec<CornerForce<T>>) {}
+    /// Appends the forces with corners at a state to a list, if the model has any.
+    fn append_corner_forces(&self, _x: &[N<T>; STATES], _forces: &mut Vec<CornerForce<T>>) {}
     /// Computes the position of the drum's front centre relative to the tub axis, and if
     /// `with_channels`, the channels' deviations from equilibrium. `dx` is the state's derivative.
     fn observe(
@@ -41,12 +41,12 @@ pub(crate) trait LaneModel<T: Lane>: SemiImplicit<T, STATES> {
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
         with_channels: bool,
-    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>);
+    ) -> ([Sample<T>; RADIAL_COMPONENTS], Option<[Sample<T>; CHANNELS]>);
 }
 
 /// Returns the coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
-fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> MovingCoordinates<T> {
+fn moving_coordinates<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> MovingCoordinates<T> {
     let (q, u) = split_state(x);
     MovingCoordinates { q, u, a: split_state(dx).1 }
 }
@@ -71,7 +71,7 @@ fn join_derivative<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) ->
     core::array::from_fn(|i| if i < COORDINATES { u[i] } else { a[i - COORDINATES] })
 }
 
-/// Returns the lanes that are in the range of the model. There the sum of squares over all
+/// Returns the lanes whose states are in the range of the model: the sum of squares over all
 /// coordinates, each divided by its limit (a quarter turn or [`MAX_COORDINATE_M`]), is less than 1.
 #[inline(always)]
 fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
@@ -79,8 +79,8 @@ fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
     let mut sum = x[0].lit(0.0);
     for (i, q) in x[..COORDINATES].iter().enumerate() {
         let limit = if i < FIRST_ANGLE { MAX_COORDINATE_M } else { FRAC_PI_2 };
-        let share = (*q * (1.0 / limit)).v();
-        sum += share * share;
+        let relative = (*q * (1.0 / limit)).v();
+        sum += relative * relative;
     }
     sum.0.less(sum.lit(1.0).0)
 }
@@ -89,9 +89,9 @@ fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
 pub(crate) struct Nonlinear<T> {
     coupling: Coupling<T>,
     machine: Coefficients<T>,
-    spin: SpinLanes<T>,
+    spin: SpinSegmentLanes<T>,
     /// The channels at the static equilibrium.
-    rest: [N<T>; CHANNELS],
+    channels_at_rest: [N<T>; CHANNELS],
     sag: Sag<T>,
 }
 
@@ -158,20 +158,20 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
         Self {
             coupling,
             machine: Coefficients::splat(zero, &point.machine),
-            spin: SpinLanes::splat(zero, &point.stretches[0]),
-            rest: InLanes::splat(zero, &point.channels_at_rest.map(N)),
+            spin: SpinSegmentLanes::splat(zero, &point.spin_segments[0]),
+            channels_at_rest: InLanes::splat(zero, &point.channels_at_rest.map(N)),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)),
         }
     }
 
     fn set_point(&mut self, lane: usize, point: &Point) {
         self.machine.set_lane(lane, &point.machine);
-        self.rest.set_lane(lane, &point.channels_at_rest.map(N));
+        self.channels_at_rest.set_lane(lane, &point.channels_at_rest.map(N));
         self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
     }
 
-    fn set_spin(&mut self, lane: usize, stretch: &SpinStretch) {
-        self.spin.set_lane(lane, stretch);
+    fn set_spin(&mut self, lane: usize, spin_segment: &SpinSegment) {
+        self.spin.set_lane(lane, spin_segment);
     }
 
     fn set_caps(&mut self, lane: usize, caps: &Caps) {
@@ -184,8 +184,8 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
     }
 
     #[inline(always)]
-    fn corner_forces(&self, x: &[N<T>; STATES], forces: &mut Vec<CornerForce<T>>) {
-        self.machine.elements.corner_forces(&self.corner_motions(x), forces);
+    fn append_corner_forces(&self, x: &[N<T>; STATES], forces: &mut Vec<CornerForce<T>>) {
+        self.machine.elements.append_corner_forces(&self.corner_motions(x), forces);
     }
 
     #[inline(always)]
@@ -195,15 +195,15 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
         with_channels: bool,
-    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>) {
-        let motion = motion(x, dx);
+    ) -> ([Sample<T>; RADIAL_COMPONENTS], Option<[Sample<T>; CHANNELS]>) {
+        let motion = moving_coordinates(x, dx);
         let axes = Axes::new(spin, &motion);
         let bodies = &self.machine.bodies;
         let mut channels = None;
         if with_channels {
             let mut samples = axes.channels(bodies, &motion);
             for i in 0..CHANNELS {
-                samples[i].value -= self.rest[i];
+                samples[i].value -= self.channels_at_rest[i];
             }
             channels = Some(samples);
         }
@@ -220,7 +220,7 @@ pub(crate) struct Linear<T> {
     /// The hinge's coordinates q9 and q10 at equilibrium (rad).
     sag: [N<T>; 2],
     outputs: LinearOutputs<T>,
-    spin: SpinLanes<T>,
+    spin: SpinSegmentLanes<T>,
 }
 
 /// The linear model's functions of time at an instant.
@@ -303,7 +303,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
             terms: RotorCoefficients::splat(zero, &point.linear.terms),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)).hinge,
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
-            spin: SpinLanes::splat(zero, &point.stretches[0]),
+            spin: SpinSegmentLanes::splat(zero, &point.spin_segments[0]),
         }
     }
 
@@ -315,8 +315,8 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
         self.outputs.set_lane(lane, &point.linear_outputs);
     }
 
-    fn set_spin(&mut self, lane: usize, stretch: &SpinStretch) {
-        self.spin.set_lane(lane, stretch);
+    fn set_spin(&mut self, lane: usize, spin_segment: &SpinSegment) {
+        self.spin.set_lane(lane, spin_segment);
     }
 
     fn set_caps(&mut self, lane: usize, caps: &Caps) {
@@ -334,8 +334,8 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
         with_channels: bool,
-    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>) {
-        let motion = LinearMotion::new(&forcing.spin, &motion(x, dx));
+    ) -> ([Sample<T>; RADIAL_COMPONENTS], Option<[Sample<T>; CHANNELS]>) {
+        let motion = LinearMotion::new(&forcing.spin, &moving_coordinates(x, dx));
         let channels = if with_channels { Some(self.outputs.channels(&motion)) } else { None };
         (self.outputs.radial(&motion), channels)
     }

@@ -5,7 +5,7 @@ use super::loads::{Gauge, Gauges};
 use crate::Snapshot;
 use crate::channel::CHANNELS;
 
-/// The recorders in use besides that of [`Record`](super::Record); none by default.
+/// The recorders in use in addition to that of [`Record`](super::Record); none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Recorders {
     /// Whether root mean squares of the channels are computed.
@@ -29,22 +29,22 @@ pub struct Reading {
     /// `Channel::ALL`.
     pub root_mean_squares: Option<[f64; CHANNELS]>,
     /// The largest deviation of each channel from equilibrium (m, rad) in each turn of the drum.
-    /// Turns are counted from the start of the run by the angle of the drum. A part of a turn at an
-    /// end of the window belongs to the whole turn beside it, and a window without whole turns is
-    /// one turn. Empty without this recorder.
+    /// Turns are counted from the start of the run by the angle of the drum. A partial turn at an
+    /// end of the window is joined to the adjacent whole turn, and a window without whole turns
+    /// counts as one turn. Empty without this recorder.
     pub turns: Vec<[f64; CHANNELS]>,
-    /// The numbers of each [`Gauge`]: one for each part in the machine's order, or a single one.
+    /// The values of each [`Gauge`]: one for each element in the machine's order, or a single one.
     /// Empty for gauges that are not in use.
     pub gauges: [Vec<f64>; Gauge::ALL.len()],
     /// The coordinates at the ends of segments up to the end or the failure of the trajectory.
     /// Empty without this recorder.
     pub checkpoints: Checkpoints,
-    /// The outputs at the point's instants. Empty without this recorder.
+    /// The outputs at the point's instants within the window. Empty without this recorder.
     pub snapshots: Vec<Snapshot>,
 }
 
 impl Reading {
-    /// Returns the numbers of a gauge; none if it was not in use.
+    /// Returns the values of a gauge; none if the gauge was not in use.
     pub fn gauge(&self, gauge: Gauge) -> &[f64] {
         &self.gauges[gauge as usize]
     }

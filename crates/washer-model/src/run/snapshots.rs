@@ -9,12 +9,12 @@ use lane_ode::{Lane, MAX_LANES, N, Sample};
 use std::sync::Arc;
 
 /// The tolerance within which an instant beyond the end of a step counts as at the end, relative to
-/// the step. Basis: the rounding errors of times are far smaller. Doubling it makes no difference.
+/// the step. Basis: the rounding errors of times are far smaller. Doubling it changes nothing.
 const END_TOLERANCE: f64 = 1e-9;
 
 /// Returns the position of an instant (s) in a lane's step, from 0 at the start to 1 at the end;
 /// `None` if the instant is beyond the end of the step.
-pub(super) fn share_of_step(time_s: f64, end_s: f64, length_s: f64) -> Option<f64> {
+pub(super) fn position_in_step(time_s: f64, end_s: f64, length_s: f64) -> Option<f64> {
     // The step of an idle lane has no length.
     let is_reached = length_s != 0.0 && time_s <= end_s + END_TOLERANCE * length_s;
     is_reached.then(|| (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0))
@@ -61,25 +61,25 @@ pub(super) struct Snapshots<T> {
 impl<T: Lane> Snapshots<T> {
     #[inline(always)]
     pub(super) fn new(zero: N<T>) -> Self {
-        let still = Sample::still(zero, zero);
+        let still = Sample::constant(zero, zero);
         Self { lanes: Default::default(), channels: [still; CHANNELS], tub: [still; 4] }
     }
 
     /// Begins a point's trajectory in one lane.
     pub(super) fn set_point(&mut self, lane: usize, point: &Point) {
         let instants_s = Arc::clone(&point.instants_s);
-        let taken = Vec::with_capacity(instants_s.len());
-        self.lanes[lane] = LaneSnapshots { instants_s, snapshots: taken };
+        let recorded = Vec::with_capacity(instants_s.len());
+        self.lanes[lane] = LaneSnapshots { instants_s, snapshots: recorded };
     }
 
-    /// Takes the snapshots of one lane.
+    /// Removes and returns the snapshots of one lane.
     pub(super) fn finish(&mut self, lane: usize) -> Vec<Snapshot> {
         std::mem::take(&mut self.lanes[lane].snapshots)
     }
 
-    /// Takes the snapshots within a step that ends at a state with derivative `dx` and with
-    /// channels. `step` has the end and the length of the step (s); it is `None` at the start of a
-    /// segment.
+    /// Records the snapshots within a step that ends at the state `x` with derivative `dx` and with
+    /// `channels`. `step` has the end and the length of the step (s); it is `None` at the start of
+    /// a segment.
     #[inline(always)]
     pub(super) fn record(
         &mut self,
@@ -92,9 +92,9 @@ impl<T: Lane> Snapshots<T> {
             for lane in 0..T::LANES {
                 let end_s = end_s.0.get(lane);
                 let length_s = length_s.0.get(lane);
-                let LaneSnapshots { instants_s, snapshots: taken } = &mut self.lanes[lane];
-                while let Some(&time_s) = instants_s.get(taken.len())
-                    && let Some(share) = share_of_step(time_s, end_s, length_s)
+                let LaneSnapshots { instants_s, snapshots: recorded } = &mut self.lanes[lane];
+                while let Some(&time_s) = instants_s.get(recorded.len())
+                    && let Some(share) = position_in_step(time_s, end_s, length_s)
                 {
                     let mut snapshot =
                         Snapshot { channels: [[0.0; 3]; CHANNELS], tub: [[0.0; 2]; 4] };
@@ -107,7 +107,7 @@ impl<T: Lane> Snapshots<T> {
                         let sample = interpolate(&self.tub[i], &tub[i], lane, length_s, share);
                         snapshot.tub[i] = [sample.value.0, sample.slope.0];
                     }
-                    taken.push(snapshot);
+                    recorded.push(snapshot);
                 }
             }
         }
@@ -130,7 +130,7 @@ fn interpolate<T: Lane>(
         slope: N(sample.slope.0.get(lane)),
         curvature: N(sample.curvature.0.get(lane)),
     };
-    Sample::between(&in_lane(start), &in_lane(end), N(length_s), share)
+    Sample::interpolate(&in_lane(start), &in_lane(end), N(length_s), share)
 }
 
 #[cfg(test)]

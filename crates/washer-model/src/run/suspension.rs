@@ -6,7 +6,7 @@
 
 use crate::coordinates::{STATES, TUB, TUB_Y, TUB_Z};
 use crate::lanes::ToDual as _;
-use crate::machine::feet::LOAD;
+use crate::machine::feet::LOAD_COMPONENTS;
 use crate::nonlinear::elements::{CabinetLine, Ends, ForceLaw, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
 use crate::run::model::{LaneModel, Nonlinear};
@@ -66,12 +66,12 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     };
     let tub = TubState {
         model,
-        moving: with_derivative(&q, &u),
-        displaced: with_derivative(&q, &core::array::from_fn(|i| state[i])),
+        moving: dual_coordinates(&q, &u),
+        displaced: dual_coordinates(&q, &core::array::from_fn(|i| state[i])),
     };
     let mut forces = Forces::default();
-    // Springs and dampers divide the force among the axes in different orders. Another order would
-    // change the last bits of stored results.
+    // The components of a spring's and of a damper's force are products and quotients in different
+    // orders. A common order would change the last bits of stored results.
     for spring in &elements.springs {
         let (tension, line) = tub.tension(&spring.constant());
         let share = tension / line.length;
@@ -90,16 +90,16 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     }
     for stop in &elements.stops {
         let stop = stop.constant();
-        let push = first_order_value(model, stop.force(&tub.point(&stop.tub)));
+        let force_n = first_order_value(model, stop.force(&tub.point(&stop.tub)));
         for k in 0..3 {
-            forces.cabinet_n[k] += push * stop.direction[k].0.value;
+            forces.cabinet_n[k] += force_n * stop.direction[k].0.value;
         }
-        forces.stops_n.push(push);
+        forces.stops_n.push(force_n);
     }
     for bushing in &elements.bushings {
         let bushing = bushing.constant();
-        let on_tub = bushing.force(&tub.point(&bushing.tub));
-        let force = on_tub.map(|force| first_order_value(model, -force));
+        let tub_load = bushing.force(&tub.point(&bushing.tub));
+        let force = tub_load.map(|force| first_order_value(model, -force));
         for k in 0..3 {
             forces.cabinet_n[k] += force[k];
         }
@@ -120,9 +120,9 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
 pub(super) fn load_on_cabinet_axes<T: Lane>(
     tub: &TubMotion<T>,
     (force, moment): &(Vec3<T>, Vec3<T>),
-) -> [N<T>; LOAD] {
-    let [fx, fy, fz] = tub.in_cabinet_axes(force);
-    let [mx, my, mz] = tub.in_cabinet_axes(moment);
+) -> [N<T>; LOAD_COMPONENTS] {
+    let [fx, fy, fz] = tub.to_cabinet_axes(force);
+    let [mx, my, mz] = tub.to_cabinet_axes(moment);
     let [y, z] = tub.midpoint;
     // The reaction of the load on the tub, with P_T at (0, y, z).
     [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
@@ -150,7 +150,7 @@ pub(crate) fn load_on_cabinet(
     point: &Point,
     model: ModelKind,
     state: &[f64; STATES],
-) -> [f64; LOAD] {
+) -> [f64; LOAD_COMPONENTS] {
     let elements = &point.machine.elements;
     let (elements, tub) = match model {
         ModelKind::Nonlinear => {
@@ -180,10 +180,10 @@ pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -
 
 /// Computes the vectors from cabinet end to tub end (m) of each spring and of each damper at
 /// coordinates, in cabinet axes.
-pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3]>; 2] {
+pub(crate) fn attachment_vectors(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3]>; 2] {
     let q = q.map(N);
     let tilt = Tilt::tub(&q);
-    let span = |ends: &Ends<f64>| from_cabinet(&tilt, &q, ends).map(|x| x.0);
+    let span = |ends: &Ends<f64>| tilted_span(&tilt, &q, ends).map(|x| x.0);
     let elements = &point.machine.elements;
     [
         elements.springs.iter().map(|spring| span(&spring.ends)).collect(),
@@ -207,8 +207,8 @@ impl TubState {
         element: &impl ForceLaw<Dual<f64>>,
     ) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>) {
         let ends = element.ends();
-        let span = tub_from_cabinet(&self.displaced, ends);
-        let moving = tub_from_cabinet(&self.moving, ends);
+        let span = dual_span(&self.displaced, ends);
+        let moving = dual_span(&self.moving, ends);
         let rate = self.velocity(dot(&moving, &moving).sqrt());
         let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate };
         (-element.force(&line) - element.optional_force(&line), line)
@@ -218,8 +218,8 @@ impl TubState {
     fn point(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
         let both_ends = Ends { cabinet: *tub, tub: *tub };
         PointMotion {
-            displacement: tub_from_cabinet(&self.displaced, &both_ends),
-            velocity: tub_from_cabinet(&self.moving, &both_ends).map(|place| self.velocity(place)),
+            displacement: dual_span(&self.displaced, &both_ends),
+            velocity: dual_span(&self.moving, &both_ends).map(|position| self.velocity(position)),
         }
     }
 
@@ -243,21 +243,21 @@ fn first_order_value(model: ModelKind, value: N<Dual<f64>>) -> f64 {
 }
 
 /// Returns coordinates as dual numbers with derivatives.
-fn with_derivative(
+fn dual_coordinates(
     q: &[f64; COORDINATES],
     direction: &[f64; COORDINATES],
 ) -> [N<Dual<f64>>; COORDINATES] {
     core::array::from_fn(|i| N(Dual { value: q[i], slope: direction[i] }))
 }
 
-/// Computes the vector from the cabinet end to the tub end, in cabinet axes.
-fn tub_from_cabinet(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Dual<f64>> {
-    from_cabinet(&Tilt::tub(q), q, ends)
+/// Computes the vector from the cabinet end to the tub end at coordinates, in cabinet axes.
+fn dual_span(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Dual<f64>> {
+    tilted_span(&Tilt::tub(q), q, ends)
 }
 
 /// Computes the vector from the cabinet end to the tub end of a tilted tub, in cabinet axes.
-fn from_cabinet<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &Ends<T>) -> Vec3<T> {
-    let tub = tilt.in_cabinet_axes(&ends.tub);
+fn tilted_span<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &Ends<T>) -> Vec3<T> {
+    let tub = tilt.to_cabinet_axes(&ends.tub);
     [
         tub[0] - ends.cabinet[0],
         tub[1] + q[TUB_Y] - ends.cabinet[1],

@@ -1,12 +1,13 @@
-//! The periodic response followed over speed, from a low one up and round its folds, or from a high
-//! one down.
+//! Continues the periodic response over the drum's speed: from a low speed up and round the folds,
+//! or from a high speed down.
 //!
-//! A curve of states and speeds, both in units of their own, is followed by pseudo-arclength
-//! (Keller 1977): along the tangent and its turning, then back onto the curve in the plane across
-//! the tangent, by the derivatives where the step has led. Steps grow where few corrections are
-//! needed and shrink where many are. The curve depends on the machine alone. So does what is found
-//! of it at a speed: the part of the curve counts up to where it first is [`OVERSHOOT_RATIO`] times
-//! as fast. Where it never is, it is lost, and a second one counts too, followed down.
+//! The curve of states and speeds, scaled by units, is continued by pseudo-arclength (Keller 1977).
+//! The predictor of second order follows the tangent and its change; Newton's method corrects the
+//! point in the plane across the tangent. Steps grow if few corrections are needed and shrink if
+//! many are. The curve depends on the machine alone. At a requested speed, the responses are those
+//! on the part of the curve before it first reaches [`OVERSHOOT_RATIO`] times the speed. A curve
+//! that does not reach it is lost, and a second curve, continued from a high speed down, has
+//! further responses.
 
 use super::monodromy::{INSTANTS, StateMatrix};
 use super::newton::{
@@ -34,39 +35,40 @@ const SPEED_UNIT_PER_S: f64 = 10.0;
 /// weight of the speed in the arclength.
 const LOG_SPEED_UNIT: f64 = 0.02;
 
-/// A response may lie on the curve after this many times its speed, but no later.
+/// The ratio of speeds up to which the curve is searched for responses: the part of the curve after
+/// it first reaches this ratio times a speed has no responses at that speed.
 pub(super) const OVERSHOOT_RATIO: f64 = 1.25;
 
 /// The length of the first step. Basis: a centimetre, or 2 % of the speed. Doubling it makes the
 /// first step fail more often.
 const FIRST_STEP_LENGTH: f64 = 1.0;
-/// The length of the longest step, which no correction exceeds. Basis: longer ones are shortened by
-/// the tangent's turning. Doubling it makes few curves faster.
+/// The length of the longest step, which no correction exceeds. Basis: longer steps are rejected
+/// because the tangent turns too much. Doubling it saves time on few curves.
 const MAX_STEP_LENGTH: f64 = 4.0;
 /// The length of the shortest step, after which the curve is lost. Basis: ten halvings. Doubling it
 /// loses curves at narrow folds.
 const MIN_STEP_LENGTH: f64 = 1e-3;
 
 /// The step length below which derivatives are computed at all instants of a turn, until a step has
-/// the greatest length again: derivatives at few instants may be the reason for short steps.
+/// the greatest length again. Derivatives at few instants may be the reason for short steps.
 const ALL_INSTANTS_STEP_LENGTH: f64 = 0.5;
 
 /// The factor of a step's length after few corrections. Basis: steps of most curves are as long as
 /// they may be. Doubling it makes steps fail.
 const STEP_INCREASE: f64 = 1.6;
-/// The greatest number of corrections that are few. Basis: a curve that hardly bends takes four.
-/// Doubling it makes all steps longer until they fail.
+/// The greatest number of corrections after which the step grows. Basis: a curve that hardly bends
+/// takes four. Doubling it makes all steps longer until they fail.
 const FEW_CORRECTIONS: usize = 4;
 
 /// The factor of a step's length after many corrections. Basis: about half the bend of the curve.
 /// Doubling it makes steps longer.
 const STEP_DECREASE: f64 = 0.7;
-/// The least number of corrections that are many. Basis: one more than keeps the length. Doubling
-/// it shortens no step.
+/// The least number of corrections after which the step shrinks. Basis: one more than the number
+/// with which the length is kept. Doubling it shortens no step.
 const MANY_CORRECTIONS: usize = 6;
 
-/// The greatest number of corrections; then the step is done again, half as long. Basis: a step
-/// that converges takes fewer. Doubling it wastes turns.
+/// The greatest number of corrections, after which the step is repeated with half its length.
+/// Basis: a step that converges takes fewer. Doubling it wastes turns.
 const MAX_CORRECTIONS: usize = 9;
 
 /// The greatest ratio of successive residuals with which the Jacobian is used again. Doubling it
@@ -93,17 +95,17 @@ const MAX_OWN_TANGENT_DISTANCE: f64 = 1e-3;
 /// doubles the truncation error and halves the rounding error of the derivative.
 const RELATIVE_SPEED_DIFFERENCE: f64 = 1e-5;
 
-/// The relative error of a fold's speed. Basis: less than any file's digits. Doubling it saves less
-/// than a round.
+/// The relative error of a fold's speed. Basis: below the digits that files have. Doubling it saves
+/// less than one iteration.
 const FOLD_TOLERANCE: f64 = 1e-6;
-/// The greatest number of rounds in which a fold is found. Basis: each squares the error. Doubling
-/// it changes nothing.
+/// The greatest number of iterations that locate a fold. Basis: each iteration squares the error.
+/// Doubling it changes nothing.
 const MAX_FOLD_ITERATIONS: usize = 5;
 
 /// The relative difference of the speeds of two successive folds, times the number of steps of a
-/// turn, below which both are spurious. If forces have corners, a motion meets them a step earlier
-/// or later as the speed changes by one step of a turn, so that the curve has stairs. Basis: the
-/// stairs of a machine that hits a stop have differences up to 0.45. Doubling it removes narrow
+/// turn, below which both are spurious. If forces have corners, a small change of the speed moves a
+/// corner into another step of the turn, so that the curve has stairs with spurious folds. Basis:
+/// the stairs of a machine that hits a stop have differences up to 0.45. Doubling it removes narrow
 /// folds of the machine.
 const SPURIOUS_FOLD_TOLERANCE: f64 = 0.5;
 
@@ -166,7 +168,7 @@ struct Node {
     position: CurvePoint,
     /// The unit tangent in the direction of continuation.
     tangent: CurvePoint,
-    /// Whether the tangent is that of the node itself, not of a nearby point.
+    /// Whether the tangent is that of the node itself instead of a nearby point.
     has_own_tangent: bool,
     /// The length of the curve from its beginning to the node.
     arclength: f64,
@@ -231,8 +233,8 @@ struct CurveJacobian {
 struct FoldBracket {
     /// The index of the node at which the interval begins.
     first_node: usize,
-    /// The number of further iterations for the fold; zero if it is known, and the interval is
-    /// beside it.
+    /// The number of remaining iterations for the fold; zero if the fold is known and the interval
+    /// is next to it.
     iterations_left: usize,
 }
 
@@ -323,13 +325,14 @@ impl<'a> ResponseCurve<'a> {
         let stalls = |previous: &Node| last.arclength - previous.arclength < FIRST_STEP_LENGTH;
         let is_stalled = node_count > STALL_NODES
             && stalls(&self.nodes[node_count - STALL_NODES])
-            && !self.settings.point.machine.elements.are_nonsmooth();
+            && !self.settings.point.machine.elements.has_nonsmooth_force();
         if !is_within || is_out_of_range || is_stalled || node_count >= MAX_NODES {
             return;
         }
         if self.step_length < MIN_STEP_LENGTH {
-            // A curve has stairs if steps of a turn are longer than corners are wide, and jumps
-            // where the number of steps changes with the speed. Shorter steps may continue it.
+            // A curve has stairs if the steps of a turn are longer than the width of corners, and
+            // jumps if the number of steps changes with the speed. It may be continued with shorter
+            // steps of a turn.
             let kept_arclength = last.arclength - FIRST_STEP_LENGTH;
             if !self.goes_down && self.settings.refine_continuation() {
                 let kept_nodes =
@@ -376,7 +379,7 @@ impl<'a> ResponseCurve<'a> {
     /// Rejects the current step, and tries a shorter one.
     fn reject_step(&mut self) {
         match self.fold_bracket.take() {
-            // A fold that cannot be located more closely stays at the last node.
+            // A fold that cannot be located more accurately is taken at the last node.
             Some(FoldBracket { first_node, iterations_left }) if iterations_left > 0 => {
                 self.fold_nodes.push(first_node + 1)
             }
@@ -496,7 +499,8 @@ impl<'a> ResponseCurve<'a> {
             let cosine = dot(&previous.tangent, &tangent);
             let has_turned = cosine.is_nan() || cosine < MIN_TANGENT_COSINE;
             if has_turned || correction > MAX_CORRECTION_SHARE * chord {
-                // If the last tangent is that of a nearby point, shorter steps do not help.
+                // If the last node's tangent is that of a nearby point, the node is computed again,
+                // because shorter steps would also fail.
                 let has_own_tangent = previous.has_own_tangent || self.fold_bracket.is_some();
                 return if has_own_tangent {
                     self.reject_step()
@@ -506,7 +510,7 @@ impl<'a> ResponseCurve<'a> {
             }
             arclength = previous.arclength + chord;
             // Close to a fold the sign of the tangent's speed is uncertain. The number of folds
-            // gives the direction, so that two close folds are not taken for one.
+            // gives the direction, so that two close folds are not merged.
             turns_back = self.is_rising() == (tangent[LOG_SPEED] < 0.0);
         }
         let has_own_tangent = correction < MAX_OWN_TANGENT_DISTANCE && self.uses_all_instants;
@@ -570,7 +574,7 @@ impl<'a> ResponseCurve<'a> {
         self.interpolate_fold(FoldBracket { first_node, iterations_left: iterations_left - 1 });
     }
 
-    /// Adds nodes close to the last fold on either side, where two branches differ by little.
+    /// Adds nodes on both sides of the last fold, where two branches are close together.
     fn add_nodes_at_fold(&mut self) {
         self.fold_bracket = None;
         let Some(&fold) = self.fold_nodes.last() else { return self.predict_next() };
@@ -602,8 +606,9 @@ impl<'a> ResponseCurve<'a> {
     }
 
     /// Returns the folds without spurious ones: pairs of successive folds are removed, the nearest
-    /// in speed first, as long as their difference is below [`SPURIOUS_FOLD_TOLERANCE`] with the
-    /// steps by which they were found. Later parts of the curve may have shorter steps.
+    /// in speed first, as long as their difference times the number of steps of a turn is below
+    /// [`SPURIOUS_FOLD_TOLERANCE`]. The number of steps is that of the pair's own nodes, because
+    /// later parts of the curve may have shorter steps.
     fn true_folds(&self) -> Vec<usize> {
         let mut folds = self.fold_nodes.clone();
         let difference_in_steps = |pair: &[usize]| {
@@ -652,7 +657,7 @@ impl<'a> ResponseCurve<'a> {
             let [a, b] = pair else { continue };
             let [from, to] = [a.position[LOG_SPEED], b.position[LOG_SPEED]];
             let is_rising = to > from;
-            // A node at exactly this speed counts once.
+            // A node at exactly the requested speed counts once.
             let is_within = if is_rising {
                 (from < target || k == 0 && from == target) && target <= to
             } else {
@@ -725,15 +730,15 @@ mod tests {
     use crate::Machine;
     use crate::stability::tests::{idle_stop, prepared};
 
-    /// The paper's machine, with a stop that does nothing or without.
+    /// Returns the paper's machine, with a stop that has no force if `has_stop`.
     fn point(has_stop: bool) -> crate::Point {
         let mut machine = Machine::paper();
         machine.stops.extend(has_stop.then(idle_stop));
         prepared(machine, 100.0)
     }
 
-    /// A curve through these speeds (rpm), each a length of 1 from the last, that turns back at
-    /// these nodes.
+    /// Returns a curve through the given speeds (rpm) at an arclength of 1 from each other, with
+    /// folds at the given nodes.
     fn curve<'a>(
         point: &'a crate::Point,
         speeds_rpm: &[f64],
@@ -776,7 +781,8 @@ mod tests {
         assert_eq!(branches_at(true, 250.0), [(2, false)]);
     }
 
-    /// A curve whose later parts need shorter steps keeps its branches before them.
+    /// Checks that a curve whose later parts need shorter steps keeps the branches of its earlier
+    /// parts.
     #[test]
     fn stairs_are_measured_by_their_own_steps() {
         let point = point(true);
@@ -790,7 +796,7 @@ mod tests {
         assert_eq!(branches(250.0), [2]);
     }
 
-    /// Many stairs by a fold leave the fold itself.
+    /// Checks that the fold itself remains if several stairs are near it.
     #[test]
     fn stairs_by_a_fold_leave_its_farthest_speed() {
         let point = point(true);
@@ -817,7 +823,7 @@ mod tests {
         assert_eq!((curve.nodes.len(), curve.fold_nodes), (2, vec![1]));
     }
 
-    /// Before and behind two folds within a step the curve goes the same way.
+    /// Two folds within a step leave the direction of the curve unchanged.
     #[test]
     fn a_curve_that_turns_twice_about_a_fold_has_two() {
         let point = point(false);

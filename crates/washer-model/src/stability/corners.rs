@@ -1,10 +1,10 @@
 //! The effect of forces with corners on disturbances.
 //!
 //! A force F along a motion of the tub adds the response r F to the accelerations. Its derivative
-//! is r dF + F dr. F and dF change abruptly, within a step, while r, dr and the dependence of the
-//! motion on the tub's coordinates are smooth over a turn.
+//! is r dF + F dr. F and dF change abruptly, within a step. The response r, dr and the dependence
+//! of the motion on the tub's coordinates are smooth over a turn.
 
-use crate::coordinates::{COORDINATES, ROTOR_TURNS, STATES, TUB};
+use crate::coordinates::{COORDINATES, ROTOR_ROTATIONS, STATES, TUB};
 use crate::lanes::lane_struct;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::elements::corners::CornerForce;
@@ -14,10 +14,10 @@ use lane_ode::{Dual, Lane, N, OutOfLine};
 /// The derivative of every acceleration by each coordinate, then by each speed.
 pub(super) type AccelerationDerivatives = [[N<f64>; STATES]; COORDINATES];
 
-/// The coordinates on which responses depend, the tub's first.
-const RESPONSE_COORDINATES: [usize; TUB.len() + ROTOR_TURNS.len()] = {
+/// The coordinates on which responses depend; those of the tub come first.
+const RESPONSE_COORDINATES: [usize; TUB.len() + ROTOR_ROTATIONS.len()] = {
     let [a, b, c, d] = TUB;
-    let [e, f, g, h] = ROTOR_TURNS;
+    let [e, f, g, h] = ROTOR_ROTATIONS;
     [a, b, c, d, e, f, g, h]
 };
 
@@ -81,12 +81,12 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
             // A force loads a coordinate by the derivative of the motion's speed by that
             // coordinate's speed (virtual power). The motion's speed is linear in the tub's speeds.
             for k in 0..TUB.len() {
-                let mut unit = state;
+                let mut unit_speed_state = state;
                 for tub_coordinate in TUB {
-                    unit[COORDINATES + tub_coordinate] = zero.constant();
+                    unit_speed_state[COORDINATES + tub_coordinate] = zero.constant();
                 }
-                unit[COORDINATES + TUB[k]] = zero.lit(1.0).constant();
-                let speeds = model.corner_motions(&unit);
+                unit_speed_state[COORDINATES + TUB[k]] = zero.lit(1.0).constant();
+                let speeds = model.corner_motions(&unit_speed_state);
                 for m in 0..corners.len() {
                     let corner = &mut corners[m];
                     let speed = speeds[m][1];
@@ -123,7 +123,7 @@ impl CornerMotion<f64> {
         }
     }
 
-    /// Adds the derivatives of the accelerations by a force along the motion, times a factor.
+    /// Adds the derivatives of the accelerations due to a force along the motion, times a factor.
     #[inline(always)]
     pub(super) fn apply(
         &self,

@@ -5,7 +5,7 @@ use super::Response;
 use super::turn::integrate_step;
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES, mirror_state};
-use crate::machine::spin::{SpinStretch, stretch_at};
+use crate::machine::spin::{SpinSegment, segment_index};
 use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
 use crate::run::model::{LaneModel, Nonlinear};
@@ -14,13 +14,13 @@ use faer::linalg::solvers::Solve as _;
 use faer::{Mat, Side};
 use lane_ode::{Kernel, Lane, N, OutOfLine, Simd, System};
 
-/// A stretch of time in which a run crosses a band of speeds.
+/// An interval of time in which a run crosses a band of speeds.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing<'a> {
     /// The times at which the run enters and leaves the band (s).
     pub interval_s: [f64; 2],
-    /// The periodic responses at the speeds of these two times, if there are any; if the drum turns
-    /// backwards, those of the mirrored machine, whose drum turns forwards.
+    /// The periodic responses at the speeds of these two times, if they exist; if the drum turns
+    /// backwards, the responses of the mirrored machine, whose drum turns forwards.
     pub responses: [Option<&'a Response>; 2],
     /// Whether the drum turns backwards.
     pub is_backward: bool,
@@ -33,8 +33,8 @@ pub struct CrossingEffect {
     /// The largest factor by which the amplitude of a small disturbance grows: the largest singular
     /// value of the tangent map in units of the square root of energy.
     pub amplification: f64,
-    /// The energy (J) of the run's departure from the periodic response at both ends; `None` if
-    /// there is no response.
+    /// The energy (J) of the difference of the run's state and the periodic response at both ends;
+    /// `None` without a response.
     pub departure_j: [Option<f64>; 2],
 }
 
@@ -97,8 +97,7 @@ pub fn follow_crossings(
 /// Returns the largest deviations (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL))
 /// of the nonlinear model within a window, in a run that enters each crossing on the periodic
 /// response, without the departures of earlier crossings. The run is otherwise that of
-/// [`follow_crossings`]. Where a crossing's response at entry is `None`, the run is continued as it
-/// is.
+/// [`follow_crossings`]. If a crossing's response at entry is `None`, the run continues unchanged.
 ///
 /// # Errors
 /// [`LeftRangeError`].
@@ -143,21 +142,21 @@ pub fn peaks_without_departures(
     Ok(peaks)
 }
 
-/// Equal steps within one stretch of the spin.
-struct SpinSegment {
-    stretch: SpinStretch,
+/// A sequence of equal steps within one spin segment.
+struct StepSequence {
+    spin: SpinSegment,
     start_s: f64,
     step_s: f64,
     steps: usize,
 }
 
-impl SpinSegment {
+impl StepSequence {
     /// Returns the time (s) after a number of steps.
     fn time_s(&self, steps: f64) -> f64 {
         self.start_s + self.step_s * steps
     }
 
-    /// Returns the forcing of step `k`: at its start, its middle and its end.
+    /// Returns the forcing at the start, the middle and the end of step `k`.
     #[inline(always)]
     fn forcings<T: Lane, S: System<T, STATES>>(
         &self,
@@ -166,7 +165,7 @@ impl SpinSegment {
         k: usize,
     ) -> [S::Forcing; 3] {
         let mut forcings = [system.forcing_out_of_line(zero.lit(self.time_s(k as f64))); 3];
-        // No closure: it would be compiled without the instruction set.
+        // This is a loop, because a closure would be compiled without the instruction set.
         for instant in 1..3 {
             let steps = k as f64 + 0.5 * instant as f64;
             forcings[instant] = system.forcing_out_of_line(zero.lit(self.time_s(steps)));
@@ -176,15 +175,15 @@ impl SpinSegment {
 }
 
 /// Divides the time from `from_s` to `to_s` at the kinks of the spin.
-fn segments(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<SpinSegment> {
-    let kinks = point.stretches.iter().map(|stretch| stretch.start_s.0);
+fn step_sequences(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<StepSequence> {
+    let kinks = point.spin_segments.iter().map(|spin_segment| spin_segment.start_s.0);
     let inner_kinks = kinks.filter(|&kink_s| kink_s > from_s && kink_s < to_s);
     let mut start_s = from_s;
     let mut segments = Vec::new();
     for end_s in inner_kinks.chain([to_s]) {
         let steps = ((end_s - start_s) / step_s).ceil().max(1.0);
-        segments.push(SpinSegment {
-            stretch: point.stretches[stretch_at(&point.stretches, start_s)],
+        segments.push(StepSequence {
+            spin: point.spin_segments[segment_index(&point.spin_segments, start_s)],
             start_s,
             step_s: (end_s - start_s) / steps,
             steps: steps as usize,
@@ -203,13 +202,13 @@ struct RunResult {
 }
 
 fn integrate(point: &Point, step_s: f64, from_to_s: [f64; 2], start: &[f64; STATES]) -> RunResult {
-    let segments = segments(point, step_s, from_to_s);
+    let segments = step_sequences(point, step_s, from_to_s);
     Simd::one_lane(SegmentRun { point, segments: &segments, start })
 }
 
 struct SegmentRun<'a> {
     point: &'a Point,
-    segments: &'a [SpinSegment],
+    segments: &'a [StepSequence],
     start: &'a [f64; STATES],
 }
 
@@ -227,7 +226,7 @@ impl OutOfLine for SegmentRun<'_> {
         let mut peaks = [0.0_f64; CHANNELS];
         let mut failure = None;
         'run: for segment in self.segments {
-            model.set_spin(0, &segment.stretch);
+            model.set_spin(0, &segment.spin);
             for k in 0..segment.steps {
                 let forcings = segment.forcings(zero, &model, k);
                 integrate_step(&model, N(segment.step_s), &forcings, &mut x);
@@ -251,8 +250,8 @@ impl OutOfLine for SegmentRun<'_> {
     }
 }
 
-/// The computation of the tangent map over a crossing, the derivative of the state at its end by
-/// the state at its start. Lanes hold its columns.
+/// The computation of the tangent map over a crossing: the derivative of the state at the end by
+/// the state at the start. Lanes hold the columns of the map.
 struct TangentMap<'a> {
     point: &'a Point,
     step_s: f64,
@@ -266,7 +265,7 @@ impl Kernel for TangentMap<'_> {
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let zero = N(zero).constant();
-        let segments = segments(self.point, self.step_s, self.crossing.interval_s);
+        let segments = step_sequences(self.point, self.step_s, self.crossing.interval_s);
         let mut model: Nonlinear<lane_ode::Dual<T>> =
             LaneModel::splat(zero, self.point, Coupling::Springs);
         let mut columns = Vec::with_capacity(STATES);
@@ -283,7 +282,7 @@ impl Kernel for TangentMap<'_> {
             }
             for segment in &segments {
                 for lane in 0..T::LANES {
-                    model.set_spin(lane, &segment.stretch);
+                    model.set_spin(lane, &segment.spin);
                 }
                 for k in 0..segment.steps {
                     let forcings = segment.forcings(zero, &model, k);
@@ -321,8 +320,8 @@ fn response_at(
         return start;
     }
     let steps = (end_s / step_s).ceil().max(1.0);
-    let segment = SpinSegment {
-        stretch: SpinStretch::steady(direction * response.speed_rpm),
+    let segment = StepSequence {
+        spin: SpinSegment::steady(direction * response.speed_rpm),
         start_s: 0.0,
         step_s: end_s / steps,
         steps: steps as usize,
@@ -332,12 +331,12 @@ fn response_at(
 
 /// Returns the drum's angle (rad) at a time, from -pi to pi.
 fn theta_rad(point: &Point, time_s: f64) -> f64 {
-    let spin = point.stretches[stretch_at(&point.stretches, time_s)].at(N(time_s));
+    let spin = point.spin_segments[segment_index(&point.spin_segments, time_s)].at(N(time_s));
     libm::atan2(spin.sin.0, spin.cos.0)
 }
 
-/// The energy of disturbances at the drum's angle at a time, as the Cholesky factor L of twice its
-/// matrix; `None` if that is not positive definite.
+/// The energy norm of disturbances at the drum's angle at a time. It has the Cholesky factor L of
+/// twice the energy's matrix; `None` if the matrix is not positive definite.
 struct EnergyNorm {
     cholesky_factor: Option<Mat<f64>>,
 }

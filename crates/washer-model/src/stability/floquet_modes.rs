@@ -1,7 +1,7 @@
 //! The Floquet modes of the linear model, which is periodic in theta: its Floquet exponents are the
 //! exact frequencies and dampings, whereas modal analysis freezes theta.
 
-use super::monodromy::{INSTANTS, StateMatrix, per_unit};
+use super::monodromy::{INSTANTS, StateMatrix, scale_speeds};
 use super::participation::modal_energies;
 use super::period_map::{TurnSetup, lane_model};
 use super::turn::{NoObserver, StepGrid, integrate_turn};
@@ -14,13 +14,13 @@ use core::f64::consts::TAU;
 use faer::{Mat, c64};
 use lane_ode::{Kernel, Lane, N, Simd};
 
-/// The product of step and frequency of the fastest mode (rad). Basis: the bearings' modes are to
-/// be accurate, too. Doubling it makes their errors 16 times as large.
+/// The product of step and frequency of the fastest mode (rad). Basis: it makes the bearings' modes
+/// accurate as well. Doubling it makes their errors 16 times as large.
 const STEP_PHASE_RAD: f64 = 0.1;
 
-/// The least magnitude of a multiplier. Basis: smaller ones are lost in the rounding of the others.
-/// Doubling it drops modes that decay by up to
-/// ln 2 less in a turn, too.
+/// The least magnitude of a multiplier. Basis: smaller multipliers are lost in the rounding errors
+/// of larger ones. Doubling it also drops modes whose logarithmic decay in a turn is less by up to
+/// ln 2.
 const MIN_MULTIPLIER: f64 = 1e-5;
 
 /// The least number of steps of a turn. Doubling it doubles the time at high speeds.
@@ -33,8 +33,9 @@ pub struct FloquetMode {
     pub frozen_mode: Mode,
     /// The real part of the Floquet exponent (1/s).
     pub re_per_s: f64,
-    /// The imaginary part of the Floquet exponent (rad/s). It is known up to multiples of the
-    /// drum's speed; this is the value nearest to the frequency of the mode with theta frozen.
+    /// The imaginary part of the Floquet exponent (rad/s). It is determined up to multiples of the
+    /// drum's speed; of these values it is the one nearest to the frequency of the mode with theta
+    /// frozen.
     pub im_rad_per_s: f64,
 }
 
@@ -45,7 +46,7 @@ impl FloquetMode {
         self.im_rad_per_s * 60.0 / TAU
     }
 
-    /// Returns the share of critical damping.
+    /// Returns the damping ratio, relative to critical damping.
     #[must_use]
     pub fn damping_ratio(&self) -> f64 {
         let squared = self.re_per_s * self.re_per_s + self.im_rad_per_s * self.im_rad_per_s;
@@ -55,7 +56,7 @@ impl FloquetMode {
 
 /// Returns the linear model's Floquet modes while the drum turns at `speed_rpm`, above 0, one for
 /// each mode with theta frozen at 0, the slowest mode first. Modes whose multiplier is lost in
-/// rounding are left out.
+/// rounding errors are skipped.
 ///
 /// # Errors
 /// Returns [`ResponseError::NoEigenvalues`] if the eigenvalues cannot be computed.
@@ -67,7 +68,7 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
     let setup =
         TurnSetup { point, speed_rpm, steps: steps as usize, instants: INSTANTS, caps: None };
     let unit_per_s = setup.unit_per_s();
-    let matrix = per_unit(&Simd::dispatch_narrow(LinearTurn(setup)), unit_per_s);
+    let matrix = scale_speeds(&Simd::dispatch_narrow(LinearTurn(setup)), unit_per_s);
     let decomposition = matrix.eigen().map_err(|_| ResponseError::NoEigenvalues)?;
     let values = decomposition.S().column_vector();
     let vectors = decomposition.U();
@@ -92,7 +93,8 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
         );
     }
     similarities.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    // A pair of conjugates belongs to one mode, and the most similar ones are assigned first.
+    // A conjugate pair of eigenvalues belongs to one mode; the most similar pairs of mode and
+    // eigenvalue are assigned first.
     let mut floquet_modes = Vec::with_capacity(COORDINATES);
     let mut has_eigenvalue = [false; COORDINATES];
     let mut is_assigned = [false; STATES];

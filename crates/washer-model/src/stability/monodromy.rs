@@ -4,7 +4,8 @@
 //! along the response, by dual numbers. Without forces with corners (`corners.rs`) these are smooth
 //! and periodic. They are computed at a few equally spaced instants, and interpolated by the
 //! trigonometric polynomial in between. Classical Runge-Kutta integrates all disturbances together.
-//! Lanes hold the instants of a turn first, and its disturbances then.
+//! Lanes hold instants of a turn while derivatives are computed, and disturbances while these are
+//! integrated.
 
 use super::corners::{AccelerationDerivatives, CornerMotion, CornerMotions};
 use super::turn::{A, B, StepGrid};
@@ -23,17 +24,17 @@ pub(super) const INSTANTS: usize = 16;
 /// Basis: corners give motions more harmonics. Doubling it doubles the number of derivatives.
 pub(super) const INSTANTS_AT_CORNERS: usize = 32;
 
-/// A matrix of the derivatives of a state by another one.
+/// A matrix of the derivatives of a state by another state.
 pub(crate) type StateMatrix = [[N<f64>; STATES]; STATES];
 
-/// Converts a matrix to speeds with a unit (1/s).
-pub(crate) fn per_unit(matrix: &StateMatrix, unit_per_s: f64) -> Mat<f64> {
+/// Converts a matrix of derivatives to speeds in a unit (1/s).
+pub(crate) fn scale_speeds(matrix: &StateMatrix, unit_per_s: f64) -> Mat<f64> {
     let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
     Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * unit(j) / unit(i))
 }
 
 /// The number of vectors of disturbances that are integrated through a step at once. Basis: they
-/// fit in the first cache. Doubling it is slower.
+/// fit in the first-level cache. Doubling it is slower.
 const BLOCK_LANES: usize = 5;
 /// The number of the widest vectors that hold all disturbances. Basis: the number of states.
 /// Doubling it leaves lanes empty.
@@ -43,12 +44,13 @@ const WIDE_BLOCK_LANES: usize = STATES.div_ceil(MAX_LANES);
 /// a multiple of it. Doubling it needs twice the memory.
 const STEPS_AT_ONCE: usize = 8;
 
-/// The number of starts, middles and ends of these steps. If forces have corners, steps are so
-/// short that the smooth derivatives are a parabola through the first, the middle and the last one.
+/// The number of starts, middles and ends of [`STEPS_AT_ONCE`] steps. If forces have corners, these
+/// steps are so short that the smooth derivatives are interpolated by parabolas through the first,
+/// the middle and the last instant.
 const INSTANTS_AT_ONCE: usize = 2 * STEPS_AT_ONCE + 1;
 
-/// The computation of the monodromy matrices of some turns, with the same set-up but for points and
-/// speeds.
+/// The computation of the monodromy matrices of several turns, whose set-ups differ in points and
+/// speeds only.
 pub(super) struct SmoothMonodromy<'a, T> {
     pub(super) zero: N<T>,
     /// The result of [`interpolation_weights`].
@@ -59,7 +61,8 @@ pub(super) struct SmoothMonodromy<'a, T> {
     pub(super) turn_count: usize,
     /// The number of equally spaced instants of a turn at which derivatives are computed.
     pub(super) instants: usize,
-    /// The states in the turns' lanes, at the instants or at a multiple of their number.
+    /// The states in the turns' lanes, at the instants or at a multiple of as many equally spaced
+    /// instants.
     pub(super) states: &'a [[N<T>; STATES]],
     /// The forces with corners in the turns' lanes, at the start, middle and end of all steps.
     pub(super) corner_forces: &'a [CornerForce<T>],
@@ -79,15 +82,16 @@ impl SmoothCoefficients {
     const NONE: Self = Self { derivatives: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
 }
 
-/// The weight of each summand.
-type Weights = [f64; INSTANTS_AT_CORNERS];
+/// The weights of the samples in a sum.
+type SampleWeights = [f64; INSTANTS_AT_CORNERS];
 
-/// Computes several weighted sums of the same samples. The sums go by coordinates, so that the
-/// summands stay in the first cache, and by four at a time, so that a loaded summand serves all.
+/// Computes several weighted sums of the same samples: coordinate by coordinate, so that the
+/// summands stay in the first-level cache, and four sums at a time, so that each loaded summand is
+/// used four times.
 #[inline(always)]
 fn add_weighted(
     samples: &[SmoothCoefficients],
-    weights: &[Weights],
+    weights: &[SampleWeights],
     sums: &mut [SmoothCoefficients],
 ) {
     let ((weights_by_four, remaining_weights), (fours, rest)) =
@@ -122,7 +126,7 @@ fn add_weighted(
 fn add_weighted_slopes<const SUMS: usize>(
     samples: &[SmoothCoefficients],
     i: usize,
-    weights: &[Weights; SUMS],
+    weights: &[SampleWeights; SUMS],
     sums: &mut [SmoothCoefficients; SUMS],
 ) {
     let mut sum = [[N(0.0); STATES]; SUMS];
@@ -138,7 +142,7 @@ fn add_weighted_slopes<const SUMS: usize>(
     }
 }
 
-/// Computes the monodromy matrix of each row's turn.
+/// Computes the monodromy matrix of each turn.
 impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
     type Output = Vec<StateMatrix>;
 
@@ -204,7 +208,7 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
 }
 
 impl<T: Lane> SmoothMonodromy<'_, T> {
-    /// Computes the smooth coefficients of each turn at the instants.
+    /// Computes the smooth coefficients of each turn at all instants.
     #[inline(always)]
     fn sample_coefficients(&self, zero: N<T>) -> Vec<Vec<SmoothCoefficients>> {
         let instants_at_once = T::LANES / self.turn_count;
@@ -287,14 +291,14 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
     }
 }
 
-/// Returns the weights of the values at the instants in the trigonometric polynomial through them.
-/// There is a list of weights for the ends and the middle of each step between the first instant
-/// and the second one.
+/// Returns the weights of the values at the instants in the trigonometric polynomial through the
+/// values. There is a list of weights for the start and the middle of each step between the first
+/// and the second instant.
 #[inline(always)]
 pub(super) fn interpolation_weights(steps: usize, instants: usize) -> Vec<Vec<f64>> {
     let subdivisions = 2 * steps / instants;
     let mut weights = vec![vec![0.0; instants]; subdivisions];
-    // No closure: it would be compiled without the instruction set.
+    // This is a loop, because a closure would be compiled without the instruction set.
     for subdivision in 0..subdivisions {
         for instant in 0..instants {
             let turns =
@@ -310,8 +314,8 @@ pub(super) fn interpolation_weights(steps: usize, instants: usize) -> Vec<Vec<f6
     weights
 }
 
-/// Interpolates the samples of a turn at equally spaced ones of the [`INSTANTS_AT_ONCE`] half steps
-/// from `first_instant` on.
+/// Interpolates the samples of a turn at `coefficients.len()` equally spaced instants out of the
+/// [`INSTANTS_AT_ONCE`] half steps from `first_instant` on.
 #[inline(always)]
 fn interpolate(
     samples: &[SmoothCoefficients],
@@ -333,7 +337,7 @@ fn interpolate(
     add_weighted(samples, weights_by_sample, coefficients);
 }
 
-/// Integrates a step of some disturbances, with the derivatives at the stages.
+/// Integrates a block of disturbances through a step, with the derivatives at each stage.
 #[inline(always)]
 fn integrate_step<T: Lane, const BLOCK_LANES: usize>(
     zero: N<T>,
@@ -346,7 +350,8 @@ fn integrate_step<T: Lane, const BLOCK_LANES: usize>(
     for stage in 0..4 {
         let derivatives = stage_derivatives[stage];
         let mut accelerations = [[zero; COORDINATES]; BLOCK_LANES];
-        // Two rows at a time, so that a loaded component of a disturbance serves both.
+        // Two rows are computed at a time, so that each loaded component of a disturbance is used
+        // twice.
         for i in (0..COORDINATES).step_by(2) {
             let mut row_sums = [[zero; BLOCK_LANES]; 2];
             for j in 0..STATES {
@@ -384,7 +389,7 @@ mod tests {
     use core::f64::consts::TAU;
 
     #[test]
-    fn a_trigonometric_polynomial_is_met_between_its_instants() {
+    fn interpolation_reproduces_a_trigonometric_polynomial() {
         let wave = |turns: f64| 0.3 + (TAU * turns).sin() - 0.5 * (7.0 * TAU * turns + 0.2).cos();
         let values: [f64; INSTANTS] = from_fn(|k| wave(k as f64 / INSTANTS as f64));
         for (subdivision, weights) in

@@ -1,5 +1,5 @@
-//! Searches that evaluate the period map: the driver of many at a time, and Newton's method for a
-//! periodic response at one speed.
+//! Searches that evaluate the period map: the driver that runs many searches together, and Newton's
+//! method for a periodic response at one speed.
 
 use super::monodromy::StateMatrix;
 use super::period_map::{OrbitRecord, TurnRequest, TurnResult, TurnSetup, compute_turns};
@@ -10,15 +10,15 @@ use lane_ode::{Cancel, Lu, N, OutOfLine, Simd};
 
 /// A search that requests turns until it is over.
 pub(super) trait PeriodMapSearch<'a> {
-    /// Returns the turns that the search needs next; none once it is over.
+    /// Returns the turns that the search needs next; none once the search is over.
     fn next_requests(&mut self) -> Vec<TurnRequest<'a>>;
 
     /// Receives the results of the requested turns, in the order of the requests.
     fn receive_results(&mut self, turned: Vec<TurnResult>);
 }
 
-/// Runs searches to their ends, with the turns of all of them together in lanes. Returns false if
-/// `cancel` was requested before.
+/// Runs searches to their ends, with the turns of all searches together in lanes. Returns false
+/// once `cancel` is requested.
 pub(super) fn run_searches<'a, S: PeriodMapSearch<'a>>(
     searches: &mut [S],
     cancel: Cancel<'_>,
@@ -55,7 +55,7 @@ const LAST_TURN_TOLERANCE: f64 = 1e-10;
 const RESPONSE_TOLERANCE: f64 = 1e-8;
 
 /// The least size of a motion (m, rad) in a relative residual. Basis: without unbalance the motion
-/// is only rounding. Doubling it changes nothing for greater motions.
+/// consists of rounding errors only. Doubling it changes nothing for greater motions.
 const MIN_DEVIATION: f64 = 1e-4;
 
 /// The greatest ratio of successive residuals with which the Jacobian is used again. Doubling it
@@ -68,14 +68,14 @@ const MAX_RESIDUAL_RATIO: f64 = 0.2;
 const QUADRATIC_CONVERGENCE_RESIDUAL: f64 = 1e-3;
 
 /// The distance (m, rad; speeds over the drum's speed) within which a known response repels a
-/// search. Basis: neighbours beside a fold are some millimetres apart, as in test
-/// `a_branch_that_was_lost_is_found_again`. Doubling it makes searches pass neighbours that they
-/// are meant to find.
+/// search. Basis: neighbouring responses near a fold are some millimetres apart, as in test
+/// `a_branch_that_was_lost_is_found_again`. Doubling it makes searches miss neighbours that they
+/// should find.
 const REPULSION_RANGE: f64 = 5e-3;
 
 /// The largest difference from 1 of a step's factor with which a search may end. Basis: a search
 /// that has converged takes steps of 1e-7 of a known response's distance, whose factor differs from
-/// 1 by as much. Doubling it changes nothing there.
+/// 1 by as much. Doubling it changes nothing for such searches.
 const MAX_FINAL_DEFLATION: f64 = 1e-3;
 
 /// Returns the distance of a turn's end from its start, relative to its deviation from equilibrium;
@@ -94,7 +94,7 @@ pub(crate) fn relative_residual(
         size = size.max((start[i] - equilibrium[i]).abs());
         let speed_gap = end[COORDINATES + i] - start[COORDINATES + i];
         let gap = (end[i] - start[i]).abs() + speed_gap.abs() / speed_rad_per_s;
-        // NaN stays.
+        // A residual of NaN is kept.
         residual = if gap > residual || gap.is_nan() { gap } else { residual };
     }
     residual / size
@@ -127,8 +127,8 @@ impl<const C: usize> OutOfLine for MatrixFactorization<'_, C> {
 }
 
 /// The search for a periodic response at one speed by Newton's method. The first correction uses
-/// the Jacobian of a nearby response, if there is one, and later ones that of the search's own
-/// states, which is computed again when the residual decreases too slowly.
+/// the Jacobian of a nearby response, if it is known. Later corrections use the Jacobian at the
+/// search's own states, which is computed again when the residual decreases too slowly.
 pub(super) struct NewtonSearch<'a> {
     setup: TurnSetup<'a>,
     state: [f64; STATES],
@@ -171,13 +171,13 @@ impl<'a> NewtonSearch<'a> {
     }
 
     /// Creates a search by damped Newton steps, none of which changes a coordinate by more than
-    /// `max_step` (m, rad). It stays near its start if another response is close.
+    /// `max_step` (m, rad). Such a search stays near its start if another response is close.
     pub(super) fn damped(setup: TurnSetup<'a>, state: [f64; STATES], max_step: f64) -> Self {
         Self { max_step, ..Self::new(setup, state, None) }
     }
 
     /// Creates a damped search by deflated Newton steps (Farrell, Birkisson and Funke 2015): known
-    /// responses repel it, so that it finds another one.
+    /// responses repel the search, so that it finds another response.
     pub(super) fn deflated(
         setup: TurnSetup<'a>,
         state: [f64; STATES],
@@ -187,9 +187,9 @@ impl<'a> NewtonSearch<'a> {
         Self { known_responses, ..Self::damped(setup, state, max_step) }
     }
 
-    /// Returns the factor that deflation puts on a Newton step: with the residual multiplied by
-    /// m(x) = product over known responses r of 1 + 1 / |x - r|^2, the step d becomes
-    /// d / (1 - d ln m), where d ln m is the derivative of ln m along d.
+    /// Returns the factor by which deflation multiplies a Newton step: with the residual multiplied
+    /// by m(x) = product over known responses r of 1 + 1 / |x - r|^2, the step d becomes d / (1 - d
+    /// ln m), where d ln m is the derivative of ln m along d.
     fn deflation_factor(&self, step: &[N<f64>; STATES]) -> f64 {
         let speed_rad_per_s = self.setup.speed_rpm * TAU / 60.0;
         let unit = |i: usize| {
@@ -290,7 +290,7 @@ impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
             let rate = if self.residual.is_finite() { residual / self.residual } else { 1.0 };
             let is_close = residual * rate.min(1.0) < LAST_TURN_TOLERANCE
                 || has_own_factors && residual < QUADRATIC_CONVERGENCE_RESIDUAL;
-            // A search that known responses still deflect has not converged.
+            // A search whose steps are still deflated by known responses has not converged.
             self.is_last_turn = is_close && (share - 1.0).abs() < MAX_FINAL_DEFLATION;
             if has_borrowed_factors {
                 self.factors = None;
@@ -305,12 +305,13 @@ impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
 mod tests {
     use super::*;
     use crate::stability::settings::Settings;
-    use crate::stability::tests::{prepared, with};
+    use crate::stability::tests::{machine_with, prepared};
 
-    /// Deflation reverses a step towards a known response, and does not change one far from all.
+    /// Checks that deflation reverses a step towards a known response, and does not change a step
+    /// far from known responses.
     #[test]
     fn known_responses_repel() {
-        let point = prepared(with(0.4, 140.0), 100.0);
+        let point = prepared(machine_with(0.4, 140.0), 100.0);
         let setup = Settings::new(&point).held_case(250.0).unwrap().setup;
         let known = [0.0; STATES];
         // The ratio of the deflated step to Newton's, which leads to the known response.

@@ -14,7 +14,7 @@ use faer::{Mat, c64};
 const NAMED_ENERGY_SHARE: f64 = 0.9;
 
 /// The greatest number of participating modes. Basis: a parametric resonance has one or two.
-/// Doubling it adds accidental ones.
+/// Doubling it adds modes that take part by accident.
 const MAX_NAMED_MODES: usize = 2;
 
 /// The number of inverse iterations. Basis: each reduces other eigenvectors by the ratio of the
@@ -25,8 +25,8 @@ const INVERSE_ITERATIONS: usize = 3;
 /// would be singular.
 const RELATIVE_SHIFT: f64 = 1e-9;
 
-/// Returns the index of every mode with its share of a disturbance's energy at theta = 0, which is
-/// not finite for a disturbance of zero.
+/// Returns the index of every mode and the mode's share of a disturbance's energy at theta = 0;
+/// shares are not finite for a disturbance of zero.
 pub(super) fn energy_shares(
     frozen_modes: &Modes,
     vector: &Mat<c64>,
@@ -76,14 +76,14 @@ pub(super) fn eigenvector(monodromy: &Mat<f64>, multiplier: c64) -> Mat<c64> {
     let mut vector = Mat::from_fn(STATES, 1, |_, _| c64::new(1.0, 0.0));
     for _ in 0..INVERSE_ITERATIONS {
         vector = factors.solve(vector);
-        let size = (0..STATES).map(|i| vector[(i, 0)].norm_sqr()).sum::<f64>().sqrt();
-        vector = Mat::from_fn(STATES, 1, |i, _| vector[(i, 0)] / size);
+        let norm = (0..STATES).map(|i| vector[(i, 0)].norm_sqr()).sum::<f64>().sqrt();
+        vector = Mat::from_fn(STATES, 1, |i, _| vector[(i, 0)] / norm);
     }
     vector
 }
 
-/// Returns the index of every mode with its part of a disturbance's energy: the squares of the
-/// modal coordinates, weighted by the energy of a unit.
+/// Returns the index of every mode and the mode's part of a disturbance's energy: the squares of
+/// the modal coordinates, weighted by the energy of a unit coordinate.
 pub(super) fn modal_energies(
     frozen_modes: &Modes,
     vector: &Mat<c64>,

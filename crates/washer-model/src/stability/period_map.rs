@@ -1,7 +1,7 @@
 //! The period map: the state after one turn at a constant speed, for many points in lanes.
 //!
-//! The turn is integrated with capped modes, which do not change motions that turn with the drum
-//! (`coupling.rs`), by classical Runge-Kutta in few steps. `newton.rs` finds fixed points of the
+//! The turn is integrated by classical Runge-Kutta in few steps, with capped modes, which do not
+//! change motions that turn with the drum (`coupling.rs`). `newton.rs` finds fixed points of the
 //! map at one speed, and `continuation.rs` continues them over speed.
 
 use super::monodromy::{INSTANTS, SmoothMonodromy, StateMatrix, interpolation_weights};
@@ -9,12 +9,12 @@ use super::stepwise_monodromy::StepwiseMonodromy;
 use super::turn::{StepGrid, StepObserver, integrate_turn};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::machine::spin::SpinStretch;
+use crate::machine::spin::SpinSegment;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::squared_distance;
 use crate::point::Point;
-use crate::preparation::{MAX_RUNS, SpeedAmplitudeSearch, own_speeds};
+use crate::preparation::{MAX_RUNS, SpeedAmplitudeSearch, motion_speeds};
 use crate::run::active_recorders::{ActiveRecorders, ObservedState};
 use crate::run::all_lanes;
 use crate::run::model::{LaneModel, Linear, Nonlinear};
@@ -27,10 +27,11 @@ use lane_ode::{Cancel, Kernel, Lane, Lu, N, OutOfLine, Peaks, Simd};
 /// effects may make whirls of the capped hinge faster than its cap. Doubling it is unstable.
 const CAP_STABILITY_SHARE: f64 = 0.7;
 
-/// The logarithmic decrement that a turn adds to the hinge's speeds where the steps themselves are
-/// differentiated, as in the continuation of responses with corners. Basis: without it, hits of
-/// stops make a hinge in resonance with a harmonic of the drum's speed swing so far that the
-/// continuation ends there. Doubling it leaves 0.04 % of the hinge's speed after a turn, not 2 %.
+/// The logarithmic decrement that a turn adds to the hinge's speeds if the steps themselves are
+/// differentiated, as in the continuation of responses with corners. Basis: without damping,
+/// impacts on stops excite a hinge in resonance with a harmonic of the drum's speed so strongly
+/// that the continuation ends. With it, 2 % of the hinge's speed remain after a turn; doubling it
+/// leaves 0.04 %.
 const HINGE_DAMPING_PER_TURN: f64 = 8.0;
 
 /// A point at a constant speed, and the discretisation of its turns.
@@ -69,20 +70,20 @@ impl TurnSetup<'_> {
         self.turn_s() / self.steps as f64
     }
 
-    /// Returns the unit (1/s) of the speeds of disturbances, with which the speeds of the fastest
-    /// ones are of the same magnitude as their coordinates.
+    /// Returns the unit (1/s) of the speeds of disturbances, with which speeds and coordinates of
+    /// the fastest disturbances have the same magnitude.
     pub(crate) fn unit_per_s(&self) -> f64 {
         1.0 / self.step_s()
     }
 
-    /// Whether the steps themselves are differentiated, not the motion.
+    /// Whether derivatives are those of the discrete steps instead of those of the motion.
     pub(super) fn differentiates_steps(&self) -> bool {
         self.instants == self.steps
     }
 
     /// Whether forces have corners.
     pub(super) fn has_corners(&self) -> bool {
-        self.point.machine.elements.are_nonsmooth()
+        self.point.machine.elements.has_nonsmooth_force()
     }
 
     pub(crate) fn batch_key(&self) -> BatchKey {
@@ -96,7 +97,7 @@ pub(crate) struct TurnRequest<'a> {
     pub(crate) setup: TurnSetup<'a>,
     /// The state at which the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub(crate) start: [f64; STATES],
-    /// Whether the result has a record, not only the end of the turn.
+    /// Whether the result has a record in addition to the end of the turn.
     pub(crate) is_recorded: bool,
 }
 
@@ -121,13 +122,13 @@ pub(crate) struct OrbitRecord {
 }
 
 /// Integrates turns in lanes, those with the same [`BatchKey`] together. The result of a turn does
-/// not depend on the others. Once `cancel` is requested, results at the end are missing.
+/// not depend on the other turns. Once `cancel` is requested, results at the end are missing.
 pub(crate) fn compute_turns(requests: &[TurnRequest<'_>], cancel: Cancel<'_>) -> Vec<TurnResult> {
     // Recorded turns come first in a batch.
     let key = |request: &TurnRequest<'_>| (request.setup.batch_key(), !request.is_recorded);
     map_in_batches(requests, key, |requests| {
         let kernel = TurnKernel { requests, cancel };
-        // Wide lanes that are mostly empty take longer than narrow ones.
+        // Mostly empty wide lanes take longer than narrow lanes.
         let is_narrow_enough = requests.len() <= Simd::narrow().lanes();
         // The differentiation of steps fills all lanes with disturbances, even for one turn.
         let fills_lanes = requests
@@ -143,18 +144,18 @@ pub(crate) fn compute_turns(requests: &[TurnRequest<'_>], cancel: Cancel<'_>) ->
 
 /// Applies a function to batches of items with the same [`BatchKey`], and returns the results in
 /// the order of the items. A batch is sorted by the second part of `key`. If the function returns
-/// too few results, those of the last items of the batch are left out.
+/// too few results, the last items of the batch have no results.
 pub(crate) fn map_in_batches<A: Copy, R>(
     items: &[A],
     key: impl Fn(&A) -> (BatchKey, bool),
-    find: impl Fn(&[A]) -> Vec<R>,
+    compute: impl Fn(&[A]) -> Vec<R>,
 ) -> Vec<R> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     order.sort_by_key(|&k| key(&items[k]));
     let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
     for batch in order.chunk_by(|&a, &b| key(&items[a]).0 == key(&items[b]).0) {
         let batch_items: Vec<A> = batch.iter().map(|&k| items[k]).collect();
-        for (&k, result) in batch.iter().zip(find(&batch_items)) {
+        for (&k, result) in batch.iter().zip(compute(&batch_items)) {
             results[k] = Some(result);
         }
     }
@@ -202,7 +203,7 @@ pub(crate) fn lane_model<T: Lane, M: LaneModel<T>>(zero: N<T>, setups: &[TurnSet
     for lane in 0..T::LANES {
         let setup = &setups[lane.min(setups.len() - 1)];
         model.set_point(lane, setup.point);
-        model.set_spin(lane, &SpinStretch::steady(setup.speed_rpm));
+        model.set_spin(lane, &SpinSegment::steady(setup.speed_rpm));
         if let Some(caps) = &setup.caps {
             model.set_caps(lane, caps);
         }
@@ -222,7 +223,8 @@ pub(crate) fn step_grid<T: Lane>(zero: N<T>, setups: &[TurnSetup<'_>]) -> StepGr
     grid
 }
 
-/// Integrates the turns of one batch of lanes, with the monodromy matrices of the recorded ones.
+/// Integrates as many turns as there are lanes, and computes the monodromy matrices of recorded
+/// turns.
 #[inline(always)]
 fn integrate_batch<T: Lane>(
     zero: N<T>,
@@ -318,25 +320,25 @@ impl LinearResponse {
     }
 }
 
-/// Returns the linear model's responses. For dampers without a given speed amplitude, the friction
-/// is linearised at the amplitude of the response itself. Once `cancel` is requested, responses
-/// are missing or not final.
-pub(super) fn linear_responses_with_own_friction(
+/// Returns the linear model's responses. The friction of dampers without a given speed amplitude is
+/// linearised at the amplitude of the response itself. Once `cancel` is requested, responses are
+/// missing or not final.
+pub(super) fn linear_responses_with_motion_friction(
     setups: &[TurnSetup<'_>],
     cancel: Cancel<'_>,
 ) -> Vec<LinearResponse> {
     let mut responses = solve_linear_responses(setups, cancel);
-    let search_of = |(k, setup): (usize, &TurnSetup<'_>)| {
+    let new_search = |(k, setup): (usize, &TurnSetup<'_>)| {
         Some((k, SpeedAmplitudeSearch::from_min_speeds(setup.point)?))
     };
-    let mut open_searches: Vec<(usize, SpeedAmplitudeSearch)> =
-        setups.iter().enumerate().filter_map(search_of).collect();
+    let mut unfinished_searches: Vec<(usize, SpeedAmplitudeSearch)> =
+        setups.iter().enumerate().filter_map(new_search).collect();
     for _ in 0..MAX_RUNS {
-        let at_speeds = |(k, search): &(usize, SpeedAmplitudeSearch)| {
-            setups[*k].point.with_own_friction_speeds(&search.speeds_m_per_s())
+        let point_at_speeds = |(k, search): &(usize, SpeedAmplitudeSearch)| {
+            setups[*k].point.with_motion_friction_speeds(&search.speeds_m_per_s())
         };
-        let points: Vec<Point> = open_searches.iter().map(at_speeds).collect();
-        let requests = open_searches
+        let points: Vec<Point> = unfinished_searches.iter().map(point_at_speeds).collect();
+        let requests = unfinished_searches
             .iter()
             .zip(&points)
             .map(|((k, _), point)| TurnSetup { point, ..setups[*k] });
@@ -344,16 +346,16 @@ pub(super) fn linear_responses_with_own_friction(
         if cancel.is_requested() {
             break;
         }
-        let mut unfinished = Vec::new();
+        let mut next_searches = Vec::new();
         for (((k, mut search), point), response) in
-            open_searches.into_iter().zip(&points).zip(batch_responses)
+            unfinished_searches.into_iter().zip(&points).zip(batch_responses)
         {
-            if !search.update(&own_speeds(point, &response.damper_speeds_m_per_s(point))) {
-                unfinished.push((k, search));
+            if !search.update(&motion_speeds(point, &response.damper_speeds_m_per_s(point))) {
+                next_searches.push((k, search));
             }
             responses[k] = response;
         }
-        open_searches = unfinished;
+        unfinished_searches = next_searches;
     }
     responses
 }
@@ -364,8 +366,8 @@ pub(super) fn solve_linear_responses(
     setups: &[TurnSetup<'_>],
     cancel: Cancel<'_>,
 ) -> Vec<LinearResponse> {
-    let find = |setups: &[TurnSetup<'_>]| Simd::dispatch_narrow(LinearKernel { setups, cancel });
-    map_in_batches(setups, |setup| (setup.batch_key(), false), find)
+    let compute = |setups: &[TurnSetup<'_>]| Simd::dispatch_narrow(LinearKernel { setups, cancel });
+    map_in_batches(setups, |setup| (setup.batch_key(), false), compute)
 }
 
 /// The computation of the linear responses of set-ups with the same [`BatchKey`]. The period map is
@@ -380,18 +382,18 @@ impl Kernel for LinearKernel<'_> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut found = Vec::with_capacity(self.setups.len());
+        let mut responses = Vec::with_capacity(self.setups.len());
         for setups in self.setups.chunks(T::LANES) {
             if self.cancel.is_requested() {
                 break;
             }
-            solve_linear_batch(N(zero), setups, &mut found);
+            solve_linear_batch(N(zero), setups, &mut responses);
         }
-        found
+        responses
     }
 }
 
-/// Computes the linear responses of one batch of lanes.
+/// Computes as many linear responses as there are lanes.
 #[inline(always)]
 fn solve_linear_batch<T: Lane>(
     zero: N<T>,
@@ -400,13 +402,14 @@ fn solve_linear_batch<T: Lane>(
 ) {
     let grid = step_grid(zero, setups);
     let model: Linear<T> = lane_model(zero, setups);
-    // From rest, then from a unit of each coordinate and speed.
+    // The first turn starts from rest, the others from a unit of each coordinate and speed.
     let mut ends = vec![[zero; STATES]; 1 + STATES];
     for j in 0..STATES {
         ends[1 + j][j] = zero.lit(1.0);
     }
     let mut start = [zero; STATES];
-    // The turn from the fixed point is recorded. A loop, for one copy of the model's code.
+    // The turn from the fixed point is recorded. The loop compiles to a single copy of the model's
+    // code.
     for has_start in [false, true] {
         if has_start {
             ends.truncate(1);
@@ -498,7 +501,7 @@ impl<T: Lane, M: LaneModel<T>> OutOfLine for CornerForcesAtState<'_, T, M> {
 
     #[inline(always)]
     fn run(self) {
-        self.model.corner_forces(self.x, self.corner_forces);
+        self.model.append_corner_forces(self.x, self.corner_forces);
     }
 }
 
@@ -511,10 +514,10 @@ impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M>
         if self.with_corner_forces {
             if k > 0 {
                 let [start, rate] = &self.last_sample;
-                let eighth = (self.grid.step_s * 0.125).v();
+                let eighth_step = (self.grid.step_s * 0.125).v();
                 let mut middle = *x;
                 for i in 0..STATES {
-                    middle[i] = (0.5 * (start[i] + x[i])).v() + eighth * (rate[i] - dx[i]);
+                    middle[i] = (0.5 * (start[i] + x[i])).v() + eighth_step * (rate[i] - dx[i]);
                 }
                 x[0].0.run_out_of_line(CornerForcesAtState {
                     model: self.model,
@@ -529,17 +532,16 @@ impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M>
             });
             self.last_sample = [*x, *dx];
         }
-        let all = all_lanes(x[0]);
+        let all_lanes_mask = all_lanes(x[0]);
         if let (radial, Some(channels)) = self.model.observe(forcing, x, dx, true) {
             if k == 0 {
-                self.peaks.begin(&channels, all);
+                self.peaks.begin(&channels, all_lanes_mask);
             } else {
-                self.peaks.advance(self.grid.step_s, &channels, all);
+                self.peaks.advance(self.grid.step_s, &channels, all_lanes_mask);
             }
             if let Some(further_recorders) = &mut self.further_recorders {
                 let radial = &radial;
                 let channels = &channels;
-                let inside = all;
                 let step = if k == 0 {
                     None
                 } else {
@@ -552,13 +554,13 @@ impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M>
                     dx,
                     radial,
                     channels,
-                    lanes_in_window: inside,
+                    lanes_in_window: all_lanes_mask,
                 });
             }
-            let greatest = self.max_radial_squared.0;
+            let max_squared = self.max_radial_squared.0;
             let radial_squared = squared_distance(&radial).value.0;
             self.max_radial_squared =
-                N(T::select(greatest.less(radial_squared), radial_squared, greatest));
+                N(T::select(max_squared.less(radial_squared), radial_squared, max_squared));
         }
     }
 }

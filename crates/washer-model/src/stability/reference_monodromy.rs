@@ -5,7 +5,7 @@ use super::monodromy::StateMatrix;
 use super::period_map::{TurnSetup, lane_model};
 use super::turn::{NoObserver, StepGrid, StepObserver, integrate_turn};
 use crate::coordinates::STATES;
-use crate::modes::{NoModes, highest_frequency_rad_per_s};
+use crate::modes::{ModesError, highest_frequency_rad_per_s};
 use crate::run::model::Nonlinear;
 use core::f64::consts::TAU;
 use lane_ode::{Dual, Lu, N, OutOfLine, System as _};
@@ -17,8 +17,7 @@ const STEP_PHASE_RAD: f64 = 1.0;
 /// Doubling it changes nothing.
 const RESPONSE_TOLERANCE: f64 = 1e-9;
 
-/// The greatest number of iterations of Newton's method, which starts at the response that is
-/// tested.
+/// The greatest number of iterations of Newton's method, which starts at the tested response.
 const MAX_ITERATIONS: usize = 6;
 
 /// The computation of the monodromy matrix of a response, with speeds in the unit `unit_per_s`.
@@ -34,7 +33,7 @@ impl<'a> ReferenceMonodromy<'a> {
         setup: &TurnSetup<'a>,
         start: [f64; STATES],
         unit_per_s: f64,
-    ) -> Result<Self, NoModes> {
+    ) -> Result<Self, ModesError> {
         let highest_rad_per_s =
             highest_frequency_rad_per_s(setup.point, setup.speed_rpm * TAU / 60.0)?;
         let steps =
@@ -93,15 +92,15 @@ impl OutOfLine for ReferenceMonodromy<'_> {
                 }
             }
             if largest_correction <= RESPONSE_TOLERANCE * largest_deviation {
-                return Some(per_unit(&matrix, self.unit_per_s));
+                return Some(scale_speeds(&matrix, self.unit_per_s));
             }
         }
         None
     }
 }
 
-/// Converts a matrix to speeds in the unit `unit_per_s`.
-fn per_unit(matrix: &StateMatrix, unit_per_s: f64) -> StateMatrix {
+/// Converts a matrix of derivatives to speeds in the unit `unit_per_s`.
+fn scale_speeds(matrix: &StateMatrix, unit_per_s: f64) -> StateMatrix {
     let unit = |i: usize| if i < STATES / 2 { 1.0 } else { unit_per_s };
     let mut scaled = *matrix;
     for i in 0..STATES {
@@ -137,9 +136,9 @@ impl StepObserver<Dual<f64>, Nonlinear<Dual<f64>>> for TraceObserver<'_> {
             return;
         }
         for j in STATES / 2..STATES {
-            let mut seeded = *x;
-            seeded[j].0.slope = 1.0;
-            self.integral += self.step_s * self.model.derivative(forcing, &seeded)[j].0.slope;
+            let mut dual_state = *x;
+            dual_state[j].0.slope = 1.0;
+            self.integral += self.step_s * self.model.derivative(forcing, &dual_state)[j].0.slope;
         }
     }
 }
@@ -155,8 +154,8 @@ impl OutOfLine for TraceIntegral<'_> {
         let steps = self.setup.steps;
         let grid = StepGrid { step_s: zero.lit(step_s), steps, hinge_damping_factor: None };
         let mut states = [self.start.map(|x| zero.lit(x))];
-        let mut diagonal = TraceObserver { model: &model, step_s, steps, integral: 0.0 };
-        integrate_turn(&model, &grid, &mut states, Some(&mut diagonal));
-        diagonal.integral
+        let mut observer = TraceObserver { model: &model, step_s, steps, integral: 0.0 };
+        integrate_turn(&model, &grid, &mut states, Some(&mut observer));
+        observer.integral
     }
 }

@@ -1,13 +1,13 @@
-//! Periodic responses at requested speeds: Newton's method from the guesses that the curve of a
-//! point's responses gives there, and the stability of the responses.
+//! Periodic responses at requested speeds: Newton's method from guesses on the curve of a point's
+//! responses, and the stability of the responses.
 
 use super::continuation::{Guess, OVERSHOOT_RATIO, ResponseCurve};
-use super::monodromy::per_unit;
+use super::monodromy::scale_speeds;
 use super::newton::{NewtonSearch, relative_residual, run_searches};
 use super::participation::{eigenvector, energy_shares, participating_modes};
 use super::period_map::{
     LinearResponse, OrbitRecord, TurnRequest, TurnSetup, compute_turns,
-    linear_responses_with_own_friction, solve_linear_responses,
+    linear_responses_with_motion_friction, solve_linear_responses,
 };
 use super::settings::{HeldCase, Settings};
 use super::{GeometryLimit, HeldSpeed, Response, ResponseError, StabilityKind, round_last_digits};
@@ -15,14 +15,15 @@ use crate::coordinates::{COORDINATES, STATES};
 use crate::modes::modes;
 use crate::point::Point;
 use crate::run::model::{LaneModel, Nonlinear};
-use crate::run::suspension::attachments;
+use crate::run::suspension::attachment_vectors;
 use crate::steps::SUSPENSION_MODES;
 use core::f64::consts::TAU;
 use faer::{Mat, c64};
 use lane_ode::Cancel;
 
-/// The least share of a disturbance's energy in the judged modes with which its multiplier counts.
-/// Basis: more than half belongs to these modes. Doubling it leaves no multiplier.
+/// The least share of a disturbance's energy in the counted modes with which its multiplier counts.
+/// Basis: the disturbance then belongs mostly to these modes. Doubling it excludes almost every
+/// multiplier.
 const MIN_ENERGY_SHARE: f64 = 0.5;
 
 /// The magnitude of growth (1/s) below which a response is computed again without caps. Basis: it
@@ -38,8 +39,8 @@ const MAX_HINGE_HARMONIC: f64 = 7.0;
 /// Doubling it doubles the effect of caps that is accepted.
 const CAP_RESIDUAL_TOLERANCE: f64 = 2e-4;
 
-/// The greatest distance (m, rad) of a response from its guess; a response farther away is another
-/// one. Doubling it takes more responses for those of a branch.
+/// The greatest distance (m, rad) of a response from its guess; a response farther away belongs to
+/// another branch. Doubling it assigns more responses of other branches to a guess.
 const MAX_GUESS_DISTANCE: f64 = 5e-3;
 
 /// The distance (m, rad) below which two responses are the same. Doubling it changes nothing as
@@ -47,7 +48,7 @@ const MAX_GUESS_DISTANCE: f64 = 5e-3;
 const SAME_RESPONSE_DISTANCE: f64 = 1e-6;
 
 /// The distance (m, rad) above which two guesses of a curve belong to different responses. Basis:
-/// it is ten times the distance of equal responses. Doubling it does not check branches this close
+/// it is ten times the distance of equal responses. Doubling it skips the check of branches closer
 /// to a fold.
 const SEPARATE_GUESS_DISTANCE: f64 = 10.0 * SAME_RESPONSE_DISTANCE;
 
@@ -65,8 +66,9 @@ const TRANSIENT_DECAY: f64 = 1e-3;
 /// [`TRANSIENT_DECAY`] within it. Doubling it doubles the time of a speed without any response.
 const MAX_TRANSIENT_S: f64 = 120.0;
 
-/// Returns the periodic responses at constant speeds, on lanes; a run of dwells of one point shares
-/// its curve of responses. Per dwell as [`ResponseCurves::find_at_speeds`].
+/// Returns the periodic responses at constant speeds, computed in lanes. Consecutive speeds of the
+/// same point share the point's curve of responses. Each result is that of
+/// [`ResponseCurves::find_at_speeds`].
 pub fn find_responses(
     held_speeds: &[HeldSpeed<'_>],
     cancel: Cancel<'_>,
@@ -108,8 +110,8 @@ impl<'a> ResponseCurves<'a> {
     ) -> Vec<Self> {
         let curves_with_range = points.iter().map(|&(point, max_speed_rpm)| {
             let curve = ResponseCurve::new(Settings::new(point));
-            let lowest_rpm =
-                start_response.map_or_else(|| curve.settings.lowest_rpm(), |it| Ok(it.speed_rpm));
+            let lowest_rpm = start_response
+                .map_or_else(|| curve.settings.lowest_rpm(), |response| Ok(response.speed_rpm));
             let lowest_rpm = lowest_rpm.ok().filter(|&lowest_rpm| lowest_rpm < max_speed_rpm);
             let end_rpm = start_response.map_or(OVERSHOOT_RATIO, |_| 1.0) * max_speed_rpm;
             (curve, lowest_rpm.map(|lowest_rpm| [lowest_rpm, end_rpm]))
@@ -118,7 +120,7 @@ impl<'a> ResponseCurves<'a> {
         else {
             return Vec::new();
         };
-        // From the response of another machine, only its branch is continued.
+        // From the response of another machine, only the branch of that response is continued.
         let is_lost = |curve: &ResponseCurve<'_>, max_speed_rpm: f64| {
             start_response.is_none() && curve.is_lost(max_speed_rpm)
         };
@@ -146,8 +148,8 @@ impl<'a> ResponseCurves<'a> {
         curves.collect()
     }
 
-    /// Returns the guesses of the responses at a speed (rpm): those on the upward curve and, if it
-    /// is lost, those on the downward curve, whose branches have the next numbers.
+    /// Returns the guesses of the responses at a speed (rpm): those on the upward curve and, if
+    /// that curve is lost, those on the downward curve, whose branches have the next numbers.
     fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
         let mut guesses = self.upward.guesses(speed_rpm);
         if let Some(downward) = self.downward.as_ref().filter(|_| self.upward.is_lost(speed_rpm)) {
@@ -181,14 +183,14 @@ impl<'a> ResponseCurves<'a> {
         requests: &[(usize, f64)],
         cancel: Cancel<'_>,
     ) -> Vec<Result<Vec<Response>, ResponseError>> {
-        let stopped_answers = || requests.iter().map(|_| Err(ResponseError::Stopped)).collect();
+        let stopped_results = || requests.iter().map(|_| Err(ResponseError::Stopped)).collect();
         if cancel.is_requested() {
-            return stopped_answers();
+            return stopped_results();
         }
         let mut cases = Vec::with_capacity(requests.len());
         let mut setups = Vec::new();
         for &(curve, speed_rpm) in requests {
-            let Some(Self { upward, .. }) = curves.get_mut(curve) else { return stopped_answers() };
+            let Some(Self { upward, .. }) = curves.get_mut(curve) else { return stopped_results() };
             let held_case = upward.settings.held_case(speed_rpm);
             setups.extend(
                 held_case
@@ -198,7 +200,7 @@ impl<'a> ResponseCurves<'a> {
             );
             cases.push(held_case);
         }
-        let mut linear = linear_responses_with_own_friction(&setups, cancel).into_iter();
+        let mut linear = linear_responses_with_motion_friction(&setups, cancel).into_iter();
         let (mut sought, mut searches): (Vec<SoughtResponse<'_>>, Vec<NewtonSearch<'_>>) =
             Default::default();
         for (request, (held_case, (curve, speed_rpm))) in cases.iter().zip(requests).enumerate() {
@@ -231,27 +233,28 @@ impl<'a> ResponseCurves<'a> {
             }
         }
         if !run_searches(&mut searches, cancel) {
-            return stopped_answers();
+            return stopped_results();
         }
         let mut found: Vec<Result<Response, ResponseError>> = sought
             .iter()
             .zip(searches)
             .map(|(sought, search)| sought.to_response(search))
             .collect();
-        if cancel.is_requested() || !retry_missing(&sought, &mut found, cancel) {
-            return stopped_answers();
+        if cancel.is_requested() || !retry_missing_responses(&sought, &mut found, cancel) {
+            return stopped_results();
         }
-        discard_known(&sought, &mut found);
+        discard_known_responses(&sought, &mut found);
         if !find_lost_branches(&sought, &mut found, cancel) {
-            return stopped_answers();
+            return stopped_results();
         }
-        // Responses whose stability is uncertain, or that caps change, are computed without caps.
-        let are_moved_by_caps = are_moved_by_caps(&sought, &found, cancel);
+        // Responses whose stability is uncertain, or which caps change, are computed again without
+        // caps.
+        let are_changed_by_caps = are_changed_by_caps(&sought, &found, cancel);
         let mut uncertain = Vec::new();
         for (index, response) in found.iter().enumerate() {
             let Ok(response) = response else { continue };
             let is_uncertain = response.growth_per_s().abs() < UNCERTAIN_GROWTH_PER_S;
-            if (is_uncertain || are_moved_by_caps[index])
+            if (is_uncertain || are_changed_by_caps[index])
                 && sought[index].held_case.setup.caps.is_some()
             {
                 uncertain.push((index, sought[index].held_case.without_caps(), response.start));
@@ -270,7 +273,7 @@ impl<'a> ResponseCurves<'a> {
         let starts: Vec<(usize, [f64; STATES])> =
             searches.iter().map(|(index, search)| (*index, search.state())).collect();
         if !run_and_store(&sought, &mut found, searches, cancel) {
-            return stopped_answers();
+            return stopped_results();
         }
         // If a harmonic excites the hinge, the response may be far from the one with caps.
         let retries: [fn(&HeldCase<'a>, [f64; STATES]) -> NewtonSearch<'a>; 2] = [
@@ -285,11 +288,11 @@ impl<'a> ResponseCurves<'a> {
                 missing.map(|(index, start)| (*index, retry(&sought[*index].held_case, *start)));
             let searches: Vec<(usize, NewtonSearch<'_>)> = searches.collect();
             if !run_and_store(&sought, &mut found, searches, cancel) {
-                return stopped_answers();
+                return stopped_results();
             }
         }
         if !find_lost_branches(&sought, &mut found, cancel) {
-            return stopped_answers();
+            return stopped_results();
         }
         let error = |held_case: Result<HeldCase<'_>, ResponseError>| {
             held_case.err().unwrap_or(ResponseError::NoResponse)
@@ -309,8 +312,8 @@ impl<'a> ResponseCurves<'a> {
     }
 }
 
-/// Continues curves, each between two speeds (rpm), from the linear model's response or from that
-/// of another machine. Returns `None` once `cancel` is requested.
+/// Continues curves, each between two speeds (rpm), from the linear model's response or from the
+/// response of another machine. Returns `None` once `cancel` is requested.
 fn continue_between<'a>(
     curves_with_range: Vec<(ResponseCurve<'a>, Option<[f64; 2]>)>,
     start_response: Option<&Response>,
@@ -356,10 +359,10 @@ fn continue_between<'a>(
 }
 
 /// Searches again for missing responses. Guesses on a curve are tried with damped steps. If a
-/// request has no response then, the machine is integrated from the linear model's response until
-/// its transient has decayed, which may lead to a stable response. Returns false once `cancel`
-/// is requested.
-fn retry_missing(
+/// request still has no response, the machine is integrated from the linear model's response until
+/// its transient has decayed, which may lead to a stable response. Returns false once `cancel` is
+/// requested.
+fn retry_missing_responses(
     sought: &[SoughtResponse<'_>],
     found: &mut [Result<Response, ResponseError>],
     cancel: Cancel<'_>,
@@ -452,22 +455,23 @@ fn discard_duplicates(
     for index in 0..found.len() {
         for other_index in index + 1..found.len() {
             let SoughtResponse { guess, request, .. } = &sought[index];
-            let other_sought = &sought[other_index];
-            if other_sought.request != *request {
+            let other = &sought[other_index];
+            if other.request != *request {
                 break;
             }
-            let are_followed = guess.is_followed() && other_sought.guess.is_followed();
-            let are_apart =
-                max_distance(&guess.state, &other_sought.guess.state) > SEPARATE_GUESS_DISTANCE;
+            let are_followed = guess.is_followed() && other.guess.is_followed();
+            let are_separate =
+                max_distance(&guess.state, &other.guess.state) > SEPARATE_GUESS_DISTANCE;
             let (Ok(a), Ok(b)) = (&found[index], &found[other_index]) else { continue };
             if are_followed
-                && are_apart
+                && are_separate
                 && max_distance(&a.start, &b.start) < SAME_RESPONSE_DISTANCE
             {
-                let from_first = max_distance(&a.start, &guess.state);
-                let from_second = max_distance(&b.start, &other_sought.guess.state);
-                let farther = if from_first > from_second { index } else { other_index };
-                found[farther] = Err(ResponseError::NoResponse);
+                let first_distance = max_distance(&a.start, &guess.state);
+                let second_distance = max_distance(&b.start, &other.guess.state);
+                let farther_index =
+                    if first_distance > second_distance { index } else { other_index };
+                found[farther_index] = Err(ResponseError::NoResponse);
             }
         }
     }
@@ -486,8 +490,8 @@ fn transient_turns(held_case: &HeldCase<'_>) -> usize {
     (transient_s.min(MAX_TRANSIENT_S) / held_case.setup.turn_s()).ceil() as usize
 }
 
-/// Runs searches, and stores their responses at the given indices. Returns false if it was stopped
-/// before.
+/// Runs searches, and stores their responses at the given indices. Returns false once `cancel` is
+/// requested.
 fn run_and_store<'a>(
     sought: &[SoughtResponse<'a>],
     found: &mut [Result<Response, ResponseError>],
@@ -504,10 +508,13 @@ fn run_and_store<'a>(
     true
 }
 
-/// Discards responses that another search at the same speed has found, too: those of the search
+/// Discards responses that another search at the same speed has found as well: those of the search
 /// from the linear response that are on a curve, and those of the downward curve that are on the
 /// upward one.
-fn discard_known(sought: &[SoughtResponse<'_>], found: &mut [Result<Response, ResponseError>]) {
+fn discard_known_responses(
+    sought: &[SoughtResponse<'_>],
+    found: &mut [Result<Response, ResponseError>],
+) {
     for index in 0..found.len() {
         let SoughtResponse { request, guess, .. } = &sought[index];
         let Ok(Response { start, .. }) = &found[index] else { continue };
@@ -527,14 +534,14 @@ fn discard_known(sought: &[SoughtResponse<'_>], found: &mut [Result<Response, Re
     }
 }
 
-/// Returns for each response whether a turn without caps does not close. Only responses are tested
+/// Returns for each response whether a turn without caps fails to close. Only responses are tested
 /// for which a harmonic of the drum's speed may be near the hinge's frequency.
-fn are_moved_by_caps(
+fn are_changed_by_caps(
     sought: &[SoughtResponse<'_>],
     found: &[Result<Response, ResponseError>],
     cancel: Cancel<'_>,
 ) -> Vec<bool> {
-    let mut are_moved_by_caps = vec![false; sought.len()];
+    let mut are_changed_by_caps = vec![false; sought.len()];
     let mut indices = Vec::new();
     let mut requests = Vec::new();
     for (index, (sought_response, response)) in sought.iter().zip(found).enumerate() {
@@ -559,9 +566,9 @@ fn are_moved_by_caps(
     {
         let TurnSetup { point, speed_rpm, .. } = request.setup;
         let residual = relative_residual(point, speed_rpm, &request.start, &result.end);
-        are_moved_by_caps[index] = residual.is_nan() || residual > CAP_RESIDUAL_TOLERANCE;
+        are_changed_by_caps[index] = residual.is_nan() || residual > CAP_RESIDUAL_TOLERANCE;
     }
-    are_moved_by_caps
+    are_changed_by_caps
 }
 
 /// Returns the linear model's response as a guess, or the machine at rest if there is none.
@@ -573,7 +580,7 @@ fn guess_from_linear(point: &Point, linear: &LinearResponse) -> Guess {
     Guess { branch: 0, fold_speeds_rpm: [None; 2], state, factors: None, is_on_curve: false }
 }
 
-/// A response that is searched for.
+/// A response for which a search runs, and its guess.
 struct SoughtResponse<'a> {
     /// The index of the request.
     request: usize,
@@ -594,7 +601,7 @@ impl SoughtResponse<'_> {
         }
         let setup = &self.held_case.setup;
         let unit_per_s = setup.unit_per_s();
-        let matrix = per_unit(&record.monodromy, unit_per_s);
+        let matrix = scale_speeds(&record.monodromy, unit_per_s);
         let (multiplier, vector) =
             leading_multiplier(&self.held_case, &matrix).ok_or(ResponseError::NoEigenvalues)?;
         let mut response = Response {
@@ -624,8 +631,8 @@ impl SoughtResponse<'_> {
 /// in the upper half plane, and its eigenvector; `None` if the eigenvalues are not finite. Speeds
 /// in the matrix have the unit [`TurnSetup::unit_per_s`].
 ///
-/// A motion of the hinge without a cap counts only if it grows. It hardly decays, so that otherwise
-/// a stable response would seem close to instability, at speeds and stiffnesses without caps only.
+/// A motion of an uncapped hinge counts only if it grows. Such motions decay slowly, so that
+/// otherwise stable responses would seem close to instability wherever the hinge has no cap.
 pub(crate) fn leading_multiplier(
     held_case: &HeldCase<'_>,
     matrix: &Mat<f64>,
@@ -642,23 +649,21 @@ pub(crate) fn leading_multiplier(
         let eigenvector = eigenvector(matrix, mu);
         let energy_shares = energy_shares(&held_case.frozen_modes, &eigenvector, unit_per_s);
         let mode_count =
-            if mu.norm_sqr() > 1.0 { held_case.judged_modes } else { SUSPENSION_MODES };
-        let judged_modes = energy_shares.iter().filter(|(mode, _)| *mode < mode_count);
-        let judged_share: f64 = judged_modes.map(|(_, energy)| energy).sum();
-        // The share is not finite if there is no eigenvector.
-        (judged_share >= MIN_ENERGY_SHARE).then_some((mu, eigenvector))
+            if mu.norm_sqr() > 1.0 { held_case.counted_modes } else { SUSPENSION_MODES };
+        let counted_modes = energy_shares.iter().filter(|(mode, _)| *mode < mode_count);
+        let counted_share: f64 = counted_modes.map(|(_, energy)| energy).sum();
+        // The share is NaN if there is no eigenvector.
+        (counted_share >= MIN_ENERGY_SHARE).then_some((mu, eigenvector))
     })
 }
 
 /// Returns the limit of the machine's geometry that a motion exceeds, if it does.
 fn exceeded_limit(point: &Point, record: &OrbitRecord) -> Option<GeometryLimit> {
-    let rest_attachments = attachments(point, point.equilibrium());
+    let rest_vectors = attachment_vectors(point, point.equilibrium());
     let mut exceeds = [false; 2];
     for state in &record.states {
-        let attachments_now = attachments(point, &core::array::from_fn(|i| state[i]));
-        for ((exceeds, now), at_rest) in
-            exceeds.iter_mut().zip(attachments_now).zip(&rest_attachments)
-        {
+        let vectors_now = attachment_vectors(point, &core::array::from_fn(|i| state[i]));
+        for ((exceeds, now), at_rest) in exceeds.iter_mut().zip(vectors_now).zip(&rest_vectors) {
             *exceeds |= now.iter().zip(at_rest).any(|(now, at_rest)| {
                 let projection: f64 = now.iter().zip(at_rest).map(|(a, b)| a * b).sum();
                 projection.is_nan() || projection <= 0.0
@@ -680,13 +685,13 @@ fn exceeded_limit(point: &Point, record: &OrbitRecord) -> Option<GeometryLimit> 
 mod tests {
     use super::*;
     use crate::channel::CHANNELS;
-    use crate::stability::tests::{prepared, with};
+    use crate::stability::tests::{machine_with, prepared};
 
-    /// The paper's machine with little damping has three responses at 255 rpm. A response whose
-    /// search failed, or ended in another response, is found again.
+    /// Replaces each of the three responses of the paper's machine with little damping at 255 rpm
+    /// by a failed search, or by another response, and checks that it is found again.
     #[test]
     fn a_branch_that_was_lost_is_found_again() {
-        let point = prepared(with(0.3, 30.0), 100.0);
+        let point = prepared(machine_with(0.3, 30.0), 100.0);
         let mut curves =
             ResponseCurves::continue_curves(&[(&point, 255.0)], None, Cancel::Never).remove(0);
         let held_case = curves.upward.settings.held_case(255.0).unwrap();

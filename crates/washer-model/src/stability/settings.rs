@@ -5,9 +5,9 @@ use super::monodromy::{INSTANTS, INSTANTS_AT_CORNERS};
 use super::period_map::{TurnSetup, caps_for_steps};
 use crate::coordinates::COORDINATES;
 use crate::modes::{Mode, Modes, highest_frequency_rad_per_s, mode_roots, modes};
-use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
+use crate::nonlinear::coupling::{BACKWARD_WHIRL_RATIO, Caps};
 use crate::point::Point;
-use crate::steps::{HINGE_TO_DRUM, SUSPENSION_MODES};
+use crate::steps::{MIN_HINGE_SPEED_RATIO, SUSPENSION_MODES};
 use core::f64::consts::TAU;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -17,8 +17,9 @@ use std::sync::Arc;
 /// up to twice as many steps as needed.
 const STEP_COUNT_INCREASE: f64 = 1.5;
 
-/// The share of a capped hinge's shift that counts. Basis: the law of the capped hinge is exact for
-/// motion that turns with the drum, which is most of the motion. Doubling it takes more steps.
+/// The share of a motion that does not turn with the drum, to which the shift by a capped hinge
+/// applies. Basis: the law of the capped hinge is exact for motion that turns with the drum, which
+/// most motion does. Doubling it takes more steps.
 const FREE_MOTION_SHARE: f64 = 0.1;
 
 /// The product of step and frequency of the fastest mode (rad), if none is capped. Doubling it
@@ -69,12 +70,13 @@ const CONTINUATION_LIMITS: AccuracyLimits = AccuracyLimits {
 };
 
 /// The least number of steps of every turn in the continuation of responses with corners, and of
-/// others whose curve is lost with steps that change from range to range. A hit of a stop makes the
-/// hinge ring, differently with other steps or caps, so that a change of these would break the
-/// curve. Basis: it is twice what smooth forces take at low speeds. Doubling it doubles the time.
+/// other responses whose curve is lost with steps that change from range to range. An impact on a
+/// stop makes the hinge ring in a way that depends on steps and caps, so that a change of steps or
+/// caps would break the curve. Basis: smooth forces take half as many steps at low speeds. Doubling
+/// it doubles the time.
 const MIN_CONTINUATION_STEPS: usize = 256;
 /// The greatest number of steps of every turn in the continuation. Basis: these steps are as short
-/// as contacts at usual speeds. Doubling it makes a curve that is lost take twice as long.
+/// as contacts at usual speeds. Doubling it doubles the time of curves that are lost.
 const MAX_CONTINUATION_STEPS: usize = 2048;
 
 /// The speed at which the continuation begins, over the slowest mode's frequency. Basis: the second
@@ -85,7 +87,7 @@ const LOWEST_SPEED_RATIO: f64 = 0.45;
 const SPEED_ROUNDING_PER_RPM: f64 = 64.0;
 
 /// The speed from which a second curve is continued down, over the frequency of the suspension's
-/// fastest mode. Basis: responses are small there. Doubling it takes more steps.
+/// fastest mode. Basis: responses are small at this speed. Doubling it takes more steps.
 const HIGHEST_SPEED_RATIO: f64 = 2.0;
 
 /// The greatest number of steps of a turn. Basis: a drum that needs more is so slow that the
@@ -102,14 +104,14 @@ pub(crate) struct HeldCase<'a> {
     pub(crate) setup: TurnSetup<'a>,
     /// The modes with theta frozen, at the lower end of the speed range.
     pub(crate) frozen_modes: Arc<Modes>,
-    /// The number of modes, from the slowest on, that the multipliers represent.
-    pub(super) judged_modes: usize,
+    /// The number of modes, from the slowest on, whose multipliers count.
+    pub(super) counted_modes: usize,
 }
 
 impl<'a> HeldCase<'a> {
     /// Returns the case without caps. A harmonic of the turn may excite the hinge, so that
-    /// derivatives are computed at as many instants as with corners: with fewer, they lack that
-    /// harmonic, and Newton's method fails.
+    /// derivatives are computed at as many instants as with corners: at fewer instants they lack
+    /// that harmonic, and Newton's method fails.
     pub(crate) fn without_caps(&self) -> Result<Self, ResponseError> {
         let steps =
             uncapped_step_count(self.setup.point, self.setup.speed_rpm, self.setup.turn_s())?;
@@ -118,7 +120,7 @@ impl<'a> HeldCase<'a> {
         Ok(Self {
             setup,
             frozen_modes: Arc::clone(&self.frozen_modes),
-            judged_modes: self.judged_modes,
+            counted_modes: self.counted_modes,
         })
     }
 }
@@ -132,7 +134,7 @@ fn uncapped_step_count(point: &Point, speed_rpm: f64, turn_s: f64) -> Result<usi
 
 /// Returns the greatest number of instants of a turn at which derivatives are computed.
 fn max_instants(point: &Point) -> usize {
-    if point.machine.elements.are_nonsmooth() { INSTANTS_AT_CORNERS } else { INSTANTS }
+    if point.machine.elements.has_nonsmooth_force() { INSTANTS_AT_CORNERS } else { INSTANTS }
 }
 
 /// Rounds a number of steps up to a multiple of [`max_instants`].
@@ -155,11 +157,11 @@ pub(crate) struct Settings<'a> {
     /// The least number of steps of every turn in the continuation; `None` if each range has its
     /// own number.
     min_continuation_steps: Option<usize>,
-    /// The settings by range and use.
+    /// The settings by range and purpose.
     settings_by_range: BTreeMap<(i64, Purpose), Result<RangeSetting, ResponseError>>,
 }
 
-/// The setting of a range of speeds.
+/// The steps and caps of a range of speeds.
 #[derive(Clone)]
 struct RangeSetting {
     frozen_modes: Arc<Modes>,
@@ -187,7 +189,7 @@ impl<'a> Settings<'a> {
             min_continuation_steps: point
                 .machine
                 .elements
-                .are_nonsmooth()
+                .has_nonsmooth_force()
                 .then_some(MIN_CONTINUATION_STEPS),
             settings_by_range: BTreeMap::new(),
         }
@@ -221,7 +223,7 @@ impl<'a> Settings<'a> {
     /// Returns the case for responses at a speed.
     ///
     /// # Errors
-    /// [`ResponseError::Eigenvalues`]; [`ResponseError::TooSlow`].
+    /// [`ResponseError::NoEigenvalues`] or [`ResponseError::TooSlow`].
     pub(crate) fn held_case(&mut self, speed_rpm: f64) -> Result<HeldCase<'a>, ResponseError> {
         self.case_for(speed_rpm, Purpose::Response)
     }
@@ -253,19 +255,21 @@ impl<'a> Settings<'a> {
     /// `min_steps`.
     fn continuation_steps(&self, min_steps: usize) -> Result<usize, ResponseError> {
         let modes_at_rest = self.modes_at_rest.as_ref().ok_or(ResponseError::NoEigenvalues)?;
-        let fastest_rad_per_s = modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
+        let highest_frequency_rad_per_s =
+            modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
         let longest_turn_s = 60.0 / self.lowest_rpm()?;
         let steps = round_up_steps(
             self.point,
-            fastest_rad_per_s * longest_turn_s / CONTINUATION_LIMITS.max_phase_rad,
+            highest_frequency_rad_per_s * longest_turn_s / CONTINUATION_LIMITS.max_phase_rad,
         )?;
         Ok(steps.max(min_steps))
     }
 
     /// Returns the number of steps of a turn in the continuation, if forces have corners.
     pub(super) fn steps_at_corners(&self) -> Option<usize> {
-        let min_steps =
-            self.min_continuation_steps.filter(|_| self.point.machine.elements.are_nonsmooth())?;
+        let min_steps = self
+            .min_continuation_steps
+            .filter(|_| self.point.machine.elements.has_nonsmooth_force())?;
         self.continuation_steps(min_steps).ok()
     }
 
@@ -298,8 +302,8 @@ impl<'a> Settings<'a> {
         let caps = is_capped.then(|| caps_for_steps(steps, 60.0 / speed_rpm));
         let instants = limits.instants * max_instants(point) / INSTANTS;
         let setup = TurnSetup { point, speed_rpm, steps, instants, caps };
-        let judged_modes = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
-        Ok(HeldCase { setup, frozen_modes, judged_modes })
+        let counted_modes = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
+        Ok(HeldCase { setup, frozen_modes, counted_modes })
     }
 
     /// Returns the modes at the lower end of a range.
@@ -312,8 +316,9 @@ impl<'a> Settings<'a> {
     }
 
     /// Chooses the number of steps that the suspension's modes need in a range of speeds, and the
-    /// highest caps that are stable with it. If caps shift the suspension's modes too far, there
-    /// are more steps; if the drum is not slow compared with the hinge, there are no caps.
+    /// highest caps that are stable with it. If caps shift the suspension's modes too far, the
+    /// number of steps is increased; if the drum is not slow compared with the hinge, modes are not
+    /// capped.
     fn choose_setting(
         &mut self,
         range: i64,
@@ -325,19 +330,21 @@ impl<'a> Settings<'a> {
             [self.modes_at_range_start(range)?, self.modes_at_range_start(range + 1)?];
         let modes_at_rest = self.modes_at_rest.as_ref().ok_or(ResponseError::NoEigenvalues)?;
         let turn_s = 60.0 / bounds_rpm[0];
-        let fastest_rad_per_s = modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
-        let mut steps = round_up_steps(point, fastest_rad_per_s * turn_s / limits.max_phase_rad)?
-            .max(limits.min_steps);
-        if point.machine.elements.are_nonsmooth() {
+        let highest_frequency_rad_per_s =
+            modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
+        let mut steps =
+            round_up_steps(point, highest_frequency_rad_per_s * turn_s / limits.max_phase_rad)?
+                .max(limits.min_steps);
+        if point.machine.elements.has_nonsmooth_force() {
             steps = steps.max(round_up_steps(point, turn_s / limits.max_corner_step_s)?);
         }
         let mut is_capped = false;
         let max_speed_rad_per_s = bounds_rpm[1] * TAU / 60.0;
         if modes_at_rest.modes[SUSPENSION_MODES].magnitude_rad_per_s
-            >= HINGE_TO_DRUM * max_speed_rad_per_s
+            >= MIN_HINGE_SPEED_RATIO * max_speed_rad_per_s
         {
             let highest_rad_per_s = modes_at_rest.modes[COORDINATES - 1].magnitude_rad_per_s;
-            // With more steps no mode is capped.
+            // With more steps caps would exceed all modes.
             while !is_capped && (steps as f64) < highest_rad_per_s * turn_s {
                 let shift_at = |bound: usize| {
                     let caps = caps_for_steps(steps, 60.0 / bounds_rpm[bound]);
@@ -363,7 +370,7 @@ impl<'a> Settings<'a> {
     }
 }
 
-/// Returns the weighted shift (rad/s) of a suspension mode by the hinge's cap, if there is one,
+/// Returns the weighted shift (rad/s) of a suspension mode by the hinge's cap, if there is a cap,
 /// while the drum turns.
 fn hinge_shift(
     point: &Point,
@@ -373,12 +380,12 @@ fn hinge_shift(
 ) -> f64 {
     let Some(cap_rad_per_s) = cap_rad_per_s else { return 0.0 };
     let frequency_rad_per_s = mode.magnitude_rad_per_s;
-    let softening_rad2_per_s2 = (frequency_rad_per_s * frequency_rad_per_s
-        - BACKWARD_SHARE * speed_rad_per_s * speed_rad_per_s)
+    let shift_rad2_per_s2 = (frequency_rad_per_s * frequency_rad_per_s
+        - BACKWARD_WHIRL_RATIO * speed_rad_per_s * speed_rad_per_s)
         .abs()
-        + (1.0 - BACKWARD_SHARE) * frequency_rad_per_s * speed_rad_per_s;
-    let hinge_ratio = softening_rad2_per_s2 / (cap_rad_per_s * cap_rad_per_s);
-    FREE_MOTION_SHARE * 0.5 * mode.hinge_share(point) * frequency_rad_per_s * hinge_ratio
+        + (1.0 - BACKWARD_WHIRL_RATIO) * frequency_rad_per_s * speed_rad_per_s;
+    let cap_ratio = shift_rad2_per_s2 / (cap_rad_per_s * cap_rad_per_s);
+    FREE_MOTION_SHARE * 0.5 * mode.hinge_share(point) * frequency_rad_per_s * cap_ratio
 }
 
 /// Returns the greatest shift of the suspension's modes by caps, in the complex plane.

@@ -1,8 +1,8 @@
 //! The derivative of a discrete turn by its start: all steps are integrated with dual numbers.
 //!
-//! If steps are longer than the corners of forces are wide, the effect of the steps on a
-//! disturbance is not that of the motion (`monodromy.rs`). Newton's method for the discrete turn
-//! needs the derivative of the steps.
+//! If steps are longer than the width of a force's corner, their effect on a disturbance differs
+//! from that of the motion (`monodromy.rs`). Newton's method for the discrete turn needs the
+//! derivative of the steps.
 
 use super::monodromy::StateMatrix;
 use super::turn::{NoObserver, StepGrid, integrate_turn};
@@ -45,50 +45,55 @@ impl<T: Lane> OutOfLine for StepwiseMonodromy<T> {
 
 #[cfg(test)]
 mod tests {
-    use crate::stability::tests::{idle_stop, prepared, with};
+    use crate::stability::tests::{idle_stop, machine_with, prepared};
     use crate::{HeldSpeed, Machine, Point, find_responses};
 
-    /// The paper's machine with 0.3 kg on dampers of 30 N s/m, whose response folds back.
+    /// Returns the paper's machine with 0.3 kg on dampers of 30 N s/m, whose curve of responses has
+    /// folds.
     fn folding_machine(change: impl Fn(&mut Machine)) -> Point {
-        let mut machine = with(0.3, 30.0);
+        let mut machine = machine_with(0.3, 30.0);
         change(&mut machine);
         prepared(machine, 100.0)
     }
 
     #[test]
-    fn an_element_that_does_nothing_leaves_the_curve_where_it_is() {
+    fn an_element_without_force_does_not_change_the_curve() {
         let points = [
             folding_machine(|_| {}),
             folding_machine(|machine| machine.stops.push(idle_stop())),
             folding_machine(|machine| machine.dampers[0].friction_n = 1e-6),
         ];
         let [plain_responses, other_responses @ ..] = points.each_ref().map(|point| {
-            let dwells =
+            let held_speeds =
                 [60.0, 110.0, 185.0, 255.0].map(|speed_rpm| HeldSpeed { point, speed_rpm });
-            let found: Vec<_> = find_responses(&dwells, lane_ode::Cancel::Never)
+            let responses: Vec<_> = find_responses(&held_speeds, lane_ode::Cancel::Never)
                 .into_iter()
                 .map(Result::unwrap)
                 .collect();
-            found.concat().into_iter().filter(|response| response.is_on_curve).collect::<Vec<_>>()
+            responses
+                .concat()
+                .into_iter()
+                .filter(|response| response.is_on_curve)
+                .collect::<Vec<_>>()
         });
-        // At 255 rpm it has three.
+        // There are three responses at 255 rpm, and one at each other speed.
         assert_eq!(plain_responses.len(), 6);
         for responses in other_responses {
             assert_eq!(responses.len(), plain_responses.len());
             for (with_element, without_element) in responses.iter().zip(&plain_responses) {
-                let at = with_element.speed_rpm;
-                assert_eq!(with_element.branch, without_element.branch, "{at}");
+                let speed_rpm = with_element.speed_rpm;
+                assert_eq!(with_element.branch, without_element.branch, "{speed_rpm}");
                 for (a, b) in
                     with_element.nonlinear_peaks.iter().zip(&without_element.nonlinear_peaks)
                 {
-                    assert!((a / b - 1.0).abs() < 1e-3, "{at}: {a} for {b}");
+                    assert!((a / b - 1.0).abs() < 1e-3, "{speed_rpm}: {a} for {b}");
                 }
                 let folds = with_element
                     .fold_speeds_rpm
                     .iter()
                     .flatten()
                     .zip(without_element.fold_speeds_rpm.iter().flatten());
-                assert!(folds.into_iter().all(|(a, b)| (a - b).abs() < 0.05), "{at}");
+                assert!(folds.into_iter().all(|(a, b)| (a - b).abs() < 0.05), "{speed_rpm}");
             }
         }
     }

@@ -1,10 +1,10 @@
-//! Against numbers from a program independent of this one, against the machine as it is, and
-//! against its simulation.
+//! Tests of responses against an independent program, against the machine without caps, and against
+//! simulations.
 
-mod company;
+mod lane_independence;
 
 use super::newton::{NewtonSearch, run_searches};
-use super::period_map::{TurnSetup, linear_responses_with_own_friction};
+use super::period_map::{TurnSetup, linear_responses_with_motion_friction};
 use super::reference_monodromy::{ReferenceMonodromy, TraceIntegral};
 use super::settings::Settings;
 use super::*;
@@ -26,18 +26,18 @@ pub(super) fn prepared(machine: Machine, speed_rpm: f64) -> Point {
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
-fn paper(case: &Value) -> Machine {
-    with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"))
+fn case_machine(case: &Value) -> Machine {
+    machine_with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"))
 }
 
-pub(super) fn with(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
+pub(super) fn machine_with(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = unbalance_mass_kg;
     machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = damping_n_s_per_m);
     machine
 }
 
-/// A stop that the tub never comes near, and that would do nothing.
+/// Returns a stop that the tub never reaches and that has no stiffness.
 pub(super) fn idle_stop() -> BumpStop {
     BumpStop {
         tub_m: [0.35, -0.28, 0.0],
@@ -53,11 +53,11 @@ fn number(case: &Value, name: &str) -> f64 {
     case[name].as_f64().unwrap()
 }
 
-fn list(name: &str) -> Vec<Value> {
+fn reference_list(name: &str) -> Vec<Value> {
     reference("stability.json")[name].as_array().unwrap().clone()
 }
 
-/// The responses of one machine at these speeds.
+/// Returns the first response of a machine at each speed.
 fn responses_of_machine(machine: Machine, speeds_rpm: &[f64]) -> Vec<Response> {
     responses_of_point(&prepared(machine, 100.0), speeds_rpm)
 }
@@ -68,7 +68,7 @@ fn responses_of_point(point: &Point, speeds_rpm: &[f64]) -> Vec<Response> {
     all_responses(&held_speeds).into_iter().map(|responses| responses.unwrap().remove(0)).collect()
 }
 
-/// All responses of some dwells.
+/// Returns all responses at each held speed.
 fn all_responses(held_speeds: &[HeldSpeed<'_>]) -> Vec<Result<Vec<Response>, ResponseError>> {
     find_responses(held_speeds, Cancel::Never)
 }
@@ -77,7 +77,7 @@ fn response_at(machine: Machine, speed_rpm: f64) -> Response {
     responses_of_machine(machine, &[speed_rpm]).remove(0)
 }
 
-/// The multipliers of the machine as it is, by plain Runge-Kutta.
+/// Returns the multipliers of the machine without caps, by plain Runge-Kutta, the largest first.
 fn reference_multipliers(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
     let point = prepared(machine, speed_rpm);
     let setup = Settings::new(&point).held_case(speed_rpm).unwrap().setup;
@@ -88,7 +88,7 @@ fn reference_multipliers(machine: Machine, speed_rpm: f64, start: [f64; STATES])
     multipliers
 }
 
-/// Finds a row's response near a state, and every multiplier.
+/// Finds the response near a state, and all of its multipliers.
 fn find_response(setup: &TurnSetup<'_>, start: [f64; STATES]) -> ([f64; STATES], Vec<c64>) {
     let mut searches = [NewtonSearch::new(*setup, start, None)];
     assert!(run_searches(&mut searches, Cancel::Never));
@@ -101,10 +101,10 @@ fn find_response(setup: &TurnSetup<'_>, start: [f64; STATES]) -> ([f64; STATES],
 
 #[test]
 fn val_growth_and_amplitudes_match_an_independent_program() {
-    for case in list("points") {
-        let ours = response_at(paper(&case), number(&case, "speed_rpm"));
+    for case in reference_list("points") {
+        let ours = response_at(case_machine(&case), number(&case, "speed_rpm"));
         let [growth, frequency] = ["growth_per_s", "frequency_cpm"].map(|name| number(&case, name));
-        // If all decays, the hinge decays slowest, which is left out here.
+        // If all disturbances decay, the slowest is that of the hinge, which is not compared.
         if growth > 0.0 {
             let difference = ours.growth_per_s() - growth;
             assert!(difference.abs() < 1e-3, "{case}: {difference:e}");
@@ -114,8 +114,8 @@ fn val_growth_and_amplitudes_match_an_independent_program() {
         for (channel, name) in [(6, "amplitude_tub_yaw_rad"), (7, "amplitude_tub_pitch_rad")] {
             let error = ours.nonlinear_peaks[channel] / number(&case, name) - 1.0;
             println!("{name} {error:e} growth {:e}", ours.growth_per_s() - growth);
-            // The reference takes the largest of its steps' ends, 1e-4 s apart, and so misses up to
-            // this of a peak.
+            // The reference takes the largest value at the ends of its steps, 1e-4 s apart, and
+            // thereby misses up to this share of a peak.
             let between_steps = 0.5 * (PI * 1e-4 * ours.speed_rpm / 60.0).powi(2);
             assert!(-1e-5 < error && error < 1e-5 + between_steps, "{case}: {error:e}");
         }
@@ -130,11 +130,12 @@ fn val_growth_and_amplitudes_match_an_independent_program() {
 
 #[test]
 fn val_edges_match_an_independent_program() {
-    for case in list("edges") {
+    for case in reference_list("edges") {
         let edges: Vec<f64> =
             case["edges_rpm"].as_array().unwrap().iter().map(|e| e.as_f64().unwrap()).collect();
-        let beside: Vec<f64> = edges.iter().flat_map(|edge| [edge - 0.05, edge + 0.05]).collect();
-        let unstable: Vec<bool> = responses_of_machine(paper(&case), &beside)
+        let test_speeds_rpm: Vec<f64> =
+            edges.iter().flat_map(|edge| [edge - 0.05, edge + 0.05]).collect();
+        let unstable: Vec<bool> = responses_of_machine(case_machine(&case), &test_speeds_rpm)
             .iter()
             .map(|r| r.kind() != StabilityKind::Stable)
             .collect();
@@ -144,13 +145,15 @@ fn val_edges_match_an_independent_program() {
 
 #[test]
 fn val_the_damping_that_closes_a_tongue_matches_an_independent_program() {
-    for case in list("critical") {
+    for case in reference_list("critical") {
         let from = if case["tongue"] == "f1+f2" { 245.0 } else { 302.0 };
         let speeds: Vec<f64> = (0..40).map(|k| from + 0.25 * f64::from(k)).collect();
-        let largest = |beside: f64| {
-            let damping = number(&case, "damping_n_s_per_m") + beside;
-            let responses =
-                responses_of_machine(with(number(&case, "unbalance_mass_kg"), damping), &speeds);
+        let largest = |difference: f64| {
+            let damping = number(&case, "damping_n_s_per_m") + difference;
+            let responses = responses_of_machine(
+                machine_with(number(&case, "unbalance_mass_kg"), damping),
+                &speeds,
+            );
             responses.iter().map(Response::growth_per_s).fold(f64::NEG_INFINITY, f64::max)
         };
         let [below, above] = [largest(-0.5), largest(0.5)];
@@ -159,14 +162,14 @@ fn val_the_damping_that_closes_a_tongue_matches_an_independent_program() {
 }
 
 #[test]
-fn multipliers_are_those_of_the_machine_as_it_is() {
+fn multipliers_are_those_of_the_machine_without_caps() {
     for (machine, speed_rpm) in [
-        (with(0.4, 140.0), 60.0),
-        (with(0.4, 140.0), 238.44),
-        (with(0.4, 140.0), 250.0),
-        (with(0.4, 100.0), 317.667),
-        (with(1.0, 250.0), 303.0),
-        (with(0.4, 140.0), 1200.0),
+        (machine_with(0.4, 140.0), 60.0),
+        (machine_with(0.4, 140.0), 238.44),
+        (machine_with(0.4, 140.0), 250.0),
+        (machine_with(0.4, 100.0), 317.667),
+        (machine_with(1.0, 250.0), 303.0),
+        (machine_with(0.4, 140.0), 1200.0),
     ] {
         let ours = response_at(machine.clone(), speed_rpm);
         let theirs = reference_multipliers(machine, speed_rpm, ours.start);
@@ -179,27 +182,28 @@ fn multipliers_are_those_of_the_machine_as_it_is() {
         let difference = ours.growth_per_s() - nearest;
         println!("{speed_rpm}: {} {difference:e}", ours.growth_per_s());
         assert!(difference.abs() < 2e-4, "{speed_rpm}: {nearest} {difference:e}");
-        // Nothing else grows; what decays as slowly as this is the hinge.
+        // No other disturbance grows; the hinge's disturbances decay slowly.
         for other in theirs.iter().map(|mu| growth_per_s([mu.re, mu.im], speed_rpm)) {
             let is_ours = other <= nearest.max(-0.1) + 1e-9;
-            assert!(is_ours, "{speed_rpm}: {other} beside {nearest}");
+            assert!(is_ours, "{speed_rpm}: {other} against {nearest}");
         }
     }
 }
 
-/// Stiff bearings are capped with the hinge, and soft ones are not. The growth is that of the
-/// suspension either way, not that of the hinge, which decays half as fast.
+/// Checks that the growth is that of the suspension both with stiff bearings, which are capped
+/// together with the hinge, and with soft bearings, which are not. Disturbances of the hinge decay
+/// half as fast.
 #[test]
 fn growth_of_a_stable_response_hardly_depends_on_stiff_bearings() {
-    let at = |stiffness_n_per_m: f64| {
+    let growth_at = |stiffness_n_per_m: f64| {
         let mut machine = crate::tests::friction::machine(0.4, [40.0, 40.0], None);
         machine.bearings.front_stiffness_n_per_m = stiffness_n_per_m;
         machine.bearings.rear_stiffness_n_per_m = stiffness_n_per_m;
         response_at(machine, 420.0).growth_per_s()
     };
-    let uncapped_per_s = at(1e8);
+    let uncapped_per_s = growth_at(1e8);
     for stiffness_n_per_m in [1e9, 5e10] {
-        let growth_per_s = at(stiffness_n_per_m);
+        let growth_per_s = growth_at(stiffness_n_per_m);
         println!("{stiffness_n_per_m:e} N/m: {growth_per_s}, uncapped {uncapped_per_s}");
         let difference = growth_per_s / uncapped_per_s - 1.0;
         assert!(
@@ -209,12 +213,12 @@ fn growth_of_a_stable_response_hardly_depends_on_stiff_bearings() {
     }
 }
 
-/// Returns how far a small disturbance of a dwell moves the machine from turn to turn: what the
-/// response itself has in it drops out.
+/// Returns the changes of the coordinates from turn to turn after a small disturbance of a
+/// response. The response itself cancels in these differences.
 fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COORDINATES]> {
     let speed_rpm = response.speed_rpm;
     let point = prepared(machine, speed_rpm);
-    let step_s = if point.machine.elements.are_nonsmooth() { 5e-5 } else { 2e-4 };
+    let step_s = if point.machine.elements.has_nonsmooth_force() { 5e-5 } else { 2e-4 };
     let mut start = InitialDeviation::default();
     for i in 0..COORDINATES {
         start.deviations[i] = response.start[i] - point.equilibrium()[i];
@@ -232,53 +236,53 @@ fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f6
     states.windows(2).map(|pair| core::array::from_fn(|i| pair[1][i] - pair[0][i])).collect()
 }
 
-/// Returns how fast that grows.
+/// Returns the growth (1/s) of a small disturbance of a response in a simulation.
 fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
-    // A thousandfold at most: after that the disturbance is not small.
+    // The disturbance grows by a factor of a thousand at most, so that it stays small.
     let moved = simulated_moves(machine, response, 7.0 / response.growth_per_s());
     let turns_per_s = response.speed_rpm / 60.0;
     largest_multiplier(&moved).ln() * turns_per_s
 }
 
-/// Returns the size of the multiplier that these moves of once a turn grow by.
+/// Returns the magnitude of the largest multiplier of changes from turn to turn.
 ///
-/// Once the others have decayed, a single real multiplier is left, a pair, or one beside a pair. By
-/// the characteristic polynomial of these n, each move is a linear combination of the n before it,
-/// which least squares give: the multipliers are the eigenvalues of its companion matrix. With too
-/// many the equations are singular, and their solution is rounding, so a further one is fitted only
-/// if fewer leave more than rounding, and a third only if a pair leaves more than motions that have
-/// nearly decayed.
+/// After the other disturbances have decayed, one real multiplier remains, or a pair, or one
+/// multiplier and a pair. By the characteristic polynomial of n multipliers, each change is a
+/// linear combination of the n changes before it. Least squares give the coefficients, and the
+/// multipliers are the eigenvalues of the companion matrix. With too large an n the equations are
+/// singular; therefore n is increased only if the residual is too large.
 fn largest_multiplier(moves: &[[f64; COORDINATES]]) -> f64 {
-    /// The greatest parts of the moves that a single multiplier and a pair leave, if they are all.
-    const LEFT: [f64; 2] = [1e-6, 1e-2];
+    /// The greatest relative residuals with which one multiplier, or a pair, is accepted.
+    const MAX_RESIDUALS: [f64; 2] = [1e-6, 1e-2];
     let late_moves = &moves[moves.len().div_ceil(2)..];
-    let fit_count = |count: usize| {
+    let fit_multipliers = |count: usize| {
         use faer::linalg::solvers::SolveLstsq as _;
         let rows = (late_moves.len() - count) * COORDINATES;
         let at = |row: usize, turn: usize| late_moves[row / COORDINATES + turn][row % COORDINATES];
         let earlier_moves = Mat::from_fn(rows, count, at);
         let next_moves = Mat::from_fn(rows, 1, |i, _| at(i, count));
         let factors = earlier_moves.qr().solve_lstsq(&next_moves);
-        let residual_share =
+        let relative_residual =
             (&earlier_moves * &factors - &next_moves).norm_l2() / next_moves.norm_l2();
         let companion = Mat::from_fn(count, count, |i, k| match i + 1 == count {
             true => factors[(k, 0)],
             false => f64::from(u8::from(k == i + 1)),
         });
         let magnitudes = companion.eigenvalues().unwrap().into_iter().map(|mu| mu.norm());
-        (magnitudes.fold(0.0, f64::max), residual_share)
+        (magnitudes.fold(0.0, f64::max), relative_residual)
     };
-    let [single, pair] = [1, 2].map(fit_count);
-    if single.1 < LEFT[0] {
+    let [single, pair] = [1, 2].map(fit_multipliers);
+    if single.1 < MAX_RESIDUALS[0] {
         single.0
-    } else if pair.1 < LEFT[1] {
+    } else if pair.1 < MAX_RESIDUALS[1] {
         pair.0
     } else {
-        fit_count(3).0
+        fit_multipliers(3).0
     }
 }
 
-/// A single multiplier, beside which another has decayed to rounding, a pair, and both.
+/// Tests a single multiplier besides a decayed one, a complex and a real pair, and three
+/// multipliers.
 #[test]
 fn the_largest_multiplier_is_found_of_one_to_three() {
     let shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (1.0 + i as f64));
@@ -303,7 +307,7 @@ fn the_largest_multiplier_is_found_of_one_to_three() {
         "{}",
         largest_multiplier(&real_pair)
     );
-    // The shares of a machine whose pair and third multiplier grow nearly as fast.
+    // The pair and the third multiplier grow nearly equally fast.
     let pair_and_real = moves(&|k| {
         let size = 1.25_f64.powi(k);
         let pair = size * (2.1 * f64::from(k)).cos();
@@ -317,24 +321,26 @@ fn the_largest_multiplier_is_found_of_one_to_three() {
 }
 
 #[test]
-fn disturbances_of_simulated_dwells_grow_as_fast() {
-    let growing: Vec<Value> =
-        list("points").into_iter().filter(|case| number(case, "growth_per_s") > 0.2).collect();
+fn disturbances_of_simulated_runs_grow_as_fast() {
+    let growing: Vec<Value> = reference_list("points")
+        .into_iter()
+        .filter(|case| number(case, "growth_per_s") > 0.2)
+        .collect();
     assert!(growing.len() >= 10);
     for case in growing.iter().take(10) {
-        let response = response_at(paper(case), number(case, "speed_rpm"));
-        let simulated_moves = simulated_growth_per_s(paper(case), &response);
-        let error = simulated_moves / response.growth_per_s() - 1.0;
+        let response = response_at(case_machine(case), number(case, "speed_rpm"));
+        let simulated_per_s = simulated_growth_per_s(case_machine(case), &response);
+        let error = simulated_per_s / response.growth_per_s() - 1.0;
         println!("{error:e}");
-        assert!(error.abs() < 0.01, "{case}: {simulated_moves}");
+        assert!(error.abs() < 0.01, "{case}: {simulated_per_s}");
     }
 }
 
-/// Without unbalance a drum that is symmetric about its axis looks the same at every angle: with
-/// its hinge's angles seen from where it does not turn, the equations are the same at all times.
+/// Without unbalance, the equations of a drum that is symmetric about its axis are constant in
+/// time, if the hinge's angles are those of axes that do not turn.
 #[test]
 fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
-    let mut machine = with(0.0, 140.0);
+    let mut machine = machine_with(0.0, 140.0);
     machine.drum.inertia_kg_m2[2] = machine.drum.inertia_kg_m2[1];
     for speed_rpm in [60.0, 250.0, 900.0] {
         let point = prepared(machine.clone(), speed_rpm);
@@ -368,7 +374,7 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
         let rest_state =
             core::array::from_fn(|i| if i < COORDINATES { point.equilibrium()[i] } else { 0.0 });
         let ours = find_response(&setup, rest_state).1;
-        // The suspension's.
+        // The eigenvalues of the suspension's motions.
         let suspension_eigenvalues =
             system.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
         let suspension_eigenvalues: Vec<c64> = suspension_eigenvalues.collect();
@@ -388,11 +394,11 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
 
 #[test]
 fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
-    let point = prepared(with(0.4, 140.0), 250.0);
+    let point = prepared(machine_with(0.4, 140.0), 250.0);
     let capped = Settings::new(&point).held_case(250.0).unwrap().setup;
-    // With steps so short that the formula takes nothing from the capped modes.
+    // The steps are so short that the formula adds no damping to the capped modes.
     let setup = TurnSetup { steps: 32 * capped.steps, ..capped };
-    let near = response_at(with(0.4, 140.0), 250.0).start;
+    let near = response_at(machine_with(0.4, 140.0), 250.0).start;
     let (start, multipliers) = find_response(&setup, near);
     let product = multipliers.into_iter().product::<c64>();
     let trace = Simd::one_lane(TraceIntegral { setup, start });
@@ -402,9 +408,10 @@ fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
 }
 
 #[test]
-fn responses_do_not_depend_on_company() {
-    let points = [with(0.4, 140.0), with(0.9, 90.0), with(0.05, 300.0)].map(|m| prepared(m, 100.0));
-    let mut point_with_elements = with(0.4, 20.0);
+fn responses_do_not_depend_on_other_requests() {
+    let points = [machine_with(0.4, 140.0), machine_with(0.9, 90.0), machine_with(0.05, 300.0)]
+        .map(|m| prepared(m, 100.0));
+    let mut point_with_elements = machine_with(0.4, 20.0);
     add_elements(&mut point_with_elements, &mut fastrand::Rng::with_seed(1));
     let point_with_elements = prepared(point_with_elements, 100.0);
     let held_speeds: Vec<_> = (0..30)
@@ -418,15 +425,17 @@ fn responses_do_not_depend_on_company() {
     for (held_speed, answer) in held_speeds.iter().zip(&answers).step_by(8) {
         assert_eq!(&all_responses(&[*held_speed])[0], answer);
     }
-    // At 20 rpm, the first, a machine is slower than where its curve begins.
+    // The first speed, 20 rpm, is below the beginning of the curve.
     assert!(answers[0].as_ref().unwrap()[0].is_on_curve);
 }
 
-/// Followed both ways every 0.25 rpm by an independent program, and lost where it folds.
+/// The independent program followed the responses up and down in steps of 0.25 rpm, until it lost
+/// them at a fold.
 #[test]
 fn val_branches_match_an_independent_program() {
     for case in reference("branches.json").as_array().unwrap() {
-        let machine = with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"));
+        let machine =
+            machine_with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"));
         let point = prepared(machine, 100.0);
         let mut folds_rpm = Vec::new();
         for (direction, lost_key) in [("up", "up_lost_after_rpm"), ("down", "down_lost_below_rpm")]
@@ -465,13 +474,13 @@ fn val_branches_match_an_independent_program() {
     }
 }
 
-/// The curve creeps up to a spring that passes its hook, and comes to no speed above 148 rpm.
+/// The upward curve approaches a spring that passes its hook, and does not exceed 148 rpm.
 #[test]
-fn where_the_curve_is_lost_another_comes_down() {
-    let point = prepared(with(0.9, 20.0), 100.0);
+fn if_the_upward_curve_is_lost_a_downward_curve_is_continued() {
+    let point = prepared(machine_with(0.9, 20.0), 100.0);
     let held_speeds = [240.0, 260.0, 340.0].map(|speed_rpm| HeldSpeed { point: &point, speed_rpm });
     let found: Vec<_> = all_responses(&held_speeds).into_iter().map(Result::unwrap).collect();
-    // A response that a search finds comes first.
+    // The response of the search from the linear model's response comes first.
     let [searched, downward] = &found[0][..] else { panic!("{found:?}") };
     assert_eq!((searched.branch, searched.fold_speeds_rpm), (downward.branch + 1, [None; 2]));
     for responses in &found[1..] {
@@ -482,7 +491,8 @@ fn where_the_curve_is_lost_another_comes_down() {
         );
     }
     assert!(
-        downward.fold_speeds_rpm[0].is_some() && !found.concat().iter().any(|it| it.is_on_curve)
+        downward.fold_speeds_rpm[0].is_some()
+            && !found.concat().iter().any(|response| response.is_on_curve)
     );
     assert_eq!(
         [1, 2].map(|k| found[k][0].kind()),
@@ -490,11 +500,11 @@ fn where_the_curve_is_lost_another_comes_down() {
     );
 }
 
-/// A machine of its own: masses, inertias, stiffnesses, damping and unbalance of the paper's,
-/// each times a factor.
-fn random(random: &mut fastrand::Rng) -> Machine {
-    let mut factor = |least: f64, most: f64| least * (most / least).powf(random.f64());
-    let mut machine = with(factor(0.05, 1.5), factor(30.0, 250.0));
+/// Returns the paper's machine with masses, inertias, stiffnesses, damping and unbalance multiplied
+/// by random factors.
+fn random_machine(numbers: &mut fastrand::Rng) -> Machine {
+    let mut factor = |low: f64, high: f64| low * (high / low).powf(numbers.f64());
+    let mut machine = machine_with(factor(0.05, 1.5), factor(30.0, 250.0));
     machine.tub.mass_kg *= factor(0.5, 2.0);
     machine.drum.mass_kg *= factor(0.5, 2.0);
     for i in 0..3 {
@@ -506,14 +516,14 @@ fn random(random: &mut fastrand::Rng) -> Machine {
     machine
 }
 
-/// Friction in the dampers, and stops to either side, for a machine.
-fn add_elements(machine: &mut Machine, random: &mut fastrand::Rng) {
-    let friction_n = 5.0 + 75.0 * random.f64();
+/// Adds friction in the dampers and stops at both sides to a machine.
+fn add_elements(machine: &mut Machine, numbers: &mut fastrand::Rng) {
+    let friction_n = 5.0 + 75.0 * numbers.f64();
     for damper in &mut machine.dampers {
         damper.friction_n = friction_n;
         damper.friction_linear_speed_m_per_s = Some(0.1);
     }
-    let clearance_m = 0.004 + 0.016 * random.f64();
+    let clearance_m = 0.004 + 0.016 * numbers.f64();
     machine.stops = [1.0, -1.0]
         .map(|side| BumpStop {
             tub_m: [0.35, 0.0, 0.28 * side],
@@ -526,27 +536,29 @@ fn add_elements(machine: &mut Machine, random: &mut fastrand::Rng) {
         .into();
 }
 
-/// Random machines, every other with friction and stops: disturbances of simulated dwells grow as
-/// fast as is said, or decay where the response is said to be stable. SEED and MACHINES choose
-/// others.
+/// Checks, for random machines of which every second one has friction and stops, that disturbances
+/// grow in simulations at the computed rate, and decay about stable responses. The environment
+/// variables SEED and MACHINES select other machines.
 #[test]
 #[ignore = "minutes of work"]
-fn random_machines_do_what_is_said() {
-    let number_from_env =
-        |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
+fn growth_of_random_machines_agrees_with_simulations() {
+    let number_from_env = |name: &str, default: u64| {
+        std::env::var(name).map_or(default, |text| text.parse().unwrap())
+    };
     let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 2026));
     let mut growing_counts = [0, 0];
     let mut decaying_counts = [0, 0];
-    let mut worst = [0.0_f64; 2];
+    let mut max_error = [0.0_f64; 2];
     let machines = number_from_env("MACHINES", 3);
-    // Few machines may have no growing response: more are drawn until there is one of either kind.
+    // A small number of machines may have no growing response, so that further machines are drawn
+    // until both kinds have one.
     let lacks_a_kind = |counts: &[i32]| counts.contains(&0);
     for number in 0..machines + 40 {
         if number >= machines && !lacks_a_kind(&growing_counts) && !lacks_a_kind(&decaying_counts) {
             break;
         }
         let kind = (number % 2) as usize;
-        let mut machine = random(&mut numbers);
+        let mut machine = random_machine(&mut numbers);
         if kind == 1 {
             add_elements(&mut machine, &mut numbers);
         }
@@ -556,21 +568,23 @@ fn random_machines_do_what_is_said() {
             speeds.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
         let found = all_responses(&held_speeds);
         let first_responses = || found.iter().flatten().filter_map(|responses| responses.first());
-        for response in
-            first_responses().filter(|it| (0.2..2.0).contains(&it.growth_per_s())).take(2)
+        for response in first_responses()
+            .filter(|response| (0.2..2.0).contains(&response.growth_per_s()))
+            .take(2)
         {
-            let simulated_moves = simulated_growth_per_s(machine.clone(), response);
-            let error = (simulated_moves / response.growth_per_s() - 1.0).abs();
+            let simulated_per_s = simulated_growth_per_s(machine.clone(), response);
+            let error = (simulated_per_s / response.growth_per_s() - 1.0).abs();
             println!("machine {number}, {} rpm: {error:e}", response.speed_rpm);
-            worst[kind] = worst[kind].max(error);
+            max_error[kind] = max_error[kind].max(error);
             growing_counts[kind] += 1;
         }
-        for response in first_responses().filter(|it| it.growth_per_s() < -0.3).take(1) {
+        for response in first_responses().filter(|response| response.growth_per_s() < -0.3).take(1)
+        {
             let moves = simulated_moves(machine.clone(), response, 20.0);
             let size = |d: &[f64; COORDINATES]| d[4].abs().max(d[5].abs());
             let largest = |moves: &[[f64; COORDINATES]]| moves.iter().map(size).fold(0.0, f64::max);
-            // Against the disturbance itself: what had left for another motion would have moved
-            // farthest on its way, and rest in the end.
+            // The final changes are compared with the first ones: a motion that leaves for another
+            // one changes most on the way, and little at the end.
             let [begin, end] = [moves.len() / 5, moves.len() * 4 / 5];
             let disturbance = largest(&moves[..begin]);
             let remaining_share = largest(&moves[end..]) / disturbance;
@@ -580,28 +594,30 @@ fn random_machines_do_what_is_said() {
             decaying_counts[kind] += 1;
         }
     }
-    println!("{growing_counts:?} grown, worst {worst:?}; {decaying_counts:?} decayed");
-    assert!(worst[0] < 0.02 && worst[1] < 0.05, "{worst:?}");
+    println!("{growing_counts:?} grown, errors up to {max_error:?}; {decaying_counts:?} decayed");
+    assert!(max_error[0] < 0.02 && max_error[1] < 0.05, "{max_error:?}");
     assert!(
         !lacks_a_kind(&growing_counts) && !lacks_a_kind(&decaying_counts),
         "{growing_counts:?} grown, {decaying_counts:?} decayed"
     );
 }
 
-/// A curve rises through a speed and falls through it in turn: of random machines with little
-/// damping, neighbouring branches have an even and an odd number. SEED and MACHINES choose others.
+/// Checks, for random machines with little damping, that neighbouring branches at a speed have an
+/// even and an odd number, because a curve crosses a speed alternately upwards and downwards. The
+/// environment variables SEED and MACHINES select other machines.
 #[test]
 fn no_branch_is_lost_between_two_others() {
-    let number_from_env =
-        |name: &str, or: u64| std::env::var(name).map_or(or, |damper| damper.parse().unwrap());
+    let number_from_env = |name: &str, default: u64| {
+        std::env::var(name).map_or(default, |text| text.parse().unwrap())
+    };
     let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 61));
     let mut speeds_with_several = 0;
     let mut violations = Vec::new();
     for number in 0..number_from_env("MACHINES", 4) {
-        let mut machine = random(&mut numbers);
+        let mut machine = random_machine(&mut numbers);
         let damping_n_s_per_m = 10.0 + 50.0 * numbers.f64();
         machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = damping_n_s_per_m);
-        machine.springs.iter_mut().for_each(|damper| damper.cubic_n_per_m3 = 5e6 * numbers.f64());
+        machine.springs.iter_mut().for_each(|spring| spring.cubic_n_per_m3 = 5e6 * numbers.f64());
         let point = prepared(machine, 100.0);
         let speeds: Vec<f64> = (0..120).map(|_| 90.0 + 250.0 * numbers.f64()).collect();
         let held_speeds: Vec<_> =
@@ -621,25 +637,26 @@ fn no_branch_is_lost_between_two_others() {
     assert!(speeds_with_several > 0 && violations.is_empty(), "{violations:?}");
 }
 
-/// Responses of random machines are those that steps of 0.05 rpm lead to, until these are lost; and
-/// there the curve has a fold.
+/// Checks that responses of random machines are those which steps of 0.05 rpm follow, and that the
+/// curve has a fold where such steps lose the response.
 #[test]
 #[ignore = "minutes of work"]
-fn followed_responses_are_those_of_short_steps() {
+fn continued_responses_are_those_of_short_steps() {
     let count = 30;
     let mut numbers = fastrand::Rng::with_seed(32);
-    let points: Vec<Point> = (0..count).map(|_| prepared(random(&mut numbers), 100.0)).collect();
+    let points: Vec<Point> =
+        (0..count).map(|_| prepared(random_machine(&mut numbers), 100.0)).collect();
     let speed_rpm_at = |step: u32| 60.0 + 0.05 * f64::from(step);
     let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
     let mut states: Vec<Option<[f64; STATES]>> = points
         .iter()
         .map(|point| Some(responses_of_point(point, &[speed_rpm_at(0)])[0].start))
         .collect();
-    // The change of each by the last step: across a resonance steps move a response far, but the
-    // next one hardly farther than the last.
+    // The change of each response by the last step. Near a resonance responses change much in a
+    // step, but by similar amounts in successive steps.
     let mut last_changes = vec![0.0_f64; count];
     let mut samples = Vec::new();
-    let mut worst = 0.0_f64;
+    let mut max_error = 0.0_f64;
     let mut jumps = Vec::new();
     for step in 1..=6000 {
         let settings_with_states = settings.iter_mut().zip(&states);
@@ -673,7 +690,7 @@ fn followed_responses_are_those_of_short_steps() {
             );
         }
     }
-    // The curve of each point is followed once.
+    // The samples are sorted by point, so that the curve of each point is continued once.
     samples.sort_by_key(|(k, ..)| *k);
     let held_speeds: Vec<_> = samples
         .iter()
@@ -685,24 +702,25 @@ fn followed_responses_are_those_of_short_steps() {
             let difference = (0..COORDINATES).map(|i| (responses[0].start[i] - state[i]).abs());
             difference.fold(0.0, f64::max)
         });
-        worst = worst.max(difference);
+        max_error = max_error.max(difference);
         if difference.is_nan() || difference >= 1e-6 {
             println!("machine {k} at {speed_rpm} rpm: {difference:e}");
         }
         assert!(!difference.is_nan());
     }
-    println!("{} compared, at most {worst:e} apart; jumps: {jumps:?}", samples.len());
+    println!("{} compared, at most {max_error:e} apart; jumps: {jumps:?}", samples.len());
     for (k, lost_rpm) in jumps {
         let ends = responses_of_point(&points[k], &[lost_rpm - 0.3])[0].fold_speeds_rpm;
         assert!(ends[1].is_some_and(|fold| (fold - lost_rpm).abs() < 0.3), "{k}: {ends:?}");
     }
-    assert!(worst < 1e-6);
+    assert!(max_error < 1e-6);
 }
 
-/// A drum with two different inertias across its axis drives the hinge by harmonics of its turn.
+/// A drum with two different moments of inertia across its axis excites the hinge at harmonics of
+/// the drum's speed.
 #[test]
-fn near_resonances_of_the_hinge_responses_are_those_of_the_machine_as_it_is() {
-    let mut machine = with(0.8, 140.0);
+fn responses_near_resonances_of_the_hinge_are_those_without_caps() {
+    let mut machine = machine_with(0.8, 140.0);
     machine.drum.inertia_kg_m2[2] *= 1.3;
     machine.springs[0].stiffness_n_per_m *= 1.2;
     let point = prepared(machine, 100.0);
@@ -723,19 +741,19 @@ fn near_resonances_of_the_hinge_responses_are_those_of_the_machine_as_it_is() {
         })
         .collect();
     assert!(run_searches(&mut uncapped_searches, Cancel::Never));
-    let mut worst = 0.0_f64;
+    let mut max_error = 0.0_f64;
     for (ours, uncapped) in ours.iter().zip(uncapped_searches) {
         let uncapped_peaks = uncapped.into_response().unwrap().1.peaks;
         for k in 0..CHANNELS {
             let difference = (ours.nonlinear_peaks[k] / uncapped_peaks[k] - 1.0).abs();
-            worst = worst.max(difference);
+            max_error = max_error.max(difference);
             assert!(difference < 6e-5, "{} rpm, channel {k}: {difference:e}", ours.speed_rpm);
         }
     }
-    println!("{worst:e}");
+    println!("{max_error:e}");
 }
 
-/// Friction, stops, a gasket, stiffening springs, a second unbalance.
+/// Tests friction, stops, a gasket, stiffening springs and a second unbalance.
 #[test]
 fn val_machines_with_elements_match_an_independent_program() {
     let mut compared = 0;
@@ -760,7 +778,7 @@ fn val_machines_with_elements_match_an_independent_program() {
                 let error = ours.nonlinear_peaks[channel] / theirs - 1.0;
                 assert!(error.abs() < 1.2e-5, "{description}: {name} {error:e}");
             }
-            // If all decays, the hinge decays slowest, which is left out here.
+            // If all disturbances decay, the slowest is that of the hinge, which is not compared.
             let growth = number(reference_row, "growth_per_s");
             if growth > 0.0 {
                 let difference = ours.growth_per_s() - growth;
@@ -774,9 +792,9 @@ fn val_machines_with_elements_match_an_independent_program() {
 
 #[test]
 fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
-    // Another program has 65.20 against 65.95 per minute in the first mode at 1200 rpm, and a
-    // second mode whose damping differs by 8 % at its resonance.
-    let point = prepared(with(0.4, 140.0), 100.0);
+    // An independent program has, for the first mode at 1200 rpm, a frequency of 65.20 per minute,
+    // and 65.95 with theta frozen; the damping of the second mode at its resonance differs by 8 %.
+    let point = prepared(machine_with(0.4, 140.0), 100.0);
     let first = floquet_modes(&point, 1200.0).unwrap()[0];
     println!("{} {}", first.frequency_rpm(), first.frozen_mode.frequency_rpm());
     assert!((first.frequency_rpm() - 65.20).abs() < 0.01);
@@ -787,13 +805,14 @@ fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
 }
 
 #[test]
-fn a_linear_response_takes_friction_at_its_own_speed() {
+fn a_linear_response_linearises_friction_at_its_own_speed() {
     let amplitude_at = |speed_rpm: f64, given_m_per_s: Option<f64>| {
         let machine = crate::tests::friction::machine(0.3, [40.0, 60.0], given_m_per_s);
         let point = prepared(machine, speed_rpm);
         let held_case = Settings::new(&point).held_case(150.0).unwrap();
-        let peaks =
-            linear_responses_with_own_friction(&[held_case.setup], Cancel::Never).remove(0).peaks;
+        let peaks = linear_responses_with_motion_friction(&[held_case.setup], Cancel::Never)
+            .remove(0)
+            .peaks;
         (point.friction_speeds()[0].speed_m_per_s, peaks[Channel::TubFrontZ.index()])
     };
     let [(slow_m_per_s, slow_m), (fast_m_per_s, fast_m)] =
@@ -807,11 +826,11 @@ fn a_linear_response_takes_friction_at_its_own_speed() {
 #[test]
 #[ignore = "prints what a response costs"]
 fn cost() {
-    let point = prepared(with(0.4, 140.0), 100.0);
+    let point = prepared(machine_with(0.4, 140.0), 100.0);
     let held_speeds: Vec<_> = (0..560)
         .map(|k| HeldSpeed { point: &point, speed_rpm: 210.0 + 0.25 * f64::from(k) })
         .collect();
-    let began = std::time::Instant::now();
+    let start_time = std::time::Instant::now();
     let count = all_responses(&held_speeds).iter().filter(|a| a.is_ok()).count();
-    println!("{:.3} ms each, {count} found", 1e3 * began.elapsed().as_secs_f64() / 560.0);
+    println!("{:.3} ms each, {count} found", 1e3 * start_time.elapsed().as_secs_f64() / 560.0);
 }

@@ -23,7 +23,7 @@ impl<T: Lane> StepGrid<T> {
 }
 
 /// The instant of each stage: 0 is the start of the step, 1 its middle, 2 its end.
-const STAGE_INSTANT: [usize; 4] = [0, 1, 1, 2];
+const STAGE_INSTANTS: [usize; 4] = [0, 1, 1, 2];
 /// The coefficients a21, a32 and a43 of the tableau; the last entry is not used.
 pub(super) const A: [f64; 4] = [0.5, 0.5, 1.0, 0.0];
 /// The weights b of the tableau.
@@ -39,7 +39,7 @@ fn first_forcings<T: Lane, S: System<T, STATES>>(
     grid: &StepGrid<T>,
 ) -> StepForcings<S::Forcing> {
     let mut forcings = [system.forcing_out_of_line(grid.time_s(0.0)); 3];
-    // No closure: it would be compiled without the instruction set.
+    // This is a loop, because a closure would be compiled without the instruction set.
     for instant in 1..3 {
         forcings[instant] = system.forcing_out_of_line(grid.time_s(0.5 * instant as f64));
     }
@@ -56,7 +56,7 @@ fn update_forcings<T: Lane, S: System<T, STATES>>(
 ) {
     let k = k as f64;
     forcings[0] = forcings[2];
-    // A loop, for one copy of its code.
+    // A loop compiles to a single copy of its code.
     for (instant, steps) in [(1, 0.5), (2, 1.0)] {
         system.update_forcing(grid.time_s(k + steps), &mut forcings[instant]);
     }
@@ -70,11 +70,11 @@ pub(super) fn integrate_step<T: Lane, S: System<T, STATES>>(
     forcings: &StepForcings<S::Forcing>,
     x: &mut [N<T>; STATES],
 ) {
-    compute_stages(system, h, forcings, x, STAGE_INSTANT.len(), None::<(usize, &mut NoObserver)>);
+    compute_stages(system, h, forcings, x, STAGE_INSTANTS.len(), None::<(usize, &mut NoObserver)>);
 }
 
-/// Computes the first `stage_count` stages of a step; with all stages, `x` advances to its end. An
-/// observer receives the state at its start.
+/// Computes the first `stage_count` stages of a step; with all stages, `x` advances to the end of
+/// the step. An observer receives the state at the start of the step.
 #[inline(always)]
 fn compute_stages<T: Lane, S: System<T, STATES>, W: StepObserver<T, S>>(
     system: &S,
@@ -87,7 +87,7 @@ fn compute_stages<T: Lane, S: System<T, STATES>, W: StepObserver<T, S>>(
     let mut stage_state = *x;
     let mut next_state = *x;
     for stage in 0..stage_count {
-        let slope = system.derivative(&forcings[STAGE_INSTANT[stage]], &stage_state);
+        let slope = system.derivative(&forcings[STAGE_INSTANTS[stage]], &stage_state);
         if stage == 0
             && let Some((k, observer)) = &mut observer
         {
@@ -95,7 +95,7 @@ fn compute_stages<T: Lane, S: System<T, STATES>, W: StepObserver<T, S>>(
         }
         let a_step = (h * A[stage]).v();
         let b_step = (h * B[stage]).v();
-        if stage == STAGE_INSTANT.len() - 1 {
+        if stage == STAGE_INSTANTS.len() - 1 {
             for i in 0..STATES {
                 x[i] = next_state[i] + b_step * slope[i];
             }
@@ -110,7 +110,8 @@ fn compute_stages<T: Lane, S: System<T, STATES>, W: StepObserver<T, S>>(
 
 /// An observer of the states of a turn.
 pub(crate) trait StepObserver<T: Lane, S: System<T, STATES>> {
-    /// Receives the state at the start of step `k` with its slope, and last the turn's end.
+    /// Receives the state at the start of step `k` with its slope, and finally the state at the
+    /// turn's end.
     fn observe(&mut self, k: usize, forcing: &S::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]);
 }
 
@@ -122,7 +123,7 @@ impl<T: Lane, S: System<T, STATES>> StepObserver<T, S> for NoObserver {
     fn observe(&mut self, _: usize, _: &S::Forcing, _: &[N<T>; STATES], _: &[N<T>; STATES]) {}
 }
 
-/// Integrates a turn from each of the states. The observer receives the states of the first one.
+/// Integrates a turn from each of `states`. The observer receives the states of the first turn.
 #[inline(always)]
 pub(crate) fn integrate_turn<T: Lane, S: System<T, STATES>, W: StepObserver<T, S>>(
     system: &S,
@@ -137,7 +138,7 @@ pub(crate) fn integrate_turn<T: Lane, S: System<T, STATES>, W: StepObserver<T, S
         if k > 0 {
             update_forcings(system, grid, k, &mut forcings);
         }
-        let stage_count = if k < grid.steps { STAGE_INSTANT.len() } else { 1 };
+        let stage_count = if k < grid.steps { STAGE_INSTANTS.len() } else { 1 };
         for (index, x) in states.iter_mut().enumerate() {
             let observer = match &mut observer {
                 Some(observer) if index == 0 => Some((k, &mut **observer)),

@@ -7,8 +7,8 @@ use lane_ode::rk4::RK4_STABILITY_LIMIT;
 
 /// The part of a formula's limit of stability that is used.
 ///
-/// Basis: random machines (`examples/differential_test.rs`) stay within their errors. Halving it
-/// doubles the cost of every level.
+/// Basis: rows of random machines (`examples/differential_test.rs`) stay within their error
+/// estimates. Halving it doubles the cost of every level.
 const STABILITY_SHARE: f64 = 0.97;
 
 /// An explicit Runge-Kutta formula with a fixed step.
@@ -24,7 +24,8 @@ impl Formula {
     /// Returns the formula that integrates a model with capped modes.
     ///
     /// The linear model spends most of its time on its matrices, which are computed at every
-    /// distinct instant of a step: two for order 4, eleven for order 8. So order 4 takes less time.
+    /// distinct instant of a step: two for order 4, eleven for order 8. Therefore order 4 takes
+    /// less time.
     pub const fn for_model(model: ModelKind) -> Self {
         match model {
             ModelKind::Nonlinear => Self::Dop853,

@@ -27,14 +27,16 @@ fn a_long_trajectory_allocates_no_more_than_a_short_one() {
         for model in [ModelKind::Nonlinear, ModelKind::Linear] {
             for method in [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(tolerance)] {
                 for recorders in [Recorders::default(), ALL_RECORDERS] {
-                    let (short, few) = allocations(simd, model, &method, recorders, 0.02);
-                    let (long, many) = allocations(simd, model, &method, recorders, 0.2);
-                    assert!(many > 5 * few, "{few} and {many} steps");
+                    let (short_count, short_steps) =
+                        allocations(simd, model, &method, recorders, 0.02);
+                    let (long_count, long_steps) =
+                        allocations(simd, model, &method, recorders, 0.2);
+                    assert!(long_steps > 5 * short_steps, "{short_steps} and {long_steps} steps");
                     // The set-up of each of the 11 points may allocate once more or less, depending
                     // on the last point in its lane. Steps must not allocate.
                     assert!(
-                        long <= short + 11,
-                        "{model:?} by {method:?} on {simd:?}: {short}, {long}"
+                        long_count <= short_count + 11,
+                        "{model:?} by {method:?} on {simd:?}: {short_count}, {long_count}"
                     );
                 }
             }

@@ -11,18 +11,18 @@ use crate::{
 };
 use lane_ode::{Dual, N, Real, Simd};
 
-/// Computes the position of a drum's point in cabinet axes from its coordinates in drum axes.
+/// Computes the position of a point of the drum in cabinet axes from its coordinates in drum axes.
 fn drum_point<T: Real>(
     q: &[N<T>; COORDINATES],
     theta: N<T>,
     hinge_x_m: f64,
-    place_m: [f64; 3],
+    position_m: [f64; 3],
 ) -> [N<T>; 3] {
     let about_2 =
         |(sin, cos): (N<T>, N<T>), [x, y, z]: [N<T>; 3]| [cos * x + sin * z, y, cos * z - sin * x];
     let about_3 =
         |(sin, cos): (N<T>, N<T>), [x, y, z]: [N<T>; 3]| [cos * x - sin * y, sin * x + cos * y, z];
-    let [x, y, z] = place_m.map(|component| theta.lit(component));
+    let [x, y, z] = position_m.map(|component| theta.lit(component));
     let from_hinge = about_3(q[9].sin_cos(), [x - hinge_x_m, y, z]);
     let [x, y, z] = about_2(q[8].sin_cos(), from_hinge);
     let (sin, cos) = theta.sin_cos();
@@ -31,12 +31,11 @@ fn drum_point<T: Real>(
     [x, y + q[2], z + q[3]]
 }
 
-/// Checks that a mass m at p adds m (p'' + g) . dp/dq to M a - f, whatever other masses the machine
-/// has.
+/// Checks that a point mass m at p adds m (p'' + g) . dp/dq to M a - f, for random machines.
 #[test]
 fn an_unbalance_at_an_angle_is_a_point_mass() {
     let mut rng = fastrand::Rng::with_seed(81);
-    let mut worst = 0.0_f64;
+    let mut max_error = 0.0_f64;
     for _ in 0..100 {
         let mut machine = random_machine(&mut rng);
         if rng.bool() {
@@ -50,10 +49,11 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
         };
         let mut heavier = machine.clone();
         heavier.further_unbalances.push(added);
-        let mut draw = |size: f64| size * (2.0 * rng.f64() - 1.0);
-        let [angle, speed, acceleration] = [draw(3.0), draw(130.0), draw(10.0)];
+        let mut random = |size: f64| size * (2.0 * rng.f64() - 1.0);
+        let [angle, speed, acceleration] = [random(3.0), random(130.0), random(10.0)];
         let spin = SpinState::new(N(angle).sin_cos(), N(speed), N(acceleration));
-        let mut vector = |size: f64| -> [f64; COORDINATES] { core::array::from_fn(|_| draw(size)) };
+        let mut vector =
+            |size: f64| -> [f64; COORDINATES] { core::array::from_fn(|_| random(size)) };
         let [q, u, a] = [vector(0.05), vector(0.5), vector(20.0)];
         let residual = |machine: &Machine| {
             let coefficients = Coefficients::new(machine);
@@ -63,30 +63,31 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
         };
         let [without, with] = [residual(&machine), residual(&heavier)];
         let (sin, cos) = added.angle_deg.to_radians().sin_cos();
-        let place_m = [added.x_m, added.radius_m * cos, added.radius_m * sin];
+        let position_m = [added.x_m, added.radius_m * cos, added.radius_m * sin];
         let hinge_x_m = machine.drum.hinge_x_m;
-        let along_time = |value: f64, rate: f64, second: f64| {
+        let twice_dual = |value: f64, rate: f64, second: f64| {
             let slope = Dual { value: rate, slope: second };
             N(Dual { value: Dual { value, slope: rate }, slope })
         };
-        let course = core::array::from_fn(|i| along_time(q[i], u[i], a[i]));
-        let theta = along_time(angle, speed, acceleration);
-        let mut accelerations =
-            drum_point(&course, theta, hinge_x_m, place_m).map(|place| place.0.slope.slope);
+        let moving_q = core::array::from_fn(|i| twice_dual(q[i], u[i], a[i]));
+        let theta = twice_dual(angle, speed, acceleration);
+        let mut accelerations = drum_point(&moving_q, theta, hinge_x_m, position_m)
+            .map(|coordinate| coordinate.0.slope.slope);
         accelerations[1] += machine.gravity_m_per_s2;
-        let largest = with.iter().fold(0.0_f64, |most, force| most.max(force.abs()));
+        let largest = with.iter().fold(0.0_f64, |largest, force| largest.max(force.abs()));
         for r in 0..COORDINATES {
-            let at = core::array::from_fn(|i| {
+            let shifted_q = core::array::from_fn(|i| {
                 N(Dual { value: q[i], slope: if i == r { 1.0 } else { 0.0 } })
             });
-            let partial = drum_point(&at, N(Dual { value: angle, slope: 0.0 }), hinge_x_m, place_m);
+            let partial =
+                drum_point(&shifted_q, N(Dual { value: angle, slope: 0.0 }), hinge_x_m, position_m);
             let power: f64 = (0..3).map(|i| accelerations[i] * partial[i].0.slope).sum();
-            let off = with[r] - without[r] - added.mass_kg * power;
-            worst = worst.max(off.abs() / largest);
+            let error = with[r] - without[r] - added.mass_kg * power;
+            max_error = max_error.max(error.abs() / largest);
         }
     }
-    eprintln!("a point mass at an angle: within {worst:.1e} of the largest force");
-    assert!(worst < 1e-13, "{worst:e}");
+    eprintln!("a point mass at an angle: within {max_error:.1e} of the largest force");
+    assert!(max_error < 1e-13, "{max_error:e}");
 }
 
 #[test]
@@ -117,10 +118,10 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
     let [forwards, mirrored] = [run(&machine, 300.0), run(&machine.mirrored(), -300.0)];
     // The mirror reverses translations along z and rotations about y.
     let signs = [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
-    for (k, (one, other)) in forwards.iter().zip(&mirrored).enumerate() {
+    for (k, (forward, backward)) in forwards.iter().zip(&mirrored).enumerate() {
         for i in 0..COORDINATES {
-            let off = (one[i] - signs[i] * other[i]).abs();
-            assert!(off < 1e-12, "instant {k}, q{}: {} {}", i + 1, one[i], other[i]);
+            let error = (forward[i] - signs[i] * backward[i]).abs();
+            assert!(error < 1e-12, "instant {k}, q{}: {} {}", i + 1, forward[i], backward[i]);
         }
     }
 }
@@ -132,12 +133,16 @@ fn an_unbalance_at_an_angle_in_other_lanes_does_not_change_the_bits() {
     let [plain, turned] = [paper(0.6, 90.0), turned].map(|m| prepared(m, triangular(), 1.5));
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
-            let of =
+            let simulate_points =
                 |points: &[&Point]| simulate(simd, model, &Method::Rk4 { step_s: 2e-4 }, points);
-            let together = of(&[&plain, &turned, &plain, &turned, &plain]);
-            let alone = of(&[&plain])[0];
+            let together = simulate_points(&[&plain, &turned, &plain, &turned, &plain]);
+            let alone = simulate_points(&[&plain])[0];
             assert_eq!([together[0], together[2], together[4]], [alone; 3], "{model:?} {simd:?}");
-            assert_eq!([together[1], together[3]], [of(&[&turned])[0]; 2], "{model:?} {simd:?}");
+            assert_eq!(
+                [together[1], together[3]],
+                [simulate_points(&[&turned])[0]; 2],
+                "{model:?} {simd:?}"
+            );
         }
     }
 }
@@ -156,28 +161,28 @@ fn slopes_of_dampers_in_two_stages_are_derivatives_of_their_force() {
     let rest = TubMotion::new(&[N(0.0); 4], &[N(0.0); 4]);
     let motions = elements.corner_motions(&rest);
     let force_at = |elongation_m: f64, speed: f64| {
-        let mut moved = motions.clone();
-        moved[0] = [moved[0][0] + elongation_m, N(speed)];
+        let mut shifted_motions = motions.clone();
+        shifted_motions[0] = [shifted_motions[0][0] + elongation_m, N(speed)];
         let mut forces = Vec::new();
-        elements.corner_forces(&moved, &mut forces);
+        elements.append_corner_forces(&shifted_motions, &mut forces);
         forces[0]
     };
     for elongation_m in [-0.006, -0.0041, 0.0, 0.001, 0.0038, 0.005] {
         for speed in [-0.2, -0.004, 0.03] {
-            let at = force_at(elongation_m, speed);
-            let d = 1e-7;
-            let by_depth = (force_at(elongation_m + d, speed).force
-                - force_at(elongation_m - d, speed).force)
+            let force = force_at(elongation_m, speed);
+            let step = 1e-7;
+            let by_depth = (force_at(elongation_m + step, speed).force
+                - force_at(elongation_m - step, speed).force)
                 .0
-                / (2.0 * d);
-            let by_speed = (force_at(elongation_m, speed + d).force
-                - force_at(elongation_m, speed - d).force)
+                / (2.0 * step);
+            let by_speed = (force_at(elongation_m, speed + step).force
+                - force_at(elongation_m, speed - step).force)
                 .0
-                / (2.0 * d);
-            assert!((at.by_depth.0 - by_depth).abs() < 1e-3 + 1e-5 * by_depth.abs());
-            assert!((at.by_speed.0 - by_speed).abs() < 1e-3 + 1e-5 * by_speed.abs());
+                / (2.0 * step);
+            assert!((force.by_depth.0 - by_depth).abs() < 1e-3 + 1e-5 * by_depth.abs());
+            assert!((force.by_speed.0 - by_speed).abs() < 1e-3 + 1e-5 * by_speed.abs());
             // The force opposes the motion.
-            assert!(at.force.0 * speed <= 0.0);
+            assert!(force.force.0 * speed <= 0.0);
         }
     }
 }

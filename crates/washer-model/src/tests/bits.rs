@@ -7,7 +7,7 @@ use crate::{
     prepare, simulate_until, simulate_with,
 };
 use core::sync::atomic::{AtomicU32, Ordering};
-use lane_ode::{Cancel, STEPS_AT_ONCE, Simd, Tolerance};
+use lane_ode::{CANCEL_POLL_STEPS, Cancel, Simd, Tolerance};
 
 type BitsScenario = (Machine, Spin);
 
@@ -67,97 +67,100 @@ fn bits((record, reading): (&Record, &Reading)) -> Vec<u64> {
 fn batch(simd: Simd, scenarios: &[BitsScenario]) -> Vec<Vec<Vec<u64>>> {
     let points = points(simd, scenarios);
     let points: Vec<_> = points.iter().collect();
-    let mut all = Vec::new();
+    let mut results = Vec::new();
     for model in MODELS {
         for method in &METHODS {
             let (records, readings) = simulate_with(simd, model, method, &points, ALL_RECORDERS);
             assert_eq!((records.len(), readings.len()), (scenarios.len(), scenarios.len()));
-            all.push(records.iter().zip(&readings).map(bits).collect());
+            results.push(records.iter().zip(&readings).map(bits).collect());
         }
     }
-    all
+    results
 }
 
 /// Selects scenarios by their indices for every model and method.
-fn select_scenarios(all: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec<u64>>> {
-    all.iter().map(|records| indices.iter().map(|&i| records[i].clone()).collect()).collect()
+fn select_scenarios(results: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec<u64>>> {
+    results.iter().map(|records| indices.iter().map(|&i| records[i].clone()).collect()).collect()
 }
 
-fn same_on_every_instruction_set(scenarios: &[BitsScenario]) {
+fn assert_same_on_every_instruction_set(scenarios: &[BitsScenario]) {
     let scalar = batch(Simd::Scalar, scenarios);
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         assert!(batch(simd, scenarios) == scalar, "{} gives other bits than scalar", simd.name());
     }
 }
 
-fn same_at_any_position(scenarios: &[BitsScenario]) {
+fn assert_same_at_any_position(scenarios: &[BitsScenario]) {
     let count = scenarios.len();
-    let as_given = batch(Simd::best(), scenarios);
-    for turn in [1, 2, 3, 5, 7] {
-        let order: Vec<_> = (0..count).map(|i| (i + turn) % count).collect();
-        let moved: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
+    let in_order = batch(Simd::best(), scenarios);
+    for shift in [1, 2, 3, 5, 7] {
+        let order: Vec<_> = (0..count).map(|i| (i + shift) % count).collect();
+        let reordered: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
         assert!(
-            batch(Simd::best(), &moved) == select_scenarios(&as_given, &order),
-            "moved by {turn}"
+            batch(Simd::best(), &reordered) == select_scenarios(&in_order, &order),
+            "moved by {shift}"
         );
     }
     let order: Vec<_> = (0..count).rev().collect();
-    let moved: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
-    assert!(batch(Simd::best(), &moved) == select_scenarios(&as_given, &order), "backwards");
+    let reordered: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
+    assert!(batch(Simd::best(), &reordered) == select_scenarios(&in_order, &order), "backwards");
 }
 
-fn same_beside_any_points(scenarios: &[BitsScenario]) {
+fn assert_same_with_any_other_points(scenarios: &[BitsScenario]) {
     let together = batch(Simd::best(), scenarios);
     for (i, scenario) in scenarios.iter().enumerate() {
         let alone = batch(Simd::best(), core::slice::from_ref(scenario));
         assert!(alone == select_scenarios(&together, &[i]), "scenario {i} alone");
     }
     // Two consecutive points fail, one early and one late, and other points start in their lanes.
-    let wild = |ramp_s: f64| {
+    let failing = |ramp_s: f64| {
         (paper(30.0, 0.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 9e4, ramp_s })
     };
     let mut mixed = scenarios.to_vec();
-    mixed.insert(1, wild(0.02));
-    mixed.insert(5, wild(0.3));
+    mixed.insert(1, failing(0.02));
+    mixed.insert(5, failing(0.3));
     let others: Vec<_> = (0..mixed.len()).filter(|i| ![1, 5].contains(i)).collect();
-    let with_wild = batch(Simd::best(), &mixed);
-    let nonlinear = &with_wild[0];
-    assert!([1, 5].iter().all(|&i| nonlinear[i].len() < nonlinear[0].len()), "the wild ones fail");
-    assert!(select_scenarios(&with_wild, &others) == together, "beside failing neighbours");
+    let with_failing = batch(Simd::best(), &mixed);
+    let nonlinear = &with_failing[0];
+    assert!(
+        [1, 5].iter().all(|&i| nonlinear[i].len() < nonlinear[0].len()),
+        "the added points fail"
+    );
+    assert!(select_scenarios(&with_failing, &others) == together, "beside failing neighbours");
 }
 
 #[test]
 fn same_bits_on_every_instruction_set_quick_map() {
-    same_on_every_instruction_set(&quick_map());
+    assert_same_on_every_instruction_set(&quick_map());
 }
 
 #[test]
 fn same_bits_on_every_instruction_set_random_machines() {
-    same_on_every_instruction_set(&random_machines());
+    assert_same_on_every_instruction_set(&random_machines());
 }
 
 #[test]
 fn same_bits_at_any_position_in_a_batch_quick_map() {
-    same_at_any_position(&quick_map());
+    assert_same_at_any_position(&quick_map());
 }
 
 #[test]
 fn same_bits_at_any_position_in_a_batch_random_machines() {
-    same_at_any_position(&random_machines());
+    assert_same_at_any_position(&random_machines());
 }
 
 #[test]
-fn same_bits_beside_any_points_quick_map() {
-    same_beside_any_points(&quick_map());
+fn same_bits_with_any_other_points_quick_map() {
+    assert_same_with_any_other_points(&quick_map());
 }
 
 #[test]
-fn same_bits_beside_any_points_random_machines() {
-    same_beside_any_points(&random_machines());
+fn same_bits_with_any_other_points_random_machines() {
+    assert_same_with_any_other_points(&random_machines());
 }
 
-/// Integrates a segment with more steps than the integrator makes between two polls of
-/// its cancellation, while segments in other lanes end before.
+/// Integrates a segment with more steps than the integrator makes between two polls of its
+/// cancellation, while segments in other lanes end earlier.
 #[test]
 fn blocks_of_steps_do_not_change_bits() {
     let timing = Timing { end_s: 1.0, window_s: [0.9, 1.0], checkpoints: 0 };
@@ -170,13 +173,13 @@ fn blocks_of_steps_do_not_change_bits() {
     let simd = Simd::best();
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
-    let all: Vec<_> = points.iter().collect();
+    let all_points: Vec<_> = points.iter().collect();
     let dop853 = Method::Capped { step_s: 2e-5, caps: CAPS };
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853] {
         for model in MODELS {
-            let together = simulate_with(simd, model, &method, &all, ALL_RECORDERS);
-            assert!(together.0[0].steps > 3 * STEPS_AT_ONCE, "{} steps", together.0[0].steps);
-            for (k, point) in all.iter().enumerate() {
+            let together = simulate_with(simd, model, &method, &all_points, ALL_RECORDERS);
+            assert!(together.0[0].steps > 3 * CANCEL_POLL_STEPS, "{} steps", together.0[0].steps);
+            for (k, point) in all_points.iter().enumerate() {
                 let alone = simulate_with(simd, model, &method, &[point], ALL_RECORDERS);
                 let expected = bits((&together.0[k], &together.1[k]));
                 assert_eq!(
@@ -201,7 +204,7 @@ fn every_method_stops_within_a_segment() {
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853].into_iter().chain(adaptive) {
         for model in MODELS {
             let calls = AtomicU32::new(0);
-            let until = |max_calls: u32| {
+            let run_until = |max_calls: u32| {
                 calls.store(0, Ordering::Relaxed);
                 let stop = || calls.fetch_add(1, Ordering::Relaxed) >= max_calls;
                 simulate_until(
@@ -213,13 +216,13 @@ fn every_method_stops_within_a_segment() {
                     Cancel::When(&stop),
                 )
             };
-            assert!(until(u32::MAX).is_some_and(|(records, _)| records[0].failure.is_none()));
+            assert!(run_until(u32::MAX).is_some_and(|(records, _)| records[0].failure.is_none()));
             assert!(
                 calls.load(Ordering::Relaxed) > 3,
                 "{model:?} by {method:?}: {} calls",
                 calls.load(Ordering::Relaxed)
             );
-            assert_eq!(until(2), None, "{model:?} by {method:?}");
+            assert_eq!(run_until(2), None, "{model:?} by {method:?}");
             assert_eq!(calls.load(Ordering::Relaxed), 3, "{model:?} by {method:?}");
         }
     }

@@ -17,7 +17,8 @@ struct OperationCount {
     fused: u32,
     divisions: u32,
     square_roots: u32,
-    /// The number of evaluations of sine and cosine of an angle, whose operations do not count.
+    /// The number of evaluations of sine and cosine of an angle, whose own operations are not
+    /// counted.
     sine_cosine_pairs: u32,
 }
 
@@ -40,18 +41,18 @@ fn count(change: impl FnOnce(&mut OperationCount)) {
     });
 }
 
-/// Returns the result of a function, and the operations that it takes.
-fn counted<R>(work: impl FnOnce() -> R) -> (R, OperationCount) {
+/// Returns the result of a function, and the number of its operations.
+fn count_operations<R>(function: impl FnOnce() -> R) -> (R, OperationCount) {
     COUNT.with(|cell| cell.set(OperationCount::default()));
-    let result = work();
+    let result = function();
     (result, COUNT.with(Cell::get))
 }
 
 fn count_fused() {
-    count(|o| {
-        o.multiplications += 1;
-        o.additions += 1;
-        o.fused += 1;
+    count(|operations| {
+        operations.multiplications += 1;
+        operations.additions += 1;
+        operations.fused += 1;
     });
 }
 
@@ -65,19 +66,19 @@ impl Real for Counting {
         Self(value)
     }
     fn add(self, b: Self) -> Self {
-        count(|o| o.additions += 1);
+        count(|operations| operations.additions += 1);
         Self(self.0 + b.0)
     }
     fn sub(self, b: Self) -> Self {
-        count(|o| o.additions += 1);
+        count(|operations| operations.additions += 1);
         Self(self.0 - b.0)
     }
     fn mul(self, b: Self) -> Self {
-        count(|o| o.multiplications += 1);
+        count(|operations| operations.multiplications += 1);
         Self(self.0 * b.0)
     }
     fn div(self, b: Self) -> Self {
-        count(|o| o.divisions += 1);
+        count(|operations| operations.divisions += 1);
         Self(self.0 / b.0)
     }
     fn neg(self) -> Self {
@@ -96,14 +97,14 @@ impl Real for Counting {
         Self((-self.0).mul_add(b.0, c.0))
     }
     fn sqrt(self) -> Self {
-        count(|o| o.square_roots += 1);
+        count(|operations| operations.square_roots += 1);
         Self(self.0.sqrt())
     }
     fn abs(self) -> Self {
         Self(self.0.abs())
     }
     fn sin_cos(self) -> (Self, Self) {
-        count(|o| o.sine_cosine_pairs += 1);
+        count(|operations| operations.sine_cosine_pairs += 1);
         let (sin, cos) = Real::sin_cos(self.0);
         (Self(sin), Self(cos))
     }
@@ -145,8 +146,9 @@ fn evaluation_cost<M: LaneModel<Counting>, P: LaneModel<f64>>(
     for (i, x) in x.iter_mut().enumerate() {
         *x += 1e-4 * i as f64;
     }
-    let (forcing, forcing_cost) = counted(|| model.forcing(N(Counting(7.3))));
-    let (dx, derivative_cost) = counted(|| model.derivative(&forcing, &x.map(|x| N(Counting(x)))));
+    let (forcing, forcing_cost) = count_operations(|| model.forcing(N(Counting(7.3))));
+    let (dx, derivative_cost) =
+        count_operations(|| model.derivative(&forcing, &x.map(|x| N(Counting(x)))));
     let plain = P::splat(N(0.0), &point, Coupling::new(N(0.0), caps.as_ref()));
     let expected = plain.derivative(&plain.forcing(N(7.3)), &x.map(N));
     for i in 0..STATES {
@@ -161,7 +163,7 @@ fn observation_cost<M: LaneModel<Counting>>() -> OperationCount {
     let model = M::splat(N(Counting(0.0)), &point, Coupling::Springs);
     let x = core::array::from_fn(|i| N(Counting(1e-4 * i as f64)));
     let forcing = model.forcing(N(Counting(7.3)));
-    counted(|| model.observe(&forcing, &x, &x, true)).1
+    count_operations(|| model.observe(&forcing, &x, &x, true)).1
 }
 
 const CAPPED: Option<Caps> = Some(Caps { bearings_rad_per_s: 700.0, hinge_rad_per_s: Some(700.0) });
@@ -175,8 +177,8 @@ fn linear_cost(caps: Option<Caps>) -> [OperationCount; 2] {
 }
 
 /// Returns the sum of all operations but sines and cosines.
-fn flops(o: OperationCount) -> u32 {
-    o.multiplications + o.additions + o.divisions + o.square_roots
+fn flops(count: OperationCount) -> u32 {
+    count.multiplications + count.additions + count.divisions + count.square_roots
 }
 
 /// Creates operations from their numbers in the order of the fields.
@@ -186,10 +188,10 @@ const fn operations(
     OperationCount { multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs }
 }
 
-/// The present cost of forcing and derivative. A change of the model updates these numbers.
-const NONLINEAR: [OperationCount; 2] =
+/// The expected cost of forcing and derivative. A change of the model changes these numbers.
+const NONLINEAR_COST: [OperationCount; 2] =
     [operations([31, 34, 18, 0, 0, 0]), operations([557, 410, 319, 12, 4, 6])];
-const LINEAR: [OperationCount; 2] =
+const LINEAR_COST: [OperationCount; 2] =
     [operations([348, 257, 241, 2, 0, 0]), operations([143, 135, 131, 0, 0, 0])];
 const NONLINEAR_MASS_SCALED: OperationCount = operations([753, 580, 474, 16, 4, 6]);
 const LINEAR_MASS_SCALED: OperationCount = operations([175, 161, 157, 0, 0, 0]);
@@ -202,14 +204,14 @@ fn the_nonlinear_right_hand_side_stays_below_the_naive_formulation() {
     eprintln!("nonlinear: right-hand side {derivative:?}; spin {forcing:?}");
     let OperationCount { multiplications, additions, divisions, square_roots, .. } = derivative;
     assert!(multiplications < 825 && additions < 605 && divisions <= 14 && square_roots <= 4);
-    assert_eq!([forcing, derivative], NONLINEAR);
+    assert_eq!([forcing, derivative], NONLINEAR_COST);
 }
 
 #[test]
 fn the_cost_of_the_linear_right_hand_side_is_unchanged() {
     let [forcing, derivative] = linear_cost(None);
     eprintln!("linear: right-hand side {derivative:?}; spin and matrices {forcing:?}");
-    assert_eq!([forcing, derivative], LINEAR);
+    assert_eq!([forcing, derivative], LINEAR_COST);
 }
 
 #[test]

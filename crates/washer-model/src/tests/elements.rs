@@ -12,10 +12,10 @@ use core::f64::consts::PI;
 use lane_ode::{Simd, Tolerance};
 use serde_json::Value;
 
-/// The speed amplitude of the linear model's friction, in tests that do not depend on it.
+/// The speed amplitude of the linear model's friction, for tests whose results do not depend on it.
 const LINEAR_SPEED_M_PER_S: f64 = 0.3;
 
-fn three(values: &[f64]) -> [f64; 3] {
+fn to_vector(values: &[f64]) -> [f64; 3] {
     [values[0], values[1], values[2]]
 }
 
@@ -40,8 +40,8 @@ pub(crate) fn machine(case: &Value) -> Machine {
     machine.stops = rows(case, "stops")
         .iter()
         .map(|row| BumpStop {
-            tub_m: three(&row[0..3]),
-            direction: three(&row[3..6]),
+            tub_m: to_vector(&row[0..3]),
+            direction: to_vector(&row[3..6]),
             clearance_m: row[6],
             stiffness_n_per_m: row[7],
             damping_n_s_per_m: row[8],
@@ -51,10 +51,10 @@ pub(crate) fn machine(case: &Value) -> Machine {
     machine.bushings = rows(case, "bush")
         .iter()
         .map(|row| Bushing {
-            tub_m: three(&row[0..3]),
-            stiffness_n_per_m: three(&row[3..6]),
-            cubic_n_per_m3: three(&row[6..9]),
-            damping_n_s_per_m: three(&row[9..12]),
+            tub_m: to_vector(&row[0..3]),
+            stiffness_n_per_m: to_vector(&row[3..6]),
+            cubic_n_per_m3: to_vector(&row[6..9]),
+            damping_n_s_per_m: to_vector(&row[9..12]),
         })
         .collect();
     machine.further_unbalances = number("m2")
@@ -74,8 +74,8 @@ pub(super) fn with_every_element() -> Machine {
     machine(&reference("elements_all.json"))
 }
 
-/// Computes the largest error of a reference's history by each method, as a share of each channel's
-/// peak.
+/// Computes the largest error of each method's history against a reference, relative to each
+/// channel's peak.
 fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N] {
     let case = reference(&format!("elements_{name}.json"));
     let peak_rpm = case["peak_rpm"].as_f64().unwrap();
@@ -108,15 +108,15 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
         let history =
             history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), 0.01);
         assert_eq!(history.len(), rows.len());
-        let mut worst = 0.0_f64;
+        let mut max_error = 0.0_f64;
         for (column, channel) in channels.iter().enumerate() {
             let peak = rows.iter().fold(0.0_f64, |peak, row| peak.max(row[column + 1].abs()));
             for (k, row) in rows.iter().enumerate() {
-                let ours = history.instant(k).unwrap().channels[channel.index()];
-                worst = worst.max((ours - row[column + 1]).abs() / peak);
+                let computed = history.instant(k).unwrap().channels[channel.index()];
+                max_error = max_error.max((computed - row[column + 1]).abs() / peak);
             }
         }
-        worst
+        max_error
     })
 }
 
@@ -140,10 +140,10 @@ fn val_histories_with_every_element_match_those_of_independent_programs() {
 /// these by 8 kg x 20 m/s^2 / 4e8 N/m = 4e-7 m, and they ring with the same amplitude.
 const BEARING_DEFLECTION_M: f64 = 8e-7;
 
-/// Returns a machine that moves only up and down, and the natural frequency (rad/s) of this motion.
+/// Returns a machine that moves only vertically, and the natural frequency (rad/s) of this motion.
 /// All mass centres are between the bearings, four springs are vertical, and the shaft hardly
 /// bends.
-fn heaving() -> (Machine, f64) {
+fn heaving_machine() -> (Machine, f64) {
     let mut machine = paper(0.0, 0.0);
     machine.tub.centre_x_m = 0.0;
     machine.shaft.centre_x_m = 0.0;
@@ -162,23 +162,23 @@ fn heaving() -> (Machine, f64) {
     (machine, (32_000.0 / mass_kg).sqrt())
 }
 
-/// Computes the heights (m above equilibrium) of a heaving machine at equal intervals. It starts at
-/// rest from a height.
-fn heights_m(machine: Machine, from_m: f64, every_s: f64, count: u32) -> Vec<f64> {
-    let end_s = every_s * f64::from(count) * (1.0 + 1e-9);
+/// Computes the heights (m above equilibrium) of a heaving machine at equal intervals. The machine
+/// starts at rest from the height `start_m`.
+fn heights_m(machine: Machine, start_m: f64, interval_s: f64, count: u32) -> Vec<f64> {
+    let end_s = interval_s * f64::from(count) * (1.0 + 1e-9);
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = prepared(machine, still, end_s);
     let mut start = InitialDeviation::default();
-    start.deviations[0] = from_m;
-    start.deviations[2] = from_m;
+    start.deviations[0] = start_m;
+    start.deviations[2] = start_m;
     let method = Method::Rk4 { step_s: 2e-5 };
-    let history = history(ModelKind::Nonlinear, &method, &point, &start, every_s);
+    let history = history(ModelKind::Nonlinear, &method, &point, &start, interval_s);
     (0..history.len()).map(|k| history.instant(k).unwrap().deviations[0]).collect()
 }
 
 #[test]
 fn friction_shortens_every_half_swing_by_the_same_length() {
-    let (mut machine, w_rad_per_s) = heaving();
+    let (mut machine, w_rad_per_s) = heaving_machine();
     machine.dampers = vec![Damper {
         cabinet_m: [0.0, -0.4, 0.0],
         tub_m: [0.0, -0.1, 0.0],
@@ -202,7 +202,7 @@ fn friction_shortens_every_half_swing_by_the_same_length() {
 
 #[test]
 fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
-    let (mut machine, _) = heaving();
+    let (mut machine, _) = heaving_machine();
     let stiffness = 32_000.0;
     let friction_n = 40.0;
     let stroke_m = 0.012;
@@ -217,21 +217,25 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
         ..Machine::paper().dampers[0]
     }];
     let heights = heights_m(machine, 0.02, 2e-4, 9000);
-    let turns = |w: &[f64]| (w[1] - w[0]) * (w[2] - w[1]) <= 0.0;
-    let extremes: Vec<f64> = heights.windows(3).filter(|w| turns(w)).map(|w| w[1].abs()).collect();
+    let is_extreme = |heights: &[f64]| (heights[1] - heights[0]) * (heights[2] - heights[1]) <= 0.0;
+    let extremes: Vec<f64> =
+        heights.windows(3).filter(|w| is_extreme(w)).map(|w| w[1].abs()).collect();
     // The energy lost from amplitude a to b is k (a^2 - b^2) / 2 = F (a - s) + F (b - s), without
     // the last term if it is negative.
-    let next_m = |a: f64| {
-        let left = stiffness * a * a / 2.0 - friction_n * (a - stroke_m);
-        let c = left + friction_n * stroke_m;
+    let next_amplitude_m = |a: f64| {
+        let remaining = stiffness * a * a / 2.0 - friction_n * (a - stroke_m);
+        let c = remaining + friction_n * stroke_m;
         let b = (-friction_n + (friction_n * friction_n + 2.0 * stiffness * c).sqrt()) / stiffness;
-        if b > stroke_m { b } else { (2.0 * left / stiffness).sqrt() }
+        if b > stroke_m { b } else { (2.0 * remaining / stiffness).sqrt() }
     };
     let mut expected = 0.02;
     assert!(extremes.len() > 12, "{}", extremes.len());
-    for (n, found) in extremes.iter().enumerate() {
-        expected = if expected > stroke_m { next_m(expected) } else { expected };
-        assert!((found - expected).abs() < 1e-5, "half swing {n}: {found} m, not {expected} m");
+    for (n, amplitude) in extremes.iter().enumerate() {
+        expected = if expected > stroke_m { next_amplitude_m(expected) } else { expected };
+        assert!(
+            (amplitude - expected).abs() < 1e-5,
+            "half swing {n}: {amplitude} m, not {expected} m"
+        );
     }
     // The amplitude tends to the free stroke.
     let last = extremes[extremes.len() - 1];
@@ -239,7 +243,7 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
 }
 
 #[test]
-fn the_linear_model_takes_the_tangent_of_a_damper_within_its_free_stroke() {
+fn the_linear_model_uses_the_tangent_of_a_damper_within_its_free_stroke() {
     let softness_m = 1e-3;
     let mut staged = paper(0.4, 80.0);
     for damper in &mut staged.dampers {
@@ -249,27 +253,30 @@ fn the_linear_model_takes_the_tangent_of_a_damper_within_its_free_stroke() {
         damper.outer_damping_n_s_per_m = 300.0;
     }
     // The engagement h at rest, where delta = -s / 2.
-    let engaged = 0.5 * (1.0 - 0.005 / 0.005_f64.hypot(softness_m));
+    let engagement = 0.5 * (1.0 - 0.005 / 0.005_f64.hypot(softness_m));
     let mut viscous = paper(0.4, 80.0);
     for damper in &mut viscous.dampers {
-        damper.damping_n_s_per_m += engaged * (300.0 + 60.0 / damper.friction_speed_m_per_s);
+        damper.damping_n_s_per_m += engagement * (300.0 + 60.0 / damper.friction_speed_m_per_s);
     }
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
     let [staged, viscous] = [staged, viscous].map(|machine| prepared(machine, spin(), 1.0));
     assert!(staged.friction_speeds().is_empty());
-    let [ours, theirs] = [staged, viscous].map(|point| point.matrices(0.3, 20.0, 1.0));
-    assert_eq!(ours.mass, theirs.mass);
-    let pairs = [(ours.damping, theirs.damping), (ours.stiffness, theirs.stiffness)];
-    for (ours, theirs) in pairs {
-        for (ours, theirs) in ours.iter().flatten().zip(theirs.iter().flatten()) {
-            assert!((ours - theirs).abs() <= 1e-9 * theirs.abs().max(1.0), "{ours} {theirs}");
+    let [computed, expected] = [staged, viscous].map(|point| point.matrices(0.3, 20.0, 1.0));
+    assert_eq!(computed.mass, expected.mass);
+    let pairs = [(computed.damping, expected.damping), (computed.stiffness, expected.stiffness)];
+    for (computed, expected) in pairs {
+        for (computed, expected) in computed.iter().flatten().zip(expected.iter().flatten()) {
+            assert!(
+                (computed - expected).abs() <= 1e-9 * expected.abs().max(1.0),
+                "{computed} {expected}"
+            );
         }
     }
 }
 
 #[test]
 fn a_closed_stop_is_a_spring_in_parallel() {
-    let (mut machine, w) = heaving();
+    let (mut machine, open_frequency) = heaving_machine();
     let stiffness = 32_000.0;
     let stop_stiffness = 40_000.0;
     machine.stops = vec![BumpStop {
@@ -281,19 +288,19 @@ fn a_closed_stop_is_a_spring_in_parallel() {
         damping_n_s_per_m: 0.0,
         softness_m: 1e-6,
     }];
-    // The gap of the stop at rest is the sag of the machine. A swing that starts 20 mm below closes
-    // the gap.
-    let gap_m = 9.81 / (w * w);
-    let below_m = 0.02;
-    let stiffer = w * (1.0 + stop_stiffness / stiffness).sqrt();
+    // The gap of the stop at rest is the sag of the machine. A swing that starts 20 mm below
+    // equilibrium closes the gap.
+    let gap_m = 9.81 / (open_frequency * open_frequency);
+    let start_depth_m = 0.02;
+    let closed_frequency = open_frequency * (1.0 + stop_stiffness / stiffness).sqrt();
     let centre_m = stop_stiffness * gap_m / (stiffness + stop_stiffness);
-    let speed = w * (below_m * below_m - gap_m * gap_m).sqrt();
-    let reach_m = (gap_m - centre_m).hypot(speed / stiffer);
-    let half_s = (-gap_m / below_m).acos() / w
-        + (0.5 * PI - ((gap_m - centre_m) / reach_m).asin()) / stiffer;
-    let heights = heights_m(machine, -below_m, half_s, 6);
+    let speed = open_frequency * (start_depth_m * start_depth_m - gap_m * gap_m).sqrt();
+    let amplitude_m = (gap_m - centre_m).hypot(speed / closed_frequency);
+    let half_period_s = (-gap_m / start_depth_m).acos() / open_frequency
+        + (0.5 * PI - ((gap_m - centre_m) / amplitude_m).asin()) / closed_frequency;
+    let heights = heights_m(machine, -start_depth_m, half_period_s, 6);
     for (n, height) in heights.iter().enumerate() {
-        let expected = if n % 2 == 0 { -below_m } else { centre_m + reach_m };
+        let expected = if n % 2 == 0 { -start_depth_m } else { centre_m + amplitude_m };
         assert!(
             (height - expected).abs() < BEARING_DEFLECTION_M,
             "half swing {n}: {height} m, not {expected} m"
@@ -312,8 +319,8 @@ fn friction_is_equivalent_viscous_damping_in_the_linear_model() {
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
     let [point, viscous] = [machine, viscous].map(|machine| prepared(machine, spin(), 1.0));
     let matrices = |point: &Point| {
-        let found = point.matrices(0.3, 20.0, 1.0);
-        (found.mass, found.damping, found.stiffness, found.force)
+        let matrices = point.matrices(0.3, 20.0, 1.0);
+        (matrices.mass, matrices.damping, matrices.stiffness, matrices.force)
     };
     assert_eq!(matrices(&point), matrices(&viscous));
 }
@@ -338,18 +345,18 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
         let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
             history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 0.1).forces(0).unwrap()
         });
-        assert!(nonlinear.stops_n.iter().any(|push| *push > 100.0), "{nonlinear:?}");
-        let all = |forces: &crate::Forces| {
+        assert!(nonlinear.stops_n.iter().any(|force_n| *force_n > 100.0), "{nonlinear:?}");
+        let all_forces = |forces: &crate::Forces| {
             let bushings = forces.bushings_n.concat();
             [&forces.springs_n[..], &forces.stops_n, &bushings, &forces.cabinet_n].concat()
         };
-        let pairs = all(&nonlinear).into_iter().zip(all(&linear));
+        let pairs = all_forces(&nonlinear).into_iter().zip(all_forces(&linear));
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let large = difference(1e-3);
     let small = difference(1e-4);
     assert!(large > 1e-4, "{large}");
-    // The difference is of second order: a tenth of the motion has a hundredth of it.
+    // The difference is of second order: for a tenth of the motion it is a hundredth.
     assert!((large / small - 100.0).abs() < 10.0, "{large} {small}");
 }
 

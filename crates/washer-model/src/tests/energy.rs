@@ -1,4 +1,4 @@
-//! Tests of the energy balance of the machine without spin. Energy and losses are written down
+//! Tests of the energy balance of the machine without spin. Energy and losses are computed
 //! independently of the equations of motion.
 
 use super::elements::with_every_element;
@@ -19,7 +19,7 @@ pub(super) fn axes(yaw: f64, pitch: f64) -> [PlainVector; 3] {
 }
 
 /// Returns `start` plus the sum of the components times the axes.
-pub(super) fn place(
+pub(super) fn position(
     start: PlainVector,
     axes: &[PlainVector; 3],
     components: PlainVector,
@@ -38,31 +38,32 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     let shaft = axes(q[6], q[7]);
     let p_t = [0.0, q[0], q[1]];
     let p_s = [0.0, q[2], q[3]];
-    // The drum's axes are those of the shaft, turned by q9 about s2, then by q10.
-    let turned = axes(q[8], q[9]);
-    let drum: [PlainVector; 3] = std::array::from_fn(|k| place([0.0; 3], &shaft, turned[k]));
-    let hinge = place(p_s, &shaft, [m.drum.hinge_x_m, 0.0, 0.0]);
-    let on_drum = |x_m: f64, r_m: f64, angle_deg: f64| {
+    // The drum's axes are those of the shaft, rotated by q9 about s2, then by q10.
+    let drum_in_shaft = axes(q[8], q[9]);
+    let drum: [PlainVector; 3] =
+        std::array::from_fn(|k| position([0.0; 3], &shaft, drum_in_shaft[k]));
+    let hinge = position(p_s, &shaft, [m.drum.hinge_x_m, 0.0, 0.0]);
+    let drum_point = |x_m: f64, r_m: f64, angle_deg: f64| {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
-        place(hinge, &drum, [x_m - m.drum.hinge_x_m, r_m * cos, r_m * sin])
+        position(hinge, &drum, [x_m - m.drum.hinge_x_m, r_m * cos, r_m * sin])
     };
     let heights = [
-        m.tub.mass_kg * place(p_t, &tub, [m.tub.centre_x_m, 0.0, 0.0])[1],
-        m.shaft.mass_kg * place(p_s, &shaft, [m.shaft.centre_x_m, 0.0, 0.0])[1],
-        m.drum.mass_kg * on_drum(m.drum.centre_x_m, 0.0, 0.0)[1],
+        m.tub.mass_kg * position(p_t, &tub, [m.tub.centre_x_m, 0.0, 0.0])[1],
+        m.shaft.mass_kg * position(p_s, &shaft, [m.shaft.centre_x_m, 0.0, 0.0])[1],
+        m.drum.mass_kg * drum_point(m.drum.centre_x_m, 0.0, 0.0)[1],
     ];
-    let height = |u: &Unbalance| u.mass_kg * on_drum(u.x_m, u.radius_m, u.angle_deg)[1];
+    let height = |u: &Unbalance| u.mass_kg * drum_point(u.x_m, u.radius_m, u.angle_deg)[1];
     let unbalances = m.unbalances().map(height);
     let mut energy = m.gravity_m_per_s2 * heights.into_iter().chain(unbalances).sum::<f64>();
     for s in &m.springs {
         let free = s.free_length_m.unwrap_or_else(|| length(s.cabinet_m, s.tub_m));
-        let stretch = length(place(p_t, &tub, s.tub_m), s.cabinet_m) - free;
-        energy += 0.5 * s.stiffness_n_per_m * stretch.powi(2);
-        energy += 0.25 * s.cubic_n_per_m3 * stretch.powi(4);
+        let elongation = length(position(p_t, &tub, s.tub_m), s.cabinet_m) - free;
+        energy += 0.5 * s.stiffness_n_per_m * elongation.powi(2);
+        energy += 0.25 * s.cubic_n_per_m3 * elongation.powi(4);
     }
     let displacement = |at: PlainVector| -> PlainVector {
-        let place = place(p_t, &tub, at);
-        std::array::from_fn(|i| place[i] - at[i])
+        let moved = position(p_t, &tub, at);
+        std::array::from_fn(|i| moved[i] - at[i])
     };
     for s in &m.stops {
         // The integral of (depth + w) / 2 with w = sqrt(depth^2 + softness^2).
@@ -82,10 +83,10 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     for (x_m, stiffness) in
         [(b.front_x_m, b.front_stiffness_n_per_m), (b.rear_x_m, b.rear_stiffness_n_per_m)]
     {
-        let on_tub = place(p_t, &tub, [x_m, 0.0, 0.0]);
-        let on_shaft = place(p_s, &shaft, [x_m, 0.0, 0.0]);
+        let on_tub = position(p_t, &tub, [x_m, 0.0, 0.0]);
+        let shaft_load = position(p_s, &shaft, [x_m, 0.0, 0.0]);
         let deflection_squared =
-            (on_shaft[1] - on_tub[1]).powi(2) + (on_shaft[2] - on_tub[2]).powi(2);
+            (shaft_load[1] - on_tub[1]).powi(2) + (shaft_load[2] - on_tub[2]).powi(2);
         energy += 0.5 * stiffness * deflection_squared;
     }
     let phi = (q[8].cos() * q[9].cos()).acos();
@@ -94,11 +95,11 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
 
 /// Returns the depth (m) of a stop's tub point.
 fn depth_m(stop: &BumpStop, displacement: PlainVector) -> f64 {
-    along(displacement, stop.direction) - stop.clearance_m
+    component_along(displacement, stop.direction) - stop.clearance_m
 }
 
 /// Returns the component along a direction of any length.
-fn along(a: PlainVector, direction: PlainVector) -> f64 {
+fn component_along(a: PlainVector, direction: PlainVector) -> f64 {
     (0..3).map(|i| a[i] * direction[i]).sum::<f64>() / length(direction, [0.0; 3])
 }
 
@@ -111,31 +112,32 @@ fn losses_w(
 ) -> f64 {
     let rest = axes(at_rest[4], at_rest[5]);
     let tub = axes(q[4], q[5]);
-    let tub_point = |at: PlainVector| place([0.0, q[0], q[1]], &tub, at);
+    let tub_point = |point: PlainVector| position([0.0, q[0], q[1]], &tub, point);
     // The tub's angular velocity: yaw rate about c2, pitch rate about t3.
-    let turn: PlainVector = [u[5] * tub[2][0], u[4], u[5] * tub[2][2]];
-    let velocity = |at: PlainVector| -> PlainVector {
-        let arm = place([0.0; 3], &tub, at);
+    let angular_velocity: PlainVector = [u[5] * tub[2][0], u[4], u[5] * tub[2][2]];
+    let velocity = |point: PlainVector| -> PlainVector {
+        let arm = position([0.0; 3], &tub, point);
         let rotation: PlainVector = std::array::from_fn(|i| {
             let j = (i + 1) % 3;
             let k = (i + 2) % 3;
-            turn[j] * arm[k] - turn[k] * arm[j]
+            angular_velocity[j] * arm[k] - angular_velocity[k] * arm[j]
         });
         [rotation[0], rotation[1] + u[0], rotation[2] + u[1]]
     };
     let mut losses = 0.0;
     for d in &m.dampers {
         let end = tub_point(d.tub_m);
-        let rest_m = length(place([0.0, at_rest[0], at_rest[1]], &rest, d.tub_m), d.cabinet_m);
-        let v = along(velocity(d.tub_m), std::array::from_fn(|i| end[i] - d.cabinet_m[i]));
+        let rest_m = length(position([0.0, at_rest[0], at_rest[1]], &rest, d.tub_m), d.cabinet_m);
+        let v =
+            component_along(velocity(d.tub_m), std::array::from_fn(|i| end[i] - d.cabinet_m[i]));
         losses += d.damping_n_s_per_m * v * v;
         let stage = d.friction_n / v.hypot(d.friction_speed_m_per_s) + d.outer_damping_n_s_per_m;
         losses += engagement(d, length(end, d.cabinet_m) - rest_m) * stage * v * v;
     }
     for s in &m.stops {
-        let place = tub_point(s.tub_m);
-        let depth = depth_m(s, std::array::from_fn(|i| place[i] - s.tub_m[i]));
-        let v = along(velocity(s.tub_m), s.direction);
+        let moved = tub_point(s.tub_m);
+        let depth = depth_m(s, std::array::from_fn(|i| moved[i] - s.tub_m[i]));
+        let v = component_along(velocity(s.tub_m), s.direction);
         let contact = 0.5 * (1.0 + depth / depth.hypot(s.softness_m));
         losses += s.damping_n_s_per_m * contact * v * v;
     }
@@ -152,8 +154,8 @@ fn engagement(damper: &Damper, elongation_m: f64) -> f64 {
     if stroke_m == 0.0 {
         return 1.0;
     }
-    let beyond = (elongation_m * elongation_m - stroke_m * stroke_m) / (2.0 * stroke_m);
-    0.5 * (1.0 + beyond / beyond.hypot(damper.free_stroke_softness_m))
+    let excess = (elongation_m * elongation_m - stroke_m * stroke_m) / (2.0 * stroke_m);
+    0.5 * (1.0 + excess / excess.hypot(damper.free_stroke_softness_m))
 }
 
 /// Computes the kinetic energy (J) without spin, u M u / 2.
@@ -169,7 +171,7 @@ fn history_from_initial_velocity(
     machine: &Machine,
     end_s: f64,
     step_s: f64,
-    every_s: f64,
+    interval_s: f64,
 ) -> Vec<InstantOutputs> {
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = prepared(machine.clone(), still, end_s);
@@ -178,18 +180,19 @@ fn history_from_initial_velocity(
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
         (start.speeds[tub], start.speeds[rotor]) = (speed, speed);
     }
-    let history = history(ModelKind::Nonlinear, &Method::Rk4 { step_s }, &point, &start, every_s);
-    let whole = |k| {
+    let history =
+        history(ModelKind::Nonlinear, &Method::Rk4 { step_s }, &point, &start, interval_s);
+    let with_full_coordinates = |k| {
         let mut instant = history.instant(k).unwrap();
         instant.deviations = std::array::from_fn(|i| point.equilibrium[i] + instant.deviations[i]);
         instant
     };
-    (0..history.len()).map(whole).collect()
+    (0..history.len()).map(with_full_coordinates).collect()
 }
 
 /// Returns the energies (J) over 10 s of the paper's machine without dampers, which starts at its
-/// equilibrium with a velocity. Tub and rotor have the same velocity, so that it does not excite
-/// the bearing modes, which a step of 2e-4 s damps.
+/// equilibrium with a velocity. Tub and rotor have the same velocity, which does not excite the
+/// bearing modes; a step of 2e-4 s would damp these.
 fn energies_j(step_s: f64) -> Vec<f64> {
     let mut machine = Machine::paper();
     machine.dampers.clear();
@@ -221,7 +224,7 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
     let mut machine = with_every_element();
     // The softness is wide enough for the trapezoidal rule.
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 1e-3);
-    // The clearance is small enough that the motion closes the stop before friction ends it.
+    // The clearance is small enough that the motion closes the stop before friction stops it.
     machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.001);
     machine.dampers.iter_mut().for_each(|damper| damper.friction_speed_m_per_s = 0.05);
     machine.dampers[0].free_stroke_m = 0.003;
@@ -229,35 +232,42 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
     machine.dampers[0].outer_damping_n_s_per_m = 50.0;
     machine.unbalance.angle_deg = 35.0;
     let coefficients = Coefficients::new(&machine);
-    let every_s = 1e-4;
-    let instants = history_from_initial_velocity(&machine, 3.0, every_s, every_s);
-    let energy = |at: &InstantOutputs| {
-        potential_j(&machine, &at.deviations) + kinetic_j(&coefficients, &at.deviations, &at.speeds)
+    let interval_s = 1e-4;
+    let instants = history_from_initial_velocity(&machine, 3.0, interval_s, interval_s);
+    let energy = |instant: &InstantOutputs| {
+        potential_j(&machine, &instant.deviations)
+            + kinetic_j(&coefficients, &instant.deviations, &instant.speeds)
     };
     let first = energy(&instants[0]);
     let at_rest = equilibrium(&machine);
-    let mut lost = 0.0;
-    let mut worst = 0.0_f64;
+    let mut dissipated_j = 0.0;
+    let mut max_error = 0.0_f64;
     for pair in instants.windows(2) {
-        let [before, after] =
-            [&pair[0], &pair[1]].map(|at| losses_w(&machine, &at_rest, &at.deviations, &at.speeds));
-        lost += 0.5 * every_s * (before + after);
-        worst = worst.max((first - energy(&pair[1]) - lost).abs() / first.abs().max(lost));
+        let [before, after] = [&pair[0], &pair[1]]
+            .map(|instant| losses_w(&machine, &at_rest, &instant.deviations, &instant.speeds));
+        dissipated_j += 0.5 * interval_s * (before + after);
+        max_error = max_error
+            .max((first - energy(&pair[1]) - dissipated_j).abs() / first.abs().max(dissipated_j));
     }
-    let given = kinetic_j(&coefficients, &instants[0].deviations, &instants[0].speeds);
-    eprintln!("of {given:.3} J given, {lost:.3} J lost; the balance is off by {worst:.1e}");
+    let initial_j = kinetic_j(&coefficients, &instants[0].deviations, &instants[0].speeds);
+    eprintln!(
+        "{dissipated_j:.3} of {initial_j:.3} J dissipated; error of the balance {max_error:.1e}"
+    );
     // Most of the energy is dissipated within 3 s.
-    assert!(lost > 0.5 * given && lost < given * (1.0 + 1e-6), "{lost} of {given} J");
-    assert!(worst < 1e-6, "{worst:e}");
+    assert!(
+        dissipated_j > 0.5 * initial_j && dissipated_j < initial_j * (1.0 + 1e-6),
+        "{dissipated_j} of {initial_j} J"
+    );
+    assert!(max_error < 1e-6, "{max_error:e}");
     // At least one stop closes.
-    let closes = |stop: &BumpStop| {
-        let depth = |at: &InstantOutputs| {
-            let q = &at.deviations;
-            let place = place([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
-            depth_m(stop, std::array::from_fn(|i| place[i] - stop.tub_m[i]))
+    let max_depth_m = |stop: &BumpStop| {
+        let depth = |instant: &InstantOutputs| {
+            let q = &instant.deviations;
+            let moved = position([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
+            depth_m(stop, std::array::from_fn(|i| moved[i] - stop.tub_m[i]))
         };
         instants.iter().map(depth).fold(f64::NEG_INFINITY, f64::max)
     };
-    let deepest_m = machine.stops[..2].iter().map(closes).fold(f64::NEG_INFINITY, f64::max);
+    let deepest_m = machine.stops[..2].iter().map(max_depth_m).fold(f64::NEG_INFINITY, f64::max);
     assert!(deepest_m > 1e-3, "{deepest_m} m");
 }

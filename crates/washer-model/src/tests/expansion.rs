@@ -6,7 +6,7 @@ use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::Coupling;
-use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
+use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL_COMPONENTS};
 use crate::point::Point;
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::{Channel, ModelKind, PointEquations, Spin};
@@ -48,18 +48,19 @@ impl MotionAtInstant {
         u: &CoordinateVector,
         a: &CoordinateVector,
     ) -> [CoordinateVector; 2] {
-        let along = |value: f64, slope: f64| N(Dual { value, slope });
-        let at: [_; COORDINATES] = core::array::from_fn(|i| along(self.point.equilibrium[i], q[i]));
-        let [u, a] = [u, a].map(|v| v.map(|v| along(0.0, v)));
+        let dual = |value: f64, slope: f64| N(Dual { value, slope });
+        let dual_q: [_; COORDINATES] =
+            core::array::from_fn(|i| dual(self.point.equilibrium[i], q[i]));
+        let [u, a] = [u, a].map(|v| v.map(|v| dual(0.0, v)));
         let [inertia, force] =
-            equations(&self.point.machine.constant(), &self.spin.constant(), &at, &u, &a);
+            equations(&self.point.machine.constant(), &self.spin.constant(), &dual_q, &u, &a);
         let residual: [_; COORDINATES] = core::array::from_fn(|i| inertia[i] - force[i]);
         [residual.map(|r| r.0.value), residual.map(|r| r.0.slope)]
     }
 }
 
 /// Calls `check` at random instants of random machines.
-fn at_random_instants(seed: u64, mut check: impl FnMut(&MotionAtInstant, &mut fastrand::Rng)) {
+fn check_random_instants(seed: u64, mut check: impl FnMut(&MotionAtInstant, &mut fastrand::Rng)) {
     let mut rng = fastrand::Rng::with_seed(seed);
     for _ in 0..INSTANTS {
         let instant = MotionAtInstant::random(&mut rng);
@@ -76,10 +77,10 @@ const AT_REST: CoordinateVector = [0.0; COORDINATES];
 
 #[test]
 fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
-    let mut worst = [0.0_f64; 4];
-    at_random_instants(21, |instant, _| {
+    let mut max_errors = [0.0_f64; 4];
+    check_random_instants(21, |instant, _| {
         let SpinState { sin, cos, speed, acceleration, .. } = instant.spin;
-        let ours = instant.point.matrices(sin.0.atan2(cos.0), speed.0, acceleration.0);
+        let computed = instant.point.matrices(sin.0.atan2(cos.0), speed.0, acceleration.0);
         let [mut mass, mut damping, mut stiffness] = [[[0.0; COORDINATES]; COORDINATES]; 3];
         let mut force = AT_REST;
         for j in 0..COORDINATES {
@@ -95,20 +96,22 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
                 force[i] = -at_rest[i];
             }
         }
-        let pairs = [(ours.mass, mass), (ours.damping, damping), (ours.stiffness, stiffness)];
-        for (kind, (ours, theirs)) in pairs.into_iter().enumerate() {
-            let largest = theirs.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
-            let difference = ours.iter().flatten().zip(theirs.iter().flatten());
-            worst[kind] = difference.fold(worst[kind], |m, (a, b)| m.max((a - b).abs() / largest));
+        let pairs =
+            [(computed.mass, mass), (computed.damping, damping), (computed.stiffness, stiffness)];
+        for (kind, (computed, expected)) in pairs.into_iter().enumerate() {
+            let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+            let difference = computed.iter().flatten().zip(expected.iter().flatten());
+            max_errors[kind] =
+                difference.fold(max_errors[kind], |m, (a, b)| m.max((a - b).abs() / largest));
         }
         // The entries of F may be far below the weight, of which they are differences.
         let bodies = &instant.point.machine.bodies;
         let weight = bodies.gravity.0 * bodies.rotor_mass.0;
         let largest = force.iter().fold(weight, |m, a| m.max(a.abs()));
-        let difference = ours.force.iter().zip(&force);
-        worst[3] = difference.fold(worst[3], |m, (a, b)| m.max((a - b).abs() / largest));
+        let difference = computed.force.iter().zip(&force);
+        max_errors[3] = difference.fold(max_errors[3], |m, (a, b)| m.max((a - b).abs() / largest));
     });
-    let [m, c, k, f] = worst;
+    let [m, c, k, f] = max_errors;
     eprintln!(
         "against automatic differentiation: M {m:.1e}, C {c:.1e}, K {k:.1e}, F {f:.1e} of the \
          largest entry"
@@ -118,8 +121,8 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
 
 #[test]
 fn accelerations_solve_the_expanded_equations() {
-    let mut worst = 0.0_f64;
-    at_random_instants(22, |instant, rng| {
+    let mut max_errors = 0.0_f64;
+    check_random_instants(22, |instant, rng| {
         let mut q = random(rng, 0.02);
         let u = random(rng, 0.5);
         // Shaft and tub differ by a small deflection of the bearings.
@@ -135,19 +138,19 @@ fn accelerations_solve_the_expanded_equations() {
         let scale = (0..COORDINATES).fold(0.0_f64, |m, i| m.max((at_rest[i] + scale[i]).abs()));
         for i in 0..COORDINATES {
             assert_eq!(dx[i].0, u[i]);
-            worst = worst.max((at_rest[i] + slope[i]).abs() / scale);
+            max_errors = max_errors.max((at_rest[i] + slope[i]).abs() / scale);
         }
     });
-    eprintln!("M q'' + C q' + K q - F: at most {worst:.1e} of the largest force");
-    assert!(worst < 1e-10, "{worst:e}");
+    eprintln!("M q'' + C q' + K q - F: at most {max_errors:.1e} of the largest force");
+    assert!(max_errors < 1e-10, "{max_errors:e}");
 }
 
 #[test]
 fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
     // The greatest errors of values, rates and second derivatives.
-    let mut worst = [0.0_f64; 3];
-    let mut turning = 0.0_f64;
-    at_random_instants(23, |instant, rng| {
+    let mut max_errors = [0.0_f64; 3];
+    let mut max_rest_value = 0.0_f64;
+    check_random_instants(23, |instant, rng| {
         let [q, u, a] = [0.02, 0.5, 20.0].map(|size| random(rng, size));
         let state = |first: &CoordinateVector, second: &CoordinateVector| -> [N<f64>; STATES] {
             core::array::from_fn(|i| N([first, second][i / COORDINATES][i % COORDINATES]))
@@ -155,40 +158,40 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let forcing = instant.model.forcing(N(instant.t_s));
         let (radial, channels) =
             instant.model.observe(&forcing, &state(&q, &u), &state(&u, &a), true);
-        let along = |value: f64, slope: f64| N(Dual { value, slope });
-        let at = core::array::from_fn(|i| along(instant.point.equilibrium[i], q[i]));
-        let [u, a] = [u, a].map(|v| v.map(|v| along(0.0, v)));
-        let motion = MovingCoordinates { q: at, u, a };
+        let dual = |value: f64, slope: f64| N(Dual { value, slope });
+        let dual_q = core::array::from_fn(|i| dual(instant.point.equilibrium[i], q[i]));
+        let [u, a] = [u, a].map(|v| v.map(|v| dual(0.0, v)));
+        let motion = MovingCoordinates { q: dual_q, u, a };
         let bodies = instant.point.machine.bodies.constant();
         let axes = Axes::new(&instant.spin.constant(), &motion);
         let spin_squared = instant.spin.speed.0.powi(2) + instant.spin.acceleration.0.abs();
         let scales = [1.0, 1.0 + spin_squared.sqrt(), 1.0 + spin_squared];
         // Channels are deviations from equilibrium; the radial distance is not.
-        let rest = instant.point.channels_at_rest.into_iter().chain([0.0; RADIAL]);
-        let ours = channels.unwrap().into_iter().chain(radial);
-        let theirs =
+        let rest = instant.point.channels_at_rest.into_iter().chain([0.0; RADIAL_COMPONENTS]);
+        let computed = channels.unwrap().into_iter().chain(radial);
+        let expected =
             axes.channels(&bodies, &motion).into_iter().chain(axes.radial(&bodies, &motion));
-        for ((ours, theirs), rest) in ours.zip(theirs).zip(rest) {
-            let order_zero = theirs.value.0.value - rest;
+        for ((computed, expected), rest) in computed.zip(expected).zip(rest) {
+            let order_zero = expected.value.0.value - rest;
             let pairs = [
-                (ours.value.0, order_zero + theirs.value.0.slope),
-                (ours.slope.0, theirs.slope.0.value + theirs.slope.0.slope),
-                (ours.curvature.0, theirs.curvature.0.value + theirs.curvature.0.slope),
+                (computed.value.0, order_zero + expected.value.0.slope),
+                (computed.slope.0, expected.slope.0.value + expected.slope.0.slope),
+                (computed.curvature.0, expected.curvature.0.value + expected.curvature.0.slope),
             ];
-            for (k, (ours, theirs)) in pairs.into_iter().enumerate() {
-                worst[k] = worst[k].max((ours - theirs).abs() / scales[k]);
+            for (k, (computed, expected)) in pairs.into_iter().enumerate() {
+                max_errors[k] = max_errors[k].max((computed - expected).abs() / scales[k]);
             }
-            turning = turning.max(order_zero.abs());
+            max_rest_value = max_rest_value.max(order_zero.abs());
         }
     });
     eprintln!(
         "linear outputs at deviations of 20 mm and 20 mrad: within {:.1e} m or rad, with a part \
-         of order zero up to {turning:.1e}; \
+         of order zero up to {max_rest_value:.1e}; \
          rates and second derivatives within {:.1e} and {:.1e} of what the spin makes of 1 m",
-        worst[0], worst[1], worst[2]
+        max_errors[0], max_errors[1], max_errors[2]
     );
-    assert!(worst.iter().all(|worst| *worst < 1e-14), "{worst:?}");
-    assert!(turning > 5e-3, "{turning:e}");
+    assert!(max_errors.iter().all(|max_errors| *max_errors < 1e-14), "{max_errors:?}");
+    assert!(max_rest_value > 5e-3, "{max_rest_value:e}");
 }
 
 #[test]
@@ -207,52 +210,53 @@ fn outputs_of_order_zero_turn_with_the_drum() {
         let spin = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![60.0, 60.0] };
         let point = prepared(machine, spin, 1.0);
         let mut equations = PointEquations::new(&point, ModelKind::Linear);
-        let mut at =
+        let mut channel_at =
             |t_s: f64, channel: Channel| equations.channels(t_s, &[0.0; STATES]).0[channel.index()];
         // The weight tilts the shaft by q8 and bends the hinge by q10. The bend turns with the
         // drum.
-        let lean = point.equilibrium[7].cos();
-        let bend = point.equilibrium[9];
-        let along =
+        let shaft_cosine = point.equilibrium[7].cos();
+        let hinge_angle = point.equilibrium[9];
+        let axial_moment =
             drum_kg * (drum_x_m - hinge_x_m) + unbalance_mass_kg * (unbalance.x_m - hinge_x_m);
-        let across = unbalance_mass_kg * unbalance.radius_m;
-        let centre_m = (across * bend.cos() + along * bend.sin()) / mass;
-        let front_m = (front_x_m - hinge_x_m) * bend.sin();
+        let radial_moment = unbalance_mass_kg * unbalance.radius_m;
+        let centre_m =
+            (radial_moment * hinge_angle.cos() + axial_moment * hinge_angle.sin()) / mass;
+        let front_m = (front_x_m - hinge_x_m) * hinge_angle.sin();
         for (y, z, radius_m) in [
             (Channel::TotalCentreY, Channel::TotalCentreZ, centre_m),
             (Channel::DrumFrontY, Channel::DrumFrontZ, front_m),
         ] {
             for (t_s, expected_y, expected_z) in [
                 (0.0, 0.0, 0.0),
-                (0.25, -radius_m * lean, radius_m),
-                (0.5, -2.0 * radius_m * lean, 0.0),
-                (0.75, -radius_m * lean, -radius_m),
+                (0.25, -radius_m * shaft_cosine, radius_m),
+                (0.5, -2.0 * radius_m * shaft_cosine, 0.0),
+                (0.75, -radius_m * shaft_cosine, -radius_m),
             ] {
                 assert!(
-                    (at(t_s, y) - expected_y).abs() < 1e-15,
+                    (channel_at(t_s, y) - expected_y).abs() < 1e-15,
                     "{y:?} at {t_s} s: {}",
-                    at(t_s, y)
+                    channel_at(t_s, y)
                 );
                 assert!(
-                    (at(t_s, z) - expected_z).abs() < 1e-15,
+                    (channel_at(t_s, z) - expected_z).abs() < 1e-15,
                     "{z:?} at {t_s} s: {}",
-                    at(t_s, z)
+                    channel_at(t_s, z)
                 );
             }
         }
         for channel in [Channel::TubFrontY, Channel::TubFrontZ, Channel::TubYaw, Channel::TubPitch]
         {
-            assert_eq!(at(0.5, channel), 0.0);
+            assert_eq!(channel_at(0.5, channel), 0.0);
         }
         // After half a turn the front of the drum is higher, because the bend of the hinge by the
         // weight has turned.
         for (channel, expected_m) in
             [(Channel::TotalCentreY, -1e-3 * centre_mm), (Channel::DrumFrontY, 1e-6 * front_um)]
         {
-            let moved_m = at(0.5, channel);
+            let displacement_m = channel_at(0.5, channel);
             assert!(
-                (moved_m / expected_m - 1.0).abs() < 1e-3,
-                "{channel:?}: {moved_m} for {expected_m}"
+                (displacement_m / expected_m - 1.0).abs() < 1e-3,
+                "{channel:?}: {displacement_m} for {expected_m}"
             );
         }
     }
@@ -260,25 +264,25 @@ fn outputs_of_order_zero_turn_with_the_drum() {
 
 #[test]
 fn the_models_differ_by_second_order_in_the_deviation() {
-    // Half the deviation leaves a quarter of the remainder of M a = f.
-    let mut slopes = Vec::new();
-    at_random_instants(24, |instant, rng| {
+    // For half the deviation the remainder of M a = f is a quarter.
+    let mut orders = Vec::new();
+    check_random_instants(24, |instant, rng| {
         let q = random(rng, 1.0);
         let u = random(rng, 10.0);
         let a = random(rng, 100.0);
         let remainder = |size: f64| {
             let [q, u, a] = [&q, &u, &a].map(|v| v.map(|v| size * v));
             let [at_rest, slope] = instant.residual(&q, &u, &a);
-            let at = core::array::from_fn(|i| N(instant.point.equilibrium[i] + q[i]));
+            let full_q = core::array::from_fn(|i| N(instant.point.equilibrium[i] + q[i]));
             let [inertia, force] =
-                equations(&instant.point.machine, &instant.spin, &at, &u.map(N), &a.map(N));
+                equations(&instant.point.machine, &instant.spin, &full_q, &u.map(N), &a.map(N));
             let difference = |i: usize| (inertia[i] - force[i]).0 - at_rest[i] - slope[i];
             (0..COORDINATES).fold(0.0_f64, |m, i| m.max(difference(i).abs()))
         };
-        slopes.push((remainder(2e-3) / remainder(1e-3)).log2());
+        orders.push((remainder(2e-3) / remainder(1e-3)).log2());
     });
-    let (least, greatest) =
-        slopes.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), &s| (l.min(s), g.max(s)));
-    eprintln!("order of the remainder: {least:.3} to {greatest:.3}");
-    assert!((1.9..2.1).contains(&least) && (1.9..2.1).contains(&greatest));
+    let (min_order, max_order) =
+        orders.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), &s| (l.min(s), g.max(s)));
+    eprintln!("order of the remainder: {min_order:.3} to {max_order:.3}");
+    assert!((1.9..2.1).contains(&min_order) && (1.9..2.1).contains(&max_order));
 }

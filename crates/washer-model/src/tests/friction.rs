@@ -1,5 +1,5 @@
-//! Tests of the speed amplitudes at which the linear model takes friction, if they follow from the
-//! linear motion.
+//! Tests of the speed amplitudes at which the linear model linearises friction, if they follow from
+//! the linear motion.
 
 use crate::modes::mode_roots;
 use crate::{
@@ -10,16 +10,17 @@ use lane_ode::Simd;
 
 const TIMING: Timing = Timing { end_s: 12.0, window_s: [4.0, 10.0], checkpoints: 0 };
 
-/// Returns a machine whose dampers have friction, at their own speed amplitudes or at a given one.
+/// Returns a machine whose dampers have friction. Without `fixed_speed_m_per_s`, their speed
+/// amplitudes follow from the motion.
 pub(crate) fn machine(
     unbalance_mass_kg: f64,
     frictions_n: [f64; 2],
-    given_m_per_s: Option<f64>,
+    fixed_speed_m_per_s: Option<f64>,
 ) -> Machine {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = unbalance_mass_kg;
     for (damper, friction_n) in machine.dampers.iter_mut().zip(frictions_n) {
-        let friction_linear_speed_m_per_s = given_m_per_s;
+        let friction_linear_speed_m_per_s = fixed_speed_m_per_s;
         *damper = Damper {
             damping_n_s_per_m: 10.0,
             friction_n,
@@ -56,36 +57,37 @@ fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
         let count = machine.dampers.iter().filter(|damper| damper.friction_n > 0.0).count();
         assert_eq!(point.friction_speeds().len(), count);
     }
-    let given = prepared(&[machine(0.4, [60.0, 60.0], Some(0.02))]).remove(0);
-    let factor = given.friction_speed_factor(ModelKind::Linear, &[0.1, 0.005]).unwrap();
+    let fixed = prepared(&[machine(0.4, [60.0, 60.0], Some(0.02))]).remove(0);
+    let factor = fixed.friction_speed_factor(ModelKind::Linear, &[0.1, 0.005]).unwrap();
     assert!((factor - 5.0).abs() < 1e-12, "{factor}: below 4 v_s / pi friction is viscous");
 }
 
-/// Between friction and the unbalance's force little is left for the viscous dampers, so that a
-/// small error of a speed moves the motion by nearly as much, and the fixed point is far away.
+/// Friction dissipates almost all of the work of the unbalance's force. A change of the speed
+/// amplitudes then changes the motion's speeds by nearly as much, so that residuals are small
+/// although the fixed point is far away.
 #[test]
 fn own_speeds_near_a_resonance_are_a_fixed_point() {
-    let with = |given_m_per_s: Option<f64>, friction_n: f64| {
-        let mut machine = machine(0.5, [friction_n; 2], given_m_per_s);
+    let machine_with = |fixed_speed_m_per_s: Option<f64>, friction_n: f64| {
+        let mut machine = machine(0.5, [friction_n; 2], fixed_speed_m_per_s);
         machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 4.0);
         machine
     };
     let method = Method::Rk4 { step_s: 2e-4 };
-    let wanted = Recorders::gauge(Gauge::DamperSpeed);
+    let recorders = Recorders::gauge(Gauge::DamperSpeed);
     for friction_n in [45.0, 50.0, 55.0] {
-        let point = prepared(&[with(None, friction_n)]).remove(0);
-        let found = point.friction_speeds().iter().map(|it| it.speed_m_per_s);
+        let point = prepared(&[machine_with(None, friction_n)]).remove(0);
+        let found = point.friction_speeds().iter().map(|amplitude| amplitude.speed_m_per_s);
         let found: Vec<f64> = found.collect();
-        // Newton's method for both speeds, with finite differences of long runs.
+        // Newton's method for both speeds, with finite differences between long runs.
         let motion = |speeds: &[f64]| -> Vec<f64> {
-            let mut machine = with(Some(1.0), friction_n);
+            let mut machine = machine_with(Some(1.0), friction_n);
             for (damper, speed) in machine.dampers.iter_mut().zip(speeds) {
                 damper.friction_linear_speed_m_per_s = Some(*speed);
             }
             let point = prepared(&[machine]).remove(0);
-            let (_, extras) =
-                simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point], wanted);
-            let reciprocals = extras[0].gauge(Gauge::DamperSpeed).iter().map(|speed| 1.0 / speed);
+            let (_, readings) =
+                simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point], recorders);
+            let reciprocals = readings[0].gauge(Gauge::DamperSpeed).iter().map(|speed| 1.0 / speed);
             reciprocals.collect()
         };
         let mut reciprocals: Vec<f64> = found.iter().map(|speed| 1.0 / speed).collect();
@@ -95,29 +97,35 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
                 let motion = motion(&speeds(x));
                 [motion[0] - x[0], motion[1] - x[1]]
             };
-            let here = residual(&reciprocals);
+            let residual_here = residual(&reciprocals);
             let column = |k: usize| {
-                let mut beside = reciprocals.clone();
-                let step = 1e-3 * beside[k];
-                beside[k] += step;
-                let there = residual(&beside);
-                [(there[0] - here[0]) / step, (there[1] - here[1]) / step]
+                let mut shifted = reciprocals.clone();
+                let step = 1e-3 * shifted[k];
+                shifted[k] += step;
+                let shifted_residual = residual(&shifted);
+                [
+                    (shifted_residual[0] - residual_here[0]) / step,
+                    (shifted_residual[1] - residual_here[1]) / step,
+                ]
             };
             let [[a, c], [b, d]] = [column(0), column(1)];
             let determinant = a * d - b * c;
-            reciprocals[0] -= (d * here[0] - b * here[1]) / determinant;
-            reciprocals[1] -= (a * here[1] - c * here[0]) / determinant;
+            reciprocals[0] -= (d * residual_here[0] - b * residual_here[1]) / determinant;
+            reciprocals[1] -= (a * residual_here[1] - c * residual_here[0]) / determinant;
         }
-        let off = found.iter().zip(&reciprocals).map(|(speed, reciprocal)| speed * reciprocal);
-        let off: Vec<f64> = off.collect();
-        println!("{friction_n} N: {found:?} are {off:?} of the fixed point");
-        assert!(off.iter().all(|off| (off - 1.0).abs() < 0.01), "{friction_n} N: {off:?}");
+        let ratio = found.iter().zip(&reciprocals).map(|(speed, reciprocal)| speed * reciprocal);
+        let ratios: Vec<f64> = ratio.collect();
+        println!("{friction_n} N: {found:?} are {ratios:?} of the fixed point");
+        assert!(
+            ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.01),
+            "{friction_n} N: {ratios:?}"
+        );
     }
 }
 
-/// Both dampers of a machine at its resonance slide, and the way to the fixed point leads against
-/// the residual of one of them. The expected speeds are by Newton's method for both, with rows of
-/// `sweep run` at given speeds.
+/// Both dampers of a machine at its resonance slide, and the step to the fixed point has the
+/// opposite sign of the residual of one damper. The expected speeds were computed by Newton's
+/// method, with rows of `sweep run` at fixed speed amplitudes.
 #[test]
 fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
     let mut machine = machine(0.514, [46.1; 2], None);
@@ -128,8 +136,8 @@ fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
     let expected_m_per_s = [0.622_071, 0.388_478];
     assert_eq!(point.friction_speeds().len(), 2);
     for (found, expected) in point.friction_speeds().iter().zip(expected_m_per_s) {
-        let off = found.speed_m_per_s / expected;
-        assert!((off - 1.0).abs() < 0.02, "{off}: {found:?}");
+        let ratio = found.speed_m_per_s / expected;
+        assert!((ratio - 1.0).abs() < 0.02, "{ratio}: {found:?}");
     }
 }
 
@@ -137,9 +145,12 @@ fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
 fn a_stuck_damper_has_the_least_speed_amplitude() {
     let machine = machine(0.01, [120.0, 120.0], None);
     let stuck = prepared(std::slice::from_ref(&machine)).remove(0);
-    let least = 4.0 * machine.dampers[0].friction_speed_m_per_s / std::f64::consts::PI;
+    let min_speed_m_per_s = 4.0 * machine.dampers[0].friction_speed_m_per_s / std::f64::consts::PI;
     for speed in stuck.friction_speeds() {
-        assert!((speed.speed_m_per_s / least - 1.0).abs() < 1e-12, "{speed:?}, least {least}");
+        assert!(
+            (speed.speed_m_per_s / min_speed_m_per_s - 1.0).abs() < 1e-12,
+            "{speed:?}, least {min_speed_m_per_s}"
+        );
     }
 }
 

@@ -34,8 +34,8 @@ pub(super) fn paper(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
     machine
 }
 
-/// Returns a random machine whose numbers are within a fifth of the paper's. It is valid and has a
-/// static equilibrium.
+/// Returns a random machine whose numbers are within a fifth of the paper's, and which is valid and
+/// has a static equilibrium.
 pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
     loop {
         let mut machine = Machine::paper();
@@ -55,7 +55,7 @@ pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
     }
 }
 
-/// Turns the unbalance of a machine about the axis, and adds one in another plane.
+/// Rotates the unbalance of a machine about the axis, and adds an unbalance in another plane.
 pub(super) fn skew(machine: &mut Machine, rng: &mut fastrand::Rng) {
     let mut angle_deg = || 360.0 * (2.0 * rng.f64() - 1.0);
     machine.unbalance.angle_deg = angle_deg();
@@ -95,34 +95,34 @@ fn inertia_forces<T: Real, const R: usize>(
     midpoint: [N<T>; 2],
     rotation: [N<T>; R],
 ) -> ([N<T>; 2], [N<T>; R]) {
-    let FloatingChain { per_mass, arm, .. } = &half.floating;
-    let mut centre = midpoint;
+    let FloatingChain { inverse_mass, arm, .. } = &half.floating;
+    let mut force = midpoint;
     for i in 0..2 {
         for r in 0..R {
-            centre[i] += arm[r][i] * rotation[r];
+            force[i] += arm[r][i] * rotation[r];
         }
-        centre[i] = centre[i] / *per_mass;
+        force[i] = force[i] / *inverse_mass;
     }
-    let mut about = rotation;
+    let mut torques = rotation;
     for r in 0..R {
-        about[r] = arm[r][0] * centre[0] + arm[r][1] * centre[1];
+        torques[r] = arm[r][0] * force[0] + arm[r][1] * force[1];
         for s in 0..R {
-            about[r] += half.inertia[r.max(s)][r.min(s)] * rotation[s];
+            torques[r] += half.inertia[r.max(s)][r.min(s)] * rotation[s];
         }
     }
-    (centre, about)
+    (force, torques)
 }
 
 /// Computes M a and f of the equations M a = f of both halves with their loads.
 pub(super) fn loaded_equations<T: Real>(
-    both: &Halves<T>,
+    halves: &Halves<T>,
     a: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; 2] {
-    let ([i1, i2], [i5, i6]) = inertia_forces(&both.tub, [a[0], a[1]], [a[4], a[5]]);
+    let ([i1, i2], [i5, i6]) = inertia_forces(&halves.tub, [a[0], a[1]], [a[4], a[5]]);
     let ([i3, i4], [i7, i8, i9, i10]) =
-        inertia_forces(&both.rotor, [a[2], a[3]], [a[6], a[7], a[8], a[9]]);
-    let ([f1, f2], [f5, f6]) = both.tub.floating.generalised_forces();
-    let ([f3, f4], [f7, f8, f9, f10]) = both.rotor.floating.generalised_forces();
+        inertia_forces(&halves.rotor, [a[2], a[3]], [a[6], a[7], a[8], a[9]]);
+    let ([f1, f2], [f5, f6]) = halves.tub.floating.generalised_forces();
+    let ([f3, f4], [f7, f8, f9, f10]) = halves.rotor.floating.generalised_forces();
     [[i1, i2, i3, i4, i5, i6, i7, i8, i9, i10], [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]]
 }
 
@@ -144,12 +144,12 @@ pub(super) fn mass_matrix(
     q: &[f64; COORDINATES],
 ) -> [[f64; COORDINATES]; COORDINATES] {
     let q = q.map(N);
-    let still = [N(0.0); COORDINATES];
+    let zeros = [N(0.0); COORDINATES];
     let mut matrix = [[0.0; COORDINATES]; COORDINATES];
     for j in 0..COORDINATES {
-        let mut unit = still;
+        let mut unit = zeros;
         unit[j] = N(1.0);
-        let [column, _] = equations(machine, spin, &q, &still, &unit);
+        let [column, _] = equations(machine, spin, &q, &zeros, &unit);
         for i in 0..COORDINATES {
             matrix[i][j] = column[i].0;
         }

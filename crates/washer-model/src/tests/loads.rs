@@ -2,8 +2,8 @@
 //! of densely sampled time histories.
 
 use super::elements::with_every_element;
-use super::energy::{axes, place};
-use crate::machine::feet::{Feet, LOAD};
+use super::energy::{axes, position};
+use crate::machine::feet::{Feet, LOAD_COMPONENTS};
 use crate::machine::{Cabinet, Foot, Machine};
 use crate::{
     Gauge, InitialDeviation, Method, ModelKind, Point, Profile, Reading, Recorders, Spin, Timing,
@@ -12,10 +12,10 @@ use crate::{
 use lane_ode::Simd;
 
 const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.5, 2.9], checkpoints: 0 };
-const EVERY_S: f64 = 1e-4;
+const INTERVAL_S: f64 = 1e-4;
 
 /// Adds a cabinet on four feet to a machine.
-fn on_feet(mut machine: Machine) -> Machine {
+fn with_cabinet(mut machine: Machine) -> Machine {
     machine.cabinet = Some(Cabinet { mass_kg: 35.0, centre_m: [0.18, -0.1, 0.02], friction: 0.4 });
     let corners = [[0.47, 0.26], [0.47, -0.26], [-0.07, 0.26], [-0.07, -0.26]];
     machine.feet = corners.map(|[x, z]| Foot { foot_m: [x, -0.45, z] }).to_vec();
@@ -28,12 +28,12 @@ fn point(machine: Machine) -> Point {
 }
 
 /// Returns the least of each number over all instants.
-fn least(instants: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
-    let least = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
-    instants.reduce(least).unwrap()
+fn minima(instants: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
+    let minima = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
+    instants.reduce(minima).unwrap()
 }
 
-fn all_close(quantity: &str, values: &[f64], expected: &[f64], tolerance: f64) {
+fn assert_close(quantity: &str, values: &[f64], expected: &[f64], tolerance: f64) {
     assert_eq!(values.len(), expected.len(), "{quantity}");
     for (k, (value, expected)) in values.iter().zip(expected).enumerate() {
         let error = (value - expected).abs();
@@ -58,11 +58,11 @@ fn load(
     point: &Point,
     deviations: &[f64; 10],
     forces: &crate::Forces,
-) -> [f64; LOAD] {
+) -> [f64; LOAD_COMPONENTS] {
     let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + deviations[i]);
     let tub = axes(q[4], q[5]);
-    let place_of = |at: [f64; 3]| place([0.0, q[0], q[1]], &tub, at);
-    let mut load = [0.0; LOAD];
+    let tub_point = |at: [f64; 3]| position([0.0, q[0], q[1]], &tub, at);
+    let mut load = [0.0; LOAD_COMPONENTS];
     let mut add = |at: [f64; 3], force: [f64; 3]| {
         for i in 0..3 {
             let j = (i + 1) % 3;
@@ -74,24 +74,24 @@ fn load(
     let springs = machine.springs.iter().map(|s| (s.cabinet_m, s.tub_m)).zip(&forces.springs_n);
     let dampers = machine.dampers.iter().map(|d| (d.cabinet_m, d.tub_m)).zip(&forces.dampers_n);
     for ((cabinet_m, tub_m), tension_n) in springs.chain(dampers) {
-        let end = place_of(tub_m);
+        let end = tub_point(tub_m);
         let span: [f64; 3] = std::array::from_fn(|i| end[i] - cabinet_m[i]);
         let length = span.iter().map(|s| s * s).sum::<f64>().sqrt();
         add(cabinet_m, span.map(|s| tension_n * s / length));
     }
     for (stop, push_n) in machine.stops.iter().zip(&forces.stops_n) {
         let length = stop.direction_length();
-        add(place_of(stop.tub_m), stop.direction.map(|d| push_n * d / length));
+        add(tub_point(stop.tub_m), stop.direction.map(|d| push_n * d / length));
     }
     for (bushing, force_n) in machine.bushings.iter().zip(&forces.bushings_n) {
-        add(place_of(bushing.tub_m), *force_n);
+        add(tub_point(bushing.tub_m), *force_n);
     }
     load
 }
 
 #[test]
 fn recorded_loads_agree_with_a_densely_sampled_history() {
-    let mut machine = on_feet(with_every_element());
+    let mut machine = with_cabinet(with_every_element());
     machine.unbalance.mass_kg = 0.9;
     machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.003);
     // The cabinet is so heavy that no foot lifts. On a single foot there would be no resistance to
@@ -101,11 +101,11 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     let feet = Feet::new(&machine).unwrap();
     let method = Method::Rk4 { step_s: 1e-4 };
     let history =
-        history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), EVERY_S);
-    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
+        history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), INTERVAL_S);
+    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
     let mut feet_n = vec![f64::INFINITY; 4];
-    let mut margin_n = f64::INFINITY;
-    let mut walk_n = f64::INFINITY;
+    let mut slip_margin_n = f64::INFINITY;
+    let mut walk_margin_n = f64::INFINITY;
     let mut stops_n = vec![0.0_f64; 3];
     let mut closed_s = vec![0.0_f64; 3];
     let mut greatest_tensions_n = vec![0.0_f64; machine.dampers.len()];
@@ -117,28 +117,28 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
             assert!((load[i] - forces.cabinet_n[i]).abs() < 1e-9);
         }
         let loads_n = feet.loads_n(&load);
-        all_close("a history's load of foot", &forces.feet_n, &loads_n, 1e-9);
+        assert_close("a history's load of foot", &forces.feet_n, &loads_n, 1e-9);
         let horizontal_n = (load[0] * load[0] + load[2] * load[2]).sqrt();
-        let margin_now_n = 0.4 * (feet.distribution.weight.0 - load[1]) - horizontal_n;
-        assert!((forces.slip_margin_n.unwrap() - margin_now_n).abs() < 1e-9);
-        margin_n = margin_n.min(margin_now_n);
+        let slip_margin_now_n = 0.4 * (feet.distribution.weight.0 - load[1]) - horizontal_n;
+        assert!((forces.slip_margin_n.unwrap() - slip_margin_now_n).abs() < 1e-9);
+        slip_margin_n = slip_margin_n.min(slip_margin_now_n);
         // The moment is taken about the centre of the feet's loads; feet that lift have no load.
         let loaded_n: Vec<f64> = loads_n.iter().map(|n| n.max(0.0)).collect();
-        let all_n: f64 = loaded_n.iter().sum();
+        let total_n: f64 = loaded_n.iter().sum();
         let mean = |axis: usize| {
             let feet = machine.feet.iter().zip(&loaded_n);
-            feet.map(|(foot, n)| foot.foot_m[axis] * n / all_n).sum::<f64>()
+            feet.map(|(foot, n)| foot.foot_m[axis] * n / total_n).sum::<f64>()
         };
         let arm = |foot: &Foot| (foot.foot_m[0] - mean(0)).hypot(foot.foot_m[2] - mean(2));
         let arms: Vec<f64> = machine.feet.iter().map(arm).collect();
         let mean_square_arm_m2: f64 =
-            arms.iter().zip(&loaded_n).map(|(arm, n)| n / all_n * arm * arm).sum();
+            arms.iter().zip(&loaded_n).map(|(arm, n)| n / total_n * arm * arm).sum();
         let longest = arms.iter().copied().fold(0.0, f64::max);
         let moment = load[4] + mean(0) * load[2] - mean(2) * load[0];
-        let walk_now_n = margin_now_n - moment.abs() * longest / mean_square_arm_m2;
-        assert!((forces.walk_margin_n.unwrap() - walk_now_n).abs() < 1e-6);
-        walk_n = walk_n.min(walk_now_n);
-        feet_n = least([feet_n, loads_n].into_iter());
+        let walk_margin_now_n = slip_margin_now_n - moment.abs() * longest / mean_square_arm_m2;
+        assert!((forces.walk_margin_n.unwrap() - walk_margin_now_n).abs() < 1e-6);
+        walk_margin_n = walk_margin_n.min(walk_margin_now_n);
+        feet_n = minima([feet_n, loads_n].into_iter());
         for (greatest_n, now_n) in stops_n.iter_mut().zip(&forces.stops_n) {
             *greatest_n = greatest_n.max(*now_n);
         }
@@ -147,60 +147,70 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         }
         let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
         for (closed_s, stop) in closed_s.iter_mut().zip(&machine.stops) {
-            let at = place([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
+            let at = position([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
             let length = stop.direction_length();
-            let along: f64 =
+            let displacement_m: f64 =
                 (0..3).map(|i| (at[i] - stop.tub_m[i]) * stop.direction[i] / length).sum();
-            *closed_s += if along > stop.clearance_m { EVERY_S } else { 0.0 };
+            *closed_s += if displacement_m > stop.clearance_m { INTERVAL_S } else { 0.0 };
         }
     }
-    let hit = stops_n.iter().zip(&closed_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
-    assert!(hit.count() >= 2, "{stops_n:?} N, {closed_s:?} s");
+    let hit_stops =
+        stops_n.iter().zip(&closed_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
+    assert!(hit_stops.count() >= 2, "{stops_n:?} N, {closed_s:?} s");
     let reading = read_gauges(&point, ModelKind::Nonlinear, Simd::best());
-    all_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
-    all_close("margin", reading.gauge(Gauge::SlipMargin), &[margin_n], 1e-2);
-    all_close("walking", reading.gauge(Gauge::WalkMargin), &[walk_n], 0.1);
-    assert!(walk_n < margin_n - 1.0, "{walk_n} N, {margin_n} N: this machine turns");
+    assert_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
+    assert_close("margin", reading.gauge(Gauge::SlipMargin), &[slip_margin_n], 1e-2);
+    assert_close("walking", reading.gauge(Gauge::WalkMargin), &[walk_margin_n], 0.1);
+    assert!(
+        walk_margin_n < slip_margin_n - 1.0,
+        "{walk_margin_n} N, {slip_margin_n} N: this machine turns"
+    );
     let greatest_n = stops_n.iter().copied().fold(0.0, f64::max);
-    all_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-3 * greatest_n);
+    assert_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-3 * greatest_n);
     // A damper's tension increases with its speed, so that both are greatest at the same instant.
     let tensions_n: Vec<f64> = reading
         .gauge(Gauge::DamperSpeed)
         .iter()
         .zip(&machine.dampers)
         .map(|(speed, damper)| {
-            let turn = damper.friction_speed_m_per_s;
+            let friction_speed = damper.friction_speed_m_per_s;
             damper.damping_n_s_per_m * speed
-                + damper.friction_n * speed / (speed * speed + turn * turn).sqrt()
+                + damper.friction_n * speed
+                    / (speed * speed + friction_speed * friction_speed).sqrt()
         })
         .collect();
     let quantity = "tension at the greatest speed of damper";
-    all_close(quantity, &tensions_n, &greatest_tensions_n, 1e-2);
+    assert_close(quantity, &tensions_n, &greatest_tensions_n, 1e-2);
     // The error of each contact is up to one interval at both ends.
-    all_close("contact of stop", reading.gauge(Gauge::StopContact), &closed_s, 40.0 * EVERY_S);
+    assert_close(
+        "contact of stop",
+        reading.gauge(Gauge::StopContact),
+        &closed_s,
+        40.0 * INTERVAL_S,
+    );
     assert_eq!(read_gauges(&point, ModelKind::Nonlinear, Simd::Scalar), reading);
 }
 
 #[test]
 fn loads_of_the_linear_model_agree_with_its_history() {
-    let mut machine = on_feet(with_every_element());
+    let mut machine = with_cabinet(with_every_element());
     machine.unbalance.mass_kg = 0.9;
     let point = point(machine.clone());
     let method = Method::Rk4 { step_s: 1e-4 };
     let history =
-        history(ModelKind::Linear, &method, &point, &InitialDeviation::default(), EVERY_S);
-    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
+        history(ModelKind::Linear, &method, &point, &InitialDeviation::default(), INTERVAL_S);
+    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
     let forces: Vec<_> = (first..=last).map(|k| history.forces(k).unwrap()).collect();
-    let feet_n = least(forces.iter().map(|forces| forces.feet_n.clone()));
-    let margin_n = least(forces.iter().map(|forces| vec![forces.slip_margin_n.unwrap()]));
-    let below_n = least(forces.iter().map(|forces| forces.stops_n.iter().map(|n| -n).collect()));
+    let feet_n = minima(forces.iter().map(|forces| forces.feet_n.clone()));
+    let slip_margin_n = minima(forces.iter().map(|forces| vec![forces.slip_margin_n.unwrap()]));
+    let below_n = minima(forces.iter().map(|forces| forces.stops_n.iter().map(|n| -n).collect()));
     let stops_n: Vec<f64> = below_n.iter().map(|below_n| -below_n).collect();
     let reading = read_gauges(&point, ModelKind::Linear, Simd::best());
     let at_rest = history.forces(0).unwrap();
     assert!(at_rest.feet_n.iter().zip(&feet_n).all(|(rest_n, n)| rest_n - n > 10.0), "{feet_n:?}");
-    all_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
-    all_close("margin", reading.gauge(Gauge::SlipMargin), &margin_n, 1e-2);
-    all_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-6);
+    assert_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
+    assert_close("margin", reading.gauge(Gauge::SlipMargin), &slip_margin_n, 1e-2);
+    assert_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-6);
     let dampers = machine.dampers.iter().zip(reading.gauge(Gauge::DamperSpeed));
     let tensions_n: Vec<f64> = dampers
         .map(|(damper, speed)| {
@@ -210,16 +220,16 @@ fn loads_of_the_linear_model_agree_with_its_history() {
         })
         .collect();
     let negative_n =
-        least(forces.iter().map(|forces| forces.dampers_n.iter().map(|n| -n.abs()).collect()));
+        minima(forces.iter().map(|forces| forces.dampers_n.iter().map(|n| -n.abs()).collect()));
     let greatest_tensions_n: Vec<f64> = negative_n.iter().map(|n| -n).collect();
     assert!(greatest_tensions_n.iter().all(|n| *n > 1.0), "{greatest_tensions_n:?}");
     let quantity = "tension at the greatest speed of damper";
-    all_close(quantity, &tensions_n, &greatest_tensions_n, 1e-2);
+    assert_close(quantity, &tensions_n, &greatest_tensions_n, 1e-2);
 }
 
 #[test]
 fn the_foot_loads_of_both_models_agree_for_small_motions() {
-    let mut machine = on_feet(with_every_element());
+    let mut machine = with_cabinet(with_every_element());
     machine.dampers.iter_mut().for_each(|damper| {
         damper.friction_n = 0.0;
         damper.damping_n_s_per_m = 100.0;

@@ -35,25 +35,28 @@ fn a_table_of_a_million_rows_is_prepared() {
     let halfway_rpm = spin.speeds_rpm(halfway_s).sum::<f64>() / rows as f64;
     assert!((halfway_rpm - 300.0).abs() < 0.1, "{halfway_rpm}");
     let point = &points(&[spin], &timing(end_s, [1.0, end_s]))[0];
-    assert_eq!((point.stretches.len(), point.segments.len()), (rows, rows));
+    assert_eq!((point.spin_segments.len(), point.segments.len()), (rows, rows));
 }
 
 #[test]
-fn every_segment_lies_within_its_stretch() {
+fn every_segment_lies_within_its_spin_segment() {
     let spin = table(200);
     // The edges are at a row's time, between two rows, and after the last one.
     for window_s in [[0.0, 1.0], [0.5, 2.3], [1.01, 4.0]] {
         let point = &points(std::slice::from_ref(&spin), &timing(4.0, window_s))[0];
         for segment in point.segments.iter() {
-            let expected =
-                point.stretches.iter().rposition(|stretch| stretch.start_s.0 <= segment.start_s);
-            assert_eq!(Some(segment.stretch), expected, "{segment:?}");
-            let next = point.stretches.get(segment.stretch + 1);
+            let expected = point
+                .spin_segments
+                .iter()
+                .rposition(|spin_segment| spin_segment.start_s.0 <= segment.start_s);
+            assert_eq!(Some(segment.spin_segment), expected, "{segment:?}");
+            let next = point.spin_segments.get(segment.spin_segment + 1);
             assert!(next.is_none_or(|next| segment.end_s <= next.start_s.0));
         }
         for t_s in [0.0, 0.3, 0.5, 2.3, 5.0] {
-            let stretch = point.stretches.iter().rev().find(|stretch| stretch.start_s.0 <= t_s);
-            let speed_rad_per_s = stretch.unwrap().speed_rad_per_s(t_s);
+            let spin_segment =
+                point.spin_segments.iter().rev().find(|spin_segment| spin_segment.start_s.0 <= t_s);
+            let speed_rad_per_s = spin_segment.unwrap().speed_rad_per_s(t_s);
             let speed_rpm = speed_rad_per_s * 60.0 / core::f64::consts::TAU;
             assert_eq!(spin.speeds_rpm([t_s]).next(), Some(speed_rpm), "{t_s}");
         }
@@ -61,12 +64,12 @@ fn every_segment_lies_within_its_stretch() {
 }
 
 #[test]
-fn neighbours_with_the_same_spin_share_stretches_and_segments() {
+fn neighbours_with_the_same_spin_share_spin_segments_and_segments() {
     let a = table(100);
     let b = table(101);
     let points = points(&[a.clone(), a.clone(), b, a], &timing(1.0, [0.0, 1.0]));
     let shared = |i: usize, j: usize| {
-        Arc::ptr_eq(&points[i].stretches, &points[j].stretches)
+        Arc::ptr_eq(&points[i].spin_segments, &points[j].spin_segments)
             && Arc::ptr_eq(&points[i].segments, &points[j].segments)
     };
     assert!(shared(0, 1) && !shared(1, 2) && !shared(2, 3));

@@ -13,39 +13,44 @@ use lane_ode::{Dual, N};
 
 #[test]
 fn val_mass_matrix_matches_that_of_an_independent_program() {
-    let mut worst = 0.0_f64;
+    let mut max_error = 0.0_f64;
     for case in reference("rhs.json")["cases"].as_array().unwrap() {
-        let ours =
+        let computed =
             mass_matrix(&Coefficients::new(&machine(case)), &spin(case), &numbers(&case["q"]));
-        let theirs: [[f64; COORDINATES]; COORDINATES] =
+        let expected: [[f64; COORDINATES]; COORDINATES] =
             std::array::from_fn(|i| numbers(&case["mass_matrix"].as_array().unwrap()[i]));
-        let largest = theirs.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+        let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
         for i in 0..COORDINATES {
             for j in 0..COORDINATES {
-                let error = (ours[i][j] - theirs[i][j]).abs() / largest;
-                assert!(error < 1e-14, "M[{i}][{j}]: {} against {}", ours[i][j], theirs[i][j]);
-                worst = worst.max(error);
+                let error = (computed[i][j] - expected[i][j]).abs() / largest;
+                assert!(
+                    error < 1e-14,
+                    "M[{i}][{j}]: {} against {}",
+                    computed[i][j],
+                    expected[i][j]
+                );
+                max_error = max_error.max(error);
             }
         }
     }
-    eprintln!("mass matrix: at most {worst:.1e} of the largest entry");
+    eprintln!("mass matrix: at most {max_error:.1e} of the largest entry");
 }
 
-/// Calls `check` with random states of random machines. The deflections of the bearings are small.
-fn in_motion(
+/// Calls `check` with random states of random machines, at small deflections of the bearings.
+fn check_random_states(
     seed: u64,
     mut check: impl FnMut(&Coefficients<f64>, &SpinState<f64>, &LaneVector, &LaneVector),
 ) {
     let mut rng = fastrand::Rng::with_seed(seed);
     for _ in 0..200 {
         let coefficients = Coefficients::new(&random_machine(&mut rng));
-        let mut draw = |size: f64| N(size * (2.0 * rng.f64() - 1.0));
-        let spin = SpinState::new(draw(40.0).sin_cos(), draw(130.0), draw(10.0));
-        let mut q: LaneVector = core::array::from_fn(|_| draw(0.05));
+        let mut random = |size: f64| N(size * (2.0 * rng.f64() - 1.0));
+        let spin = SpinState::new(random(40.0).sin_cos(), random(130.0), random(10.0));
+        let mut q: LaneVector = core::array::from_fn(|_| random(0.05));
         for (rotor, tub) in [(2, 0), (3, 1), (6, 4), (7, 5)] {
-            q[rotor] = q[tub] + draw(1e-5);
+            q[rotor] = q[tub] + random(1e-5);
         }
-        let u = core::array::from_fn(|_| draw(0.5));
+        let u = core::array::from_fn(|_| random(0.5));
         check(&coefficients, &spin, &q, &u);
     }
 }
@@ -60,16 +65,16 @@ fn residual([inertia, force]: &[LaneVector; 2]) -> f64 {
 
 #[test]
 fn accelerations_solve_the_equations_of_motion_of_any_machine() {
-    let mut worst = 0.0_f64;
-    in_motion(11, |machine, spin, q, u| {
+    let mut max_error = 0.0_f64;
+    check_random_states(11, |machine, spin, q, u| {
         let a = accelerations(machine, &Coupling::Springs, &sag(), spin, q, u);
-        worst = worst.max(residual(&equations(machine, spin, q, u, &a)));
+        max_error = max_error.max(residual(&equations(machine, spin, q, u, &a)));
     });
-    eprintln!("M a - f: at most {worst:.1e} of the largest force");
-    assert!(worst < 1e-12, "{worst:e}");
+    eprintln!("M a - f: at most {max_error:.1e} of the largest force");
+    assert!(max_error < 1e-12, "{max_error:e}");
 }
 
-/// Returns a sag of any size, because mass scaling is correct for any sag.
+/// Returns an arbitrary sag; mass scaling is correct for any sag.
 fn sag() -> Sag<f64> {
     let bearings = Deflection { offset: [N(-3e-6), N(1e-6)], tilt: [N(2e-5), N(-1e-5)] };
     Sag { bearings, hinge: [N(2e-4), N(-7e-4)] }
@@ -77,10 +82,10 @@ fn sag() -> Sag<f64> {
 
 #[test]
 fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
-    let mut worst = 0.0_f64;
+    let mut max_error = 0.0_f64;
     for (cap, hinge_rad_per_s) in [(300.0_f64, Some(400.0)), (1500.0, None)] {
         let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
-        in_motion(12, |machine, spin, q, u| {
+        check_random_states(12, |machine, spin, q, u| {
             let sag = sag();
             let a = accelerations(machine, &Coupling::new(N(0.0), Some(&caps)), &sag, spin, q, u);
             // Nested dual numbers give the second time derivative of the deflection.
@@ -91,7 +96,7 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
             let [tub, shaft] = [4, 6].map(|i| Tilt::new(motion[i], motion[i + 1]));
             let d = Deflection::new(&motion, &tub, &shaft);
             let speed_squared = spin.speed.0 * spin.speed.0;
-            let added = |d: [N<Dual<Dual<f64>>>; 2], sag: [N<f64>; 2]| {
+            let mass_deflection = |d: [N<Dual<Dual<f64>>>; 2], sag: [N<f64>; 2]| {
                 let component = |i: usize| {
                     let Dual { value, slope } = d[i].0;
                     N((slope.slope + speed_squared * (value.value - sag[i].0)) / (cap * cap))
@@ -99,28 +104,31 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
                 [component(0), component(1)]
             };
             let Deflection { offset, tilt } = sag.bearings;
-            let deflection =
-                Deflection { offset: added(d.offset, offset), tilt: added(d.tilt, tilt) };
+            let deflection = Deflection {
+                offset: mass_deflection(d.offset, offset),
+                tilt: mass_deflection(d.tilt, tilt),
+            };
             let load = deflection.load_on_shaft(&machine.bodies);
-            let mut both = coupled_halves(machine, spin, q, u);
-            both.tub.floating.apply(&load.reaction());
-            both.rotor.floating.apply(&load);
+            let mut halves = coupled_halves(machine, spin, q, u);
+            halves.tub.floating.apply(&load.reaction());
+            halves.rotor.floating.apply(&load);
             if let Some(cap) = hinge_rad_per_s {
-                // The deflection by weight does not turn with the drum, so that it turns backwards
-                // in the shaft's frame.
-                let [nine, ten] = sag.hinge;
-                let turned = [spin.cos * nine + spin.sin * ten, spin.cos * ten - spin.sin * nine];
+                // The deflection by weight does not turn with the drum, so that it rotates
+                // backwards in the shaft's frame.
+                let [sag_9, sag_10] = sag.hinge;
+                let rotated_sag =
+                    [spin.cos * sag_9 + spin.sin * sag_10, spin.cos * sag_10 - spin.sin * sag_9];
                 let mass = N(machine.bodies.flexure_stiffness.0 / (cap * cap));
                 let forwards = [-u[9], u[8]];
                 for i in 0..2 {
-                    let whirl =
-                        N(1.5 * spin.speed.0) * forwards[i] - N(0.5 * speed_squared) * turned[i];
-                    both.rotor.floating.torque[2 + i] -= mass * (a[8 + i] + whirl);
+                    let whirl = N(1.5 * spin.speed.0) * forwards[i]
+                        - N(0.5 * speed_squared) * rotated_sag[i];
+                    halves.rotor.floating.torque[2 + i] -= mass * (a[8 + i] + whirl);
                 }
             }
-            worst = worst.max(residual(&loaded_equations(&both, &a)));
+            max_error = max_error.max(residual(&loaded_equations(&halves, &a)));
         });
     }
-    eprintln!("(M + K/w^2) a - f: at most {worst:.1e} of the largest force");
-    assert!(worst < 1e-11, "{worst:e}");
+    eprintln!("(M + K/w^2) a - f: at most {max_error:.1e} of the largest force");
+    assert!(max_error < 1e-11, "{max_error:e}");
 }

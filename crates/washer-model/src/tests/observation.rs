@@ -4,49 +4,49 @@ use super::instruments::{prepared, random_machine, random_spin};
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
 use crate::nonlinear::coupling::Coupling;
-use crate::nonlinear::outputs::RADIAL;
+use crate::nonlinear::outputs::RADIAL_COMPONENTS;
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use lane_ode::{N, Sample};
 
-const OUTPUTS: usize = CHANNELS + RADIAL;
+const OUTPUTS: usize = CHANNELS + RADIAL_COMPONENTS;
 
 /// Computes the largest errors of slope and curvature, relative to their largest magnitudes,
-/// against central differences over `2 H_S`.
+/// against central differences over `2 STEP_S`.
 fn errors<M: LaneModel<f64>>(seed: u64) -> [f64; 2] {
-    const H_S: f64 = 1e-5;
+    const STEP_S: f64 = 1e-5;
     let mut rng = fastrand::Rng::with_seed(seed);
-    let mut worst = [0.0_f64; 2];
+    let mut max_errors = [0.0_f64; 2];
     for kind in 0..40 {
         let point = prepared(random_machine(&mut rng), random_spin(&mut rng, kind, 4.0), 4.0);
         let model = M::splat(N(0.0), &point, Coupling::Springs);
-        let mut draw = |size: f64| size * (2.0 * rng.f64() - 1.0);
-        let middle_s = 0.2 + draw(0.1);
+        let mut random = |size: f64| size * (2.0 * rng.f64() - 1.0);
+        let middle_s = 0.2 + random(0.1);
         let rest = M::at_rest(&point);
-        let q: [f64; COORDINATES] = core::array::from_fn(|i| rest[i] + draw(0.03));
-        let u: [f64; COORDINATES] = core::array::from_fn(|_| draw(0.5));
-        let a: [f64; COORDINATES] = core::array::from_fn(|_| draw(20.0));
+        let q: [f64; COORDINATES] = core::array::from_fn(|i| rest[i] + random(0.03));
+        let u: [f64; COORDINATES] = core::array::from_fn(|_| random(0.5));
+        let a: [f64; COORDINATES] = core::array::from_fn(|_| random(20.0));
         // The outputs of a motion of constant acceleration.
         let outputs = |t: f64| -> [Sample<f64>; OUTPUTS] {
             let position = |i: usize| q[i] + t * (u[i] + 0.5 * t * a[i]);
             let speed = |i: usize| u[i] + t * a[i];
-            let joined =
+            let join =
                 |first: &dyn Fn(usize) -> f64, second: &dyn Fn(usize) -> f64| -> [N<f64>; STATES] {
                     core::array::from_fn(|i| {
                         N(if i < COORDINATES { first(i) } else { second(i - COORDINATES) })
                     })
                 };
-            let x = joined(&position, &speed);
-            let dx = joined(&speed, &|i| a[i]);
+            let x = join(&position, &speed);
+            let dx = join(&speed, &|i| a[i]);
             let (radial, channels) = model.observe(&model.forcing(N(middle_s + t)), &x, &dx, true);
             let channels = channels.unwrap();
             core::array::from_fn(|i| if i < CHANNELS { channels[i] } else { radial[i - CHANNELS] })
         };
-        let [before, now, after] = [-H_S, 0.0, H_S].map(outputs);
+        let [before, now, after] = [-STEP_S, 0.0, STEP_S].map(outputs);
         let mut largest = [0.0_f64; 2];
         let mut difference = [0.0_f64; 2];
         for i in 0..OUTPUTS {
-            let slope = (after[i].value.0 - before[i].value.0) / (2.0 * H_S);
-            let curvature = (after[i].slope.0 - before[i].slope.0) / (2.0 * H_S);
+            let slope = (after[i].value.0 - before[i].value.0) / (2.0 * STEP_S);
+            let curvature = (after[i].slope.0 - before[i].slope.0) / (2.0 * STEP_S);
             for (k, (value, expected)) in
                 [(now[i].slope.0, slope), (now[i].curvature.0, curvature)].into_iter().enumerate()
             {
@@ -55,10 +55,10 @@ fn errors<M: LaneModel<f64>>(seed: u64) -> [f64; 2] {
             }
         }
         for k in 0..2 {
-            worst[k] = worst[k].max(difference[k] / largest[k]);
+            max_errors[k] = max_errors[k].max(difference[k] / largest[k]);
         }
     }
-    worst
+    max_errors
 }
 
 #[test]

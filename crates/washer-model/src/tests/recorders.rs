@@ -9,9 +9,9 @@ use crate::{
 use lane_ode::{Simd, Tolerance};
 
 const TIMING: Timing = Timing { end_s: 4.0, window_s: [1.3, 3.9], checkpoints: 0 };
-const EVERY_S: f64 = 2.5e-4;
+const INTERVAL_S: f64 = 2.5e-4;
 
-/// Returns a point that passes the resonances in four seconds, with so small a clearance that drum
+/// Returns a point that passes the resonances in four seconds, with a clearance so small that drum
 /// and tub overlap at times.
 fn point() -> Point {
     let machine = Machine { radial_clearance_m: 0.4e-3, ..paper(0.8, 120.0) };
@@ -20,7 +20,7 @@ fn point() -> Point {
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
-/// The readings that follow from a history.
+/// The readings that are computed from a history.
 struct SampledReadings {
     root_mean_squares: [f64; 8],
     turns: Vec<[f64; 8]>,
@@ -28,11 +28,11 @@ struct SampledReadings {
     clash_time_s: f64,
 }
 
-fn sampled(point: &Point, model: ModelKind, method: &Method) -> SampledReadings {
-    let history = history(model, method, point, &InitialDeviation::default(), EVERY_S);
-    let cuts = whole_turn_cuts_s(&point.stretches, TIMING.window_s);
-    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
-    let mut found = SampledReadings {
+fn sample_readings(point: &Point, model: ModelKind, method: &Method) -> SampledReadings {
+    let history = history(model, method, point, &InitialDeviation::default(), INTERVAL_S);
+    let cuts = whole_turn_cuts_s(&point.spin_segments, TIMING.window_s);
+    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
+    let mut readings = SampledReadings {
         root_mean_squares: [0.0; 8],
         turns: vec![[0.0; 8]; cuts.len() + 1],
         cabinet_force_n: 0.0,
@@ -40,24 +40,25 @@ fn sampled(point: &Point, model: ModelKind, method: &Method) -> SampledReadings 
     };
     for k in first..=last {
         // The weight of the trapezoidal rule.
-        let weight = if k == first || k == last { 0.5 * EVERY_S } else { EVERY_S };
+        let weight = if k == first || k == last { 0.5 * INTERVAL_S } else { INTERVAL_S };
         let instant = history.instant(k).unwrap();
-        let turn = cuts.partition_point(|cut_s| *cut_s < k as f64 * EVERY_S);
+        let turn = cuts.partition_point(|cut_s| *cut_s < k as f64 * INTERVAL_S);
         for (i, y) in instant.channels.into_iter().enumerate() {
-            found.root_mean_squares[i] += weight * y * y;
-            found.turns[turn][i] = found.turns[turn][i].max(y.abs());
+            readings.root_mean_squares[i] += weight * y * y;
+            readings.turns[turn][i] = readings.turns[turn][i].max(y.abs());
         }
         let force_n =
             history.forces(k).unwrap().cabinet_n.iter().map(|f| f * f).sum::<f64>().sqrt();
-        found.cabinet_force_n = found.cabinet_force_n.max(force_n);
-        found.clash_time_s += if instant.gap_m < 0.0 { weight } else { 0.0 };
+        readings.cabinet_force_n = readings.cabinet_force_n.max(force_n);
+        readings.clash_time_s += if instant.gap_m < 0.0 { weight } else { 0.0 };
     }
     let length_s = TIMING.window_s[1] - TIMING.window_s[0];
-    found.root_mean_squares = found.root_mean_squares.map(|integral| (integral / length_s).sqrt());
-    found
+    readings.root_mean_squares =
+        readings.root_mean_squares.map(|integral| (integral / length_s).sqrt());
+    readings
 }
 
-fn close(quantity: &str, value: f64, expected: f64, tolerance: f64) {
+fn assert_close(quantity: &str, value: f64, expected: f64, tolerance: f64) {
     let error = (value - expected).abs() / expected.abs();
     assert!(error <= tolerance, "{quantity}: {value} instead of {expected}, error {error:e}");
 }
@@ -75,36 +76,42 @@ fn readings_agree_with_densely_sampled_histories() {
             "recorders do not change peaks"
         );
         let reading = &readings[0];
-        let expected = sampled(&point, model, &method);
-        let rms = reading.root_mean_squares.unwrap();
+        let expected = sample_readings(&point, model, &method);
+        let root_mean_squares = reading.root_mean_squares.unwrap();
         assert!(reading.turns.len() > 10);
         assert_eq!(reading.turns.len(), expected.turns.len());
         for channel in Channel::ALL {
             let i = channel.index();
             let name = channel.name();
-            close(name, rms[i], expected.root_mean_squares[i], 1e-5);
-            let mut exact = 0;
-            for (found, expected) in reading.turns.iter().zip(&expected.turns) {
-                // A sample near a crest has almost the crest's value. The error is greater for a
-                // turn whose largest deviation is at its end, on a flank.
-                close(name, found[i], expected[i], 2e-2);
-                exact += usize::from((found[i] - expected[i]).abs() < 1e-4 * found[i]);
+            assert_close(name, root_mean_squares[i], expected.root_mean_squares[i], 1e-5);
+            let mut exact_turns = 0;
+            for (turn_peaks, expected) in reading.turns.iter().zip(&expected.turns) {
+                // A sample near a maximum has almost the value of the maximum. The error is greater
+                // for a turn whose largest deviation is at its end, where the slope is not zero.
+                assert_close(name, turn_peaks[i], expected[i], 2e-2);
+                exact_turns +=
+                    usize::from((turn_peaks[i] - expected[i]).abs() < 1e-4 * turn_peaks[i]);
             }
             assert!(
-                2 * exact > reading.turns.len(),
-                "{name}: {exact} of {} turns",
+                2 * exact_turns > reading.turns.len(),
+                "{name}: {exact_turns} of {} turns",
                 reading.turns.len()
             );
             let greatest =
                 reading.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
-            close(name, greatest, records[0].amplitudes[i], 1e-9);
+            assert_close(name, greatest, records[0].amplitudes[i], 1e-9);
         }
-        close("force", reading.gauge(Gauge::CabinetForce)[0], expected.cabinet_force_n, 1e-4);
+        assert_close(
+            "force",
+            reading.gauge(Gauge::CabinetForce)[0],
+            expected.cabinet_force_n,
+            1e-4,
+        );
         let clash_s = reading.gauge(Gauge::ClashTime)[0];
         assert!(clash_s > 0.05 && clash_s < 2.5, "{clash_s} s, least gap {}", records[0].min_gap_m);
         // The error of each overlap is at most one interval.
         let error_s = (clash_s - expected.clash_time_s).abs();
-        assert!(error_s < 20.0 * EVERY_S, "{clash_s} instead of {}", expected.clash_time_s);
+        assert!(error_s < 20.0 * INTERVAL_S, "{clash_s} instead of {}", expected.clash_time_s);
     }
 }
 
@@ -118,24 +125,25 @@ fn readings_do_not_depend_on_the_method() {
         };
         let reference = run(Method::Rk4 { step_s: 2e-4 });
         for other in [run(Method::Dopri5(tolerance)), run(Method::Additive(tolerance))] {
-            let rms = [&other, &reference].map(|reading| reading.root_mean_squares.unwrap());
-            rms[0]
+            let root_mean_squares =
+                [&other, &reference].map(|reading| reading.root_mean_squares.unwrap());
+            root_mean_squares[0]
                 .iter()
-                .zip(rms[1])
-                .for_each(|(found, expected)| close("rms", *found, expected, 1e-4));
+                .zip(root_mean_squares[1])
+                .for_each(|(found, expected)| assert_close("rms", *found, expected, 1e-4));
             assert_eq!(other.turns.len(), reference.turns.len());
             for (found, expected) in
                 other.turns.iter().flatten().zip(reference.turns.iter().flatten())
             {
-                close("turn", *found, *expected, 1e-3);
+                assert_close("turn", *found, *expected, 1e-3);
             }
-            close(
+            assert_close(
                 "force",
                 other.gauge(Gauge::CabinetForce)[0],
                 reference.gauge(Gauge::CabinetForce)[0],
                 1e-4,
             );
-            close(
+            assert_close(
                 "clash",
                 other.gauge(Gauge::ClashTime)[0],
                 reference.gauge(Gauge::ClashTime)[0],
@@ -180,8 +188,8 @@ fn at_rest_the_cabinet_carries_the_weight() {
             &[&point],
             ALL_RECORDERS,
         );
-        // The springs also have a small force along c1, against the constraint of the model.
-        close("force", readings[0].gauge(Gauge::CabinetForce)[0], weight_n, 1e-4);
+        // The springs also have a small force along c1, which the model's constraint balances.
+        assert_close("force", readings[0].gauge(Gauge::CabinetForce)[0], weight_n, 1e-4);
         assert_eq!(readings[0].gauge(Gauge::ClashTime), [0.0]);
         assert_eq!(readings[0].turns.len(), 1);
     }

@@ -47,7 +47,7 @@ fn val_accelerations_match_an_independent_right_hand_side() {
     for case in reference("rhs.json")["cases"].as_array().unwrap() {
         let coefficients = Coefficients::new(&machine(case));
         let [q, u] = ["q", "u"].map(|name| numbers::<COORDINATES>(&case[name]).map(N));
-        let ours = nonlinear::accelerations(
+        let computed = nonlinear::accelerations(
             &coefficients,
             &Coupling::Springs,
             &Sag::new(&[0.0; COORDINATES]),
@@ -55,11 +55,17 @@ fn val_accelerations_match_an_independent_right_hand_side() {
             &q,
             &u,
         );
-        let theirs: [f64; COORDINATES] = numbers(&case["acceleration"]);
-        let largest = theirs.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        let expected: [f64; COORDINATES] = numbers(&case["acceleration"]);
+        let largest = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
         for i in 0..COORDINATES {
-            let error = (ours[i].0 - theirs[i]).abs() / largest;
-            assert!(error < 1e-9, "coordinate {}: {} against {}", i + 1, ours[i].0, theirs[i]);
+            let error = (computed[i].0 - expected[i]).abs() / largest;
+            assert!(
+                error < 1e-9,
+                "coordinate {}: {} against {}",
+                i + 1,
+                computed[i].0,
+                expected[i]
+            );
         }
     }
 }
@@ -67,16 +73,17 @@ fn val_accelerations_match_an_independent_right_hand_side() {
 #[test]
 fn val_equilibrium_matches_an_independent_solution() {
     for case in reference("equilibrium.json")["cases"].as_array().unwrap() {
-        let (q, found) = equilibrium::solve_equilibrium(N(0.0), &Coefficients::new(&machine(case)));
-        assert_eq!(found & 1, 1);
-        let theirs: [f64; COORDINATES] = numbers(&case["q"]);
+        let (q, solved_lanes) =
+            equilibrium::solve_equilibrium(N(0.0), &Coefficients::new(&machine(case)));
+        assert_eq!(solved_lanes & 1, 1);
+        let expected: [f64; COORDINATES] = numbers(&case["q"]);
         for i in 0..COORDINATES {
             assert!(
-                (q[i].0 - theirs[i]).abs() < 1e-12,
+                (q[i].0 - expected[i]).abs() < 1e-12,
                 "q{}: {} against {}",
                 i + 1,
                 q[i].0,
-                theirs[i]
+                expected[i]
             );
         }
     }
@@ -88,28 +95,30 @@ fn val_linear_matrices_match_an_independent_expansion() {
         let coefficients = Coefficients::new(&machine(case));
         let (q, _) = equilibrium::solve_equilibrium(N(0.0), &coefficients);
         let point = linear::Linearise { machine: &coefficients, q: &q }.run().remove(0);
-        let ours = point.matrices(&coefficients.bodies, &spin(case));
-        for (name, ours) in [("M", ours.mass), ("C", ours.damping), ("K", ours.stiffness)] {
-            let theirs: [[f64; COORDINATES]; COORDINATES] =
+        let computed = point.matrices(&coefficients.bodies, &spin(case));
+        for (name, computed) in
+            [("M", computed.mass), ("C", computed.damping), ("K", computed.stiffness)]
+        {
+            let expected: [[f64; COORDINATES]; COORDINATES] =
                 std::array::from_fn(|i| numbers(&case[name].as_array().unwrap()[i]));
-            let largest = theirs.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+            let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
             for i in 0..COORDINATES {
                 for j in 0..COORDINATES {
-                    let error = (ours[i][j] - theirs[i][j]).abs() / largest;
+                    let error = (computed[i][j] - expected[i][j]).abs() / largest;
                     assert!(
                         error < 1e-9,
                         "{name}[{i}][{j}]: {} against {}",
-                        ours[i][j],
-                        theirs[i][j]
+                        computed[i][j],
+                        expected[i][j]
                     );
                 }
             }
         }
-        let theirs: [f64; COORDINATES] = numbers(&case["F"]);
-        let largest = theirs.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        let expected: [f64; COORDINATES] = numbers(&case["F"]);
+        let largest = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
         for i in 0..COORDINATES {
-            let error = (ours.force[i] - theirs[i]).abs() / largest;
-            assert!(error < 1e-9, "F[{i}]: {} against {}", ours.force[i], theirs[i]);
+            let error = (computed.force[i] - expected[i]).abs() / largest;
+            assert!(error < 1e-9, "F[{i}]: {} against {}", computed.force[i], expected[i]);
         }
     }
 }
@@ -121,11 +130,16 @@ fn val_eigenvalues_match_an_independent_solution() {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 100.0, ramp_s: 1.0 };
         let point = prepare(Simd::Scalar, &[(machine(case), spin)], &timing).remove(0).unwrap();
         let speed = case["speed_rpm"].as_f64().unwrap() * TAU / 60.0;
-        let ours = modes(&point, case["theta"].as_f64().unwrap(), speed).unwrap().modes;
-        for (ours, theirs) in ours.iter().zip(case["eigenvalues"].as_array().unwrap()) {
-            let [re, im] = numbers(theirs);
-            let error = (ours.re_per_s - re).hypot(ours.im_rad_per_s - im) / re.hypot(im);
-            assert!(error < 1e-7, "{} {} against {re} {im}", ours.re_per_s, ours.im_rad_per_s);
+        let computed = modes(&point, case["theta"].as_f64().unwrap(), speed).unwrap().modes;
+        for (computed, expected) in computed.iter().zip(case["eigenvalues"].as_array().unwrap()) {
+            let [re, im] = numbers(expected);
+            let error = (computed.re_per_s - re).hypot(computed.im_rad_per_s - im) / re.hypot(im);
+            assert!(
+                error < 1e-7,
+                "{} {} against {re} {im}",
+                computed.re_per_s,
+                computed.im_rad_per_s
+            );
         }
         let highest = highest_frequency_rad_per_s(&point, speed).unwrap();
         let [re, im] = numbers(case["eigenvalues"].as_array().unwrap().last().unwrap());
@@ -172,16 +186,19 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
             if matches!(channel, Channel::TotalCentreY | Channel::TotalCentreZ) {
                 continue;
             }
-            let [ours_n, ours_l] = [&nonlinear, &linear].map(|r| r[i].amplitudes[channel.index()]);
-            largest_ratio = largest_ratio.max(ours_n / ours_l);
-            for (prefix, ours) in [("nonlinear", ours_n), ("linear", ours_l)] {
-                let theirs = row[column(&format!("{prefix}_{}", channel.name()))];
+            let [computed_nonlinear, computed_linear] =
+                [&nonlinear, &linear].map(|r| r[i].amplitudes[channel.index()]);
+            largest_ratio = largest_ratio.max(computed_nonlinear / computed_linear);
+            for (prefix, computed) in
+                [("nonlinear", computed_nonlinear), ("linear", computed_linear)]
+            {
+                let expected = row[column(&format!("{prefix}_{}", channel.name()))];
                 let is_regular = row[column("step_sensitivity")] < 1e-4;
                 if prefix == "linear" || is_regular {
-                    let error = (ours - theirs).abs() / theirs;
+                    let error = (computed - expected).abs() / expected;
                     assert!(
                         error < 1e-4,
-                        "{prefix} {} at {:?}: {ours} against {theirs}",
+                        "{prefix} {} at {:?}: {computed} against {expected}",
                         channel.name(),
                         &row[..2]
                     );

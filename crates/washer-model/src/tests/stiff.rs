@@ -40,11 +40,11 @@ fn the_additive_method_agrees_with_converged_rk4() {
     let point = point(2e8);
     for model in ModelKind::ALL {
         let reference = run(model, &Method::Rk4 { step_s: 5e-5 }, &point);
-        for (relative, allowed) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
-            let found = run(model, &Method::Additive(tolerance(relative)), &point);
-            let error = difference(&found, &reference);
-            eprintln!("{model:?} at {relative:e}: {error:.1e} in {} steps", found.steps);
-            assert!(error < allowed, "{model:?} at {relative:e}: {error:e}");
+        for (relative, max_error) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
+            let record = run(model, &Method::Additive(tolerance(relative)), &point);
+            let error = difference(&record, &reference);
+            eprintln!("{model:?} at {relative:e}: {error:.1e} in {} steps", record.steps);
+            assert!(error < max_error, "{model:?} at {relative:e}: {error:e}");
         }
     }
 }
@@ -53,18 +53,18 @@ fn the_additive_method_agrees_with_converged_rk4() {
 fn the_additive_method_integrates_bearings_too_stiff_for_explicit_methods() {
     let points = [2e9, 1e11, 1e14].map(point);
     for model in ModelKind::ALL {
-        // The bearings of the reference deflect by a tenth of a micrometre, so that those of the
-        // other points, which are almost rigid, give a similar motion.
+        // The bearings of the reference deflect by a tenth of a micrometre only, so that the almost
+        // rigid bearings of the other points give a similar motion.
         let reference = run(model, &Method::Rk4 { step_s: 5e-5 }, &points[0]);
-        for stiffer in &points[1..] {
-            assert!(run(model, &Method::Rk4 { step_s: 5e-5 }, stiffer).failure.is_some());
-            let found = run(model, &Method::Additive(tolerance(1e-4)), stiffer);
-            let error = difference(&found, &reference);
-            let tried = found.steps + found.rejected;
-            eprintln!("{model:?}: {error:.1e} in {tried} steps");
+        for stiff_point in &points[1..] {
+            assert!(run(model, &Method::Rk4 { step_s: 5e-5 }, stiff_point).failure.is_some());
+            let record = run(model, &Method::Additive(tolerance(1e-4)), stiff_point);
+            let error = difference(&record, &reference);
+            let attempted_steps = record.steps + record.rejected;
+            eprintln!("{model:?}: {error:.1e} in {attempted_steps} steps");
             assert!(error < 5e-4, "{model:?}: {error:e}");
             // An explicit method of order 5 needs 3e5 and 1e7 steps.
-            assert!(tried < 10_000, "{model:?}: {tried} steps");
+            assert!(attempted_steps < 10_000, "{model:?}: {attempted_steps} steps");
         }
     }
 }
@@ -72,13 +72,14 @@ fn the_additive_method_integrates_bearings_too_stiff_for_explicit_methods() {
 #[test]
 fn records_of_stiff_bearings_do_not_depend_on_other_points() {
     let points = [2e8, 1e11, 1e7, 1e8].map(point);
-    let all: Vec<&Point> = points.iter().collect();
-    // With one lane the points run one after another, on other instruction sets side by side.
+    let all_points: Vec<&Point> = points.iter().collect();
+    // With a single lane the points run one after another; on other instruction sets they share
+    // lanes.
     let method = Method::Additive(tolerance(1e-5));
     for model in ModelKind::ALL {
-        let together = simulate(Simd::Scalar, model, &method, &all);
-        assert_eq!(simulate(Simd::best(), model, &method, &all), together, "{model:?}");
-        for (point, record) in all.iter().zip(together) {
+        let together = simulate(Simd::Scalar, model, &method, &all_points);
+        assert_eq!(simulate(Simd::best(), model, &method, &all_points), together, "{model:?}");
+        for (point, record) in all_points.iter().zip(together) {
             assert_eq!(run(model, &method, point), record, "{model:?}");
         }
     }
@@ -87,10 +88,13 @@ fn records_of_stiff_bearings_do_not_depend_on_other_points() {
 #[test]
 fn stiff_bearings_do_not_limit_the_steps_of_the_additive_method() {
     let [soft, stiff] = [2e9, 1e14].map(point);
-    let by_all = highest_frequency_rad_per_s(&stiff, 40.0).unwrap();
-    let by_explicit = highest_explicit_frequency_rad_per_s(&stiff, 40.0).unwrap();
-    assert!(by_all > 1e6, "{by_all}");
-    assert!(by_explicit < 1e4, "{by_explicit}");
-    let softer = highest_explicit_frequency_rad_per_s(&soft, 40.0).unwrap();
-    assert!((softer / by_explicit - 1.0).abs() < 0.1, "{softer} and {by_explicit}");
+    let full_rad_per_s = highest_frequency_rad_per_s(&stiff, 40.0).unwrap();
+    let explicit_rad_per_s = highest_explicit_frequency_rad_per_s(&stiff, 40.0).unwrap();
+    assert!(full_rad_per_s > 1e6, "{full_rad_per_s}");
+    assert!(explicit_rad_per_s < 1e4, "{explicit_rad_per_s}");
+    let softer_rad_per_s = highest_explicit_frequency_rad_per_s(&soft, 40.0).unwrap();
+    assert!(
+        (softer_rad_per_s / explicit_rad_per_s - 1.0).abs() < 0.1,
+        "{softer_rad_per_s} and {explicit_rad_per_s}"
+    );
 }

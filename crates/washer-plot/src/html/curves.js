@@ -1,7 +1,7 @@
 // Time histories and spectra of the live panel.
 
 // The highest frequency of a spectrum, Hz.
-const HIGHEST = 25;
+const MAX_FREQUENCY_HZ = 25;
 
 // Time histories and spectra of both models, redrawn in place.
 function createCurves(host, live) {
@@ -9,33 +9,33 @@ function createCurves(host, live) {
   const times = Float32Array.from({ length: instants }, (_, k) => k * live.everyS);
   const [from, to] = live.windowS.map((at) => Math.round(at / live.everyS));
   const size = spectrumSize(to - from + 1);
-  const perBin = 1 / (size * live.everyS);
-  const bins = Math.min(Math.floor(HIGHEST / perBin), size / 2);
-  const frequencies = Float32Array.from({ length: bins }, (_, k) => k * perBin);
-  // The models whose motions are known.
+  const binWidth = 1 / (size * live.everyS);
+  const bins = Math.min(Math.floor(MAX_FREQUENCY_HZ / binWidth), size / 2);
+  const frequencies = Float32Array.from({ length: bins }, (_, k) => k * binWidth);
+  // The version of the motions, by which spectra know whether they are current.
   let version = 0;
   const line = (name, colour, count, alpha) => plainLine(name, colour,
     new Float32Array(count).fill(NaN), alpha);
-  const both = (count) => [line("nonlinear model", "#0072b2", count),
+  const bothModels = (count) => [line("nonlinear model", "#0072b2", count),
     line("linear model", "#d55e00", count, 0.65)];
   const first = live.compared[Math.max(live.compared.length - 2, 0)];
   const motion = live.channels.map((channel, k) => plainPanel(channel.name,
-    capitalised(channel.words), channel.unit, k === first, both(instants)));
-  const gap = plainPanel("gap", "Gap, drum to tub", "mm", false, both(instants));
+    capitalise(channel.words), channel.unit, k === first, bothModels(instants)));
+  const gap = plainPanel("gap", "Gap, drum to tub", "mm", false, bothModels(instants));
   const speed = plainPanel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
   // Spectra are computed when they are drawn.
-  const ofWindow = (one, source) => {
-    const [y, found] = [new Float32Array(bins).fill(NaN), { version: -1 }];
-    return Object.defineProperty({ ...one }, "y", { get() {
-      if (found.version === version) return y;
-      found.version = version;
+  const spectrumOf = (line, source) => {
+    const [y, cache] = [new Float32Array(bins).fill(NaN), { version: -1 }];
+    return Object.defineProperty({ ...line }, "y", { get() {
+      if (cache.version === version) return y;
+      cache.version = version;
       y.set(spectrum(Array.from(source.y.subarray(from, to + 1)), live.everyS, bins));
       return y;
     } });
   };
   const spectra = live.channels.map((channel, k) => plainPanel(channel.name,
-    capitalised(channel.words), channel.unit, k === first,
-    both(bins).map((one, model) => ofWindow(one, motion[k].series[model]))));
+    capitalise(channel.words), channel.unit, k === first,
+    bothModels(bins).map((line, model) => spectrumOf(line, motion[k].series[model]))));
   const histories = element("div", { id: "live-histories" });
   const spectrumHost = element("div", { id: "live-spectrum" });
   host.append(element("h2", {}, "Time histories"), histories,

@@ -1,44 +1,46 @@
 // The live panel: sliders, both models' peaks and curves at any point, a finer map.
 
-// A number beyond all refinement levels, for which the module takes the quick one.
-const QUICK_RUNG = 255;
-// Time for which sliders must rest before their point is checked, ms.
-const REST = 150;
+// An index beyond all refinement levels, for which the module uses the quick level.
+const QUICK_LEVEL = 255;
+// Time without a change of the sliders after which their point is checked, ms.
+const REST_MS = 150;
 const FAILURES = ["", "diverged", "needs steps too small", "used up its steps"];
 // The size of a finer map: points along each axis, cells that it spans without a zoom, points in a
 // call.
-const FINE = { points: 20, cells: 7, together: 10 };
+const FINE_MAP = { points: 20, cells: 7, together: 10 };
 
 function createLive(host, data) {
   const { live } = data;
   const values = live.sliders.map((slider) => slider.value);
   let map = null;
   let latest = 0;
-  let resting = 0;
+  let restTimer = 0;
   let isBusy = false;
   let isMoved = false;
   let fine = [];
-  let fineLeft = 0;
+  let fineRemaining = 0;
   // Returns the ends of a slider along both axes, as the map spaces them.
   let fineEdges = null;
 
-  const find = furnish(host, "live");
-  const [panel, status, reset, refine, told, charts] = ["#live", "#live-status", "#live-reset",
-    "#refine", "#live-values", "#live-charts"].map(find);
+  const find = appendTemplate(host, "live");
+  const [panel, status, reset, refine, valuesHost, charts] = ["#live", "#live-status",
+    "#live-reset", "#refine", "#live-values", "#live-charts"].map(find);
   const inputs = live.sliders.map((slider, k) => createSlider(slider, k));
-  find(".sliders").append(...inputs.map((one) => one.row));
+  find(".sliders").append(...inputs.map((input) => input.row));
   values.forEach((value, k) => set(k, value));
   reset.addEventListener("click", () => {
-    put(live.sliders.flatMap(({ axis, value }, k) => (axis ? [] : [[k, value]])));
+    setSliders(live.sliders.flatMap(({ axis, value }, k) => (axis ? [] : [[k, value]])));
   });
   refine.addEventListener("click", refineMap);
-  const facts = { ...live, window: live.windowS.join(" to ") };
-  for (const at of panel.querySelectorAll("[data-said]")) at.textContent = facts[at.dataset.said];
+  const texts = { ...live, window: live.windowS.join(" to ") };
+  for (const node of panel.querySelectorAll("[data-said]")) {
+    node.textContent = texts[node.dataset.said];
+  }
   panel.querySelectorAll("#computed-with ul").forEach((list, model) => {
     list.append(...live.rungs[model].map((text) => element("li", {}, text)));
   });
 
-  const pool = createPool(unpacked(live.module), doubles(live.setup), (state) => {
+  const pool = createPool(unpackGzip(live.module), decodeDoubles(live.setup), (state) => {
     if (state.error) status.textContent = `This browser cannot compute here: ${state.error}.`;
     panel.dataset.ready = `${state.ready} of ${state.workers}`;
     find("#live-workers").textContent = `${state.ready} workers, each with a module `
@@ -58,7 +60,7 @@ function createLive(host, data) {
       onchange: () => {
         const typed = Number(number.value);
         set(k, Number.isFinite(typed) ? bounded(typed) : values[k]);
-        changed();
+        pointChanged();
       },
     });
     const range = element("input", {
@@ -66,7 +68,7 @@ function createLive(host, data) {
       "aria-label": slider.words, "data-slider": slider.name, title: slider.description,
       oninput: () => {
         set(k, bounded(Number(back(Number(range.value)).toPrecision(4))));
-        changed();
+        pointChanged();
       },
     });
     return { number, range, scaled, row: element("label", { title: slider.description },
@@ -83,93 +85,96 @@ function createLive(host, data) {
   }
 
   // Sets some sliders, each by its number and value.
-  function put(some) {
-    for (const [k, value] of some) set(k, value);
-    changed();
+  function setSliders(settings) {
+    for (const [k, value] of settings) set(k, value);
+    pointChanged();
   }
 
-  function changed() {
+  function pointChanged() {
     latest += 1;
-    clearTimeout(resting);
-    pool.drop("check");
+    clearTimeout(restTimer);
+    pool.cancel("check");
     growth?.moved();
     map?.mark?.();
     if (isBusy) isMoved = true;
     else preview();
   }
 
-  const ask = (kind, urgency, call, rest) => pool.ask(kind, urgency, call, [...values], rest);
-  const motions = (kind, rungs) => [0, 1].map((model) => ask(kind, 3, "history",
-    [model, rungs[model], live.everyS]));
+  const request = (kind, urgency, call, rest) => pool
+    .request(kind, urgency, call, [...values], rest);
+  const requestMotions = (kind, levels) => [0, 1].map((model) => request(kind, 3, "history",
+    [model, levels[model], live.everyS]));
 
-  // Computes quick answers, each as soon as the last one is there, and then the checked one.
+  // Computes quick answers until the point rests, one after the other, and then the checked answer.
   async function preview() {
     isBusy = true;
     do {
       isMoved = false;
       const started = performance.now();
       try {
-        const speeds = ask("preview", 3, "speeds", [live.everyS]);
-        const [peaks, ...found] = await Promise.all([ask("preview", 4, "quick", [values.length]),
-          ...motions("preview", [QUICK_RUNG, QUICK_RUNG])]);
-        const took = performance.now() - started;
-        const ms = [peaks, ...found].map((one) => one.ms);
-        show({ ...parsedAnswer(peaks.numbers, live), isChecked: false, took, ms });
-        curves.show(found.map((one) => one.numbers), (await speeds).numbers);
+        const speeds = request("preview", 3, "speeds", [live.everyS]);
+        const [peaks, ...motions] = await Promise.all([
+          request("preview", 4, "quick", [values.length]),
+          ...requestMotions("preview", [QUICK_LEVEL, QUICK_LEVEL])]);
+        const duration = performance.now() - started;
+        const ms = [peaks, ...motions].map((one) => one.ms);
+        show({ ...parsedAnswer(peaks.numbers, live), isChecked: false, took: duration, ms });
+        curves.show(motions.map((one) => one.numbers), (await speeds).numbers);
       } catch (error) {
-        tellError(error);
+        showError(error);
       }
     } while (isMoved);
     isBusy = false;
-    resting = setTimeout(() => check(latest), REST);
+    restTimer = setTimeout(() => check(latest), REST_MS);
   }
 
-  async function check(of) {
+  async function check(revision) {
     try {
       const started = performance.now();
-      const { numbers, ms } = await ask("check", 2, "checked");
-      if (of !== latest) return;
+      const { numbers, ms } = await request("check", 2, "checked");
+      if (revision !== latest) return;
       const answer = parsedAnswer(numbers, live);
       if (answer.is !== 1) return;
       show({ ...answer, isChecked: true, took: performance.now() - started, ms: [ms] });
-      const asked = ask("check", 2, "speeds", [live.everyS]);
-      const rungs = answer.records.map((record) => record.rung);
-      const found = await Promise.all(motions("check", rungs));
-      const speeds = (await asked).numbers;
-      if (of === latest) {
-        curves.show(found.map((one) => one.numbers), speeds);
-        if (live.heldMetrics.length) tellHeld(of);
+      const speedsRequest = request("check", 2, "speeds", [live.everyS]);
+      const levels = answer.records.map((record) => record.rung);
+      const motions = await Promise.all(requestMotions("check", levels));
+      const speeds = (await speedsRequest).numbers;
+      if (revision === latest) {
+        curves.show(motions.map((one) => one.numbers), speeds);
+        if (live.heldMetrics.length) showHeldMetrics(revision);
         growth?.rested([...values], speeds.reduce((most, speed) => Math.max(most, speed)));
       }
     } catch (error) {
-      tellError(error);
+      showError(error);
     }
   }
 
-  // The map's own metrics of constant speeds; slow ones are computed on request.
-  function tellHeld(of) {
+  // Shows the map's metrics at constant speeds; slow ones are computed on request.
+  function showHeldMetrics(revision) {
     const line = element("p", { id: "held" });
     const compute = () => Promise.all(live.heldMetrics.map(async (metric) => {
       line.textContent = "Constant speeds: computing.";
-      const [said, numbers] = await HELD[metric](pool, [...values], live);
+      const [sentence, numbers] = await HELD_METRICS[metric](pool, [...values], live);
       line.dataset[metric] = numbers.join(" ");
-      return said;
+      return sentence;
     })).then((all) => {
-      if (of === latest) line.textContent = all.join(" ");
-    }, tellError);
-    told.append(line);
+      if (revision === latest) line.textContent = all.join(" ");
+    }, showError);
+    valuesHost.append(line);
     if (!live.hasSlowGrowth && !live.heldMetrics.includes("dwell")) compute();
     else line.append(element("button", { type: "button", onclick: compute },
       `Compute ${live.heldMetrics.join(" and ")} at ${live.heldSpeedsRpm.length} constant speeds`));
   }
 
-  // Work that was dropped fails without an error.
-  function tellError(error) {
+  // Shows an error. A cancelled request has none.
+  function showError(error) {
     if (!error) return;
     status.textContent = `This point could not be computed: ${error.message}. It is a defect.`;
   }
 
-  const compared = (ratios) => live.compared.map((of) => ratios[of]).filter(Number.isFinite);
+  const compared = (ratios) => live.compared.map((channel) => ratios[channel])
+    .filter(Number.isFinite);
   const greatestOf = (ratios) => Math.max(...compared(ratios));
   const leastOf = (ratios) => Math.min(...compared(ratios));
   const isTrusted = (ratios) => greatestOf(ratios) < live.ratioLimit
@@ -180,7 +185,7 @@ function createLive(host, data) {
     panel.dataset.point = values.join(" ");
     panel.dataset.ms = answer.ms.join(" ");
     if (answer.is !== 1) {
-      told.replaceChildren(element("p", { class: "verdict" }, answer.is === 0
+      valuesHost.replaceChildren(element("p", { class: "verdict" }, answer.is === 0
         ? "No such machine: its numbers contradict each other."
         : "No static equilibrium: the springs cannot carry the machine."));
       status.textContent = "Nothing to compute.";
@@ -196,24 +201,24 @@ function createLive(host, data) {
     const failed = records.findIndex((record) => record.failure !== 0);
     const verdict = failed >= 0
       ? `The ${["nonlinear", "linear"][failed]} model ${FAILURES[records[failed].failure]} at `
-        + `${significant(records[failed].failTime)} s`
+        + `${formatSignificant(records[failed].failTime)} s`
       : channel === undefined ? "Undefined: no excitation"
         : `Linear model ${isTrusted(ratios) ? "" : "un"}reliable here`;
     const row = (words, unit, of, beside = "") => tableRow(withUnit(words, unit),
-      [...records.map((record) => significant(of(record))), beside]);
+      [...records.map((record) => formatSignificant(of(record))), beside]);
     const rows = live.channels.map((channel, k) => row(channel.words, channel.unit,
-      (record) => record.amplitudes[k] * channel.factor, significant(ratios[k])));
+      (record) => record.amplitudes[k] * channel.factor, formatSignificant(ratios[k])));
     rows.push(row("Least gap, whole run", "mm", (record) => record.gap * 1e3));
     live.metrics.forEach((metric, k) => rows.push(row(metric.words, metric.unit,
       (record) => record.metrics[k] * metric.factor)));
     const sag = live.hasStaticSag
-      ? [element("p", {}, `Static sag of the tub ${significant(answer.sag * 1e3)} mm`)] : [];
-    const largest = channel !== undefined && `Largest ratio ${significant(greatest)} `
+      ? [element("p", {}, `Static sag of the tub ${formatSignificant(answer.sag * 1e3)} mm`)] : [];
+    const largest = channel !== undefined && `Largest ratio ${formatSignificant(greatest)} `
       + `(${live.channels[channel].words}), the limit is ${live.ratioLimit}`;
     const numbers = table(["", "nonlinear", "linear", "ratio"], rows);
     numbers.prepend(element("caption", {},
-      `${capitalised(live.criterion[0])}. Ratio: ${live.criterion[1]}.`));
-    told.replaceChildren(
+      `${capitalise(live.criterion[0])}. Ratio: ${live.criterion[1]}.`));
+    valuesHost.replaceChildren(
       element("p", { class: "kind" }, answer.isChecked ? "Checked" : "Preview, not checked"),
       element("p", { class: "verdict" }, answer.isChecked ? verdict : `${verdict}?`),
       ...(largest ? [element("p", {}, largest)] : []),
@@ -223,25 +228,27 @@ function createLive(host, data) {
     const took = `${answer.took.toFixed(answer.took < 10 ? 1 : 0)} ms`;
     status.textContent = answer.isChecked
       ? `Checked in ${took}: estimated relative error at most `
-        + `${significant(Math.max(...records.map((record) => record.error)), 2)}; `
+        + `${formatSignificant(Math.max(...records.map((record) => record.error)), 2)}; `
         + `nonlinear model by ${records[0].level}, linear model by ${records[1].level}.`
       : `Preview in ${took}: peaks of both models ${answer.ms[0].toFixed(1)} ms, curves `
         + `${answer.ms.slice(1).map((ms) => ms.toFixed(1)).join(" and ")} ms, side by side.`;
   }
 
-  // Computes a finer map: quick answers around the point, from the middle outwards.
+  // Computes a finer map of quick answers around the point, from the middle outwards.
   function refineMap() {
-    pool.drop("fine");
-    fineEdges = map.region(map.sliders.slice(0, 2).map((k) => values[k]), FINE.cells);
-    const step = fineEdges.map(([low, high]) => (high - low) / FINE.points);
-    const far = (place) => Math.hypot(...place.map((at) => at - (FINE.points - 1) / 2));
-    const places = Array.from({ length: FINE.points ** 2 },
-      (_, k) => [Math.floor(k / FINE.points), k % FINE.points]).sort((a, b) => far(a) - far(b));
-    [fine, fineLeft] = [[], places.length];
+    pool.cancel("fine");
+    fineEdges = map.region(map.sliders.slice(0, 2).map((k) => values[k]), FINE_MAP.cells);
+    const step = fineEdges.map(([low, high]) => (high - low) / FINE_MAP.points);
+    const middle = (FINE_MAP.points - 1) / 2;
+    const distance = (place) => Math.hypot(...place.map((index) => index - middle));
+    const places = Array.from({ length: FINE_MAP.points ** 2 },
+      (_, k) => [Math.floor(k / FINE_MAP.points), k % FINE_MAP.points])
+      .sort((a, b) => distance(a) - distance(b));
+    [fine, fineRemaining] = [[], places.length];
     map.mark();
     map.request();
-    for (let k = 0; k < places.length; k += FINE.together) {
-      const part = places.slice(k, k + FINE.together).map((place) => {
+    for (let k = 0; k < places.length; k += FINE_MAP.together) {
+      const part = places.slice(k, k + FINE_MAP.together).map((place) => {
         const from = place.map((at, axis) => fineEdges[axis][0] + at * step[axis]);
         return { from, to: from.map((at, axis) => at + step[axis]) };
       });
@@ -252,7 +259,7 @@ function createLive(host, data) {
         });
         return point;
       });
-      pool.ask("fine", 1, "quick", points, [values.length]).then(({ numbers }) => {
+      pool.request("fine", 1, "quick", points, [values.length]).then(({ numbers }) => {
         const width = numbers.length / part.length;
         part.forEach((cell, at) => {
           const answer = parsedAnswer(numbers.slice(at * width, (at + 1) * width), live);
@@ -260,34 +267,35 @@ function createLive(host, data) {
           const extremes = { ratio_max: greatestOf(ratios), ratio_min: leastOf(ratios) };
           if (answer.is === 1) fine.push({ ...cell, columns: { ...byColumn, ...extremes } });
         });
-        fineLeft -= part.length;
-        panel.dataset.fine = `${fine.length} ${fineLeft}`;
+        fineRemaining -= part.length;
+        panel.dataset.fine = `${fine.length} ${fineRemaining}`;
         map.request();
-      }, tellError);
+      }, showError);
     }
   }
 
-  // The sliders of axes, and the middles of their ranges.
-  function alone() {
+  // Returns the sliders of axes, and the middles of their ranges.
+  function withoutMap() {
     const sliders = live.sliders.flatMap((slider, k) => (slider.axis ? [k] : []));
     const middle = ({ from, to, log }) => (log ? Math.sqrt(from * to) : 0.5 * (from + to));
     return { sliders, start: sliders.map((k) => Number(middle(live.sliders[k]).toPrecision(4))) };
   }
 
-  const ofAxes = (place) => place.map((value, k) => [map.sliders[k], value]);
+  const axisSettings = (place) => place.map((value, k) => [map.sliders[k], value]);
   return {
     // The interface for the figure; `connect` passes the interface of a map to this panel.
-    connect(given = alone()) {
+    connect(given = withoutMap()) {
       map = given;
       refine.hidden = !map.region;
-      put(ofAxes(map.start));
+      setSliders(axisSettings(map.start));
     },
-    pinned: (place) => put(ofAxes(place)),
+    pinned: (place) => setSliders(axisSettings(place)),
     // Values by name, with the 32-bit precision of the file's numbers.
-    chosen: (point) => put(live.sliders.flatMap(({ name }, k) => (name in point
+    chosen: (point) => setSliders(live.sliders.flatMap(({ name }, k) => (name in point
       ? [[k, Number(point[name].toPrecision(7))]] : []))),
     values: () => [...values],
-    restore: (given) => put([...given.entries()].filter(([, value]) => Number.isFinite(value))),
+    restore: (saved) => setSliders([...saved.entries()]
+      .filter(([, value]) => Number.isFinite(value))),
     hasFine: () => fine.length > 0,
     cells(context, layer, at, colour) {
       if (!layer) return;
@@ -307,7 +315,7 @@ function createLive(host, data) {
           .map((ends) => ends[end])));
         context.beginPath();
         context.rect(left, high, right - left, low - high);
-        outlined(context, [1.5, 1.5], [5, 4]);
+        strokeOutlined(context, [1.5, 1.5], [5, 4]);
       }
       const [x, y] = at(...map.sliders.slice(0, 2).map((k, axis) => map.even(axis, values[k])));
       context.beginPath();
@@ -315,7 +323,7 @@ function createLive(host, data) {
         context.moveTo(x - dx, y - dy);
         context.lineTo(x + dx, y + dy);
       }
-      outlined(context, [5, 2]);
+      strokeOutlined(context, [5, 2]);
     },
   };
 }

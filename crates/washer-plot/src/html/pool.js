@@ -1,54 +1,54 @@
-// The pool of workers that compute, each with the module; a queue feeds them.
+// A pool of workers, each with an instance of the module, and the queue of their tasks.
 
 // Maximum number of workers, from the browser's number of processors.
-const MOST_WORKERS = 8;
-// Time after which work that was dropped is cut off, ms.
-const PATIENCE = 60;
+const MAX_WORKERS = 8;
+// Time after its start from which a cancelled task is aborted, ms.
+const ABORT_DELAY_MS = 60;
 
-// `module` is a promise of its bytes. `tell` is called with { workers, ready, lanes, error } as
-// workers start.
-function createPool(module, setup, tell) {
+// `module` is a promise of the bytes of the module. `report` is called with
+// { workers, ready, lanes, error } when workers start.
+function createPool(module, setup, report) {
   const source = document.getElementById("worker").textContent;
   const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
-  const count = Math.min(Math.max(navigator.hardwareConcurrency || 2, 2), MOST_WORKERS);
+  const count = Math.min(Math.max(navigator.hardwareConcurrency || 2, 2), MAX_WORKERS);
   const state = { workers: count, ready: 0, lanes: 0, error: null };
   const members = [];
   let queue = [];
-  let next = 0;
+  let nextId = 0;
   let compiled = null;
 
-  function failed(error) {
+  function reportFailure(error) {
     state.error = error;
-    tell(state);
+    report(state);
   }
 
-  function hire(member) {
+  function startWorker(member) {
     member.worker = new Worker(url);
     member.task = null;
     member.isReady = false;
     member.worker.onmessage = ({ data }) => {
       if (data.ready !== undefined) {
         member.isReady = data.ready;
-        state.ready = members.filter((one) => one.isReady).length;
+        state.ready = members.filter((other) => other.isReady).length;
         if (data.ready) state.lanes = data.lanes;
         else state.error = data.error;
-        tell(state);
+        report(state);
       } else if (member.task?.id === data.id) {
         const { task } = member;
         member.task = null;
-        if (data.error) task.fail(new Error(data.error));
-        else task.done({ numbers: data.found, ms: data.ms });
+        if (data.error) task.reject(new Error(data.error));
+        else task.resolve({ numbers: data.result, ms: data.ms });
       }
-      feed();
+      assignTasks();
     };
-    member.worker.onerror = (event) => failed(event.message || "a worker did not start");
+    member.worker.onerror = (event) => reportFailure(event.message || "a worker did not start");
     member.worker.postMessage({ module: compiled, setup });
   }
 
-  function feed() {
+  function assignTasks() {
     for (const member of members) {
       if (!member.isReady || member.task || queue.length === 0) continue;
-      // The most urgent call comes first; of equally urgent ones, the oldest.
+      // The most urgent call comes first, and among equally urgent ones the oldest.
       queue.sort((a, b) => b.urgency - a.urgency || a.id - b.id);
       const task = queue.shift();
       member.task = task;
@@ -58,38 +58,39 @@ function createPool(module, setup, tell) {
     }
   }
 
-  // Calls the module and returns a promise of { numbers, ms }. `drop` refers to calls by `kind`.
-  function ask(kind, urgency, call, numbers, rest = []) {
-    return new Promise((done, fail) => {
-      next += 1;
-      queue.push({ id: next, kind, urgency, call, numbers, rest, done, fail });
-      feed();
+  // Queues a call of the module and returns a promise of { numbers, ms }. `cancel` identifies calls
+  // by `kind`.
+  function request(kind, urgency, call, numbers, rest = []) {
+    return new Promise((resolve, reject) => {
+      nextId += 1;
+      queue.push({ id: nextId, kind, urgency, call, numbers, rest, resolve, reject });
+      assignTasks();
     });
   }
 
-  // Drops calls that are not needed any more, even if a worker is on them.
-  function drop(kind) {
-    const isDropped = (task) => task.kind === kind;
-    for (const task of queue.filter(isDropped)) task.fail(null);
-    queue = queue.filter((task) => !isDropped(task));
+  // Cancels all calls of a kind, also those that a worker executes.
+  function cancel(kind) {
+    const isCancelled = (task) => task.kind === kind;
+    for (const task of queue.filter(isCancelled)) task.reject(null);
+    queue = queue.filter((task) => !isCancelled(task));
     for (const member of members) {
       const { task } = member;
-      if (!task || !isDropped(task)) continue;
+      if (!task || !isCancelled(task)) continue;
       setTimeout(() => {
         if (member.task !== task) return;
         member.worker.terminate();
-        task.fail(null);
-        hire(member);
-      }, Math.max(0, PATIENCE - (performance.now() - task.started)));
+        task.reject(null);
+        startWorker(member);
+      }, Math.max(0, ABORT_DELAY_MS - (performance.now() - task.started)));
     }
   }
 
-  module.then((bytes) => WebAssembly.compile(bytes)).then((ready) => {
-    compiled = ready;
+  module.then((bytes) => WebAssembly.compile(bytes)).then((compiledModule) => {
+    compiled = compiledModule;
     for (let k = 0; k < count; k++) {
       members.push({});
-      hire(members[k]);
+      startWorker(members[k]);
     }
-  }, (error) => failed(String(error)));
-  return { ask, drop };
+  }, (error) => reportFailure(String(error)));
+  return { request, cancel };
 }

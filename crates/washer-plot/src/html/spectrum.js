@@ -1,24 +1,25 @@
 // Spectra of motions by a fast Fourier transform.
 
-// Transforms a power of two of complex numbers: [real parts, imaginary parts].
-function transformed([re, im]) {
+// Returns the Fourier transform of complex numbers, [real parts, imaginary parts], whose count is a
+// power of two.
+function fourierTransform([re, im]) {
   const half = re.length / 2;
   if (half < 1) return [re, im];
-  const every = (odd) => [re, im].map((part) => part.filter((_, k) => k % 2 === odd));
-  const [[a, b], [c, d]] = [transformed(every(0)), transformed(every(1))];
-  const found = [new Float64Array(2 * half), new Float64Array(2 * half)];
+  const elements = (odd) => [re, im].map((part) => part.filter((_, k) => k % 2 === odd));
+  const [[a, b], [c, d]] = [fourierTransform(elements(0)), fourierTransform(elements(1))];
+  const result = [new Float64Array(2 * half), new Float64Array(2 * half)];
   for (let k = 0; k < half; k++) {
     const [cos, sin] = [Math.cos((Math.PI * k) / half), -Math.sin((Math.PI * k) / half)];
     const [x, y] = [c[k] * cos - d[k] * sin, c[k] * sin + d[k] * cos];
-    [found[0][k], found[1][k]] = [a[k] + x, b[k] + y];
-    [found[0][k + half], found[1][k + half]] = [a[k] - x, b[k] - y];
+    [result[0][k], result[1][k]] = [a[k] + x, b[k] + y];
+    [result[0][k + half], result[1][k + half]] = [a[k] - x, b[k] - y];
   }
-  return found;
+  return result;
 }
 
-// Returns the amplitude of a steady motion of each frequency for values `every` s apart in a
+// Returns the amplitude of a steady motion of each frequency for values `intervalS` s apart in a
 // window, with Hann's weights; none if values are missing.
-function spectrum(values, every, bins) {
+function spectrum(values, intervalS, bins) {
   const size = spectrumSize(values.length);
   const weighted = [new Float64Array(size), new Float64Array(size)];
   if (!values.every(Number.isFinite)) return new Float32Array(bins).fill(NaN);
@@ -27,7 +28,7 @@ function spectrum(values, every, bins) {
     const turn = (2 * Math.PI * k) / (values.length - 1);
     weighted[0][k] = (value - mean) * (0.5 - 0.5 * Math.cos(turn));
   });
-  const [re, im] = transformed(weighted);
+  const [re, im] = fourierTransform(weighted);
   // The mean of the weights is a half, and half of the motion is at negative frequencies.
   const scale = 4 / values.length;
   return Float32Array.from({ length: bins }, (_, k) => scale * Math.hypot(re[k], im[k]));

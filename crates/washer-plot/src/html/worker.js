@@ -6,8 +6,8 @@ let setup = null;
 let api = null;
 
 function write(numbers) {
-  const at = api.input(numbers.length);
-  new Float64Array(api.memory.buffer, at, numbers.length).set(numbers);
+  const address = api.input(numbers.length);
+  new Float64Array(api.memory.buffer, address, numbers.length).set(numbers);
 }
 
 async function start() {
@@ -24,10 +24,10 @@ async function answer({ id, call, numbers, rest = [] }) {
     write(numbers);
     const count = api[call](...rest);
     const ms = performance.now() - started;
-    const found = new Float64Array(api.memory.buffer, api.output(), count).slice();
-    postMessage({ id, found, ms }, [found.buffer]);
+    const result = new Float64Array(api.memory.buffer, api.output(), count).slice();
+    postMessage({ id, result, ms }, [result.buffer]);
   } catch (error) {
-    // A module that trapped is not used again.
+    // After a trap the module is instantiated anew.
     api = null;
     postMessage({ id, error: String(error) });
   }

@@ -9,12 +9,11 @@ use super::{MachineSection, find_parameter, no_spin};
 /// The key of the data sheet's mass, at the top of a machine file.
 pub(super) const MOVING_MASS: &str = "moving_mass_kg";
 
-/// The numbers of a data sheet in a machine file, from which the numbers that the file omits
-/// follow.
+/// The keys of a data sheet in a machine file. Numbers that the file omits follow from them.
 #[derive(Default)]
 pub(super) struct SheetKeys {
     /// Whether the file gives a number of a data sheet, so that it may omit numbers that follow
-    /// from a whole one.
+    /// from a complete sheet.
     pub(super) is_given: bool,
     moving_mass_kg: Option<f64>,
     drum_radius_m: Option<f64>,
@@ -69,11 +68,11 @@ const DRUM_SIZES: [&str; 2] = [DRUM_RADIUS, DRUM_DEPTH];
 const DRUM_SIZE: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
 
 impl SheetKeys {
-    /// Returns the data sheet of a file whose keys are not yet read.
+    /// Creates the data sheet of a file whose keys have not been read.
     pub(super) fn new(keys: &Keys<'_>) -> Self {
         let has_any = |root: &Section<'_>| {
-            let is_of_drum = |key: &str| root.key_inside("drum", key);
-            root.key_at(MOVING_MASS).is_some() || DRUM_SIZES.into_iter().any(is_of_drum)
+            let is_drum_key = |key: &str| root.key_inside("drum", key);
+            root.key_at(MOVING_MASS).is_some() || DRUM_SIZES.into_iter().any(is_drum_key)
         };
         Self { is_given: keys.section().is_some_and(has_any), ..Self::default() }
     }
@@ -82,9 +81,9 @@ impl SheetKeys {
     pub(super) fn walk(&mut self, section: &MachineSection, k: usize, keys: &mut Keys<'_>) {
         match section.name {
             "" => {
-                let about =
+                let description =
                     "mass of tub, shaft and drum without laundry, in place of the tub's, kg";
-                let key = keys::Key::new(MOVING_MASS, about);
+                let key = keys::Key::new(MOVING_MASS, description);
                 keys.key(key, &Form::Number(Range::Positive), &mut self.moving_mass_kg);
             }
             "drum" => {
@@ -102,21 +101,21 @@ impl SheetKeys {
 
     /// Walks over the name of an unbalance's plane, which replaces its position along the axis.
     fn walk_plane(&mut self, section: &MachineSection, k: usize, keys: &mut Keys<'_>) {
-        let about = "the drum's front, or its rear where it is fixed: in place of x_m";
+        let description = "the drum's front, or its rear where it is fixed: in place of x_m";
         let mut word: Option<String> = None;
         let names = DrumPlane::ALL.map(|(_, name)| name);
-        let found =
-            keys.key(keys::Key::new(UNBALANCE_PLANE, about), &Form::Word(&names), &mut word);
+        let field =
+            keys.key(keys::Key::new(UNBALANCE_PLANE, description), &Form::Word(&names), &mut word);
         let plane = DrumPlane::ALL.into_iter().find(|(_, name)| word.as_deref() == Some(name));
-        let (Field::Given(found), Some((plane, _))) = (found, plane) else { return };
+        let (Field::Given(location), Some((plane, _))) = (field, plane) else { return };
         let Some(table) = keys.section() else { return };
         if table.key_at(UNBALANCE_X).is_some() {
             let title = format!("`{UNBALANCE_PLANE}` beside `{UNBALANCE_X}`");
             let expected = "expected only one of them: both say where the unbalance is";
-            table.report.refuse::<()>(&found.at, title, expected);
+            table.report.refuse::<()>(&location.at, title, expected);
         }
         let name = format!("{}{UNBALANCE_X}", section.prefix(k));
-        table.report.put(name.as_str(), found.at);
+        table.report.put(name.as_str(), location.at);
         // The paper's machine has no further unbalances, so it has no parameters of them.
         let machine = with_unbalances(k + 1);
         self.planes.extend(find_parameter(&name, &machine).map(|parameter| (parameter, plane)));
@@ -128,17 +127,18 @@ impl SheetKeys {
         key == UNBALANCE_X && self.planes.iter().any(|(parameter, _)| parameter.name() == name)
     }
 
-    /// Sets the parameters that the file omits by their rules, which become their sources.
+    /// Sets the parameters that the file omits by their rules, which become the parameters'
+    /// sources.
     pub(super) fn fill_omitted(self, machine: &mut Machine, root: &Section<'_>) {
         let report = root.report;
-        let is_omitted = |name: &str| self.omitted.iter().any(|one| one.name() == name);
-        let needs_mass = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg"].map(is_omitted);
+        let is_omitted = |name: &str| self.omitted.iter().any(|parameter| parameter.name() == name);
+        let are_masses_omitted = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg"].map(is_omitted);
         let sheet = DataSheet {
             moving_mass_kg: self.moving_mass_kg,
             drum_radius_m: self.drum_radius_m.unwrap_or_default(),
             drum_depth_m: self.drum_depth_m.unwrap_or_default(),
         };
-        let is_whole = self.drum_radius_m.is_some() && self.drum_depth_m.is_some();
+        let is_complete = self.drum_radius_m.is_some() && self.drum_depth_m.is_some();
         if !self.omitted.is_empty() {
             for key in DRUM_SIZES.into_iter().filter(|key| !root.key_inside("drum", key)) {
                 let expected = "the drum's inner radius_m and depth_m in [drum], from which the \
@@ -146,21 +146,21 @@ impl SheetKeys {
                 root.missing(key, expected);
             }
         }
-        if sheet.moving_mass_kg.is_some() && !needs_mass[0] {
+        if sheet.moving_mass_kg.is_some() && !are_masses_omitted[0] {
             let title = format!("`{MOVING_MASS}` beside the tub's mass");
             let expected =
                 "expected no `mass_kg` in [tub]: it is the moving mass less shaft and drum";
-            let at = root.key_at(MOVING_MASS).unwrap_or_else(|| root.at().clone());
-            report.refuse::<()>(&at, title, expected);
-        } else if needs_mass.contains(&true) && sheet.moving_mass_kg.is_none() {
+            let location = root.key_at(MOVING_MASS).unwrap_or_else(|| root.at().clone());
+            report.refuse::<()>(&location, title, expected);
+        } else if are_masses_omitted.contains(&true) && sheet.moving_mass_kg.is_none() {
             let expected = "the mass of tub, shaft and drum without laundry, or `mass_kg` of each";
             root.missing(MOVING_MASS, expected);
-        } else if is_whole {
+        } else if is_complete {
             sheet.fill(&self.omitted, machine);
         }
         for parameter in &self.omitted {
             let Some(value) = parameter.get(machine, &no_spin()) else { continue };
-            if is_whole && !parameter.range().contains(value) {
+            if is_complete && !parameter.range().contains(value) {
                 let name = parameter.name();
                 let range = parameter.range();
                 let title = format!("the rule for the left-out `{name}` gives {value:.4}");

@@ -11,11 +11,11 @@ use super::MAX_ROWS;
 
 /// Range of a cycle's speeds (rpm), that of a table in the grid file. Basis: far above any washing
 /// machine. Doubling it accepts more mistakes of units.
-const SPEEDS_RPM: Range = Range::Within(-1e5, 1e5);
+const SPEED_RANGE_RPM: Range = Range::Within(-1e5, 1e5);
 
-/// Maximum distance of the straight pieces from a smooth joint, as a share of the greatest speed.
-/// Basis: less than a digit of a tachometer; a joint from rest to full speed has some 60 pieces,
-/// each a segment of every run. Doubling it takes 1.4 times fewer pieces.
+/// Maximum distance of the straight pieces from a smooth joint, relative to the greatest speed.
+/// Basis: less than the resolution of a tachometer. A joint from rest to full speed has about 60
+/// pieces, each a segment of every run. Doubling it takes 1.4 times fewer pieces.
 const JOINT_TOLERANCE: f64 = 1e-4;
 
 /// The joints between a cycle's points.
@@ -36,23 +36,26 @@ impl Joints {
 /// The times (s) and speeds (rpm) of a cycle's points.
 pub(super) type CyclePoints = (Vec<f64>, Vec<f64>);
 
-/// Reads a cycle's points and joins them; mistakes are reported. The file is named at `at`.
+/// Reads a cycle's points and joins them; mistakes are reported. `location` is that of the file's
+/// name.
 pub(super) fn read(
     path: &Path,
     joints: Joints,
-    at: &Location,
+    location: &Location,
     report: &Report,
 ) -> Option<CyclePoints> {
-    let table = NumberTable::read(path, &Names { known: &known, renamed: &[] }, report)?;
+    let table =
+        NumberTable::read(path, &Names { known: &quantity_and_unit, renamed: &[] }, report)?;
     table.notes().into_iter().for_each(|note| report.note(format!("the cycle: {note}")));
-    let times = column(&table, "time_s", "time", at, report);
-    let speeds = column(&table, "speed_rpm", "speed", at, report);
+    let times = column(&table, "time_s", "time", location, report);
+    let speeds = column(&table, "speed_rpm", "speed", location, report);
     let times = times?;
     let speeds = speeds?;
     if !check_columns(&table, times, speeds, report) {
         return None;
     }
-    // Smooth joints multiply rows by up to a hundred, so a table that is too long is not joined.
+    // Smooth joints multiply the number of rows by up to a hundred, so that a table that is too
+    // long is not joined.
     let is_short = |rows: usize| rows <= MAX_ROWS;
     let points = match joints {
         Joints::Smooth if is_short(times.values.len()) => smooth(&times.values, &speeds.values),
@@ -63,13 +66,13 @@ pub(super) fn read(
         let expected = format!(
             "expected at most {MAX_ROWS}: leave out rows between which the speed is straight"
         );
-        return report.refuse(at, title, expected);
+        return report.refuse(location, title, expected);
     }
     Some(points)
 }
 
-/// Returns the name and the unit of the quantity of a header, if it is known.
-fn known(header: &str) -> Option<(String, String)> {
+/// Returns the quantity and the unit of a header, if the header is known.
+fn quantity_and_unit(header: &str) -> Option<(String, String)> {
     let [name, unit] = match header {
         "time_s" | "t_s" | "zeit_s" => ["time_s", "s"],
         "speed_rpm" | "spin_speed_rpm" | "drum_speed_rpm" | "drehzahl_rpm" | "n_rpm" | "rpm" => {
@@ -80,33 +83,34 @@ fn known(header: &str) -> Option<(String, String)> {
     Some((name.to_owned(), unit.to_owned()))
 }
 
-/// Returns the column of a name, if the table has it once.
+/// Returns the column of a name; `None` and a mistake if the table has none or two.
 fn column<'t>(
     table: &'t NumberTable,
     name: &str,
-    what: &str,
-    at: &Location,
+    quantity: &str,
+    location: &Location,
     report: &Report,
 ) -> Option<&'t ListColumn> {
-    let mut found = table.columns.iter().filter(|column| column.name.value == name);
-    let first = found.next();
-    if let Some(second) = found.next() {
-        let title = format!("the cycle's file has two columns of {what}");
+    let mut matching = table.columns.iter().filter(|column| column.name.value == name);
+    let first = matching.next();
+    if let Some(second) = matching.next() {
+        let title = format!("the cycle's file has two columns of {quantity}");
         return report.refuse(&second.name.at, title, "expected one");
     }
     if first.is_none() {
-        let headers: Vec<&str> = table.columns.iter().map(|it| it.header.as_str()).collect();
-        let title = format!("the cycle's file has no column of {what} with its unit");
+        let headers: Vec<&str> =
+            table.columns.iter().map(|column| column.header.as_str()).collect();
+        let title = format!("the cycle's file has no column of {quantity} with its unit");
         let expected = "expected a header such as `time_s` or `Time [min]`, and one such as \
             `speed_rpm`, `Speed [Hz]` or `n (rad/s)`";
-        let refusal = Diagnostic::new(title).at(at, expected);
+        let refusal = Diagnostic::new(title).at(location, expected);
         report.push(refusal.help(format!("its columns are {headers:?}")));
     }
     first
 }
 
-/// Returns whether times rise from 0 and all speeds are given and within their range. It reports
-/// the first row of each mistake.
+/// Returns whether times increase from 0 and all speeds are given and within their range. The first
+/// row of each mistake is reported.
 fn check_columns(
     table: &NumberTable,
     times: &ListColumn,
@@ -136,44 +140,51 @@ fn check_columns(
         let title = format!("the cycle's time goes from {before_s} s to {after_s} s");
         refuse(times, row + 1, title, expected);
     }
-    if let Some(row) = speeds.values.iter().position(|speed| !SPEEDS_RPM.contains(*speed)) {
+    if let Some(row) = speeds.values.iter().position(|speed| !SPEED_RANGE_RPM.contains(*speed)) {
         let title = match speeds.values[row] {
             missing if missing.is_nan() => "the cycle has a row without its speed".to_owned(),
             speed_rpm => format!("the cycle's speed {} rpm is out of range", decimal(speed_rpm)),
         };
-        refuse(speeds, row, title, &format!("expected {SPEEDS_RPM}"));
+        refuse(speeds, row, title, &format!("expected {SPEED_RANGE_RPM}"));
     }
     report.is_clean()
 }
 
 /// Returns monotone cubics through points, as straight pieces. Between two points no speed is
-/// beyond theirs.
+/// beyond those of the points.
 ///
 /// F. N. Fritsch, R. E. Carlson, Monotone piecewise cubic interpolation, SIAM Journal on Numerical
 /// Analysis 17 (1980), 238-246.
 fn smooth(time_s: &[f64], speed_rpm: &[f64]) -> CyclePoints {
     let slopes = slopes(time_s, speed_rpm);
     let greatest = speed_rpm.iter().fold(0.0, |most: f64, speed| most.max(speed.abs()));
-    let off = JOINT_TOLERANCE * greatest;
+    let tolerance = JOINT_TOLERANCE * greatest;
     let mut points = (vec![time_s[0]], vec![speed_rpm[0]]);
     for k in 1..time_s.len() {
         let length_s = time_s[k] - time_s[k - 1];
         let change = speed_rpm[k] - speed_rpm[k - 1];
-        let [begin, end] = [slopes[k - 1] * length_s, slopes[k] * length_s];
-        // The second derivative is linear, so its greatest value is that of an end. It bounds the
-        // distance of a chord.
-        let bends =
-            [6.0 * change - 4.0 * begin - 2.0 * end, 2.0 * begin + 4.0 * end - 6.0 * change];
-        let bend = bends[0].abs().max(bends[1].abs());
-        let pieces = if off > 0.0 { (bend / (8.0 * off)).sqrt().ceil().max(1.0) } else { 1.0 };
+        let [start_slope, end_slope] = [slopes[k - 1] * length_s, slopes[k] * length_s];
+        // The second derivative is linear, so that it is greatest at an end. It bounds the distance
+        // of a chord from the cubic.
+        let end_curvatures = [
+            6.0 * change - 4.0 * start_slope - 2.0 * end_slope,
+            2.0 * start_slope + 4.0 * end_slope - 6.0 * change,
+        ];
+        let curvature = end_curvatures[0].abs().max(end_curvatures[1].abs());
+        let pieces = if tolerance > 0.0 {
+            (curvature / (8.0 * tolerance)).sqrt().ceil().max(1.0)
+        } else {
+            1.0
+        };
         let pieces = pieces as usize;
         for piece in 1..pieces {
-            let part = piece as f64 / pieces as f64;
-            let rest = 1.0 - part;
-            let risen = part * part * (3.0 - 2.0 * part);
-            let bent = part * rest * (rest * begin - part * end);
-            points.0.push(time_s[k - 1] + part * length_s);
-            points.1.push(speed_rpm[k - 1] + risen * change + bent);
+            let fraction = piece as f64 / pieces as f64;
+            let remainder = 1.0 - fraction;
+            let linear_part = fraction * fraction * (3.0 - 2.0 * fraction);
+            let slope_part =
+                fraction * remainder * (remainder * start_slope - fraction * end_slope);
+            points.0.push(time_s[k - 1] + fraction * length_s);
+            points.1.push(speed_rpm[k - 1] + linear_part * change + slope_part);
         }
         points.0.push(time_s[k]);
         points.1.push(speed_rpm[k]);
@@ -188,19 +199,19 @@ fn slopes(time_s: &[f64], speed_rpm: &[f64]) -> Vec<f64> {
         .collect();
     let mut slopes = vec![0.0; time_s.len()];
     for k in 1..chords.len() {
-        let is_turn = chords[k - 1] * chords[k] <= 0.0;
-        slopes[k] = if is_turn { 0.0 } else { 0.5 * (chords[k - 1] + chords[k]) };
+        let is_extremum = chords[k - 1] * chords[k] <= 0.0;
+        slopes[k] = if is_extremum { 0.0 } else { 0.5 * (chords[k - 1] + chords[k]) };
     }
     for (k, chord) in chords.iter().copied().enumerate() {
         if chord == 0.0 {
             continue;
         }
-        let [begin, end] = [slopes[k] / chord, slopes[k + 1] / chord];
-        let size = (begin * begin + end * end).sqrt();
-        // Within this circle the cubic is monotone.
-        if size > 3.0 {
-            slopes[k] = 3.0 / size * begin * chord;
-            slopes[k + 1] = 3.0 / size * end * chord;
+        let [start_ratio, end_ratio] = [slopes[k] / chord, slopes[k + 1] / chord];
+        let radius = (start_ratio * start_ratio + end_ratio * end_ratio).sqrt();
+        // The cubic is monotone if the two ratios lie within this circle.
+        if radius > 3.0 {
+            slopes[k] = 3.0 / radius * start_ratio * chord;
+            slopes[k + 1] = 3.0 / radius * end_ratio * chord;
         }
     }
     slopes
@@ -210,27 +221,31 @@ fn slopes(time_s: &[f64], speed_rpm: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Speeds of a spin cycle with steep and flat parts, a wait and a reversal.
+    /// The times of a spin cycle with steep and flat parts, a pause and a reversal.
     const TIMES_S: [f64; 8] = [0.0, 5.0, 20.0, 22.0, 40.0, 60.0, 61.0, 80.0];
-    const SPEEDS: [f64; 8] = [0.0, 50.0, 50.0, 90.0, 800.0, 1200.0, 0.0, -45.0];
+    const SPEEDS_RPM: [f64; 8] = [0.0, 50.0, 50.0, 90.0, 800.0, 1200.0, 0.0, -45.0];
 
     #[test]
     fn smooth_joints_are_monotone_and_pass_through_the_points() {
-        let (times, speeds) = smooth(&TIMES_S, &SPEEDS);
+        let (times, speeds) = smooth(&TIMES_S, &SPEEDS_RPM);
         assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
-        for (time_s, speed) in TIMES_S.iter().zip(SPEEDS) {
-            let place = times.iter().position(|time| time == time_s).expect("it is kept");
-            assert_eq!(speeds[place], speed);
+        for (time_s, speed) in TIMES_S.iter().zip(SPEEDS_RPM) {
+            let position = times.iter().position(|time| time == time_s).expect("it is kept");
+            assert_eq!(speeds[position], speed);
         }
         for k in 1..TIMES_S.len() {
-            let inside = |time: &f64| (TIMES_S[k - 1]..=TIMES_S[k]).contains(time);
-            let own: Vec<f64> =
-                times.iter().zip(&speeds).filter(|(t, _)| inside(t)).map(|(_, s)| *s).collect();
-            let [least, most] = [SPEEDS[k - 1].min(SPEEDS[k]), SPEEDS[k - 1].max(SPEEDS[k])];
-            assert!(own.iter().all(|speed| (least..=most).contains(speed)), "{k}: {own:?}");
-            let rises = own.windows(2).all(|pair| pair[0] <= pair[1]);
-            let falls = own.windows(2).all(|pair| pair[0] >= pair[1]);
-            assert!(rises || falls, "{k}: {own:?}");
+            let is_between = |time: &f64| (TIMES_S[k - 1]..=TIMES_S[k]).contains(time);
+            let speeds_between: Vec<f64> =
+                times.iter().zip(&speeds).filter(|(t, _)| is_between(t)).map(|(_, s)| *s).collect();
+            let [least, greatest] =
+                [SPEEDS_RPM[k - 1].min(SPEEDS_RPM[k]), SPEEDS_RPM[k - 1].max(SPEEDS_RPM[k])];
+            assert!(
+                speeds_between.iter().all(|speed| (least..=greatest).contains(speed)),
+                "{k}: {speeds_between:?}"
+            );
+            let rises = speeds_between.windows(2).all(|pair| pair[0] <= pair[1]);
+            let falls = speeds_between.windows(2).all(|pair| pair[0] >= pair[1]);
+            assert!(rises || falls, "{k}: {speeds_between:?}");
         }
         assert!(times.len() < 60 * TIMES_S.len(), "{}", times.len());
     }
@@ -239,15 +254,20 @@ mod tests {
     fn pieces_are_within_the_tolerance_of_the_cubic() {
         // From rest to rest the cubic is 3 x^2 - 2 x^3.
         let (times, speeds) = smooth(&[0.0, 10.0], &[0.0, 1000.0]);
-        let mut off: f64 = 0.0;
+        let mut largest_error: f64 = 0.0;
         for k in 1..times.len() {
             for step in 0..=20 {
-                let share = f64::from(step) / 20.0;
-                let part = (times[k - 1] + share * (times[k] - times[k - 1])) / 10.0;
-                let cubic = 1000.0 * part * part * (3.0 - 2.0 * part);
-                off = off.max((speeds[k - 1] + share * (speeds[k] - speeds[k - 1]) - cubic).abs());
+                let step_fraction = f64::from(step) / 20.0;
+                let fraction = (times[k - 1] + step_fraction * (times[k] - times[k - 1])) / 10.0;
+                let cubic = 1000.0 * fraction * fraction * (3.0 - 2.0 * fraction);
+                largest_error = largest_error.max(
+                    (speeds[k - 1] + step_fraction * (speeds[k] - speeds[k - 1]) - cubic).abs(),
+                );
             }
         }
-        assert!((0.5e-4 * 1000.0..1e-4 * 1000.0 + 1e-9).contains(&off), "{off}");
+        assert!(
+            (0.5e-4 * 1000.0..1e-4 * 1000.0 + 1e-9).contains(&largest_error),
+            "{largest_error}"
+        );
     }
 }

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use proptest::prelude::*;
 
 use super::super::*;
-use super::{SMALLEST, load_text};
+use super::{MINIMAL_GRID, load_text};
 use crate::estimate;
 
 /// Returns a grid whose spin is a table with a number of rows.
-fn with_a_table(rows: usize, more: &str) -> String {
+fn grid_with_table(rows: usize, sections: &str) -> String {
     let column = |value: fn(usize) -> f64| {
         (0..rows).fold(String::new(), |mut text, k| {
             let _ = write!(text, "{},", value(k));
@@ -20,7 +20,7 @@ fn with_a_table(rows: usize, more: &str) -> String {
     let speeds = column(|k| (k % 100) as f64);
     format!(
         "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n\
-         [time]\nend_s = 320\n{more}"
+         [time]\nend_s = 320\n{sections}"
     )
 }
 
@@ -43,9 +43,9 @@ fn the_longest_spin_is_checked_and_a_longer_one_is_refused() {
     let mut axes: String = masses.map(axis).concat();
     axes.push_str(&axis("damping_n_s_per_m"));
     axes.push_str(&axis("spin_table_2_speed_rpm"));
-    let plan = load_text(with_a_table(spin::MAX_ROWS, &axes), &[]).unwrap();
+    let plan = load_text(grid_with_table(spin::MAX_ROWS, &axes), &[]).unwrap();
     assert_eq!(plan.corners(), 64);
-    let refused = load_text(with_a_table(spin::MAX_ROWS + 1, &axes), &[]).unwrap_err();
+    let refused = load_text(grid_with_table(spin::MAX_ROWS + 1, &axes), &[]).unwrap_err();
     assert!(refused.contains("`time_s` has 20001 numbers"), "{refused}");
     assert!(refused.contains("at most 20000"), "{refused}");
     assert!(!refused.contains("is empty"), "{refused}");
@@ -53,14 +53,14 @@ fn the_longest_spin_is_checked_and_a_longer_one_is_refused() {
 
 #[test]
 fn a_list_of_millions_of_points_is_checked() {
-    // The only wrong point is in the last row.
+    // The only invalid point is in the last row.
     let mut list = "spring_1_cabinet_x_m,shaft_mass_kg\n".to_owned();
     list.push_str(&"0.1,1e0\n".repeat(3_000_000));
-    let plan = load_list(SMALLEST, &list).unwrap();
+    let plan = load_list(MINIMAL_GRID, &list).unwrap();
     assert_eq!(plan.points(), 3_000_000);
     assert!((250..=256).contains(&plan.some_corners().len()));
     list.push_str("0.1,0\n");
-    let refused = load_list(SMALLEST, &list).unwrap_err();
+    let refused = load_list(MINIMAL_GRID, &list).unwrap_err();
     assert!(refused.contains("points.csv:3000002:5"), "{refused}");
     assert!(refused.contains("value 3000001"), "{refused}");
 }
@@ -75,7 +75,7 @@ fn extreme_points_of_a_long_list_are_corners() {
             _ => "2e8,4\n",
         });
     }
-    let corners = load_list(SMALLEST, &list).unwrap().some_corners();
+    let corners = load_list(MINIMAL_GRID, &list).unwrap().some_corners();
     assert!(corners.contains(&vec![5e10, 4.0]) && corners.contains(&vec![2e8, 0.5]), "{corners:?}");
 }
 
@@ -83,16 +83,16 @@ fn extreme_points_of_a_long_list_are_corners() {
 fn points_that_would_take_minutes_to_check_are_refused() {
     let mut list = "spin_table_2_speed_rpm\n".to_owned();
     list.push_str(&"5\n".repeat(50_001));
-    let refused = load_list(&with_a_table(20_000, ""), &list).unwrap_err();
+    let refused = load_list(&grid_with_table(20_000, ""), &list).unwrap_err();
     assert!(refused.contains("50001") && refused.contains("at most 50000 points"), "{refused}");
-    // An axis of a mass leaves the table as it is, so that it is checked once.
+    // With an axis of a mass the table is the same at all points, so that it is checked once.
     let list = list.replace("spin_table_2_speed_rpm", "tub_mass_kg");
-    assert_eq!(load_list(&with_a_table(20_000, ""), &list).unwrap().points(), 50_001);
+    assert_eq!(load_list(&grid_with_table(20_000, ""), &list).unwrap().points(), 50_001);
 }
 
-/// Loads a grid with a tub so light that its dampers make it stiff.
-fn light(tub_mass_kg: f64, end_s: f64, integrator: &str) -> Result<Plan, String> {
-    let grid = SMALLEST.replace("end_s = 50", &format!("end_s = {end_s}"));
+/// Loads a grid with a tub that is light enough for its dampers to make it stiff.
+fn load_light_tub(tub_mass_kg: f64, end_s: f64, integrator: &str) -> Result<Plan, String> {
+    let grid = MINIMAL_GRID.replace("end_s = 50", &format!("end_s = {end_s}"));
     let set = format!("[set]\ntub_mass_kg = {tub_mass_kg:e}\n");
     load_text(format!("{grid}{set}[integrator]\n{integrator}\n"), &[])
 }
@@ -100,19 +100,19 @@ fn light(tub_mass_kg: f64, end_s: f64, integrator: &str) -> Result<Plan, String>
 #[test]
 fn a_machine_that_is_too_stiff_is_refused_with_every_explicit_method() {
     for method in ["rk4-mass-scaled", "dopri5", "rk4"] {
-        let refused = light(1e-9, 50.0, &format!("method = \"{method}\"")).unwrap_err();
+        let refused = load_light_tub(1e-9, 50.0, &format!("method = \"{method}\"")).unwrap_err();
         assert!(refused.contains("the machine is too stiff"), "{refused}");
         assert!(refused.contains("use method = \"additive\""), "{refused}");
     }
-    assert!(light(1e-9, 50.0, "method = \"additive\"").is_ok());
-    assert!(light(1e-6, 1.0, "method = \"rk4-mass-scaled\"").is_ok());
+    assert!(load_light_tub(1e-9, 50.0, "method = \"additive\"").is_ok());
+    assert!(load_light_tub(1e-6, 1.0, "method = \"rk4-mass-scaled\"").is_ok());
 }
 
 #[test]
 fn a_machine_with_too_stiff_dampers_is_refused_with_the_additive_method() {
     for method in ["dopri5", "additive"] {
         let set = "[set]\ndamping_n_s_per_m = 1e12\n";
-        let grid = format!("{SMALLEST}{set}[integrator]\nmethod = \"{method}\"\n");
+        let grid = format!("{MINIMAL_GRID}{set}[integrator]\nmethod = \"{method}\"\n");
         let refused = load_text(grid, &[]).unwrap_err();
         assert!(refused.contains("the machine is too stiff"), "{refused}");
         assert!(!refused.contains("use method"), "it is of no use: {refused}");
@@ -121,42 +121,42 @@ fn a_machine_with_too_stiff_dampers_is_refused_with_the_additive_method() {
 
 #[test]
 fn a_step_above_the_stability_limit_is_refused_with_a_suitable_method() {
-    let grid = format!("{SMALLEST}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-3\n");
+    let grid = format!("{MINIMAL_GRID}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-3\n");
     let refused = load_text(grid, &[]).unwrap_err();
     assert!(refused.contains("past the stability limit of rk4"), "{refused}");
     assert!(refused.contains("method = \"additive\""), "{refused}");
 }
 
 #[test]
-fn the_estimate_of_a_stiff_machine_is_from_a_beginning() {
-    let plan = light(1e-6, 10.0, "method = \"dopri5\"").unwrap();
+fn the_estimate_of_a_stiff_machine_takes_a_short_sample() {
+    let plan = load_light_tub(1e-6, 10.0, "method = \"dopri5\"").unwrap();
     let estimate = estimate::estimate(&plan, 1).unwrap();
     assert!(estimate.sampled_s < 1.0, "{estimate:?}");
 }
 
 #[test]
-fn mistakes_beside_an_unknown_choice_are_reported() {
-    let refused = |text: &str, parts: &[&str]| {
-        let refused = load_text(text, &[]).unwrap_err();
+fn mistakes_together_with_an_unknown_choice_are_reported() {
+    let assert_refused = |text: &str, parts: &[&str]| {
+        let message = load_text(text, &[]).unwrap_err();
         for part in parts {
-            assert!(refused.contains(part), "no {part} in\n{refused}");
+            assert!(message.contains(part), "no {part} in\n{message}");
         }
     };
-    refused(
+    assert_refused(
         "[spin]\nprofile = \"sinus\"\npeak_rpm = \"fast\"\nramp_s = -1\nspeed = 3\n\
          [time]\nend_s = 50\n",
         &["unknown profile", "`peak_rpm` has the wrong type", "`ramp_s` = -1", "key `speed`"],
     );
-    refused(
+    assert_refused(
         &format!(
-            "{SMALLEST}[integrator]\nmethod = \"euler\"\nstep_s = 0\n\
+            "{MINIMAL_GRID}[integrator]\nmethod = \"euler\"\nstep_s = 0\n\
              rtol = \"small\"\norder = 1\n"
         ),
         &["unknown method", "`step_s` = 0", "`rtol` has the wrong type", "unknown key `order`"],
     );
-    refused(
+    assert_refused(
         &format!(
-            "{SMALLEST}[design]\nmethod = \"halton\"\npoints = 0\nseed = -1\nskip = 3\n\
+            "{MINIMAL_GRID}[design]\nmethod = \"halton\"\npoints = 0\nseed = -1\nskip = 3\n\
              [[axis]]\nparameter = \"tub_mas_kg\"\n"
         ),
         &[
@@ -168,7 +168,7 @@ fn mistakes_beside_an_unknown_choice_are_reported() {
             "`range` is missing",
         ],
     );
-    let refused = load_list(SMALLEST, "tub_mas_kg,shaft_mass_kg\n1,x\n1,-5\n1\n").unwrap_err();
+    let refused = load_list(MINIMAL_GRID, "tub_mas_kg,shaft_mass_kg\n1,x\n1,-5\n1\n").unwrap_err();
     for part in
         ["unknown parameter", "`x` is not a number", "value 2 of `shaft_mass_kg`", "a row of"]
     {
@@ -183,20 +183,20 @@ fn a_range_with_too_few_different_values_is_refused() {
         let ends = format!("from = {from:?}, to = {to:?}");
         let range = format!("{{ {ends}, count = {count}, spacing = \"{spacing}\" }}");
         let axis = format!("[[axis]]\nparameter = \"tub_mass_kg\"\nrange = {range}\n");
-        load_text(format!("{SMALLEST}{axis}"), &[])
+        load_text(format!("{MINIMAL_GRID}{axis}"), &[])
     };
-    let close = 1.0 + 2.0 * f64::EPSILON;
+    let next_but_one = 1.0 + 2.0 * f64::EPSILON;
     for spacing in ["linear", "log"] {
-        let refused = load(1.0, close, 5, spacing).unwrap_err();
+        let refused = load(1.0, next_but_one, 5, spacing).unwrap_err();
         assert!(refused.contains("has no 5 different values"), "{refused}");
         assert!(refused.contains("at most 2"), "{refused}");
-        assert_eq!(load(1.0, close, 2, spacing).unwrap().points(), 2);
+        assert_eq!(load(1.0, next_but_one, 2, spacing).unwrap().points(), 2);
         assert_eq!(load(1.0, 2.0, 1_000_000_000_000, spacing).unwrap().points(), 1_000_000_000_000);
     }
     let design = "[design]\nmethod = \"sobol\"\npoints = 1024\n\
         [[axis]]\nparameter = \"tub_mass_kg\"\n";
-    let range = format!("range = {{ from = 1.0, to = {close:?} }}\n");
-    let refused = load_text(format!("{SMALLEST}{design}{range}"), &[]).unwrap_err();
+    let range = format!("range = {{ from = 1.0, to = {next_but_one:?} }}\n");
+    let refused = load_text(format!("{MINIMAL_GRID}{design}{range}"), &[]).unwrap_err();
     assert!(refused.contains("has no 1024 different values"), "{refused}");
 }
 
@@ -212,19 +212,22 @@ proptest! {
         from in 1e-6_f64..1e6,
         ulps in 1_u64..400,
         count in 2_u64..60,
-        down in any::<bool>(),
-        log in any::<bool>(),
+        is_descending in any::<bool>(),
+        is_logarithmic in any::<bool>(),
     ) {
         let to = f64::from_bits(from.to_bits() + ulps);
-        let [from, to] = if down { [to, from] } else { [from, to] };
-        let spacing = if log { "log" } else { "linear" };
+        let [from, to] = if is_descending { [to, from] } else { [from, to] };
+        let spacing = if is_logarithmic { "log" } else { "linear" };
         let ends = format!("from = {from:?}, to = {to:?}");
         let range = format!("{{ {ends}, count = {count}, spacing = \"{spacing}\" }}");
-        let grid = format!("{SMALLEST}[[axis]]\nparameter = \"tub_mass_kg\"\nrange = {range}\n");
+        let axis = format!("[[axis]]\nparameter = \"tub_mass_kg\"\nrange = {range}\n");
+        let grid = format!("{MINIMAL_GRID}{axis}");
         match load_text(grid, &[]) {
             Ok(plan) => {
                 let values: Vec<f64> = (0..count).map(|i| plan.axes[0].values.value(i)).collect();
-                let ordered = |pair: &[f64]| (pair[0] > pair[1]) == down && pair[0] != pair[1];
+                let ordered = |pair: &[f64]| {
+                    (pair[0] > pair[1]) == is_descending && pair[0] != pair[1]
+                };
                 prop_assert!(values.windows(2).all(ordered), "{values:?}");
             }
             Err(refused) => {

@@ -7,7 +7,7 @@ use washer_model::Spin;
 use super::super::load;
 use crate::plan::Plan;
 
-const END: &str = "[time]\nend_s = 50\n";
+const TIME_SECTION: &str = "[time]\nend_s = 50\n";
 
 /// Loads a grid with a cycle in a file.
 fn load_cycle(spin: &str, cycle: &str) -> Result<Plan, String> {
@@ -16,7 +16,7 @@ fn load_cycle(spin: &str, cycle: &str) -> Result<Plan, String> {
     std::fs::create_dir(folder.path().join("grids")).unwrap();
     std::fs::create_dir(folder.path().join("cycles")).unwrap();
     std::fs::write(folder.path().join("cycles/cycle.csv"), cycle).unwrap();
-    let text = format!("[spin]\nfile = \"../cycles/cycle.csv\"\n{spin}{END}");
+    let text = format!("[spin]\nfile = \"../cycles/cycle.csv\"\n{spin}{TIME_SECTION}");
     std::fs::write(&path, text).unwrap();
     load(Path::new(&path), &[]).map_err(|diagnostics| diagnostics.to_string())
 }
@@ -52,14 +52,14 @@ fn a_cycle_is_read_with_its_units() {
 fn the_plan_has_the_cycle() {
     let text = "time_s,speed_rpm\n0,0\n30,300\n60,0\n";
     let plan = load_cycle("", text).unwrap();
-    let other = load_cycle("", &text.replace("300", "301")).unwrap();
-    assert_ne!(plan.to_json()["spin"], other.to_json()["spin"]);
+    let changed = load_cycle("", &text.replace("300", "301")).unwrap();
+    assert_ne!(plan.to_json()["spin"], changed.to_json()["spin"]);
     assert_eq!(plan.to_json()["spin"]["speed_rpm"][1], 300.0);
 }
 
 #[test]
 fn mistakes_in_a_cycle_are_reported() {
-    for (text, said) in [
+    for (text, part) in [
         ("time_s,speed_rpm\n0,0\n30,300\n20,0\n", "time goes from 30 s to 20 s"),
         ("time_s,speed_rpm\n3,0\n30,300\n", "begins at 3 s"),
         ("time_s,speed_rpm\n0,0\n30,\n", "a row without its speed"),
@@ -72,7 +72,7 @@ fn mistakes_in_a_cycle_are_reported() {
         ("time_s [ms],speed_rpm\n0,0\n30,300\n", "names two units"),
     ] {
         let refused = load_cycle("", text).unwrap_err();
-        assert!(refused.contains(said), "{said}: {refused}");
+        assert!(refused.contains(part), "{part}: {refused}");
     }
     let refused = load_cycle("peak_rpm = 300\n", "time_s,speed_rpm\n0,0\n").unwrap_err();
     assert!(refused.contains("`peak_rpm` does not belong"), "{refused}");

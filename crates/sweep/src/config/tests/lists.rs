@@ -1,4 +1,4 @@
-//! Tests of lists of points as loggers and spreadsheets write them.
+//! Tests of lists of points in the formats of loggers and spreadsheets.
 
 use super::super::load;
 use crate::plan::Plan;
@@ -7,11 +7,11 @@ const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[tim
     [design]\nmethod = \"list\"\nfile = \"points.csv\"\n";
 
 /// Loads a grid with a list of points.
-fn load_list(more: &str, list: &str) -> Result<Plan, String> {
+fn load_list(sections: &str, list: &str) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
     std::fs::write(folder.path().join("points.csv"), list).unwrap();
-    std::fs::write(&path, format!("{GRID}{more}")).unwrap();
+    std::fs::write(&path, format!("{GRID}{sections}")).unwrap();
     load(&path, &[]).map_err(|mistakes| mistakes.to_string())
 }
 
@@ -41,7 +41,7 @@ fn the_grid_file_may_name_the_parameters_of_columns() {
 
 #[test]
 fn a_list_without_points_or_parameters_is_refused() {
-    for (list, said) in [
+    for (list, part) in [
         ("unbalance_mass_kg,weather\n", "is empty"),
         ("weather,height\n1,2\n", "no column of a parameter"),
         ("weather\n", "no column of a parameter"),
@@ -51,6 +51,6 @@ fn a_list_without_points_or_parameters_is_refused() {
         ("sep=;\n", "is empty"),
     ] {
         let refused = load_list("", list).unwrap_err();
-        assert!(refused.contains(said), "{list}: {refused}");
+        assert!(refused.contains(part), "{list}: {refused}");
     }
 }

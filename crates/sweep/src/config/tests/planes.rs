@@ -19,22 +19,22 @@ fn load(change: impl Fn(String) -> String) -> Result<Machine, String> {
     plan.map(|plan| plan.model.machine).map_err(|mistakes| mistakes.to_string())
 }
 
-const FURTHER: &str =
+const FURTHER_UNBALANCE: &str =
     "\n[[further_unbalances]]\nplane = \"front\"\nmass_kg = 0.2\nradius_m = -0.2\n";
 
 /// Returns a machine file in which the unbalance's position is that of the rear plane.
 fn with_rear_unbalance(file: &str) -> String {
     let lines = file.lines().scan(false, |is_unbalance, line| {
         *is_unbalance = if line.starts_with('[') { line == "[unbalance]" } else { *is_unbalance };
-        let is_place = *is_unbalance && line.starts_with("x_m");
-        Some(if is_place { "plane = \"rear\"\n".to_owned() } else { format!("{line}\n") })
+        let is_position = *is_unbalance && line.starts_with("x_m");
+        Some(if is_position { "plane = \"rear\"\n".to_owned() } else { format!("{line}\n") })
     });
     lines.collect()
 }
 
 #[test]
 fn unbalances_lie_in_named_planes() {
-    let machine = load(|file| with_rear_unbalance(&file) + FURTHER).unwrap();
+    let machine = load(|file| with_rear_unbalance(&file) + FURTHER_UNBALANCE).unwrap();
     let paper = Machine::paper();
     assert_eq!(machine.unbalance.x_m, paper.drum.hinge_x_m);
     assert_eq!(machine.further_unbalances[0].x_m, paper.drum.front_x_m);
@@ -43,14 +43,14 @@ fn unbalances_lie_in_named_planes() {
 
 #[test]
 fn loads_have_angles_and_dampers_have_stages() {
-    let turned = FURTHER.replace("radius_m", "angle_deg = -120\nradius_m");
+    let with_angle = FURTHER_UNBALANCE.replace("radius_m", "angle_deg = -120\nradius_m");
     let file = |file: String| {
         let damper = "[[dampers]]\nfree_stroke_m = 0.006\nouter_damping_n_s_per_m = 30\n";
         file.replacen("[[dampers]]\n", damper, 1).replacen(
             "[unbalance]\n",
             "[unbalance]\nangle_deg = 30\n",
             1,
-        ) + &turned
+        ) + &with_angle
     };
     let machine = load(file).unwrap();
     assert_eq!(machine.unbalance.angle_deg, 30.0);
@@ -58,22 +58,22 @@ fn loads_have_angles_and_dampers_have_stages() {
     assert_eq!(machine.dampers[0].free_stroke_m, 0.006);
     assert_eq!(machine.dampers[0].outer_damping_n_s_per_m, 30.0);
     assert_eq!(machine.dampers[1].free_stroke_m, 0.0);
-    // A machine file that is written is read again.
+    // The text of the machine reads back to the same machine.
     let written = machine_file(&machine, &WrittenIn::default());
     assert_eq!(load(|_| written.clone()).unwrap(), machine);
-    let refused = load(|file| file + &turned.replace("-120", "500")).unwrap_err();
+    let refused = load(|file| file + &with_angle.replace("-120", "500")).unwrap_err();
     assert!(refused.contains("angle_deg"), "{refused}");
 }
 
 #[test]
 fn an_unbalance_has_either_a_plane_or_a_position() {
-    let both = FURTHER.replace("mass_kg", "x_m = 0.1\nmass_kg");
-    let refused = load(|file| file + &both).unwrap_err();
+    let with_plane_and_position = FURTHER_UNBALANCE.replace("mass_kg", "x_m = 0.1\nmass_kg");
+    let refused = load(|file| file + &with_plane_and_position).unwrap_err();
     assert!(refused.contains("`plane` beside `x_m`"), "{refused}");
-    let neither = FURTHER.replace("plane = \"front\"\n", "");
-    let refused = load(|file| file + &neither).unwrap_err();
+    let without_position = FURTHER_UNBALANCE.replace("plane = \"front\"\n", "");
+    let refused = load(|file| file + &without_position).unwrap_err();
     assert!(refused.contains("`x_m` is missing"), "{refused}");
-    let wrong = FURTHER.replace("front", "middle");
-    let refused = load(|file| file + &wrong).unwrap_err();
+    let with_unknown_plane = FURTHER_UNBALANCE.replace("front", "middle");
+    let refused = load(|file| file + &with_unknown_plane).unwrap_err();
     assert!(refused.contains("unknown plane \"middle\""), "{refused}");
 }

@@ -2,17 +2,17 @@
 
 use super::super::WasherGridInput;
 
-fn notes(more: &str, sets: &[&str]) -> Vec<String> {
+fn notes(sections: &str, sets: &[&str]) -> Vec<String> {
     let grid =
         "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n".to_owned();
     let sets = sets.iter().map(|set| (*set).to_owned()).collect();
-    let input = WasherGridInput::text("plan", format!("{grid}{more}"), sets);
+    let input = WasherGridInput::text("plan", format!("{grid}{sections}"), sets);
     input.load().unwrap_or_else(|mistakes| panic!("{mistakes}")).aside.notes
 }
 
 #[test]
 fn a_number_in_another_unit_is_noted_with_its_converted_value() {
-    for (set, said) in [
+    for (set, part) in [
         ("tub_mass_kg=23870", "23870 g would be 23.87 kg"),
         ("radial_clearance_m=10", "10 mm would be 0.01 m"),
         ("unbalance_mass_kg=400", "400 g would be 0.4 kg"),
@@ -20,8 +20,11 @@ fn a_number_in_another_unit_is_noted_with_its_converted_value() {
         ("damping_n_s_per_m=0.12", "0.12 N s/mm would be 120 N s/m"),
         ("spin_peak_rpm=30000", "machines have 0 to 5000"),
     ] {
-        let found = notes("", &[set]);
-        assert!(!found.is_empty() && found[0].contains(said), "{set}: {found:?}");
+        let notes_on_set = notes("", &[set]);
+        assert!(
+            !notes_on_set.is_empty() && notes_on_set[0].contains(part),
+            "{set}: {notes_on_set:?}"
+        );
     }
     let axis = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [100, 400, 800]\n";
     assert!(notes(axis, &[])[0].contains("800 g would be 0.8 kg"));

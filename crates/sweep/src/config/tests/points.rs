@@ -23,13 +23,13 @@ fn a_million_mistakes_are_counted() {
 #[test]
 fn columns_are_found_by_name_and_an_axis_of_one_value_may_be_left_out() {
     assert_eq!(check(&[("unbalance_mass_kg", &[0.1, 0.2, 0.5])]), Ok(vec![Some(0), None]));
-    let both: [(&str, &[f64]); 2] = [("tub_mass_kg", &[20.0]), ("unbalance_mass_kg", &[0.3])];
-    assert_eq!(check(&both), Ok(vec![Some(1), Some(0)]));
+    let columns: [(&str, &[f64]); 2] = [("tub_mass_kg", &[20.0]), ("unbalance_mass_kg", &[0.3])];
+    assert_eq!(check(&columns), Ok(vec![Some(1), Some(0)]));
 }
 
 #[test]
 fn every_mistake_names_its_column_and_row() {
-    for (columns, said) in [
+    for (columns, part) in [
         (&[("unbalance_mass", &[0.1][..])][..], "did you mean `unbalance_mass_kg`"),
         (&[("unbalance_mass", &[0.1][..])][..], "has no column `unbalance_mass_kg`"),
         (&[("unbalance_mass_kg", &[0.1, 0.6])], "row 2 of `unbalance_mass_kg` = 0.6 is off"),
@@ -45,6 +45,6 @@ fn every_mistake_names_its_column_and_row() {
         ),
     ] {
         let text = check(columns).unwrap_err();
-        assert!(text.contains(said), "{text}");
+        assert!(text.contains(part), "{text}");
     }
 }

@@ -10,7 +10,7 @@ fn load_machine(text: &str) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("machine.toml"), text).unwrap();
     let grid = folder.path().join("grid.toml");
-    std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+    std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
     load(&grid, &[]).map_err(|mistakes| mistakes.to_string())
 }
 
@@ -29,18 +29,21 @@ fn a_data_sheet_makes_a_machine_near_the_built_in_one() {
         assumed += 1;
         let source = plan.written.source(&[parameter.name()]);
         assert_eq!(source, Some(format!("assumed: {}", assumption.rule)));
-        let [value, paper] = [machine, &built_in].map(|one| parameter.get(one, spin).unwrap());
-        let [least, most] = assumption.expected_bounds(value, machine);
+        let [value, paper] =
+            [machine, &built_in].map(|machine| parameter.get(machine, spin).unwrap());
+        let [least, greatest] = assumption.expected_bounds(value, machine);
         let name = parameter.name();
         // The paper's value lies within the range about the assumed value.
-        let is_within = least.min(most) - 1e-9 <= paper && paper <= least.max(most) + 1e-9;
-        assert!(is_within, "{name}: {paper} is not from {least} to {most}");
+        let is_within = least.min(greatest) - 1e-9 <= paper && paper <= least.max(greatest) + 1e-9;
+        assert!(is_within, "{name}: {paper} is not from {least} to {greatest}");
     }
     assert_eq!(assumed, 27);
     // The complete file has the rule of each number.
-    let long = machine_file(machine, &plan.written);
-    assert!(long.contains("[assumed: half the drum's depth before O, as the built-in machine]"));
-    assert_eq!(load_machine(&long).unwrap().model.machine, *machine);
+    let complete = machine_file(machine, &plan.written);
+    assert!(
+        complete.contains("[assumed: half the drum's depth before O, as the built-in machine]")
+    );
+    assert_eq!(load_machine(&complete).unwrap().model.machine, *machine);
 }
 
 #[test]
@@ -55,17 +58,18 @@ fn a_given_number_replaces_a_rule() {
 #[test]
 fn missing_and_contradicting_numbers_of_a_data_sheet_are_reported() {
     let short = SHORT_MACHINE;
-    let with = |from: &str, to: &str| load_machine(&short.replace(from, to)).unwrap_err();
-    let found = with("moving_mass_kg = 31.85", "");
-    assert!(found.contains("`moving_mass_kg` is missing"), "{found}");
-    let found = with("[drum]\n", "[tub]\nmass_kg = 20\n[drum]\n");
-    assert!(found.contains("`moving_mass_kg` beside the tub's mass"), "{found}");
-    let found = with("[drum]\n", "[drum]\nmass_kg = 40\n");
-    assert!(found.contains("the rule for the left-out `tub_mass_kg` gives"), "{found}");
-    // This is one mistake, not one for every number that would follow from the depth.
-    let found = with("depth_m = 0.30", "");
-    assert!(found.contains("`depth_m` is missing"), "{found}");
-    assert!(!found.contains("[tub]") && !found.contains("gravity"), "{found}");
+    let refusal = |old: &str, new: &str| load_machine(&short.replace(old, new)).unwrap_err();
+    let message = refusal("moving_mass_kg = 31.85", "");
+    assert!(message.contains("`moving_mass_kg` is missing"), "{message}");
+    let message = refusal("[drum]\n", "[tub]\nmass_kg = 20\n[drum]\n");
+    assert!(message.contains("`moving_mass_kg` beside the tub's mass"), "{message}");
+    let message = refusal("[drum]\n", "[drum]\nmass_kg = 40\n");
+    assert!(message.contains("the rule for the left-out `tub_mass_kg` gives"), "{message}");
+    // A missing depth is one mistake, and the numbers that would follow from it are not further
+    // ones.
+    let message = refusal("depth_m = 0.30", "");
+    assert!(message.contains("`depth_m` is missing"), "{message}");
+    assert!(!message.contains("[tub]") && !message.contains("gravity"), "{message}");
 }
 
 #[test]
@@ -76,9 +80,9 @@ fn bushings_alone_can_carry_a_machine() {
     let Washer { machine, spin, .. } = plan.model.clone();
     let point = crate::plan::prepare_point(machine, spin, &crate::plan::timing(&plan)).unwrap();
     // The static deflection of 689 kg on 1,467,056 N/m.
-    let middle_m = 689.0 * 9.81 / 1_467_056.0;
-    assert!((point.static_sag_m() / middle_m - 1.0).abs() < 0.3, "{}", point.static_sag_m());
-    let none = file.split("[[bushings]]").next().unwrap();
-    let found = load_machine(none).unwrap_err();
+    let expected_m = 689.0 * 9.81 / 1_467_056.0;
+    assert!((point.static_sag_m() / expected_m - 1.0).abs() < 0.3, "{}", point.static_sag_m());
+    let without_bushings = file.split("[[bushings]]").next().unwrap();
+    let found = load_machine(without_bushings).unwrap_err();
     assert!(found.contains("at least one [[springs]] or [[bushings]]"), "{found}");
 }

@@ -5,9 +5,9 @@ use crate::plan::Plan;
 
 const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n";
 
-fn load(more: &str, sets: &[&str]) -> Result<Plan, String> {
+fn load(sections: &str, sets: &[&str]) -> Result<Plan, String> {
     let sets = sets.iter().map(|set| (*set).to_owned()).collect();
-    let input = WasherGridInput::text("plan", format!("{GRID}{more}"), sets);
+    let input = WasherGridInput::text("plan", format!("{GRID}{sections}"), sets);
     input.load().map_err(|mistakes| mistakes.to_string())
 }
 
@@ -29,8 +29,8 @@ fn an_axis_with_a_tolerance_is_about_the_machines_number() {
     let json = plan.to_json();
     assert_eq!(json["axis"][0]["tolerance"], 0.5);
     assert_eq!(load(&damping, &[]).unwrap().to_json()["axis"][0]["tolerance"], "5 %");
-    let again = WasherGridInput::from_plan("plan", &json).load().unwrap();
-    assert_eq!(values(&again), [7.5, 8.0, 8.5]);
+    let reloaded = WasherGridInput::from_plan("plan", &json).load().unwrap();
+    assert_eq!(values(&reloaded), [7.5, 8.0, 8.5]);
     // An option with the axis' name fixes it.
     assert_eq!(load(&mass, &["drum_mass_kg=9"]).unwrap().axes.len(), 0);
 }
@@ -46,13 +46,16 @@ fn a_distribution_with_a_tolerance_is_about_the_machines_number() {
     for (kind, keys) in [("normal", ["mean", "sd"]), ("lognormal", ["median", "sigma"])] {
         let plan = load(&design(kind), &[]).unwrap().to_json();
         assert_eq!(plan["axis"][0]["tolerance"], "30 %");
-        let told = &plan["axis"][0]["distribution"];
-        let numbers = keys.map(|key| told[key].as_f64().unwrap());
-        assert!((numbers[0] - 0.4).abs() < 1e-12, "{told}");
+        let distribution = &plan["axis"][0]["distribution"];
+        let numbers = keys.map(|key| distribution[key].as_f64().unwrap());
+        assert!((numbers[0] - 0.4).abs() < 1e-12, "{distribution}");
         let spread = if kind == "normal" { 0.04 } else { 1.3_f64.ln() / 3.0 };
-        assert!((numbers[1] - spread).abs() < 1e-12, "{told}");
-        let ends = ["from", "to"].map(|key| told[key].as_f64().unwrap());
-        assert!((ends[0] - 0.28).abs() < 1e-12 && (ends[1] - 0.52).abs() < 1e-12, "{told}");
+        assert!((numbers[1] - spread).abs() < 1e-12, "{distribution}");
+        let bounds = ["from", "to"].map(|key| distribution[key].as_f64().unwrap());
+        assert!(
+            (bounds[0] - 0.28).abs() < 1e-12 && (bounds[1] - 0.52).abs() < 1e-12,
+            "{distribution}"
+        );
     }
     let plan = load(&design("uniform"), &[]).unwrap();
     assert!((0..16).all(|point| (0.28..=0.52).contains(&plan.axis_values(point)[0])));
@@ -65,10 +68,10 @@ fn a_distribution_with_a_tolerance_is_about_the_machines_number() {
 
 #[test]
 fn wrong_tolerances_are_refused() {
-    let axis = |tolerance: &str, more: &str| {
-        format!("[[axis]]\nparameter = \"drum_mass_kg\"\ntolerance = {tolerance}\n{more}")
+    let axis = |tolerance: &str, keys: &str| {
+        format!("[[axis]]\nparameter = \"drum_mass_kg\"\ntolerance = {tolerance}\n{keys}")
     };
-    for (text, said) in [
+    for (text, part) in [
         (axis("\"5 kg\"", "count = 3\n"), "\"5 kg\" is no tolerance"),
         (axis("\"-5 %\"", "count = 3\n"), "is no tolerance"),
         (axis("0.5", ""), "`count` is missing"),
@@ -77,7 +80,7 @@ fn wrong_tolerances_are_refused() {
         (axis("true", "count = 3\n"), "wrong type"),
     ] {
         let refused = load(&text, &[]).unwrap_err();
-        assert!(refused.contains(said), "{said}: {refused}");
+        assert!(refused.contains(part), "{part}: {refused}");
     }
     let axis = "[[axis]]\nparameter = \"damping_n_s_per_m\"\ntolerance = \"5 %\"\ncount = 3\n";
     let refused = load(axis, &["damper_1_damping_n_s_per_m=90"]).unwrap_err();

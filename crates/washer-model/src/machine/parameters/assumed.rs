@@ -21,7 +21,7 @@ pub struct DataSheet {
 /// The rule for a number that a machine file may leave out.
 #[derive(Debug)]
 pub struct Assumption {
-    /// The function of the data sheet and of the other numbers that returns the value.
+    /// The function that computes the value from the data sheet and the machine's other numbers.
     pub(super) value: fn(&DataSheet, &Machine) -> f64,
     /// The rule in words, as listings show it.
     pub rule: &'static str,
@@ -44,26 +44,26 @@ impl Assumption {
     pub fn expected_bounds(&self, value: f64, machine: &Machine) -> [f64; 2] {
         let depth_m = machine.drum.front_x_m - machine.drum.hinge_x_m;
         match self.expected_range {
-            ExpectedRange::Factor(least, most) => [value * least, value * most],
-            ExpectedRange::Depth(back, forth) => [value + back * depth_m, value + forth * depth_m],
+            ExpectedRange::Factor(low, high) => [value * low, value * high],
+            ExpectedRange::Depth(low, high) => [value + low * depth_m, value + high * depth_m],
         }
     }
 }
 
 impl DataSheet {
-    /// Sets the parameters that a file leaves out to their assumed values. Rules read results of
-    /// other rules, without cycles, so that the iteration ends.
-    pub fn fill(&self, left_out: &[MachineParameter], machine: &mut Machine) {
+    /// Sets the parameters that a file leaves out to their assumed values. Rules may read the
+    /// results of other rules, without cycles, so that the passes end.
+    pub fn fill(&self, omitted: &[MachineParameter], machine: &mut Machine) {
         let mut no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
-        for _ in left_out {
-            let before = machine.clone();
-            for parameter in left_out {
+        for _ in omitted {
+            let previous = machine.clone();
+            for parameter in omitted {
                 if let Some(assumption) = parameter.assumption() {
                     let value = (assumption.value)(self, machine);
                     parameter.set(machine, &mut no_spin, value);
                 }
             }
-            if *machine == before {
+            if *machine == previous {
                 return;
             }
         }
@@ -72,7 +72,7 @@ impl DataSheet {
 
 /// Returns the moments of inertia of a thin-walled open cylinder about its mass centre, along and
 /// across its axis.
-pub(super) fn cylinder_kg_m2(mass_kg: f64, radius_m: f64, length_m: f64) -> [f64; 2] {
+pub(super) fn cylinder_inertia_kg_m2(mass_kg: f64, radius_m: f64, length_m: f64) -> [f64; 2] {
     let about_axis = mass_kg * radius_m * radius_m;
     [about_axis, about_axis / 2.0 + mass_kg * length_m * length_m / 12.0]
 }

@@ -2,16 +2,16 @@
 
 use super::Range::{Any, Negative, NonNegative, Positive, Within};
 use super::assumed::ExpectedRange::{Depth, Factor};
-use super::assumed::{Assumption, DataSheet, cylinder_kg_m2};
-use super::{ElementList, Get, ParameterRow, Range, Set, Target, common_value};
+use super::assumed::{Assumption, DataSheet, cylinder_inertia_kg_m2};
+use super::{ElementList, Getter, ParameterRow, Range, Setter, Target, common_value};
 use crate::{BumpStop, Bushing, Damper, Foot, Machine, Spin, Spring, Unbalance};
 
 /// The target of a row, and the functions that read and write it.
-type Access = (Target, Get, Set);
+type Access = (Target, Getter, Setter);
 
 /// Declares a row: name, unit, range, source, description, access. Before the access, `else` gives
-/// the value where a machine file leaves the number out, or `assume` gives a rule from a data
-/// sheet, the rule in words, and the range in which machines are expected.
+/// the value if a machine file leaves the number out, or `assume` gives a function of a data sheet,
+/// the rule in words, and the range in which real machines are expected.
 macro_rules! row {
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
         assume $value:expr, $rule:literal, $expected_range:expr; $($access:tt)+) => {
@@ -48,7 +48,7 @@ macro_rules! row {
     }};
 }
 
-/// Expands the access of a row to its target and functions.
+/// Expands the access of a row to its target and to the functions that read and write it.
 macro_rules! access {
     (machine $($field:tt)+) => {
         (Target::Machine, |m, _, _| Some(m.$($field)+), |m, _, _, v| m.$($field)+ = v)
@@ -113,15 +113,15 @@ macro_rules! access {
 /// Declares the rows of a vector's three components: the parts of the names before and after the
 /// axis, then the arguments of [`row!`]. Descriptions end with the direction of the axis.
 macro_rules! axes {
-    ($before:literal $after:literal, $unit:literal, $range:expr, $source:expr, $what:literal,
+    ($before:literal $after:literal, $unit:literal, $range:expr, $source:expr, $prefix:literal,
         $($vector:tt)+) => {
         &[
             row!(concat!($before, "x", $after), $unit, $range, $source,
-                concat!($what, "towards the door"), $($vector)+[0]),
+                concat!($prefix, "towards the door"), $($vector)+[0]),
             row!(concat!($before, "y", $after), $unit, $range, $source,
-                concat!($what, "upwards"), $($vector)+[1]),
+                concat!($prefix, "upwards"), $($vector)+[1]),
             row!(concat!($before, "z", $after), $unit, $range, $source,
-                concat!($what, "sideways"), $($vector)+[2]),
+                concat!($prefix, "sideways"), $($vector)+[2]),
         ]
     };
 }
@@ -135,54 +135,54 @@ const TABLE_4: &str = "paper, Table 4";
 /// The source of stiffnesses and dampings.
 const SECTION_3_1: &str = "paper, section 3.1";
 /// The source of numbers that the paper's machine does not have.
-const NONE: &str = "assumed: none unless given";
-/// The source of v_s.
+const ASSUMED_NONE: &str = "assumed: none unless given";
+/// The source of the friction speed v_s.
 const USUAL_SPEED: &str = "assumed: a usual value";
-/// The source of V.
-const OWN_SPEED: &str = "assumed: that of the linear motion";
-/// The range of v_s and V (m/s), in which friction over speed is finite.
-const SPEED: Range = Within(1e-6, 1e3);
+/// The source of the speed amplitude V of friction in the linear model.
+const LINEAR_MOTION_SPEED: &str = "assumed: that of the linear motion";
+/// The range of the speeds v_s and V (m/s), in which friction over speed is finite.
+const FRICTION_SPEEDS: Range = Within(1e-6, 1e3);
 /// The source of the unbalances' angles.
 const ALONG_D2: &str = "assumed: along d2, up at the start";
 /// The range of the unbalances' angles (deg).
-const ANGLE: Range = Within(-360.0, 360.0);
+const UNBALANCE_ANGLES: Range = Within(-360.0, 360.0);
 /// The source of the spin's numbers.
-const GRID: &str = "the grid file's [spin]";
+const SPIN_SECTION: &str = "the grid file's [spin]";
 /// The source of the window.
-const TIME: &str = "the grid file's [time]";
+const TIME_SECTION: &str = "the grid file's [time]";
 /// The source of the bare drum and of its unbalance.
-const SPLIT: &str = "derived: the drum of Tables 2 and 3 less its 0.4 kg unbalance";
+const BARE_DRUM: &str = "derived: the drum of Tables 2 and 3 less its 0.4 kg unbalance";
 
-/// Returns the moments of inertia of an assumed tub about its axis and across.
+/// Returns the moments of inertia of an assumed tub, about its axis and across it.
 fn tub_inertia_kg_m2(sheet: &DataSheet, machine: &Machine) -> [f64; 2] {
     let radius_m = sheet.drum_radius_m + machine.radial_clearance_m;
-    cylinder_kg_m2(machine.tub.mass_kg, radius_m, 2.0 * sheet.drum_depth_m)
+    cylinder_inertia_kg_m2(machine.tub.mass_kg, radius_m, 2.0 * sheet.drum_depth_m)
 }
 
-/// Returns the moments of inertia of an assumed shaft and rotor about their axis and across.
+/// Returns the moments of inertia of an assumed shaft and rotor, about their axis and across it.
 fn shaft_inertia_kg_m2(sheet: &DataSheet, machine: &Machine) -> [f64; 2] {
     let radius_m = sheet.drum_radius_m / 2.0;
-    cylinder_kg_m2(machine.shaft.mass_kg, radius_m, sheet.drum_depth_m / 3.0)
+    cylinder_inertia_kg_m2(machine.shaft.mass_kg, radius_m, sheet.drum_depth_m / 3.0)
 }
 
-/// Returns the moments of inertia of an assumed drum about its axis and across.
+/// Returns the moments of inertia of an assumed drum, about its axis and across it.
 fn drum_inertia_kg_m2(sheet: &DataSheet, machine: &Machine) -> [f64; 2] {
-    cylinder_kg_m2(machine.drum.mass_kg, sheet.drum_radius_m, sheet.drum_depth_m)
+    cylinder_inertia_kg_m2(machine.drum.mass_kg, sheet.drum_radius_m, sheet.drum_depth_m)
 }
 
 /// Returns the stiffness at which the empty drum, turned about its hinge, has the built-in
 /// machine's natural frequency.
 fn hinge_stiffness_n_m_per_rad(machine: &Machine) -> f64 {
-    let about_hinge_kg_m2 = |machine: &Machine| {
+    let hinge_inertia_kg_m2 = |machine: &Machine| {
         let arm_m = machine.drum.centre_x_m - machine.drum.hinge_x_m;
         machine.drum.inertia_kg_m2[1] + machine.drum.mass_kg * arm_m * arm_m
     };
     let built_in = Machine::paper();
-    let share = about_hinge_kg_m2(machine) / about_hinge_kg_m2(&built_in);
-    built_in.flexure.stiffness_n_m_per_rad * share
+    let inertia_ratio = hinge_inertia_kg_m2(machine) / hinge_inertia_kg_m2(&built_in);
+    built_in.flexure.stiffness_n_m_per_rad * inertia_ratio
 }
 
-/// The rows that are not of a list.
+/// The rows of parameters that do not belong to a list.
 #[rustfmt::skip]
 pub(super) static TABLE: &[ParameterRow] = &[
     row!("gravity_m_per_s2", "m/s^2", NonNegative, "convention",
@@ -250,27 +250,27 @@ pub(super) static TABLE: &[ParameterRow] = &[
         assume |sheet, m| shaft_inertia_kg_m2(sheet, m)[1],
         "a ring of half the drum's radius, a third of its depth long",
         Factor(0.5, 3.0); machine shaft.inertia_kg_m2[2]),
-    row!("drum_mass_kg", "kg", Positive, SPLIT,
+    row!("drum_mass_kg", "kg", Positive, BARE_DRUM,
         "mass of the drum without unbalance (m_0)",
         assume |sheet, _| 0.11 * sheet.moving_mass_kg.unwrap_or(0.0),
         "0.11 of the moving mass, as the built-in machine",
         Factor(0.7, 2.0); machine drum.mass_kg),
-    row!("drum_centre_x_m", "m", Any, SPLIT,
+    row!("drum_centre_x_m", "m", Any, BARE_DRUM,
         "mass centre of the drum without unbalance, on its axis (x_0)",
         assume |sheet, m| m.drum.hinge_x_m + sheet.drum_depth_m / 6.0,
         "a sixth of the drum's depth before the hinge, as the built-in machine",
         Depth(-0.1, 0.3); machine drum.centre_x_m),
-    row!("drum_inertia_11_kg_m2", "kg m^2", Positive, SPLIT,
+    row!("drum_inertia_11_kg_m2", "kg m^2", Positive, BARE_DRUM,
         "bare drum's moment of inertia about its axis",
         assume |sheet, m| drum_inertia_kg_m2(sheet, m)[0],
         "a thin-walled cylinder of the drum's radius and depth",
         Factor(0.8, 1.5); machine drum.inertia_kg_m2[0]),
-    row!("drum_inertia_22_kg_m2", "kg m^2", Positive, SPLIT,
+    row!("drum_inertia_22_kg_m2", "kg m^2", Positive, BARE_DRUM,
         "bare drum's moment of inertia along d2, towards the unbalance",
         assume |sheet, m| drum_inertia_kg_m2(sheet, m)[1],
         "a thin-walled cylinder of the drum's radius and depth",
         Factor(0.7, 2.0); machine drum.inertia_kg_m2[1]),
-    row!("drum_inertia_33_kg_m2", "kg m^2", Positive, SPLIT,
+    row!("drum_inertia_33_kg_m2", "kg m^2", Positive, BARE_DRUM,
         "bare drum's moment of inertia along d3",
         assume |sheet, m| drum_inertia_kg_m2(sheet, m)[1],
         "a thin-walled cylinder of the drum's radius and depth",
@@ -287,7 +287,7 @@ pub(super) static TABLE: &[ParameterRow] = &[
         Depth(-0.1, 0.1); machine drum.front_x_m),
     row!("unbalance_mass_kg", "kg", NonNegative, TABLE_2,
         "point mass stuck to the drum's wall (m_u)", machine unbalance.mass_kg),
-    row!("unbalance_x_m", "m", Any, SPLIT,
+    row!("unbalance_x_m", "m", Any, BARE_DRUM,
         "position of the unbalance along the axis (x_u)",
         assume |sheet, m| m.drum.hinge_x_m + 0.5 * sheet.drum_depth_m,
         "the middle of the drum's depth",
@@ -297,7 +297,7 @@ pub(super) static TABLE: &[ParameterRow] = &[
         assume |sheet, _| sheet.drum_radius_m,
         "the drum's radius",
         Factor(0.8, 1.0); machine unbalance.radius_m),
-    row!("unbalance_angle_deg", "deg", ANGLE, ALONG_D2,
+    row!("unbalance_angle_deg", "deg", UNBALANCE_ANGLES, ALONG_D2,
         "angle of the unbalance about the axis, from d2 in the direction in which the drum turns",
         else 0.0, machine unbalance.angle_deg),
     row!("flexure_stiffness_n_m_per_rad", "N m/rad", Positive, SECTION_3_1,
@@ -339,13 +339,13 @@ pub(super) static TABLE: &[ParameterRow] = &[
     row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1,
         "damping of all dampers (C)",
         every dampers Dampers damping_n_s_per_m),
-    row!("friction_n", "N", NonNegative, NONE,
+    row!("friction_n", "N", NonNegative, ASSUMED_NONE,
         "friction of all dampers (F_f)",
         every dampers Dampers friction_n),
-    row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
+    row!("friction_speed_m_per_s", "m/s", FRICTION_SPEEDS, USUAL_SPEED,
         "speed below which the friction of all dampers fades (v_s)",
         every dampers Dampers friction_speed_m_per_s),
-    row!("friction_linear_speed_m_per_s", "m/s", SPEED, OWN_SPEED,
+    row!("friction_linear_speed_m_per_s", "m/s", FRICTION_SPEEDS, LINEAR_MOTION_SPEED,
         "speed amplitude at which the linear model takes the friction of all dampers (V)",
         Target::Dampers("friction_linear_speed_m_per_s"),
         get |m, _, _| {
@@ -356,36 +356,36 @@ pub(super) static TABLE: &[ParameterRow] = &[
         set |m, _, _, v| {
             m.dampers.iter_mut().for_each(|d| d.friction_linear_speed_m_per_s = Some(v));
         }),
-    row!("free_stroke_m", "m", NonNegative, NONE,
+    row!("free_stroke_m", "m", NonNegative, ASSUMED_NONE,
         "free stroke of all dampers to each side of their place at rest, without friction (s)",
         else 0.0, every dampers Dampers free_stroke_m),
-    row!("outer_damping_n_s_per_m", "N s/m", NonNegative, NONE,
+    row!("outer_damping_n_s_per_m", "N s/m", NonNegative, ASSUMED_NONE,
         "damping of all dampers beyond their free stroke, added to that which always acts",
         else 0.0, every dampers Dampers outer_damping_n_s_per_m),
-    row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), GRID,
+    row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), SPIN_SECTION,
         "greatest spin speed; negative turns backwards", spin peak_rpm),
-    row!("spin_ramp_s", "s", Positive, GRID,
+    row!("spin_ramp_s", "s", Positive, SPIN_SECTION,
         "duration of the run-up, and of a triangle's run-down (Figs. 10 to 12: 50 s, assumed)",
         spin ramp_s),
-    row!("cabinet_mass_kg", "kg", NonNegative, NONE,
+    row!("cabinet_mass_kg", "kg", NonNegative, ASSUMED_NONE,
         "mass of the cabinet with all that is fixed to it", cabinet mass_kg),
-    row!("cabinet_centre_x_m", "m", Any, NONE,
+    row!("cabinet_centre_x_m", "m", Any, ASSUMED_NONE,
         "mass centre of the cabinet, towards the door", cabinet centre_m[0]),
-    row!("cabinet_centre_y_m", "m", Any, NONE,
+    row!("cabinet_centre_y_m", "m", Any, ASSUMED_NONE,
         "mass centre of the cabinet, upwards", cabinet centre_m[1]),
-    row!("cabinet_centre_z_m", "m", Any, NONE,
+    row!("cabinet_centre_z_m", "m", Any, ASSUMED_NONE,
         "mass centre of the cabinet, sideways", cabinet centre_m[2]),
-    row!("cabinet_friction", "", Within(0.0, 10.0), NONE,
+    row!("cabinet_friction", "", Within(0.0, 10.0), ASSUMED_NONE,
         "coefficient of friction between feet and floor", cabinet friction),
-    row!("window_from_s", "s", NonNegative, TIME,
+    row!("window_from_s", "s", NonNegative, TIME_SECTION,
         "when amplitudes begin to be taken", window 0),
-    row!("window_to_s", "s", NonNegative, TIME,
+    row!("window_to_s", "s", NonNegative, TIME_SECTION,
         "when amplitudes cease to be taken", window 1),
 ];
 
 /// The rows of each spring, after `spring_1_`.
 #[rustfmt::skip]
-static SPRING: &[&[ParameterRow]] = &[
+static SPRING_ROWS: &[&[ParameterRow]] = &[
     &[
         row!("stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1,
             "stiffness of this spring", of springs stiffness_n_per_m),
@@ -395,7 +395,7 @@ static SPRING: &[&[ParameterRow]] = &[
                 m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m()))
             },
             set |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.free_length_m = Some(v) }),
-        row!("cubic_n_per_m3", "N/m^3", NonNegative, NONE,
+        row!("cubic_n_per_m3", "N/m^3", NonNegative, ASSUMED_NONE,
             "tension of this spring per cube of its elongation", else 0.0,
             of springs cubic_n_per_m3),
     ],
@@ -405,29 +405,29 @@ static SPRING: &[&[ParameterRow]] = &[
 
 /// The rows of each damper, after `damper_1_`.
 #[rustfmt::skip]
-static DAMPER: &[&[ParameterRow]] = &[
+static DAMPER_ROWS: &[&[ParameterRow]] = &[
     &[
         row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1,
             "damping of this damper", of dampers damping_n_s_per_m),
-        row!("friction_n", "N", NonNegative, NONE,
+        row!("friction_n", "N", NonNegative, ASSUMED_NONE,
             "friction of this damper (F_f)", else 0.0, of dampers friction_n),
-        row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
+        row!("friction_speed_m_per_s", "m/s", FRICTION_SPEEDS, USUAL_SPEED,
             "speed below which the friction of this damper fades (v_s)",
             else Damper::FRICTION_SPEED_M_PER_S, of dampers friction_speed_m_per_s),
-        row!("friction_linear_speed_m_per_s", "m/s", SPEED, OWN_SPEED,
+        row!("friction_linear_speed_m_per_s", "m/s", FRICTION_SPEEDS, LINEAR_MOTION_SPEED,
             "speed amplitude at which the linear model takes the friction of this damper (V)",
             Target::Machine,
             get |m, _, k| m.dampers.get(k)?.friction_linear_speed_m_per_s,
             set |m, _, k, v| if let Some(d) = m.dampers.get_mut(k) {
                 d.friction_linear_speed_m_per_s = Some(v)
             }),
-        row!("free_stroke_m", "m", NonNegative, NONE,
+        row!("free_stroke_m", "m", NonNegative, ASSUMED_NONE,
             "free stroke of this damper to each side of its place at rest, without friction (s)",
             else 0.0, of dampers free_stroke_m),
         row!("free_stroke_softness_m", "m", Within(1e-9, 1.0), "assumed: a tenth of a millimetre",
             "length over which forces beyond the free stroke set in",
             else Damper::FREE_STROKE_SOFTNESS_M, of dampers free_stroke_softness_m),
-        row!("outer_damping_n_s_per_m", "N s/m", NonNegative, NONE,
+        row!("outer_damping_n_s_per_m", "N s/m", NonNegative, ASSUMED_NONE,
             "damping of this damper beyond its free stroke, added to that which always acts",
             else 0.0, of dampers outer_damping_n_s_per_m),
     ],
@@ -437,80 +437,81 @@ static DAMPER: &[&[ParameterRow]] = &[
 
 /// The rows of each stop, after `stop_1_`.
 #[rustfmt::skip]
-static STOP: &[&[ParameterRow]] = &[
+static STOP_ROWS: &[&[ParameterRow]] = &[
     &[
-        row!("clearance_m", "m", Any, NONE,
+        row!("clearance_m", "m", Any, ASSUMED_NONE,
             "how far the tub may move before it meets this stop", of stops clearance_m),
-        row!("stiffness_n_per_m", "N/m", NonNegative, NONE,
+        row!("stiffness_n_per_m", "N/m", NonNegative, ASSUMED_NONE,
             "stiffness of this stop in contact", of stops stiffness_n_per_m),
-        row!("damping_n_s_per_m", "N s/m", NonNegative, NONE,
+        row!("damping_n_s_per_m", "N s/m", NonNegative, ASSUMED_NONE,
             "damping of this stop in contact", else 0.0, of stops damping_n_s_per_m),
         row!("softness_m", "m", Within(1e-9, 1.0), "assumed: a tenth of a millimetre",
             "depth over which contact with this stop sets in", else BumpStop::SOFTNESS_M,
             of stops softness_m),
     ],
-    axes!("tub_" "_m", "m", Any, NONE, "tub point of this stop, ", of stops tub_m),
-    axes!("direction_" "", "", Any, NONE, "way from the tub to this stop, ", of stops direction),
+    axes!("tub_" "_m", "m", Any, ASSUMED_NONE, "tub point of this stop, ", of stops tub_m),
+    axes!("direction_" "", "", Any, ASSUMED_NONE, "way from the tub to this stop, ",
+        of stops direction),
 ];
 
 /// The rows of each bushing, after `bushing_1_`.
 #[rustfmt::skip]
-static BUSHING: &[&[ParameterRow]] = &[
-    axes!("tub_" "_m", "m", Any, NONE, "tub point of this bushing, ", of bushings tub_m),
-    axes!("stiffness_" "_n_per_m", "N/m", NonNegative, NONE, "stiffness of this bushing ",
+static BUSHING_ROWS: &[&[ParameterRow]] = &[
+    axes!("tub_" "_m", "m", Any, ASSUMED_NONE, "tub point of this bushing, ", of bushings tub_m),
+    axes!("stiffness_" "_n_per_m", "N/m", NonNegative, ASSUMED_NONE, "stiffness of this bushing ",
         of bushings stiffness_n_per_m),
     &[
-        row!("cubic_x_n_per_m3", "N/m^3", NonNegative, NONE,
+        row!("cubic_x_n_per_m3", "N/m^3", NonNegative, ASSUMED_NONE,
             "force of this bushing per cube of its displacement towards the door",
             else 0.0, of bushings cubic_n_per_m3[0]),
-        row!("cubic_y_n_per_m3", "N/m^3", NonNegative, NONE,
+        row!("cubic_y_n_per_m3", "N/m^3", NonNegative, ASSUMED_NONE,
             "the same upwards", else 0.0, of bushings cubic_n_per_m3[1]),
-        row!("cubic_z_n_per_m3", "N/m^3", NonNegative, NONE,
+        row!("cubic_z_n_per_m3", "N/m^3", NonNegative, ASSUMED_NONE,
             "the same sideways", else 0.0, of bushings cubic_n_per_m3[2]),
     ],
-    axes!("damping_" "_n_s_per_m", "N s/m", NonNegative, NONE, "damping of this bushing ",
+    axes!("damping_" "_n_s_per_m", "N s/m", NonNegative, ASSUMED_NONE, "damping of this bushing ",
         else 0.0, of bushings damping_n_s_per_m),
 ];
 
 /// The rows of each further unbalance, after `unbalance_2_`.
 #[rustfmt::skip]
-static UNBALANCE: &[&[ParameterRow]] = &[&[
-    row!("mass_kg", "kg", NonNegative, NONE,
+static UNBALANCE_ROWS: &[&[ParameterRow]] = &[&[
+    row!("mass_kg", "kg", NonNegative, ASSUMED_NONE,
         "mass of this further unbalance", of further_unbalances mass_kg),
-    row!("x_m", "m", Any, NONE,
+    row!("x_m", "m", Any, ASSUMED_NONE,
         "position of this further unbalance along the axis", of further_unbalances x_m),
-    row!("radius_m", "m", Any, NONE,
+    row!("radius_m", "m", Any, ASSUMED_NONE,
         "distance of this further unbalance from the axis; negative on the opposite side",
         of further_unbalances radius_m),
-    row!("angle_deg", "deg", ANGLE, ALONG_D2,
+    row!("angle_deg", "deg", UNBALANCE_ANGLES, ALONG_D2,
         "angle of this further unbalance about the axis, from d2 in the direction of the turn",
         else 0.0, of further_unbalances angle_deg),
 ]];
 
 /// The rows of each foot, after `foot_1_`.
 #[rustfmt::skip]
-static FOOT: &[&[ParameterRow]] =
-    &[axes!("" "_m", "m", Any, NONE, "place of this foot, ", of feet foot_m)];
+static FOOT_ROWS: &[&[ParameterRow]] =
+    &[axes!("" "_m", "m", Any, ASSUMED_NONE, "place of this foot, ", of feet foot_m)];
 
 /// The rows of each point of a spin's table, after `spin_table_1_`.
 #[rustfmt::skip]
-static SPIN_POINT: &[&[ParameterRow]] = &[&[
-    row!("time_s", "s", NonNegative, GRID,
+static SPIN_POINT_ROWS: &[&[ParameterRow]] = &[&[
+    row!("time_s", "s", NonNegative, SPIN_SECTION,
         "time of this point of the spin's table; the first is 0", table time_s),
-    row!("speed_rpm", "rpm", Range::Within(-1e5, 1e5), GRID,
+    row!("speed_rpm", "rpm", Range::Within(-1e5, 1e5), SPIN_SECTION,
         "speed at this point of the spin's table", table speed_rpm),
 ]];
 
 /// Declares a list of the machine: the field with a default element, the element's name, the number
-/// of the first, and the rows.
+/// of the first element, and the rows.
 macro_rules! list {
-    ($name:ident = $like:expr, $element:literal $first:literal $rows:ident) => {
+    ($name:ident = $default:expr, $element:literal $first:literal $rows:ident) => {
         ElementList {
             name: stringify!($name),
             element: $element,
             first: $first,
             count: |machine| machine.$name.len(),
-            fill: |machine, count| machine.$name = vec![$like; count],
+            fill: |machine, count| machine.$name = vec![$default; count],
             rows: $rows,
         }
     };
@@ -519,17 +520,17 @@ macro_rules! list {
 /// The lists of the machine, and the points of a spin's table.
 pub(super) static LISTS: &[ElementList] = &[
     list!(springs = Spring { free_length_m: None, ..Machine::paper().springs[0] },
-        "spring" 1 SPRING),
-    list!(dampers = Machine::paper().dampers[0], "damper" 1 DAMPER),
-    list!(stops = BumpStop::default(), "stop" 1 STOP),
-    list!(bushings = Bushing::default(), "bushing" 1 BUSHING),
-    // Number 1 is the unbalance that every machine has.
-    list!(further_unbalances = Unbalance::default(), "unbalance" 2 UNBALANCE),
-    list!(feet = Foot::default(), "foot" 1 FOOT),
+        "spring" 1 SPRING_ROWS),
+    list!(dampers = Machine::paper().dampers[0], "damper" 1 DAMPER_ROWS),
+    list!(stops = BumpStop::default(), "stop" 1 STOP_ROWS),
+    list!(bushings = Bushing::default(), "bushing" 1 BUSHING_ROWS),
+    // Unbalance 1 is the one that every machine has.
+    list!(further_unbalances = Unbalance::default(), "unbalance" 2 UNBALANCE_ROWS),
+    list!(feet = Foot::default(), "foot" 1 FOOT_ROWS),
     ElementList {
         name: "",
         element: "spin_table",
-        rows: SPIN_POINT,
+        rows: SPIN_POINT_ROWS,
         first: 1,
         count: |_| 0,
         fill: |_, _| (),

@@ -22,7 +22,7 @@ fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
             continue;
         }
         let Some(before) = parameter.get(&machine, &spin) else {
-            // This number may be left out.
+            // This number is optional.
             assert!(parameter.name().ends_with("friction_linear_speed_m_per_s"), "{parameter:?}");
             parameter.set(&mut machine, &mut spin, 0.125);
             assert_eq!(parameter.get(&machine, &spin), Some(0.125), "{parameter:?}");
@@ -36,20 +36,20 @@ fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
 
 #[test]
 fn each_parameter_writes_its_parts_and_nothing_else() {
-    let everything = MachineParameter::all(&Machine::paper(), &spin());
-    for parameter in &everything {
+    let parameters = MachineParameter::all(&Machine::paper(), &spin());
+    for parameter in &parameters {
         let mut machine = Machine::paper();
         let mut spin = spin();
-        let before: Vec<_> = everything.iter().map(|p| p.get(&machine, &spin)).collect();
+        let before: Vec<_> = parameters.iter().map(|p| p.get(&machine, &spin)).collect();
         parameter.set(&mut machine, &mut spin, 0.875);
         let parts = parameter.single_names(&machine);
-        for (other, before) in everything.iter().zip(before) {
+        for (other, before) in parameters.iter().zip(before) {
             if other.single_names(&machine).iter().all(|part| !parts.contains(part)) {
-                // A default free length follows the ends of its spring.
-                let follows =
+                // A default free length is the distance between the ends of its spring.
+                let follows_ends =
                     other.name().ends_with("free_length_m") && other.index == parameter.index;
                 assert!(
-                    follows || other.get(&machine, &spin) == before,
+                    follows_ends || other.get(&machine, &spin) == before,
                     "{parameter:?} wrote {other:?}"
                 );
             }
@@ -59,12 +59,12 @@ fn each_parameter_writes_its_parts_and_nothing_else() {
 
 #[test]
 fn names_end_with_their_unit_and_are_unique() {
-    let everything = MachineParameter::all(&Machine::paper(), &spin());
-    let mut names: Vec<_> = everything.iter().map(MachineParameter::name).collect();
+    let parameters = MachineParameter::all(&Machine::paper(), &spin());
+    let mut names: Vec<_> = parameters.iter().map(MachineParameter::name).collect();
     names.sort_unstable();
     names.dedup();
-    assert_eq!(names.len(), everything.len());
-    for parameter in &everything {
+    assert_eq!(names.len(), parameters.len());
+    for parameter in &parameters {
         let unit = parameter.unit();
         let suffix = unit_suffix(unit).unwrap_or_else(|| panic!("no suffix is known for {unit}"));
         assert!(parameter.name().ends_with(suffix), "{parameter:?}");
@@ -73,7 +73,7 @@ fn names_end_with_their_unit_and_are_unique() {
 
 #[test]
 fn sources_cite_the_paper() {
-    let silent = [
+    let unstated_names = [
         "tub_front_x_m",
         "drum_hinge_x_m",
         "drum_front_x_m",
@@ -81,8 +81,8 @@ fn sources_cite_the_paper() {
         "bearing_rear_x_m",
     ];
     // The paper's machine has no friction, no second stage of dampers and no cubic stiffness.
-    let absent = ["friction", "cubic", "free_stroke", "outer_damping"];
-    let is_absent = |name: &str| absent.iter().any(|part| name.contains(part));
+    let absent_features = ["friction", "cubic", "free_stroke", "outer_damping"];
+    let is_absent = |name: &str| absent_features.iter().any(|part| name.contains(part));
     let mut counts = [0; 5];
     for parameter in MachineParameter::all(&Machine::paper(), &spin()) {
         let name = parameter.name();
@@ -90,16 +90,16 @@ fn sources_cite_the_paper() {
             assert!(parameter.source().starts_with("assumed: "), "{parameter:?}");
             continue;
         }
-        let body = ["tub_", "shaft_"].iter().any(|body| name.starts_with(body));
-        let (expected, count) = if body && name.contains("_inertia_") {
+        let is_body = ["tub_", "shaft_"].iter().any(|prefix| name.starts_with(prefix));
+        let (expected, count) = if is_body && name.contains("_inertia_") {
             ("paper, Table 3", &mut counts[0])
-        } else if name.contains("_cabinet_") || (name.contains("_tub_") && !body) {
+        } else if name.contains("_cabinet_") || (name.contains("_tub_") && !is_body) {
             ("paper, Table 4", &mut counts[1])
         } else if ["n_per_m", "n_s_per_m", "n_m_per_rad"].iter().any(|unit| name.ends_with(unit)) {
             ("paper, section 3.1", &mut counts[2])
-        } else if body && !silent.contains(&name) {
+        } else if is_body && !unstated_names.contains(&name) {
             ("paper, Table 2", &mut counts[3])
-        } else if silent.contains(&name)
+        } else if unstated_names.contains(&name)
             || name.ends_with("free_length_m")
             || name == "radial_clearance_m"
         {
@@ -127,16 +127,17 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
         find("damper_3_damping_n_s_per_m"),
         not_here("the machine has 2 dampers, numbered from 1")
     );
-    let mut further = machine.clone();
-    further.further_unbalances = vec![crate::Unbalance::default(); 2];
-    further.stops = vec![crate::BumpStop::default()];
-    let find_further = |name: &str| MachineParameter::find(name, &further, &spin).map(|p| p.index);
-    assert_eq!(find_further("unbalance_2_mass_kg"), Ok(0));
-    assert_eq!(find_further("unbalance_3_mass_kg"), Ok(1));
-    assert_eq!(find_further("stop_1_direction_y"), Ok(0));
+    let mut extended = machine.clone();
+    extended.further_unbalances = vec![crate::Unbalance::default(); 2];
+    extended.stops = vec![crate::BumpStop::default()];
+    let find_extended =
+        |name: &str| MachineParameter::find(name, &extended, &spin).map(|p| p.index);
+    assert_eq!(find_extended("unbalance_2_mass_kg"), Ok(0));
+    assert_eq!(find_extended("unbalance_3_mass_kg"), Ok(1));
+    assert_eq!(find_extended("stop_1_direction_y"), Ok(0));
     for name in ["unbalance_1_mass_kg", "unbalance_4_mass_kg"] {
-        let none = not_here("the machine has 3 unbalances, numbered from 1");
-        assert_eq!(find_further(name), none, "{name}");
+        let expected = not_here("the machine has 3 unbalances, numbered from 1");
+        assert_eq!(find_extended(name), expected, "{name}");
     }
     assert_eq!(find("stop_1_clearance_m"), not_here("the machine has 0 stops, numbered from 1"));
     for name in [
@@ -149,7 +150,7 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
         "tub_mass",
         "",
     ] {
-        assert!(find(name).is_err_and(|none| none.is_strange), "{name}");
+        assert!(find(name).is_err_and(|expected| expected.is_strange), "{name}");
     }
     let table = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 100.0] };
     let find = |name: &str| MachineParameter::find(name, &machine, &table).map(|p| p.index);

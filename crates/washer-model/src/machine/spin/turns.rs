@@ -1,26 +1,27 @@
 //! The times at which the drum completes turns, and the division of the window into turns.
 
-use super::{Spin, SpinStretch};
+use super::{Spin, SpinSegment};
 use core::f64::consts::TAU;
 use lane_ode::{N, trig};
 
-/// The greatest number of bisections and Newton steps in the search for an instant. Basis:
-/// bisection reaches the spacing of floating-point numbers in 64. Doubling it changes nothing.
+/// The greatest number of bisections and Newton steps in the search for the time of a whole turn.
+/// Basis: bisection reaches the spacing of floating-point numbers in 64 steps. Doubling it changes
+/// nothing.
 const MAX_ITERATIONS: usize = 64;
 
 /// A piece of a segment in which the drum turns in one direction; times are from the segment's
 /// start.
 struct MonotonePiece<'a> {
-    stretch: &'a SpinStretch,
-    from: f64,
-    to: f64,
+    segment: &'a SpinSegment,
+    from_s: f64,
+    to_s: f64,
 }
 
 impl Spin {
     /// Returns the turns of the drum within a window (s), in either direction.
     pub fn turns_within(&self, window_s: [f64; 2]) -> f64 {
-        let stretches = self.stretches();
-        let monotone_pieces = monotone_pieces(&stretches, window_s);
+        let segments = self.segments();
+        let monotone_pieces = monotone_pieces(&segments, window_s);
         monotone_pieces
             .iter()
             .filter(|piece| piece.start_s() >= window_s[0])
@@ -31,16 +32,16 @@ impl Spin {
     /// Returns the times from 0 to `end_s` at which the drum has made a whole number of turns; the
     /// first is 0.
     pub fn whole_turns_s(&self, end_s: f64) -> Vec<f64> {
-        whole_turns_s(&self.stretches(), [0.0, end_s])
+        whole_turns_s(&self.segments(), [0.0, end_s])
     }
 }
 
 /// Returns the times at which a window is cut into whole turns of the drum, counted from the start
 /// of the run in either direction (at theta = 2 pi k if the drum never reverses). Partial turns at
-/// the window's ends belong to the whole turn beside them, so that a window with less than two
+/// the window's ends are joined to the adjacent whole turn, so that a window with less than two
 /// whole turns is not cut.
-pub(crate) fn whole_turn_cuts_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
-    let mut times_s = whole_turns_s(stretches, window_s);
+pub(crate) fn whole_turn_cuts_s(segments: &[SpinSegment], window_s: [f64; 2]) -> Vec<f64> {
+    let mut times_s = whole_turns_s(segments, window_s);
     times_s.pop();
     if !times_s.is_empty() {
         times_s.remove(0);
@@ -49,18 +50,18 @@ pub(crate) fn whole_turn_cuts_s(stretches: &[SpinStretch], window_s: [f64; 2]) -
 }
 
 /// Returns the times in the closed window at which the drum has made a whole number of turns.
-fn whole_turns_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
+fn whole_turns_s(segments: &[SpinSegment], window_s: [f64; 2]) -> Vec<f64> {
     let mut times = Vec::new();
     let mut turns_before = 0.0_f64;
     let mut next_turn = 0.0;
-    for piece in monotone_pieces(stretches, window_s) {
+    for piece in monotone_pieces(segments, window_s) {
         let turns_after = turns_before + piece.turns();
         if piece.start_s() >= window_s[0] {
             next_turn = turns_before.ceil().max(next_turn);
-            let mut earliest = piece.from;
+            let mut earliest = piece.from_s;
             while next_turn <= turns_after {
                 earliest = piece.time_of_turns(next_turn - turns_before, earliest);
-                times.push((piece.stretch.start_s.0 + earliest).clamp(window_s[0], window_s[1]));
+                times.push((piece.segment.start_s.0 + earliest).clamp(window_s[0], window_s[1]));
                 next_turn += 1.0;
             }
         }
@@ -69,29 +70,30 @@ fn whole_turns_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
     times
 }
 
-/// Cuts the run up to the window's end at the window's beginning and where the drum reverses.
-fn monotone_pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<MonotonePiece<'_>> {
+/// Divides the run up to the window's end at the window's beginning and at reversals of the drum.
+fn monotone_pieces(segments: &[SpinSegment], [from_s, to_s]: [f64; 2]) -> Vec<MonotonePiece<'_>> {
     let mut monotone_pieces = Vec::new();
-    for (k, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s.0 < to_s)
+    for (k, segment) in segments.iter().enumerate().filter(|(_, segment)| segment.start_s.0 < to_s)
     {
-        let end_s = stretches.get(k + 1).map_or(to_s, |next_turn| next_turn.start_s.0.min(to_s));
-        let length = end_s - stretch.start_s.0;
-        let mut edges = vec![0.0, length];
-        let mut add_edge = |at: f64| {
-            if 0.0 < at && at < length {
-                edges.push(at);
+        let end_s =
+            segments.get(k + 1).map_or(to_s, |next_segment| next_segment.start_s.0.min(to_s));
+        let length_s = end_s - segment.start_s.0;
+        let mut edges = vec![0.0, length_s];
+        let mut add_edge = |t_s: f64| {
+            if 0.0 < t_s && t_s < length_s {
+                edges.push(t_s);
             }
         };
-        add_edge(from_s - stretch.start_s.0);
+        add_edge(from_s - segment.start_s.0);
         // A cycloidal ramp does not reverse.
-        if stretch.wave_turns.0 == 0.0 {
-            add_edge(-stretch.turns_per_s.0 / (2.0 * stretch.turns_per_s2.0));
+        if segment.wave_turns.0 == 0.0 {
+            add_edge(-segment.turns_per_s.0 / (2.0 * segment.turns_per_s2.0));
         }
         edges.sort_by(f64::total_cmp);
         monotone_pieces.extend(edges.windows(2).map(|edge| MonotonePiece {
-            stretch,
-            from: edge[0],
-            to: edge[1],
+            segment,
+            from_s: edge[0],
+            to_s: edge[1],
         }));
     }
     monotone_pieces
@@ -100,33 +102,34 @@ fn monotone_pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<M
 impl MonotonePiece<'_> {
     /// Returns the time at which the piece begins, from the start of the run.
     fn start_s(&self) -> f64 {
-        self.stretch.start_s.0 + self.from
+        self.segment.start_s.0 + self.from_s
     }
 
     /// Returns the turns made in the piece.
     fn turns(&self) -> f64 {
-        self.turns_until(self.to)
+        self.turns_until(self.to_s)
     }
 
     /// Returns the turns made in the piece up to a time.
     fn turns_until(&self, t: f64) -> f64 {
-        (self.stretch.turns(t) - self.stretch.turns(self.from)).abs()
+        (self.segment.turns(t) - self.segment.turns(self.from_s)).abs()
     }
 
     /// Returns the time at which a number of turns has been made in the piece, not before
     /// `earliest`.
     fn time_of_turns(&self, turns: f64, earliest: f64) -> f64 {
-        let stretch = self.stretch;
-        if stretch.wave_turns.0 == 0.0 {
-            let sign = if stretch.turns(self.to) < stretch.turns(self.from) { -1.0 } else { 1.0 };
-            let rate = sign * stretch.rate(self.from);
+        let segment = self.segment;
+        if segment.wave_turns.0 == 0.0 {
+            let sign =
+                if segment.turns(self.to_s) < segment.turns(self.from_s) { -1.0 } else { 1.0 };
+            let rate = sign * segment.rate(self.from_s);
             // Solves turns = rate t + sign b t^2 by the formula without cancellation.
-            let root = (rate * rate + 4.0 * sign * stretch.turns_per_s2.0 * turns).max(0.0).sqrt();
-            let turns_after = if turns > 0.0 { 2.0 * turns / (rate + root) } else { 0.0 };
-            return (self.from + turns_after).clamp(earliest, self.to);
+            let root = (rate * rate + 4.0 * sign * segment.turns_per_s2.0 * turns).max(0.0).sqrt();
+            let elapsed_s = if turns > 0.0 { 2.0 * turns / (rate + root) } else { 0.0 };
+            return (self.from_s + elapsed_s).clamp(earliest, self.to_s);
         }
         let mut low = earliest;
-        let mut high = self.to;
+        let mut high = self.to_s;
         let mut t = low;
         for _ in 0..MAX_ITERATIONS {
             let remaining_turns = turns - self.turns_until(t);
@@ -135,7 +138,7 @@ impl MonotonePiece<'_> {
             } else {
                 high = t;
             }
-            let newton = t + remaining_turns / stretch.rate(t).abs();
+            let newton = t + remaining_turns / segment.rate(t).abs();
             let next_estimate =
                 if low < newton && newton < high { newton } else { 0.5 * (low + high) };
             if next_estimate == t {
@@ -147,7 +150,7 @@ impl MonotonePiece<'_> {
     }
 }
 
-impl SpinStretch {
+impl SpinSegment {
     /// Returns the turns made up to `t` after the start; negative for backward turns.
     fn turns(&self, t: f64) -> f64 {
         let (_, cos) = trig::sin_cos_turns(N(self.wave_hz.0 * t));
@@ -169,9 +172,9 @@ mod tests {
 
     /// Returns the fractional part of the angle in turns, from the equations' sine and cosine.
     fn phase(spin: &Spin, t_s: f64) -> f64 {
-        let stretches = spin.stretches();
-        let stretch = stretches.iter().rev().find(|stretch| stretch.start_s.0 <= t_s).unwrap();
-        let state = stretch.at(N(t_s));
+        let segments = spin.segments();
+        let segment = segments.iter().rev().find(|segment| segment.start_s.0 <= t_s).unwrap();
+        let state = segment.at(N(t_s));
         state.sin.0.atan2(state.cos.0) / TAU
     }
 
@@ -187,7 +190,7 @@ mod tests {
             },
         ] {
             for window_s in [[0.0, 30.0], [13.3, 29.9]] {
-                let times = whole_turns_s(&spin.stretches(), window_s);
+                let times = whole_turns_s(&spin.segments(), window_s);
                 let turns = spin.turns_within(window_s);
                 assert!(
                     (times.len() as f64 - turns).abs() <= 1.0,
@@ -204,13 +207,13 @@ mod tests {
     }
 
     #[test]
-    fn partial_turns_belong_to_the_whole_turn_beside_them() {
-        // The drum makes one turn per second after the first turn.
+    fn partial_turns_are_joined_to_the_adjacent_whole_turn() {
+        // The drum makes one turn per second after the first turn, which takes two seconds.
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 2.0 };
-        let cuts = |window_s| whole_turn_cuts_s(&spin.stretches(), window_s);
-        let assert_near = |found: Vec<f64>, expected: &[f64]| {
-            assert_eq!(found.len(), expected.len(), "{found:?}");
-            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        let cuts = |window_s| whole_turn_cuts_s(&spin.segments(), window_s);
+        let assert_near = |times: Vec<f64>, expected: &[f64]| {
+            assert_eq!(times.len(), expected.len(), "{times:?}");
+            assert!(times.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{times:?}");
         };
         assert_near(cuts([2.5, 6.5]), &[4.0, 5.0]);
         // A window from whole turn to whole turn has no partial turns.
@@ -219,17 +222,18 @@ mod tests {
         assert_near(cuts([2.5, 3.4]), &[]);
         assert_near(cuts([3.2, 3.4]), &[]);
         let still = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 2.0 };
-        assert_near(whole_turn_cuts_s(&still.stretches(), [0.0, 100.0]), &[]);
+        assert_near(whole_turn_cuts_s(&still.segments(), [0.0, 100.0]), &[]);
     }
 
     #[test]
     fn backward_turns_are_counted_too() {
-        // The drum makes a turn per second forwards, then through rest a turn per second backwards.
+        // The drum makes a turn per second forwards, stops and reverses, and makes a turn per
+        // second backwards.
         let spin = Spin::Table {
             time_s: vec![0.0, 3.0, 7.0, 8.0],
             speed_rpm: vec![60.0, 60.0, -60.0, -60.0],
         };
-        let times = whole_turns_s(&spin.stretches(), [0.0, 10.0]);
+        let times = whole_turns_s(&spin.segments(), [0.0, 10.0]);
         let expected = [0.0, 1.0, 2.0, 3.0, 5.0, 7.0, 8.0, 9.0, 10.0];
         assert_eq!(times.len(), expected.len(), "{times:?}");
         assert!(times.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7), "{times:?}");

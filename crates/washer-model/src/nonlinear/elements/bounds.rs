@@ -1,5 +1,5 @@
 //! Bounds the tangents of the elements by linear elements with the greatest stiffness and damping
-//! that the machine's elements reach. The integrators' steps are chosen from these.
+//! that the machine's elements reach. The steps of integrators are chosen by these bounds.
 
 use crate::coordinates::{COORDINATES, TUB};
 use crate::nonlinear::elements::{
@@ -8,20 +8,20 @@ use crate::nonlinear::elements::{
 use crate::nonlinear::frame::{dot, subtract};
 use lane_ode::N;
 
-/// The greatest travel of a tub point from its place at rest (m). Basis: no machine has room for
-/// more. Doubling it quadruples the bound of cubic stiffnesses.
+/// The greatest travel of a tub point from its position at rest (m). Basis: cabinets leave less
+/// room than this. Doubling it quadruples the bound of cubic stiffnesses.
 const MAX_TRAVEL_M: f64 = 0.05;
 
-/// The depth at which a stop counts as in full contact, as a multiple of its softness. Basis: there
-/// the slope of its force is constant to less than a thousandth. Doubling it reduces that to a
-/// quarter.
+/// The depth at which a stop counts as in full contact, as a multiple of its softness. Basis: at
+/// this depth the slope of the force is within a thousandth of its limit. Doubling it reduces the
+/// difference to a quarter.
 const CONTACT_DEPTH: f64 = 20.0;
 
 impl Elements<f64> {
     /// Returns linear elements with the greatest tangents that the elements have near the
     /// equilibrium `q`; `None` if all elements are linear along their lines.
     pub(crate) fn with_steepest_tangents(&self, q: &[f64; COORDINATES]) -> Option<Self> {
-        if !self.has_optional.holds() {
+        if !self.has_optional_forces.holds() {
             return None;
         }
         let mut linearised = self.clone();
@@ -69,8 +69,8 @@ impl Elements<f64> {
 
 impl DamperCoefficients<f64> {
     /// Returns a spring without tension at rest that is as stiff as the onset of friction at the
-    /// end of the free stroke, where the acting share of friction grows by up to 1 / (2 sigma) per
-    /// unit of length.
+    /// end of the free stroke, where the share of friction that acts grows by up to 1 / (2 sigma)
+    /// per unit of length. Returns `None` without a free stroke.
     fn onset_spring(&self) -> Option<SpringCoefficients<f64>> {
         if !self.has_free_stroke() {
             return None;

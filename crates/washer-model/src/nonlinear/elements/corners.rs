@@ -1,5 +1,5 @@
-//! Computes the forces with corners as functions of one motion each: the friction of a damper as a
-//! function of its length and speed, and the force of a stop as a function of depth and speed.
+//! Computes each force with a corner as a function of a single motion: the friction of a damper as
+//! a function of its length and speed, and the force of a stop as a function of depth and speed.
 
 use super::{CabinetLine, Elements, ForceLaw as _, TubMotion};
 use crate::lanes::{ToDual as _, lane_struct};
@@ -13,7 +13,8 @@ lane_struct! {
 }
 
 impl<T: Lane> Elements<T> {
-    /// Computes the depth (m) and the speed (m/s) of each motion. A damper's depth is its length.
+    /// Computes depth (m) and speed (m/s) of the motion along each damper, then each stop. A
+    /// damper's depth is its length.
     #[inline(always)]
     pub(crate) fn corner_motions(&self, tub: &TubMotion<T>) -> Vec<[N<T>; 2]> {
         let mut motions = Vec::with_capacity(self.dampers.len() + self.stops.len());
@@ -27,9 +28,13 @@ impl<T: Lane> Elements<T> {
         motions
     }
 
-    /// Appends the forces at these motions to a list.
+    /// Appends the force of each damper and stop at its motion to a list.
     #[inline(always)]
-    pub(crate) fn corner_forces(&self, motions: &[[N<T>; 2]], forces: &mut Vec<CornerForce<T>>) {
+    pub(crate) fn append_corner_forces(
+        &self,
+        motions: &[[N<T>; 2]],
+        forces: &mut Vec<CornerForce<T>>,
+    ) {
         let (damper_motions, stop_motions) = motions.split_at(self.dampers.len());
         for (damper, [length, speed]) in self.dampers.iter().zip(damper_motions) {
             let damper = damper.constant();
@@ -42,7 +47,7 @@ impl<T: Lane> Elements<T> {
             line.rate.0.slope = zero.lit(1.0).0;
             let N(by_speed) = damper.optional_force(&line);
             let mut by_depth = zero;
-            if damper.has_stage.holds() {
+            if damper.has_second_stage.holds() {
                 line.rate.0.slope = zero.0;
                 line.length.0.slope = zero.lit(1.0).0;
                 by_depth = N(damper.optional_force(&line).0.slope);
@@ -52,12 +57,12 @@ impl<T: Lane> Elements<T> {
         }
         for (stop, [depth, speed]) in self.stops.iter().zip(stop_motions) {
             let stop = stop.constant();
-            let mut deeper = depth.constant();
-            let mut faster = speed.constant();
-            deeper.0.slope = depth.lit(1.0).0;
-            faster.0.slope = depth.lit(1.0).0;
-            let N(by_depth) = -stop.force_at(deeper, speed.constant());
-            let N(by_speed) = -stop.force_at(depth.constant(), faster);
+            let mut depth_dual = depth.constant();
+            let mut speed_dual = speed.constant();
+            depth_dual.0.slope = depth.lit(1.0).0;
+            speed_dual.0.slope = depth.lit(1.0).0;
+            let N(by_depth) = -stop.force_at_depth(depth_dual, speed.constant());
+            let N(by_speed) = -stop.force_at_depth(depth.constant(), speed_dual);
             forces.push(CornerForce {
                 force: N(by_depth.value),
                 by_depth: N(by_depth.slope),

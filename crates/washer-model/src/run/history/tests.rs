@@ -22,17 +22,18 @@ fn difference(file: &str, history: &History<'_>) -> f64 {
     let rows: Vec<Vec<f64>> =
         lines.map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect();
     assert_eq!(history.len(), rows.len());
-    let ours: Vec<_> = (0..rows.len()).map(|k| history.instant(k).unwrap().channels).collect();
-    let mut worst = 0.0_f64;
+    let computed: Vec<_> = (0..rows.len()).map(|k| history.instant(k).unwrap().channels).collect();
+    let mut max_difference = 0.0_f64;
     for channel in Channel::ALL {
         let name = format!("{}_{}", channel.name(), channel.unit());
         let column = names.iter().position(|known| **known == name).unwrap();
         let peak = rows.iter().fold(0.0_f64, |peak, row| peak.max(row[column].abs()));
-        for (ours, row) in ours.iter().zip(&rows) {
-            worst = worst.max((ours[channel.index()] - row[column]).abs() / peak);
+        for (computed, row) in computed.iter().zip(&rows) {
+            max_difference =
+                max_difference.max((computed[channel.index()] - row[column]).abs() / peak);
         }
     }
-    worst
+    max_difference
 }
 
 #[test]
@@ -44,8 +45,8 @@ fn val_a_run_up_matches_that_of_an_independent_program() {
     let method = Method::Rk4 { step_s: 0.97e-4 };
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
         let history = history(model, &method, &point, &InitialDeviation::default(), 0.01);
-        let worst = difference(&format!("cycloidal_600rpm_4s_{file}.csv"), &history);
-        assert!(worst < 1e-8, "{file}: {worst:e}");
+        let max_difference = difference(&format!("cycloidal_600rpm_4s_{file}.csv"), &history);
+        assert!(max_difference < 1e-8, "{file}: {max_difference:e}");
     }
 }
 
@@ -62,8 +63,8 @@ fn val_a_run_up_and_down_matches_that_of_an_independent_program() {
     let method = Method::Rk4 { step_s: 1e-4 };
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
         let history = history(model, &method, &point, &InitialDeviation::default(), 0.01);
-        let worst = difference(&format!("triangular_350rpm_8s_{file}.csv"), &history);
-        assert!(worst < 1e-6, "{file}: {worst:e}");
+        let max_difference = difference(&format!("triangular_350rpm_8s_{file}.csv"), &history);
+        assert!(max_difference < 1e-6, "{file}: {max_difference:e}");
     }
 }
 
@@ -151,16 +152,16 @@ fn linear_forces_equal_the_nonlinear_forces_to_first_order() {
         let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
             history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 0.1).forces(0).unwrap()
         });
-        let all = |forces: &crate::Forces| {
+        let all_forces = |forces: &crate::Forces| {
             [&forces.springs_n[..], &forces.dampers_n[..], &forces.cabinet_n[..]].concat()
         };
-        let pairs = all(&nonlinear).into_iter().zip(all(&linear));
+        let pairs = all_forces(&nonlinear).into_iter().zip(all_forces(&linear));
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let large = difference(1e-2);
     let small = difference(1e-3);
     assert!(large > 1e-3, "{large}");
-    // The difference is of second order: a tenth of the motion has a hundredth of it.
+    // The difference is of second order: for a tenth of the motion it is a hundredth.
     assert!((large / small - 100.0).abs() < 10.0, "{large} {small}");
 }
 

@@ -1,3 +1,5 @@
+//! Tests of crossings against nearby runs and against periodic responses.
+
 use super::super::{HeldSpeed, find_responses};
 use super::*;
 use crate::machine::Machine;
@@ -12,22 +14,22 @@ fn point(spin: Spin) -> Point {
     prepare(&[(Machine::paper(), spin)], &timing).remove(0).unwrap()
 }
 
-/// A crossing with a response at its begin.
-fn forward_crossing(from_to_s: [f64; 2], response: Option<&Response>) -> Crossing<'_> {
-    Crossing { interval_s: from_to_s, responses: [response, None], is_backward: false }
+/// Returns a crossing with a response at its start.
+fn forward_crossing(interval_s: [f64; 2], response: Option<&Response>) -> Crossing<'_> {
+    Crossing { interval_s, responses: [response, None], is_backward: false }
 }
 
-/// A run that gains speed until 2 s, and is held from there.
+/// Returns a point whose speed rises until 2 s and is constant afterwards.
 fn ramp() -> Point {
     point(Spin::Ramped { profile: Profile::Ramp, peak_rpm: 250.0, ramp_s: 2.0 })
 }
 
 #[test]
-fn the_tangent_map_is_what_nearby_runs_do() {
+fn the_tangent_map_agrees_with_differences_of_nearby_runs() {
     let point = ramp();
     let at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
     let entry = integrate(&point, STEP_S, [0.0, 1.8], &at_rest).end;
-    // Over the profile's kink.
+    // The interval contains the profile's kink.
     let crossing = forward_crossing([1.8, 2.2], None);
     let map = Simd::dispatch_narrow(TangentMap {
         point: &point,
@@ -54,16 +56,16 @@ fn the_tangent_map_is_what_nearby_runs_do() {
 }
 
 #[test]
-fn a_crossing_of_no_length_amplifies_nothing() {
+fn a_crossing_of_zero_length_does_not_amplify() {
     let point = ramp();
     let crossing = forward_crossing([1.0, 1.0 + 1e-9], None);
-    let crossed = follow_crossings(&point, STEP_S, &[crossing])[0].unwrap();
-    assert!((crossed.amplification - 1.0).abs() < 1e-4, "{crossed:?}");
-    assert_eq!(crossed.departure_j, [None, None]);
+    let effect = follow_crossings(&point, STEP_S, &[crossing])[0].unwrap();
+    assert!((effect.amplification - 1.0).abs() < 1e-4, "{effect:?}");
+    assert_eq!(effect.departure_j, [None, None]);
 }
 
 #[test]
-fn a_run_on_its_response_departs_by_nothing() {
+fn a_run_on_its_response_does_not_depart() {
     let point = point(Spin::Table { time_s: vec![0.0], speed_rpm: vec![225.0] });
     let response = find_responses(&[HeldSpeed { point: &point, speed_rpm: 225.0 }], Cancel::Never);
     let response = response.into_iter().next().unwrap().unwrap().remove(0);
@@ -75,25 +77,25 @@ fn a_run_on_its_response_departs_by_nothing() {
             expected[i] - if i < COORDINATES { point.equilibrium()[i] } else { 0.0 }
         });
         let energy = EnergyNorm::new(&point, time_s);
-        let share = energy.energy_j(&difference) / energy.energy_j(&deviation);
-        assert!(share < 1e-6, "{time_s}: {share}");
+        let energy_ratio = energy.energy_j(&difference) / energy.energy_j(&deviation);
+        assert!(energy_ratio < 1e-6, "{time_s}: {energy_ratio}");
     }
 }
 
 #[test]
-fn peaks_are_of_the_window_and_of_the_run_that_was_put_on_its_response() {
+fn peaks_are_those_of_the_window_and_of_a_run_that_starts_on_its_response() {
     let point = ramp();
     let at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
     let ramp_peaks = integrate(&point, STEP_S, [0.0, 3.0], &at_rest).peaks;
     let state_at_1_s = integrate(&point, STEP_S, [0.0, 1.0], &at_rest);
-    let state_at_1_s = integrate(&point, STEP_S, [1.0, 3.0], &state_at_1_s.end).peaks;
-    let deviation = peaks_without_departures(&point, STEP_S, &[], [0.0, 3.0]).unwrap();
+    let window_peaks = integrate(&point, STEP_S, [1.0, 3.0], &state_at_1_s.end).peaks;
+    let all_peaks = peaks_without_departures(&point, STEP_S, &[], [0.0, 3.0]).unwrap();
     let window_only = peaks_without_departures(&point, STEP_S, &[], [1.0, 3.0]).unwrap();
     for i in 0..CHANNELS {
-        assert!((deviation[i] / ramp_peaks[i] - 1.0).abs() < 1e-6);
-        assert!((window_only[i] / state_at_1_s[i] - 1.0).abs() < 1e-6);
+        assert!((all_peaks[i] / ramp_peaks[i] - 1.0).abs() < 1e-6);
+        assert!((window_only[i] / window_peaks[i] - 1.0).abs() < 1e-6);
     }
-    // The ramp of two seconds leaves much that the response has not.
+    // After the ramp of two seconds the run differs much from the response.
     let response = find_responses(&[HeldSpeed { point: &point, speed_rpm: 225.0 }], Cancel::Never);
     let response = response.into_iter().next().unwrap().unwrap().remove(0);
     let crossing = forward_crossing([1.8, 2.2], Some(&response));
@@ -109,19 +111,19 @@ fn peaks_are_of_the_window_and_of_the_run_that_was_put_on_its_response() {
 }
 
 #[test]
-fn a_run_that_leaves_its_range_says_when() {
+fn a_run_that_leaves_its_range_reports_the_time() {
     let point = ramp();
-    // A speed that no suspension holds.
+    // The suspension cannot stop a motion of this speed within the model's range.
     let mut start = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
     start[COORDINATES] = 1e4;
     let failure = integrate(&point, STEP_S, [0.0, 1.0], &start).failure.unwrap();
     assert!(failure.time_s > 0.0 && failure.time_s < 1.0, "{failure}");
 }
 
-/// A machine that is not its own mirror image, whose drum turns backwards, is in the mirror image
-/// of the mirrored machine's response.
+/// The response of an asymmetric machine whose drum turns backwards is the mirror image of the
+/// response of the mirrored machine.
 #[test]
-fn backwards_the_response_is_the_mirrored_machines() {
+fn a_backward_response_is_that_of_the_mirrored_machine() {
     let mut machine = Machine::paper();
     machine.springs[0].stiffness_n_per_m *= 1.3;
     machine.dampers[1].damping_n_s_per_m *= 0.6;
@@ -143,16 +145,16 @@ fn backwards_the_response_is_the_mirrored_machines() {
             expected[i] - if i < COORDINATES { point.equilibrium()[i] } else { 0.0 }
         });
         let energy = EnergyNorm::new(&point, time_s);
-        let share = |of: &[f64; STATES]| {
-            let difference = core::array::from_fn(|i| followed[i] - of[i]);
+        let energy_ratio = |state: &[f64; STATES]| {
+            let difference = core::array::from_fn(|i| followed[i] - state[i]);
             energy.energy_j(&difference) / energy.energy_j(&deviation)
         };
-        assert!(share(&expected) < 1e-6, "{time_s}: {}", share(&expected));
-        // Nothing else is it: not the response as it is.
+        assert!(energy_ratio(&expected) < 1e-6, "{time_s}: {}", energy_ratio(&expected));
+        // The mirror image of the expected state is not a response.
         assert!(
-            share(&mirror_state(&expected)) > 1e-2,
+            energy_ratio(&mirror_state(&expected)) > 1e-2,
             "{time_s}: {}",
-            share(&mirror_state(&expected))
+            energy_ratio(&mirror_state(&expected))
         );
     }
 }

@@ -1,14 +1,14 @@
-//! Turns do not depend on those that share their lanes.
+//! Tests that the result of a turn does not depend on the turns in other lanes.
 
 use super::*;
 use crate::stability::period_map::{TurnRequest, TurnResult, compute_turns};
 use crate::{Bushing, Unbalance};
 use lane_ode::Cancel;
 
-/// A random machine with the elements of `element_kinds`' bits: friction, stops, stiffening
-/// springs, a bushing, a second unbalance.
+/// Returns a random machine with the kinds of elements whose bits are set in `element_kinds`:
+/// friction, stops, stiffening springs, a bushing, a second unbalance.
 fn with_elements(element_kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
-    let mut machine = random(numbers);
+    let mut machine = random_machine(numbers);
     let mut between = |low: f64, high: f64| low + (high - low) * numbers.f64();
     if element_kinds & 1 != 0 {
         for damper in &mut machine.dampers {
@@ -48,21 +48,22 @@ fn with_elements(element_kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
 
 fn bits(result: &TurnResult) -> Vec<u64> {
     let mut numbers: Vec<f64> = result.end.to_vec();
-    if let Some(seen) = &result.record {
-        numbers.extend(seen.monodromy.iter().flatten().map(|entry| entry.0));
-        numbers.extend(seen.peaks);
-        numbers.push(seen.min_gap_m);
-        numbers.extend(seen.states.iter().flatten());
+    if let Some(record) = &result.record {
+        numbers.extend(record.monodromy.iter().flatten().map(|entry| entry.0));
+        numbers.extend(record.peaks);
+        numbers.push(record.min_gap_m);
+        numbers.extend(record.states.iter().flatten());
     }
     numbers.into_iter().map(f64::to_bits).collect()
 }
 
-/// Turns of random machines with every choice of elements, alone and in random company. SEED and
-/// MACHINES choose others.
+/// Compares turns of random machines with every combination of elements, computed alone and
+/// together with others. The environment variables SEED and MACHINES select other machines.
 #[test]
-fn turns_do_not_depend_on_company() {
-    let number_from_env =
-        |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
+fn turns_do_not_depend_on_other_lanes() {
+    let number_from_env = |name: &str, default: u64| {
+        std::env::var(name).map_or(default, |text| text.parse().unwrap())
+    };
     let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 1));
     for number in 0..number_from_env("MACHINES", 64) {
         let element_kinds = number % 32;
@@ -83,27 +84,27 @@ fn turns_do_not_depend_on_company() {
             let rest = settings.point.equilibrium();
             let size = 0.02 * numbers.f64();
             let start = core::array::from_fn(|i| {
-                let by = size * (2.0 * numbers.f64() - 1.0);
+                let offset = size * (2.0 * numbers.f64() - 1.0);
                 if i < 2 || (4..6).contains(&i) {
-                    rest[i] + by
+                    rest[i] + offset
                 } else if i < COORDINATES {
                     rest[i]
                 } else {
-                    by
+                    offset
                 }
             });
             requests.push(TurnRequest { setup, start, is_recorded: numbers.bool() });
         }
-        let solve_linear_responses = compute_turns(&requests, Cancel::Never);
-        for (requests, solve_linear_responses) in requests.iter().zip(&solve_linear_responses) {
-            let alone = compute_turns(core::slice::from_ref(requests), Cancel::Never).remove(0);
-            let kind = requests.setup.batch_key();
+        let results = compute_turns(&requests, Cancel::Never);
+        for (request, result) in requests.iter().zip(&results) {
+            let alone = compute_turns(core::slice::from_ref(request), Cancel::Never).remove(0);
+            let key = request.setup.batch_key();
             assert!(
-                bits(&alone) == bits(solve_linear_responses),
-                "machine {number}, elements {element_kinds:b}, {kind:?}, seen {}: {:?} {:?}",
-                requests.is_recorded,
+                bits(&alone) == bits(result),
+                "machine {number}, elements {element_kinds:b}, {key:?}, recorded {}: {:?} {:?}",
+                request.is_recorded,
                 alone.end,
-                solve_linear_responses.end
+                result.end
             );
         }
     }
