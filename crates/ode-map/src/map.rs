@@ -211,7 +211,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             let greatest = defined().reduce(|most, next| if next.1 > most.1 { next } else { most });
             let least = defined().reduce(|least, next| if next.1 < least.1 { next } else { least });
             Compared {
-                reliable: least.zip(greatest).map(|(least, most)| limits.trust(least.1, most.1)),
+                reliable: least.zip(greatest).map(|(least, most)| limits.contain(least.1, most.1)),
                 greatest,
                 least,
                 converged: row.converged,

@@ -150,7 +150,7 @@ pub fn amplitude_columns<R: AsRef<Compared>>(
         let name = format!("ratio_{}", channel.name);
         let get = move |row: &R| row.as_ref().ratios.get(i).copied().flatten();
         let column = ResultColumn::measured(name, "1", text, get);
-        columns.push(column.worse(Worse::Greater).limit(limits.most, 1.0));
+        columns.push(column.worse(Worse::Greater).limit(limits.upper, 1.0));
     }
     columns
 }
@@ -164,9 +164,9 @@ pub fn verdict_columns<R: AsRef<Compared>>(
     method_description: &str,
 ) -> Vec<ResultColumn<R>> {
     let mut columns =
-        extreme_ratio(channels, "max", |row| row.greatest, Worse::Greater, limits.most);
-    let mut rule = format!("ratio_max below {}", limits.most);
-    if let Some(limit) = limits.least {
+        extreme_ratio(channels, "max", |row| row.greatest, Worse::Greater, limits.upper);
+    let mut rule = format!("ratio_max below {}", limits.upper);
+    if let Some(limit) = limits.lower {
         columns.extend(extreme_ratio(channels, "min", |row| row.least, Worse::Less, limit));
         rule.push_str(&format!(" and ratio_min above {limit}"));
     }

@@ -90,7 +90,7 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
     /// An unknown name, with the reason.
     fn find(&self, name: &str) -> Result<ModelParameter<Self>, UnknownParameter> {
         let found = self.parameters().into_iter().find(|parameter| parameter.name == name);
-        found.ok_or_else(UnknownParameter::strange)
+        found.ok_or_else(UnknownParameter::in_no_model)
     }
 
     /// Writes a parameter's value, which is in its range. The parameter is no edge of the window.

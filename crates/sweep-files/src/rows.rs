@@ -51,8 +51,8 @@ fn without_point<S: serde::Serializer>(number: &f64, to: S) -> Result<S::Ok, S::
 /// Returns the limits of ratios in a plan.
 pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
     let reliability = &plan["reliability"];
-    let most = reliability["ratio_limit"].as_f64()?;
-    Some(RatioLimits { most, least: reliability["ratio_min"].as_f64() })
+    let upper = reliability["ratio_limit"].as_f64()?;
+    Some(RatioLimits { upper, lower: reliability["ratio_min"].as_f64() })
 }
 
 /// An open result file of any kind.

@@ -21,7 +21,7 @@ pub struct Parameter<H> {
     pub range: Range,
     /// The source of the model's own value, in words.
     pub source: &'static str,
-    /// The model's own value, if it has one number for the parameter.
+    /// The names of the single numbers that the parameter writes; usually its own name alone.
     pub value: Option<f64>,
     /// The names of the single numbers that the parameter writes; mostly its own name.
     pub parts: Vec<Cow<'static, str>>,
@@ -57,18 +57,18 @@ pub struct UnknownParameter {
     /// The reason, in words.
     pub reason: String,
     /// Whether no model has a parameter of this name, so that it may be a typing error.
-    pub is_strange: bool,
+    pub is_in_no_model: bool,
 }
 
 impl UnknownParameter {
     /// Returns the reason for a name that no model has.
-    pub fn strange() -> Self {
-        Self { reason: "no parameter has this name".to_owned(), is_strange: true }
+    pub fn in_no_model() -> Self {
+        Self { reason: "no parameter has this name".to_owned(), is_in_no_model: true }
     }
 
     /// Returns the reason for a name that other models have, but not this one.
-    pub fn not_here(reason: impl Into<String>) -> Self {
-        Self { reason: reason.into(), is_strange: false }
+    pub fn in_other_models(reason: impl Into<String>) -> Self {
+        Self { reason: reason.into(), is_in_no_model: false }
     }
 }
 
@@ -124,7 +124,7 @@ impl Range {
     }
 
     /// Describes the allowed values, for the message about a refused `value`.
-    pub fn instead_of(self, value: f64) -> String {
+    pub fn describe_for(self, value: f64) -> String {
         if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
             format!("{self}, at most {:e} in magnitude", Self::LARGEST)
         } else {
@@ -184,36 +184,36 @@ pub struct Limit {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RatioLimits {
     /// The greatest ratio must be below this.
-    pub most: f64,
+    pub upper: f64,
     /// The least ratio must be above this, if there is a lower limit.
-    pub least: Option<f64>,
+    pub lower: Option<f64>,
 }
 
 impl From<f64> for RatioLimits {
     /// Returns limits without a lower one.
-    fn from(most: f64) -> Self {
-        Self { most, least: None }
+    fn from(upper: f64) -> Self {
+        Self { upper, lower: None }
     }
 }
 
 impl RatioLimits {
-    /// Whether a point with these least and greatest ratios is trusted.
-    pub fn trust(self, least: f64, greatest: f64) -> bool {
-        greatest < self.most && self.least.is_none_or(|limit| least > limit)
+    /// Whether these least and greatest ratios of a point are within the limits.
+    pub fn contain(self, least: f64, greatest: f64) -> bool {
+        greatest < self.upper && self.lower.is_none_or(|limit| least > limit)
     }
 
     /// Returns how far a point with these least and greatest ratios is from the other verdict,
     /// relative to the limit.
     pub fn margin(self, least: f64, greatest: f64) -> f64 {
-        let from = |ratio: f64, limit: f64| (ratio / limit - 1.0).abs();
-        let from_least = self.least.map_or(f64::INFINITY, |limit| from(least, limit));
-        from(greatest, self.most).min(from_least)
+        let distance = |ratio: f64, limit: f64| (ratio / limit - 1.0).abs();
+        let lower_margin = self.lower.map_or(f64::INFINITY, |limit| distance(least, limit));
+        distance(greatest, self.upper).min(lower_margin)
     }
 
     /// Returns the ratio below which the linear model over-estimates too much: the lower limit, or
     /// without one the reciprocal of the upper limit.
     pub fn over_estimate(self) -> f64 {
-        self.least.unwrap_or(1.0 / self.most)
+        self.lower.unwrap_or(1.0 / self.upper)
     }
 }
 

@@ -27,7 +27,7 @@ macro_rules! named {
 
             /// Finds the value of this name.
             pub fn named(name: &str) -> Option<Self> {
-                Self::ALL.into_iter().find(|one| one.name() == name)
+                Self::ALL.into_iter().find(|value| value.name() == name)
             }
         }
     };

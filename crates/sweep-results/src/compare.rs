@@ -102,7 +102,7 @@ pub struct ColumnChange {
     /// The number of shared rows in which the column differs.
     pub rows: u64,
     /// The greatest difference of numbers.
-    pub greatest: f64,
+    pub greatest_difference: f64,
     /// The rows in which numbers differ most, the farthest apart first, without sensitive ones; at
     /// most [`MAX_WORST`].
     pub worst: Vec<ColumnRow>,
@@ -137,12 +137,12 @@ pub struct Comparison {
     pub keys: Vec<String>,
     /// The units of the key columns.
     pub key_units: Vec<String>,
-    /// Whether rows are matched by their points, because the axes have the same tolerances about
-    /// other numbers.
+    /// Whether rows are matched by the index of their point, because the axes have the same
+    /// tolerances about different nominal values.
     pub is_matched_by_point: bool,
-    /// The axes that only one file has, with a single value there: the file (0 or 1), the axis, the
-    /// value.
-    pub fixed: Vec<(usize, String, f64)>,
+    /// The axes that only one file has, with the same value in all of its rows: the index of the
+    /// file, the axis, the value.
+    pub single_valued_axes: Vec<(usize, String, f64)>,
     /// The number of rows that only the first file has, and that only the second has.
     pub unmatched_rows: [u64; 2],
     /// The names of the columns that only the first file has, and that only the second has.
@@ -169,7 +169,7 @@ impl Comparison {
     pub fn is_empty(&self) -> bool {
         self.plan.is_empty()
             && self.unmatched_rows == [0, 0]
-            && self.fixed.is_empty()
+            && self.single_valued_axes.is_empty()
             && self.unmatched_columns.iter().all(Vec::is_empty)
             && self.columns.is_empty()
     }
@@ -181,7 +181,7 @@ impl Comparison {
 
     /// Returns the `count` rows with the greatest deviations above 0, the greatest first, either of
     /// the sensitive or of the other rows.
-    pub fn greatest(
+    pub fn most_deviating(
         &self,
         count: usize,
         sensitive: bool,
@@ -209,8 +209,8 @@ fn kind(table: &ResultTable) -> &'static str {
 ///
 /// Rows match if their key columns agree to nine digits: a grid's axes, and any further column that
 /// numbers the rows of one point. An axis that only one file has is ignored if it has a single
-/// value. Where the axes have the same tolerances about other numbers, the index of the point takes
-/// the place of their values.
+/// value. Where the axes have the same tolerances about different nominal values, the index of the
+/// point takes the place of their values.
 ///
 /// # Errors
 /// [`ResultsError::Refused`] with the reason, [`ResultsError::File`].
@@ -228,7 +228,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     let keys_by_file = tables.map(|table| side::key_columns(table, is_boundary));
     let keys: Vec<String> =
         keys_by_file[0].iter().filter(|name| keys_by_file[1].contains(name)).cloned().collect();
-    let mut fixed = Vec::new();
+    let mut single_valued_axes = Vec::new();
     for (file, names) in keys_by_file.iter().enumerate() {
         for name in names.iter().filter(|name| !keys.contains(name)) {
             let Some(value) = side::single_value(tables[file], name)? else {
@@ -237,7 +237,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
                     "only the {ordinal} has the axis `{name}`, with several values"
                 )));
             };
-            fixed.push((file, name.clone(), value));
+            single_valued_axes.push((file, name.clone(), value));
         }
     }
     let unmatched_columns = [0, 1].map(|file| {
@@ -249,7 +249,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     });
     let is_matched_by_point = !is_boundary
         && tables.iter().all(|table| table.column("point").is_some())
-        && plans::is_about_other_numbers(first.plan.as_ref(), second.plan.as_ref());
+        && plans::differs_in_nominal_values(first.plan.as_ref(), second.plan.as_ref());
     let mut matched_by = keys.clone();
     if is_matched_by_point {
         matched_by.retain(|name| !first.axes().contains(&name.as_str()));
@@ -285,7 +285,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
         keys,
         key_units,
         is_matched_by_point,
-        fixed,
+        single_valued_axes,
         unmatched_columns,
         shared,
         columns,
@@ -344,7 +344,7 @@ fn compare_columns(
             name: column.name.clone(),
             unit: column.unit.clone(),
             rows: 0,
-            greatest: 0.0,
+            greatest_difference: 0.0,
             worst: Vec::new(),
         };
         for (index, (pair, row)) in pairs.iter().zip(shared.iter_mut()).enumerate() {
@@ -360,12 +360,12 @@ fn compare_columns(
             let column_row =
                 ColumnRow { row: index, values: [number(first_cell), number(second_cell)] };
             if let [Some(first), Some(second)] = column_row.values {
-                change.greatest = change.greatest.max((second - first).abs());
+                change.greatest_difference = change.greatest_difference.max((second - first).abs());
             }
             let deviation = column_row.deviation();
             if deviation > 0.0 && !row.sensitive {
                 let index_in_worst =
-                    change.worst.partition_point(|row_kept| row_kept.deviation() >= deviation);
+                    change.worst.partition_point(|worst_row| worst_row.deviation() >= deviation);
                 change.worst.insert(index_in_worst, column_row);
                 change.worst.truncate(MAX_WORST);
             }

@@ -122,11 +122,11 @@ impl ExpressionNode {
             Self::And(left, right) => conjoin(left.truth(context), right.truth(context)),
             // De Morgan's law holds in three-valued logic too.
             Self::Or(left, right) => {
-                let neither = conjoin(
+                let neither_holds = conjoin(
                     left.truth(context).map(|truth| !truth),
                     right.truth(context).map(|truth| !truth),
                 );
-                neither.map(|truth| !truth)
+                neither_holds.map(|truth| !truth)
             }
             Self::IsNull(node) => Some(node.value(context) == Cell::Null),
             Self::Compare(operator, left, right) => {

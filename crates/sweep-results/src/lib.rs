@@ -29,6 +29,6 @@ pub use error::ResultsError;
 pub use export::{ExportFormat, export};
 pub use goal::{Goal, Slack};
 pub use nearest::nearest;
-pub use require::{Checked, Offender, check};
+pub use require::{ConditionCheck, ViolatingRow, check};
 pub use sweep_files::{Cell, CellKind, Column, ResultTable, columns, ratio_limits};
 pub use top::top;

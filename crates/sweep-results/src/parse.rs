@@ -226,7 +226,7 @@ struct Parser<'a> {
     depth: usize,
 }
 
-/// Parses an expression of a wanted type over these columns.
+/// Parses an expression of an expected type over these columns.
 pub(crate) fn parse_expression(
     text: &str,
     columns: &[Column],
@@ -534,7 +534,7 @@ fn unknown_function_error(word: String, span: Range<usize>) -> ParseResult {
     })
 }
 
-/// Returns an error that states a rule if a node has another type than the wanted one.
+/// Returns an error that states a rule if a node has another type than the expected one.
 fn expect_kind(
     node: &TypedNode,
     expected_kind: CellKind,
@@ -588,8 +588,8 @@ mod tests {
             ("quantile(ratio_max, 95) < 1", "95", "0.95 for 95 %"),
             ("", "", "ends too early"),
         ] {
-            let (text_found, message) = parse_error(text);
-            assert_eq!(text_found, text_at_error, "{text}: {message}");
+            let (reported_text, message) = parse_error(text);
+            assert_eq!(reported_text, text_at_error, "{text}: {message}");
             assert!(message.contains(message_part), "{text}: {message}");
         }
         let deep = format!("{}reliable{}", "(".repeat(100), ")".repeat(100));

@@ -9,7 +9,7 @@ use sweep_files::{Cell, ResultTable};
 
 /// A row that violates a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Offender {
+pub struct ViolatingRow {
     /// The row's number in the file, from 0.
     pub row: u64,
     /// Whether the condition is neither true nor false, because a value is missing.
@@ -20,7 +20,7 @@ pub struct Offender {
 
 /// The result of checking a condition.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Checked {
+pub struct ConditionCheck {
     /// The condition as typed.
     pub expression: String,
     /// Whether the condition is true for every checked row; a condition of aggregates alone, for
@@ -36,14 +36,16 @@ pub struct Checked {
     pub undefined: u64,
     /// The values of the aggregates over the rows that have a value, in the order of their closing
     /// parentheses.
-    pub folded: Vec<Cell>,
+    #[serde(rename = "folded")]
+    pub aggregate_values: Vec<Cell>,
     /// The number of rows that have a value, for each aggregate.
-    pub folded_rows: Vec<u64>,
+    #[serde(rename = "folded_rows")]
+    pub aggregate_rows: Vec<u64>,
     /// For each aggregate that is a share, the number of rows for which its condition is true.
     pub share_counts: Vec<Option<u64>>,
     /// The rows that violate the condition. They are sorted by the first column of the condition
     /// that has a direction in which it is bad, the worst first.
-    pub offenders: Vec<Offender>,
+    pub offenders: Vec<ViolatingRow>,
 }
 
 /// Checks a condition on the rows that a filter accepts.
@@ -60,26 +62,23 @@ pub fn check(
     filter: Option<&Condition>,
     allow_null: bool,
     max_offenders: usize,
-) -> Result<Checked, ResultsError> {
+) -> Result<ConditionCheck, ResultsError> {
     let results = condition.aggregate(table, filter)?;
     let value_or_null = |result: &AggregateValue| {
         if result.is_complete || allow_null { result.value.clone() } else { Cell::Null }
     };
     let aggregates: Vec<Cell> = results.iter().map(value_or_null).collect();
-    let mut checked = Checked {
+    let mut checked = ConditionCheck {
         expression: condition.text.clone(),
         by_row: condition.by_row,
-        folded_rows: results.iter().map(|result| result.rows).collect(),
+        aggregate_rows: results.iter().map(|result| result.rows).collect(),
         share_counts: results.iter().map(AggregateValue::share_count).collect(),
-        folded: results.into_iter().map(|result| result.value).collect(),
-        ..Checked::default()
+        aggregate_values: results.into_iter().map(|result| result.value).collect(),
+        ..ConditionCheck::default()
     };
-    let index_and_direction = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
-    let order_column = condition.columns.iter().enumerate().find_map(index_and_direction);
-    let mut offenders = WorstRows::new(
-        order_column.map(|(_, index_and_direction)| index_and_direction),
-        max_offenders,
-    );
+    let ordered_column = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
+    let order_column = condition.columns.iter().enumerate().find_map(ordered_column);
+    let mut offenders = WorstRows::new(order_column.map(|(_, direction)| direction), max_offenders);
     let mut truth_of_file = None;
     let key_columns = table.places();
     let names = [&condition.column_names()[..], &key_columns].concat();
@@ -108,7 +107,7 @@ pub fn check(
             let cells = columns
                 .map(|column| (names[column].to_owned(), context.row.cell(column)))
                 .collect();
-            Offender { row: context.row.index(), undefined: truth.is_none(), cells }
+            ViolatingRow { row: context.row.index(), undefined: truth.is_none(), cells }
         });
         Ok(())
     })?;
@@ -127,7 +126,7 @@ mod tests {
     use super::*;
     use crate::sample;
 
-    fn checked(text: &str, filter: Option<&str>, allow_null: bool) -> Checked {
+    fn check_text(text: &str, filter: Option<&str>, allow_null: bool) -> ConditionCheck {
         let table = sample::table();
         let condition = Condition::parse(text, &table).unwrap();
         let filter = filter.map(|filter| Condition::parse(filter, &table).unwrap());
@@ -138,7 +137,7 @@ mod tests {
     // diverged; row 4 is sensitive.
     #[test]
     fn violating_rows_are_listed_with_their_keys() {
-        let result = checked("ratio_max < 2", None, false);
+        let result = check_text("ratio_max < 2", None, false);
         assert!(!result.holds && result.by_row);
         assert_eq!((result.rows, result.failing, result.undefined), (6, 2, 1));
         assert_eq!(
@@ -156,7 +155,7 @@ mod tests {
     #[test]
     fn the_worst_offenders_come_first() {
         // The gaps are 0.009, 0.0085, 0.0075, null, 0.006, 0.0088 m.
-        let result = checked("min_gap_nonlinear_m > 0.0089", None, false);
+        let result = check_text("min_gap_nonlinear_m > 0.0089", None, false);
         assert_eq!((result.failing, result.undefined), (4, 1));
         assert_eq!(
             result.offenders.iter().map(|offender| offender.row).collect::<Vec<_>>(),
@@ -166,22 +165,22 @@ mod tests {
 
     #[test]
     fn missing_values_violate_conditions_unless_allowed() {
-        assert!(!checked("ratio_max < 9", None, false).holds);
-        assert!(checked("ratio_max < 9", None, true).holds);
-        assert!(checked("ratio_max < 9 or ratio_max is null", None, false).holds);
-        assert!(checked("ratio_max < 9 or status == 'diverged'", None, false).holds);
-        assert!(!checked("ratio_max is not null", None, false).holds);
-        assert!(!checked("not (ratio_max < 9)", None, true).holds);
-        assert_eq!(checked("not (ratio_max < 9)", None, true).undefined, 1);
+        assert!(!check_text("ratio_max < 9", None, false).holds);
+        assert!(check_text("ratio_max < 9", None, true).holds);
+        assert!(check_text("ratio_max < 9 or ratio_max is null", None, false).holds);
+        assert!(check_text("ratio_max < 9 or status == 'diverged'", None, false).holds);
+        assert!(!check_text("ratio_max is not null", None, false).holds);
+        assert!(!check_text("not (ratio_max < 9)", None, true).holds);
+        assert_eq!(check_text("not (ratio_max < 9)", None, true).undefined, 1);
     }
 
     #[test]
     fn rows_outside_the_filter_are_not_checked_and_no_condition_holds_for_no_rows() {
-        let result = checked("ratio_max < 3", Some("not sensitive and status == \"ok\""), false);
+        let result = check_text("ratio_max < 3", Some("not sensitive and status == \"ok\""), false);
         assert!(result.holds, "{result:?}");
         assert_eq!(result.rows, 4);
-        assert!(!checked("ratio_max < 3", Some("status == \"panicked\""), false).holds);
-        assert!(!checked("count(reliable) == 0", Some("status == \"panicked\""), false).holds);
+        assert!(!check_text("ratio_max < 3", Some("status == \"panicked\""), false).holds);
+        assert!(!check_text("count(reliable) == 0", Some("status == \"panicked\""), false).holds);
     }
 
     #[test]
@@ -199,22 +198,22 @@ mod tests {
             ("max(-ratio_max) < -1", false),
             ("count(status != \"ok\") < 1", false),
         ] {
-            let result = checked(text, None, true);
+            let result = check_text(text, None, true);
             assert!(!result.by_row);
             assert_eq!(result.holds, holds, "{text}: {result:?}");
         }
-        let by_row_with_aggregate = checked("ratio_max <= max(ratio_max)", None, true);
+        let by_row_with_aggregate = check_text("ratio_max <= max(ratio_max)", None, true);
         assert!(by_row_with_aggregate.holds && by_row_with_aggregate.by_row);
-        assert_eq!(by_row_with_aggregate.folded, [Cell::Number(4.0)]);
-        let filtered = checked("max(ratio_max) == 2.5", Some("not sensitive"), true);
+        assert_eq!(by_row_with_aggregate.aggregate_values, [Cell::Number(4.0)]);
+        let filtered = check_text("max(ratio_max) == 2.5", Some("not sensitive"), true);
         assert!(filtered.holds, "{filtered:?}");
     }
 
     #[test]
     fn shares_come_with_their_counts() {
-        let result = checked("share(reliable) > 0.5 and mean(ratio_max) < 9", None, true);
+        let result = check_text("share(reliable) > 0.5 and mean(ratio_max) < 9", None, true);
         assert_eq!(result.share_counts, [Some(3), None]);
-        assert_eq!(result.folded_rows, [5, 5]);
+        assert_eq!(result.aggregate_rows, [5, 5]);
     }
 
     #[test]
@@ -247,15 +246,15 @@ mod tests {
         let ratios = [Some(1.0), Some(f64::NAN), Some(3.0), None];
         sample::write(&path, vec![("x", "1", sample::numbers(&ratios))], &[]);
         let table = ResultTable::open(&path).unwrap();
-        let checked = |text: &str, filter: Option<&str>| {
+        let check_column = |text: &str, filter: Option<&str>| {
             let condition = Condition::parse(text, &table).unwrap();
             let filter = filter.map(|filter| Condition::parse(filter, &table).unwrap());
             check(&table, &condition, filter.as_ref(), true, 3).unwrap()
         };
-        assert!(checked("count(x is null) == 2 and mean(x) == 2 and max(x) == 3", None).holds);
-        assert_eq!(checked("x > 0", Some("x is not null")).rows, 2);
-        assert_eq!(checked("x > 0", None).undefined, 2);
-        assert!(checked("share(x > 2) == 0.5", None).holds);
+        assert!(check_column("count(x is null) == 2 and mean(x) == 2 and max(x) == 3", None).holds);
+        assert_eq!(check_column("x > 0", Some("x is not null")).rows, 2);
+        assert_eq!(check_column("x > 0", None).undefined, 2);
+        assert!(check_column("share(x > 2) == 0.5", None).holds);
     }
 
     // Row 3 has diverged, so no aggregate of ratios has a value of all rows.
@@ -271,16 +270,20 @@ mod tests {
             "not (max(ratio_max) > 9)",
             "ratio_max is null or ratio_max <= max(ratio_max)",
         ] {
-            let result = checked(text, None, false);
+            let result = check_text(text, None, false);
             assert!(!result.holds, "{text}: {result:?}");
-            assert_eq!((result.rows, &result.folded_rows[..]), (6, &[5][..]), "{text}");
-            assert!(checked(text, None, true).holds, "{text}");
-            assert!(checked(text, Some("ratio_max is not null"), false).holds, "{text}");
+            assert_eq!((result.rows, &result.aggregate_rows[..]), (6, &[5][..]), "{text}");
+            assert!(check_text(text, None, true).holds, "{text}");
+            assert!(check_text(text, Some("ratio_max is not null"), false).holds, "{text}");
         }
-        assert!(checked("max(ratio_max) < 9 or count(true) == 6", None, false).holds);
-        assert!(checked("share(status == \"ok\") > 0.8", None, false).holds);
+        assert!(check_text("max(ratio_max) < 9 or count(true) == 6", None, false).holds);
+        assert!(check_text("share(status == \"ok\") > 0.8", None, false).holds);
         // An aggregate of no values is unknown even with --allow-null.
-        let without_values = checked("max(ratio_max) < 9", Some("ratio_max is null"), true);
-        assert!(!without_values.holds && without_values.folded_rows == [0], "{without_values:?}");
+        let check_without_values =
+            check_text("max(ratio_max) < 9", Some("ratio_max is null"), true);
+        assert!(
+            !check_without_values.holds && check_without_values.aggregate_rows == [0],
+            "{check_without_values:?}"
+        );
     }
 }

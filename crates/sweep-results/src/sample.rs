@@ -30,8 +30,8 @@ pub(crate) fn texts(values: &[&str]) -> ArrayRef {
     Arc::new(values.iter().copied().collect::<DictionaryArray<Int32Type>>())
 }
 
-/// Writes a file of these columns with these metadata.
-pub(crate) fn write(path: &Path, columns: Vec<ColumnData>, keys: &[(&str, Value)]) {
+/// Writes a file of these columns and key-value metadata.
+pub(crate) fn write(path: &Path, columns: Vec<ColumnData>, key_values: &[(&str, Value)]) {
     let field = |(name, unit, array): &ColumnData| {
         let unit = ("unit".to_owned(), (*unit).to_owned());
         let is_gap = name.starts_with("min_gap");
@@ -42,7 +42,7 @@ pub(crate) fn write(path: &Path, columns: Vec<ColumnData>, keys: &[(&str, Value)
     let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()));
     let arrays = columns.into_iter().map(|(_, _, array)| array).collect();
     let batch = RecordBatch::try_new(schema.clone(), arrays).unwrap();
-    let pairs = keys.iter().map(|(key, value)| {
+    let pairs = key_values.iter().map(|(key, value)| {
         let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         KeyValue::new((*key).to_owned(), text)
     });
@@ -101,6 +101,6 @@ pub(crate) fn table() -> ResultTable {
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join("sample.parquet");
     write(&path, map(&RATIOS), &[(key::PLAN, plan())]);
-    // The open file outlives its name.
+    // The open file stays readable after its folder is deleted.
     ResultTable::open(&path).unwrap()
 }

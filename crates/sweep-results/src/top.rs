@@ -71,12 +71,12 @@ impl<T> WorstRows<T> {
         Self { worse, count, selected: Vec::new() }
     }
 
-    /// Adds a row if it may be among the selected ones; `row` is called only then.
-    pub(crate) fn insert(&mut self, value: Option<f64>, row: impl FnOnce() -> T) {
+    /// Adds a row if it may be among the selected ones. `create_row` is called only then.
+    pub(crate) fn insert(&mut self, value: Option<f64>, create_row: impl FnOnce() -> T) {
         if self.worse.is_none() && self.selected.len() == self.count {
             return;
         }
-        self.selected.push((value, row()));
+        self.selected.push((value, create_row()));
         // The rows are sorted when there are twice as many as needed, which limits the memory, and
         // the time for a row.
         if self.selected.len() == self.count.saturating_mul(2).max(1024) {

@@ -183,7 +183,7 @@ fn explain_in_pool(
         passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
     });
     let keeps_limit = |amplitudes: &Vec<f64>| {
-        swept.greatest_ratio(amplitudes).is_some_and(|(ratio, _)| ratio < swept.limits.most)
+        swept.greatest_ratio(amplitudes).is_some_and(|(ratio, _)| ratio < swept.limits.upper)
     };
     let has_passed = matches!(&without_departures, Some(Ok(amplitudes)) if keeps_limit(amplitudes));
     let cause = cause::find_cause((&point, spin), step_s, &swept, has_passed, growing);

@@ -61,7 +61,7 @@ impl Setup {
                 end_s: 0.0,
                 window_s: [0.0; 2],
                 accuracy: 0.0,
-                limits: RatioLimits { most: 0.0, least: None },
+                limits: RatioLimits { upper: 0.0, lower: None },
                 channels: Vec::new(),
                 measures: Measures::default(),
             },
@@ -130,8 +130,8 @@ fn walk_profile(walk: &mut NumberWalk<'_>, spin: &mut Spin) -> Option<()> {
 /// Writes or reads the rule, without the numbers of stops, feet and dampers.
 fn walk_rule(walk: &mut NumberWalk<'_>, rule: &mut RowRule) -> Option<()> {
     let RowRule { end_s, window_s: [from_s, to_s], accuracy, limits, channels, measures } = rule;
-    walk.numbers([end_s, from_s, to_s, accuracy, &mut limits.most])?;
-    walk.optional(&mut limits.least)?;
+    walk.numbers([end_s, from_s, to_s, accuracy, &mut limits.upper])?;
+    walk.optional(&mut limits.lower)?;
     walk.choices(channels, &Channel::ALL)?;
     walk.choice(&mut measures.criterion, &Criterion::ALL)?;
     walk.choices(&mut measures.metrics, &Metric::ALL)

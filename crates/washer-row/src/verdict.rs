@@ -87,7 +87,7 @@ impl Verdict {
         let greatest = extreme(|a, b| a > b);
         let least = extreme(|a, b| a < b);
         let reliable = match (least, greatest) {
-            (Some((_, least)), Some((_, greatest))) => Some(limits.trust(least, greatest)),
+            (Some((_, least)), Some((_, greatest))) => Some(limits.contain(least, greatest)),
             _ => None,
         };
         Self { ratios, greatest, least, reliable }
@@ -127,7 +127,7 @@ mod tests {
             trajectory(Status::Ok, &[1.0, 2.0, 2.0], None),
         );
         let reliable =
-            |least| Verdict::new(&row, 3, RatioLimits { most: 2.0, least }).reliable.unwrap();
+            |lower| Verdict::new(&row, 3, RatioLimits { upper: 2.0, lower }).reliable.unwrap();
         assert_eq!(Verdict::new(&row, 3, 2.0).least, Some((1, 0.15)));
         assert!(reliable(None) && reliable(Some(0.1)));
         assert!(!reliable(Some(0.15)) && !reliable(Some(0.5)), "at the limit is not above it");

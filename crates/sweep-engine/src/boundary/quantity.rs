@@ -74,7 +74,7 @@ pub fn offered<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<M>)> {
         (plan, Some(channel_columns(channel.name)))
     };
     let mut least = plan.clone();
-    least.reliability.limits.least = Some(plan.reliability.limits.over_estimate());
+    least.reliability.limits.lower = Some(plan.reliability.limits.over_estimate());
     let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
     let plans = M::ABOUT.channels.iter().map(channel_plan).chain(further.map(|plan| (plan, None)));
     let mut offered: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
@@ -266,9 +266,9 @@ pub fn traced<M: Model>(
         return Err(Error::option("--limit", value, expected));
     }
     if name == LEAST_RATIO {
-        plan.reliability.limits.least = Some(value);
+        plan.reliability.limits.lower = Some(value);
     } else if is_ratio {
-        plan.reliability.limits.most = value;
+        plan.reliability.limits.upper = value;
     }
     let quantity = TracedQuantity {
         name: column.name,

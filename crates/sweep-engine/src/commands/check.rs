@@ -66,10 +66,10 @@ fn summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     }
     let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name).collect();
     line("channels", channels.join(", "));
-    let RatioLimits { most, least } = plan.reliability.limits;
+    let RatioLimits { upper, lower } = plan.reliability.limits;
     let criterion = estimate.criterion;
-    let least = least.map_or(String::new(), |least| format!(" and above {least}"));
-    line("verdict", format!("reliable where every ratio is below {most}{least}{criterion}"));
+    let lower_limit = lower.map_or(String::new(), |lower| format!(" and above {lower}"));
+    line("verdict", format!("reliable where every ratio is below {upper}{lower_limit}{criterion}"));
     line("output", format!("results/{}.parquet", plan.name));
     let Estimate { threads, simd, .. } = estimate;
     let threads = counted(*threads, "thread");

@@ -184,13 +184,13 @@ fn lists(args: &CompareArgs, found: &Comparison) -> Vec<TitledTable> {
         list(title, rows, &|row| ([0, 1].map(|side| verdict_cell(row, side)), None));
     }
     for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
-        let rows = found.greatest(most, sensitive, SharedRow::ratio_deviation);
+        let rows = found.most_deviating(most, sensitive, SharedRow::ratio_deviation);
         list(format!("greatest changes of the ratio{which}"), rows, &|row| {
             let change = row.ratio_quotient().map(|change| 100.0 * (change - 1.0));
             let change = change.map_or_else(|| number(None), |change| format!("{change:+.3} %"));
             (row.ratio.map(number), Some(change))
         });
-        let rows = found.greatest(most, sensitive, SharedRow::gap_deviation_m);
+        let rows = found.most_deviating(most, sensitive, SharedRow::gap_deviation_m);
         list(format!("greatest changes of the least gap{which}, m"), rows, &|row| {
             let sign = if row.gap_difference_m() > Some(0.0) { "+" } else { "" };
             let change = format!("{sign}{}", number(row.gap_difference_m()));
@@ -245,7 +245,7 @@ fn facts(found: &Comparison, overridden: &[Overridden]) -> Vec<(&'static str, St
                     tables have the values in A";
         facts.push(("matched", told.to_owned()));
     }
-    for (place, name, value) in &found.fixed {
+    for (place, name, value) in &found.single_valued_axes {
         let which = ["A", "B"][*place];
         facts.push(("axis", format!("{name} = {} in {which} alone, left out", short(*value))));
     }
@@ -289,7 +289,7 @@ fn facts(found: &Comparison, overridden: &[Overridden]) -> Vec<(&'static str, St
 fn boundary(moved: &BoundaryShift) -> String {
     let BoundaryShift { axis, unit, crossings, .. } = moved;
     let count = counted(crossings.len(), "crossing");
-    let mut told = match (moved.farthest(), moved.mean_range()) {
+    let mut told = match (moved.most_shifted(), moved.mean_shift_range()) {
         (Some(_), _) if crossings.iter().all(|crossing| crossing.shift_range() == [0.0; 2]) => {
             format!("{count} along {axis}, none moved")
         }
@@ -301,7 +301,7 @@ fn boundary(moved: &BoundaryShift) -> String {
             let place: Vec<String> =
                 place.map(|(name, value)| format!("{name} {}", short(*value))).collect();
             let [from, to] = farthest.bracket.map(|ends| span(ends, short));
-            let certain = moved.count_certain();
+            let certain = moved.count_certain_shifts();
             let place = place.join(", ");
             format!(
                 "{count} along {axis}, {certain} moved farther than brackets explain; in the mean \
@@ -425,7 +425,7 @@ fn to_json(
     let all = |rows: Vec<&SharedRow>| rows.into_iter().map(row).collect::<Value>();
     let greatest = |sensitive| {
         let [ratio, gap] = [SharedRow::ratio_deviation, SharedRow::gap_deviation_m]
-            .map(|by| all(found.greatest(most, sensitive, by)));
+            .map(|by| all(found.most_deviating(most, sensitive, by)));
         json!({ "ratio": ratio, "gap": gap })
     };
     json!({
@@ -445,7 +445,7 @@ fn to_json(
             "only_in_second": found.unmatched_rows[1],
             "differing": found.shared.iter().filter(|row| row.differs).count(),
         },
-        "axes_left_out": found.fixed.iter().map(|(place, name, value)| json!({
+        "axes_left_out": found.single_valued_axes.iter().map(|(place, name, value)| json!({
             "file": (["first", "second"][*place]), "parameter": name, "value": value,
         })).collect::<Value>(),
         "columns": found.columns,
@@ -462,8 +462,8 @@ fn to_json(
         "boundary": found.boundary.as_ref().map(|moved| json!({
             "axis": moved.axis,
             "unit": moved.unit,
-            "mean": moved.mean_range(),
-            "certain": moved.count_certain(),
+            "mean": moved.mean_shift_range(),
+            "certain": moved.count_certain_shifts(),
             "crossings": moved.crossings.iter().map(|crossing| json!({
                 "place": crossing.key_values, "number": crossing.number, "at": crossing.positions,
                 "bracket": crossing.bracket,

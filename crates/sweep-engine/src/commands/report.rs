@@ -150,8 +150,8 @@ fn is_expression(path: &Path) -> bool {
 
 /// Describes the range of reliable ratios.
 fn within(limits: RatioLimits) -> String {
-    let most = short(limits.most);
-    limits.least.map_or_else(
+    let most = short(limits.upper);
+    limits.lower.map_or_else(
         || format!("below {most}"),
         |least| format!("between {} and {most}", short(least)),
     )

@@ -10,7 +10,7 @@ use super::{conditions, table, word};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, show};
 use sweep_plot::Share;
-use sweep_results::{Cell, Checked, Condition, ResultTable, check};
+use sweep_results::{Cell, Condition, ConditionCheck, ResultTable, check};
 
 /// Arguments of `sweep require`.
 #[derive(Debug, clap::Args)]
@@ -95,12 +95,12 @@ pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
 #[derive(Serialize)]
 struct Gate {
     #[serde(flatten)]
-    whole: Checked,
+    whole: ConditionCheck,
     /// The 95 % confidence interval of each function over all rows; `None` for functions other than
     /// shares of random points.
     intervals: Vec<Option<[f64; 2]>>,
     /// The results of the parts that an expression joins by `and`, if the expression fails.
-    parts: Vec<Checked>,
+    parts: Vec<ConditionCheck>,
 }
 
 /// Returns whether a design placed the points at random, so that a share of them has a confidence
@@ -112,12 +112,12 @@ fn is_random(file: &ResultTable) -> bool {
 }
 
 /// Computes Wilson's interval of every share.
-fn intervals(checked: &Checked, is_random: bool) -> Vec<Option<[f64; 2]>> {
+fn intervals(checked: &ConditionCheck, is_random: bool) -> Vec<Option<[f64; 2]>> {
     let interval = |(count, rows): (&Option<u64>, &u64)| {
         let share = Share::wilson((*count)?, *rows).filter(|_| is_random)?;
         Some([share.low, share.high])
     };
-    checked.share_counts.iter().zip(&checked.folded_rows).map(interval).collect()
+    checked.share_counts.iter().zip(&checked.aggregate_rows).map(interval).collect()
 }
 
 /// Checks each part that an expression joins by `and`, if the expression fails.
@@ -127,7 +127,7 @@ fn parts(
     keep: Option<&Condition>,
     allow_null: bool,
     holds: bool,
-) -> Result<Vec<Checked>, Error> {
+) -> Result<Vec<ConditionCheck>, Error> {
     let texts = condition.conjuncts();
     if holds || texts.len() < 2 {
         return Ok(Vec::new());
@@ -160,7 +160,11 @@ fn with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> String {
 }
 
 /// Formats the result of an expression: a line, and a table of the rows that violate it.
-fn format_checked(args: &RequireArgs, checked: &Checked, intervals: &[Option<[f64; 2]>]) -> String {
+fn format_checked(
+    args: &RequireArgs,
+    checked: &ConditionCheck,
+    intervals: &[Option<[f64; 2]>],
+) -> String {
     let verdict = if checked.holds { "holds" } else { "FAILS" };
     let mut text = format!("{verdict}  {}", checked.expression);
     // Writing to a String cannot fail.
@@ -178,11 +182,11 @@ fn format_checked(args: &RequireArgs, checked: &Checked, intervals: &[Option<[f6
             writeln!(text, ": {} of {rows} rows false{undefined}", checked.failing)
         }
         (rows, false) => {
-            let values = checked.folded.iter().enumerate();
+            let values = checked.aggregate_values.iter().enumerate();
             let values = values.map(|(k, cell)| with_interval(cell, intervals.get(k)));
             let values: Vec<String> = values.collect();
             let values = values.join(", ");
-            match checked.folded_rows.iter().min() {
+            match checked.aggregate_rows.iter().min() {
                 Some(&over) if over < rows => {
                     let missing = rows - over;
                     let say = match args.allow_null {
@@ -197,7 +201,7 @@ fn format_checked(args: &RequireArgs, checked: &Checked, intervals: &[Option<[f6
     };
     let Some(first) = checked.offenders.first() else { return text };
     let headings: Vec<String> = first.cells.iter().map(|(name, _)| name.clone()).collect();
-    let cells = |offender: &sweep_results::Offender| {
+    let cells = |offender: &sweep_results::ViolatingRow| {
         offender.cells.iter().map(|(_, cell)| word(cell)).collect()
     };
     let rows: Vec<Vec<String>> = checked.offenders.iter().map(cells).collect();

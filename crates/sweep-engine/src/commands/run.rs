@@ -262,8 +262,8 @@ fn share(tally: &Tally) -> String {
 pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
     let percent = |count: u64| 100.0 * count as f64 / tally.points.max(1) as f64;
-    let most = limits.most;
-    let range = limits.least.map_or_else(
+    let most = limits.upper;
+    let range = limits.lower.map_or_else(
         || format!("below ratio {most}"),
         |least| format!("with ratios from {least} to {most}"),
     );

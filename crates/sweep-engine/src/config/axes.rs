@@ -169,7 +169,7 @@ fn is_foreign<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) -> bool {
     let Err(error) = model.find(name.value) else { return false };
     let all = model.parameters();
     let near = nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| &*one.name));
-    error.is_strange && near.is_none()
+    error.is_in_no_model && near.is_none()
 }
 
 /// The kinds of distributions by name, with their numbers; "uniform" is another name of a range.

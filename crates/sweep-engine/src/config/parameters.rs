@@ -105,14 +105,14 @@ pub fn find<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) -> Option<Mode
 /// Returns the mistake of a name that is no parameter.
 pub fn unknown<M: Model>(
     name: &Located<&str>,
-    UnknownParameter { reason, is_strange }: &UnknownParameter,
+    UnknownParameter { reason, is_in_no_model }: &UnknownParameter,
     model: &M,
 ) -> Diagnostic {
     let title = format!("unknown parameter {}", quoted(name.value));
     let diagnostic = Diagnostic::new(title).at(&name.at, reason.as_str());
     let tables = ["time", "integrator", "reliability"];
-    let table = is_strange.then(|| described::<M>().table_of(name.value, &tables)).flatten();
-    match (is_strange, table) {
+    let table = is_in_no_model.then(|| described::<M>().table_of(name.value, &tables)).flatten();
+    match (is_in_no_model, table) {
         (true, Some(table)) => {
             let set = format!("`{}` is set in [{table}] of the grid file", name.value);
             diagnostic.help(match name.value {

@@ -461,5 +461,5 @@ pub fn refused_number(what: &str, value: f64, at: &Location, range: Range) -> Di
     } else {
         format!("{what} = {} is out of range", decimal(value))
     };
-    Diagnostic::new(title).at(at, format!("expected {}", range.instead_of(value)))
+    Diagnostic::new(title).at(at, format!("expected {}", range.describe_for(value)))
 }

@@ -73,9 +73,9 @@ pub(super) fn sections<M: Model>(
         model.walk(GridTable::Reliability, keys, input);
         let Reliability { limits, channels } = reliability;
         let key = Key::new("ratio_limit", "a point is reliable where every ratio is below this");
-        keys.key(key.set(), &Form::Number(Range::Positive), &mut limits.most);
+        keys.key(key.set(), &Form::Number(Range::Positive), &mut limits.upper);
         let about = "if given, a point is reliable where every ratio is above this too";
-        keys.key(Key::new("ratio_min", about).set(), &Form::Number(RATIO_MIN), &mut limits.least);
+        keys.key(Key::new("ratio_min", about).set(), &Form::Number(RATIO_MIN), &mut limits.lower);
         let key = Key::new("channels", "channels that are compared").set();
         keys.words(key, "channel", M::ABOUT.channels, |channel| channel.name, channels);
     });

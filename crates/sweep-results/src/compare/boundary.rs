@@ -59,19 +59,19 @@ pub struct BoundaryShift {
 impl BoundaryShift {
     /// Returns the crossing with the greatest certain shift; if several have it, that with the
     /// greatest estimated shift.
-    pub fn farthest(&self) -> Option<&BoundaryCrossing> {
-        let estimated =
+    pub fn most_shifted(&self) -> Option<&BoundaryCrossing> {
+        let estimated_shift =
             |crossing: &BoundaryCrossing| (crossing.positions[1] - crossing.positions[0]).abs();
         self.crossings.iter().max_by(|a, b| {
             a.certain_shift()
                 .total_cmp(&b.certain_shift())
-                .then(estimated(a).total_cmp(&estimated(b)))
+                .then(estimated_shift(a).total_cmp(&estimated_shift(b)))
         })
     }
 
     /// Returns the mean of the least shifts and the mean of the greatest shifts that the brackets
     /// allow.
-    pub fn mean_range(&self) -> Option<[f64; 2]> {
+    pub fn mean_shift_range(&self) -> Option<[f64; 2]> {
         if self.crossings.is_empty() {
             return None;
         }
@@ -83,7 +83,7 @@ impl BoundaryShift {
     }
 
     /// Counts the crossings that shifted farther than their brackets explain.
-    pub fn count_certain(&self) -> usize {
+    pub fn count_certain_shifts(&self) -> usize {
         self.crossings.iter().filter(|crossing| crossing.certain_shift() > 0.0).count()
     }
 }
@@ -101,7 +101,7 @@ struct LineCrossings {
     by_file: [Vec<BracketedCrossing>; 2],
 }
 
-/// The lines, sorted by their places.
+/// The crossings of each line, sorted by the values of the other axes.
 type CrossingsByLine = BTreeMap<Vec<u64>, LineCrossings>;
 
 /// Pairs the crossings of the two files line by line.
@@ -133,12 +133,12 @@ fn pair_crossings(
 
 /// Returns integers that sort in the same order as the numbers.
 fn sort_key(values: &[f64]) -> Vec<u64> {
-    let key = |value: &f64| {
+    let order_bits = |value: &f64| {
         let bits = (value + 0.0).to_bits();
         // The bits of negative numbers sort in reverse order.
         if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
     };
-    values.iter().map(key).collect()
+    values.iter().map(order_bits).collect()
 }
 
 /// Compares two boundary files.

@@ -58,18 +58,17 @@ pub fn plan_changes(first: &Value, second: &Value) -> Vec<PlanChange> {
     changes
 }
 
-/// Returns whether two plans have the same points but for the numbers about which their axes'
-/// tolerances lie.
-pub(super) fn is_about_other_numbers(first: Option<&Value>, second: Option<&Value>) -> bool {
+/// Returns whether the points of two plans differ only by the nominal values of axes with
+/// tolerances.
+pub(super) fn differs_in_nominal_values(first: Option<&Value>, second: Option<&Value>) -> bool {
     let Some((first, second)) = first.zip(second) else { return false };
     first["axis"] != second["axis"]
         && first["design"] == second["design"]
-        && without_tolerated_numbers(&first["axis"]) == without_tolerated_numbers(&second["axis"])
+        && without_toleranced_numbers(&first["axis"]) == without_toleranced_numbers(&second["axis"])
 }
 
-/// Returns the axes of a plan without the numbers that follow from a tolerance and the number in
-/// its middle.
-fn without_tolerated_numbers(axes: &Value) -> Value {
+/// Returns the axes of a plan without the numbers that a tolerance and its nominal value determine.
+fn without_toleranced_numbers(axes: &Value) -> Value {
     let mut axes = axes.clone();
     for axis in axes.as_array_mut().into_iter().flatten() {
         if axis.get("tolerance").is_none() {
@@ -77,8 +76,8 @@ fn without_tolerated_numbers(axes: &Value) -> Value {
         }
         for key in ["range", "distribution"] {
             if let Some(values) = axis.get_mut(key).and_then(Value::as_object_mut) {
-                let follows = ["from", "to", "mean", "sd", "median", "sigma"];
-                values.retain(|key, _| !follows.contains(&key.as_str()));
+                let determined_keys = ["from", "to", "mean", "sd", "median", "sigma"];
+                values.retain(|key, _| !determined_keys.contains(&key.as_str()));
             }
         }
     }

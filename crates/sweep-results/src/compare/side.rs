@@ -11,7 +11,7 @@ const MAX_CELLS: u64 = 100_000_000;
 /// The columns of a file that take part in a comparison.
 #[derive(Debug)]
 pub(super) struct ComparedFile {
-    /// The row groups: the key columns, further columns by which rows are matched, and the compared
+    /// The row groups: the key columns, further_names columns by which rows are matched, and the compared
     /// columns.
     row_groups: Vec<Rows>,
     /// The number of rows.
@@ -71,16 +71,16 @@ impl ComparedFile {
         let is_in_both = |column: &Column| {
             let counterpart = other_table.column(&column.name);
             let has_same_kind =
-                counterpart.is_some_and(|other_table| other_table.kind == column.kind);
+                counterpart.is_some_and(|counterpart| counterpart.kind == column.kind);
             has_same_kind && column.name != "point" && !keys.contains(&column.name)
         };
         let mut columns = table.columns.clone();
         columns.retain(is_in_both);
         let mut names: Vec<&str> = keys.iter().map(String::as_str).collect();
-        let further = matched_by.iter().filter(|name| !keys.contains(name));
-        names.extend(further.map(String::as_str));
+        let further_names = matched_by.iter().filter(|name| !keys.contains(name));
+        names.extend(further_names.map(String::as_str));
         let first_column = names.len();
-        let position = |name: &String| names.iter().position(|known| known == name);
+        let position = |name: &String| names.iter().position(|read_name| read_name == name);
         let matched_by = matched_by.iter().filter_map(position).collect();
         names.extend(columns.iter().map(|column| column.name.as_str()));
         let cell_count = table.rows().saturating_mul(names.len() as u64);
@@ -133,7 +133,7 @@ impl ComparedFile {
         ratios.filter_map(|(position, _)| self.cell(position, row).number()).reduce(f64::min)
     }
 
-    /// Returns a pair of matching rows as one.
+    /// Combines two matching rows: one of this file and one of the other.
     pub(super) fn shared_row(&self, other: &Self, pair: [usize; 2]) -> SharedRow {
         let cells = |name: &str| {
             [(self, pair[0]), (other, pair[1])].map(|(file, row)| {

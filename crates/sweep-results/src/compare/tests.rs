@@ -26,11 +26,11 @@ fn a_file_equals_itself() {
     let comparison = compare(&map(&RATIOS), &map(&RATIOS)).unwrap();
     assert!(comparison.is_empty(), "{comparison:?}");
     assert_eq!((comparison.shared.len(), comparison.flips(false).count()), (6, 0));
-    assert!(comparison.greatest(5, false, SharedRow::ratio_deviation).is_empty());
+    assert!(comparison.most_deviating(5, false, SharedRow::ratio_deviation).is_empty());
     let shift = comparison.boundary.unwrap();
     assert!(
         shift.unmatched_lines.is_empty()
-            && shift.crossings.iter().all(|c| c.shift_range() == [0.0; 2])
+            && shift.crossings.iter().all(|crossing| crossing.shift_range() == [0.0; 2])
     );
 }
 
@@ -52,11 +52,11 @@ fn flips_are_found_and_sensitive_rows_are_separate() {
     assert_eq!(count_lost(&comparison), 1);
     ratios[0] = None; // reliable before
     assert_eq!(count_lost(&compare(&map(&RATIOS), &map(&ratios)).unwrap()), 2);
-    let greatest = comparison.greatest(3, false, SharedRow::ratio_deviation);
+    let greatest = comparison.most_deviating(3, false, SharedRow::ratio_deviation);
     assert_eq!(greatest.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [3, 2, 1]);
     assert!((greatest[1].ratio_deviation() - 1.0).abs() < 1e-12, "2.5 to 1.25 is a factor of two");
-    let gap = comparison.greatest(2, false, SharedRow::gap_deviation_m)[1];
-    assert!((gap.gap_deviation_m() - 1.25e-3).abs() < 1e-12, "{gap:?}");
+    let gap_row = comparison.most_deviating(2, false, SharedRow::gap_deviation_m)[1];
+    assert!((gap_row.gap_deviation_m() - 1.25e-3).abs() < 1e-12, "{gap_row:?}");
     assert!(comparison.shared.iter().filter(|row| row.differs).count() == 4);
     assert!(comparison.columns.iter().any(|column| column.name == "ratio_max" && column.rows == 4));
     assert!(!comparison.is_empty());
@@ -77,7 +77,7 @@ fn deviations_from_missing_numbers_are_infinite() {
     ratios[3] = Some(1.0); // failed before
     let comparison = compare(&map(&RATIOS), &map(&ratios)).unwrap();
     for deviation in [SharedRow::ratio_deviation, SharedRow::gap_deviation_m] {
-        let rows = comparison.greatest(5, false, deviation);
+        let rows = comparison.most_deviating(5, false, deviation);
         assert_eq!(rows.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [0, 3]);
         assert!(rows.iter().all(|row| deviation(row) == f64::INFINITY));
     }
@@ -115,10 +115,10 @@ fn maps_of_different_grids_are_compared_at_common_points() {
     assert!(comparison.columns.is_empty(), "{:?}", comparison.columns);
 }
 
-/// Returns the sample's map with dampings that follow from a tolerance about their middle.
-fn map_about(middle: f64, tolerance: &str, ratios: &[Option<f64>]) -> ResultTable {
+/// Returns the sample's map with dampings that follow from a tolerance about a nominal value.
+fn map_with_tolerance(nominal: f64, tolerance: &str, ratios: &[Option<f64>]) -> ResultTable {
     let mut plan = sample::plan();
-    let [from, to] = [middle - 10.0, middle + 10.0];
+    let [from, to] = [nominal - 10.0, nominal + 10.0];
     plan["axis"][1] = json!({
         "parameter": "damping_n_s_per_m",
         "range": { "from": from, "to": to, "count": 3, "spacing": "linear" },
@@ -131,32 +131,34 @@ fn map_about(middle: f64, tolerance: &str, ratios: &[Option<f64>]) -> ResultTabl
 }
 
 #[test]
-fn rows_of_tolerances_about_other_numbers_are_matched_by_point() {
+fn rows_of_different_nominal_values_are_matched_by_point() {
     let mut ratios = RATIOS;
     ratios[0] = Some(2.5); // reliable before
-    let first = map_about(100.0, "10 %", &RATIOS);
-    let found = compare(&first, &map_about(200.0, "10 %", &ratios)).unwrap();
-    assert!(found.is_matched_by_point);
-    assert_eq!((found.shared.len(), found.unmatched_rows), (6, [0, 0]));
-    assert!(found.shared.iter().all(|row| row.rows[0] == row.rows[1]));
+    let first = map_with_tolerance(100.0, "10 %", &RATIOS);
+    let comparison = compare(&first, &map_with_tolerance(200.0, "10 %", &ratios)).unwrap();
+    assert!(comparison.is_matched_by_point);
+    assert_eq!((comparison.shared.len(), comparison.unmatched_rows), (6, [0, 0]));
+    assert!(comparison.shared.iter().all(|row| row.rows[0] == row.rows[1]));
     assert_eq!(
-        (&*found.shared[5].key, &*found.shared[5].second_key),
+        (&*comparison.shared[5].key, &*comparison.shared[5].second_key),
         (&[0.2, 110.0][..], &[0.2, 210.0][..])
     );
-    let flips: Vec<u64> = found.flips(false).map(|row| row.rows[0]).collect();
+    let flips: Vec<u64> = comparison.flips(false).map(|row| row.rows[0]).collect();
     assert_eq!(flips, [0]);
-    let columns: Vec<&str> = found.columns.iter().map(|column| column.name.as_str()).collect();
+    let columns: Vec<&str> = comparison.columns.iter().map(|column| column.name.as_str()).collect();
     assert!(!columns.contains(&"damping_n_s_per_m") && columns.contains(&"ratio_max"));
     // Each file's crossings lie between its own values.
-    let found = compare(&first, &map_about(200.0, "10 %", &RATIOS)).unwrap();
-    assert!(found.columns.is_empty() && !found.is_empty());
-    let brackets = found.boundary.unwrap().crossings.remove(0).bracket;
+    let comparison = compare(&first, &map_with_tolerance(200.0, "10 %", &RATIOS)).unwrap();
+    assert!(comparison.columns.is_empty() && !comparison.is_empty());
+    let brackets = comparison.boundary.unwrap().crossings.remove(0).bracket;
     assert_eq!(brackets, [[100.0, 110.0], [200.0, 210.0]]);
 
-    // Values that are the same are matched as ever, and other tolerances are other grids.
-    assert!(!compare(&first, &map_about(100.0, "10 %", &RATIOS)).unwrap().is_matched_by_point);
-    let refused = compare(&first, &map_about(200.0, "5 %", &RATIOS)).unwrap_err();
-    assert!(refused.to_string().contains("they share no row"), "{refused}");
+    // Equal nominal values match by their axes, and different tolerances make different grids.
+    assert!(
+        !compare(&first, &map_with_tolerance(100.0, "10 %", &RATIOS)).unwrap().is_matched_by_point
+    );
+    let error = compare(&first, &map_with_tolerance(200.0, "5 %", &RATIOS)).unwrap_err();
+    assert!(error.to_string().contains("they share no row"), "{error}");
 }
 
 #[test]
@@ -170,14 +172,14 @@ fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
         file(columns, &[(key::PLAN, plan)])
     };
     let comparison = compare(&map(&RATIOS), &with_spin(&[350.0; 6])).unwrap();
-    assert_eq!(comparison.fixed, [(1, "forcing_rad_per_s".to_owned(), 350.0)]);
+    assert_eq!(comparison.single_valued_axes, [(1, "forcing_rad_per_s".to_owned(), 350.0)]);
     assert_eq!(comparison.shared.len(), 6);
     let with_two_values = with_spin(&[300.0, 300.0, 300.0, 350.0, 350.0, 350.0]);
-    let refused = compare(&map(&RATIOS), &with_two_values).unwrap_err();
-    assert!(matches!(refused, ResultsError::Refused(_)));
+    let error = compare(&map(&RATIOS), &with_two_values).unwrap_err();
+    assert!(matches!(error, ResultsError::Refused(_)));
     assert!(
-        refused.to_string().contains("only the second has the axis `forcing_rad_per_s`"),
-        "{refused}"
+        error.to_string().contains("only the second has the axis `forcing_rad_per_s`"),
+        "{error}"
     );
 }
 
@@ -186,15 +188,15 @@ fn files_without_common_rows_are_refused_with_the_reason() {
     let mut columns = sample::map(&RATIOS);
     columns[1] = ("unbalance_mass_kg", "kg", numbers(&[Some(0.7); 6]));
     let second = file(columns, &[(key::PLAN, sample::plan())]);
-    let refused = compare(&map(&RATIOS), &second).unwrap_err().to_string();
-    assert!(refused.contains("share no row"), "{refused}");
-    let refused = compare(&map(&RATIOS), &boundary(&[Some(100.0)])).unwrap_err().to_string();
-    assert!(refused.contains("are map and boundary"), "{refused}");
+    let error = compare(&map(&RATIOS), &second).unwrap_err().to_string();
+    assert!(error.contains("share no row"), "{error}");
+    let error = compare(&map(&RATIOS), &boundary(&[Some(100.0)])).unwrap_err().to_string();
+    assert!(error.contains("are map and boundary"), "{error}");
 }
 
 #[test]
 fn rows_with_equal_keys_are_paired_in_order() {
-    let listed = |ratios: [f64; 2]| {
+    let design = |ratios: [f64; 2]| {
         let plan = json!({ "axis": [{ "parameter": "unbalance_mass_kg" }], "design": {} });
         let columns: Vec<ColumnData> = vec![
             ("unbalance_mass_kg", "kg", numbers(&[Some(0.1); 2])),
@@ -203,23 +205,23 @@ fn rows_with_equal_keys_are_paired_in_order() {
         ];
         file(columns, &[(key::PLAN, plan)])
     };
-    let comparison = compare(&listed([1.0, 3.0]), &listed([1.0, 4.0])).unwrap();
+    let comparison = compare(&design([1.0, 3.0]), &design([1.0, 4.0])).unwrap();
     assert_eq!(comparison.shared.iter().map(|row| row.rows).collect::<Vec<_>>(), [[0, 0], [1, 1]]);
     assert_eq!(comparison.columns[0].rows, 1);
 }
 
-/// Returns a boundary file with a mass for each position; brackets are 0.5 wide, `None` is a line
-/// without a crossing.
+/// Returns a boundary file with a mass for each position. Brackets are 0.5 wide; a position of
+/// `None` makes a line without a crossing.
 fn boundary(positions: &[Option<f64>]) -> ResultTable {
     let rows = positions.len();
     let shifted = |offset: f64| {
         positions
             .iter()
-            .map(|positions| positions.map(|positions| positions + offset))
+            .map(|position| position.map(|position| position + offset))
             .collect::<Vec<_>>()
     };
     let masses: Vec<_> = (0..rows).map(|k| Some(0.1 + 0.1 * k as f64)).collect();
-    let crossing = positions.iter().map(|positions| u64::from(positions.is_some()));
+    let crossing = positions.iter().map(|position| u64::from(position.is_some()));
     let columns: Vec<ColumnData> = vec![
         ("unbalance_mass_kg", "kg", numbers(&masses)),
         ("damping_n_s_per_m", "N s/m", numbers(positions)),
@@ -238,16 +240,16 @@ fn a_shift_is_certain_only_beyond_the_brackets() {
     let comparison = compare(&first, &second).unwrap();
     let shift = comparison.boundary.unwrap();
     assert_eq!((shift.axis.as_str(), shift.unit.as_str()), ("damping_n_s_per_m", "N s/m"));
-    assert_eq!((shift.crossings.len(), shift.count_certain()), (3, 1));
-    let farthest = shift.farthest().unwrap();
-    assert_eq!((farthest.shift_range(), farthest.certain_shift()), ([2.5, 3.5], 2.5));
+    assert_eq!((shift.crossings.len(), shift.count_certain_shifts()), (3, 1));
+    let most_shifted = shift.most_shifted().unwrap();
+    assert_eq!((most_shifted.shift_range(), most_shifted.certain_shift()), ([2.5, 3.5], 2.5));
     // The shifts are 0.3 and 3, each give or take 0.5; the third crossing has not moved.
-    let mean = shift.mean_range().unwrap();
+    let mean = shift.mean_shift_range().unwrap();
     assert!((mean[0] - 2.3 / 3.0).abs() < 1e-9 && (mean[1] - 4.3 / 3.0).abs() < 1e-9, "{mean:?}");
     assert_eq!(shift.unmatched_lines.len(), 1);
     assert_eq!(shift.unmatched_lines[0].1, [0, 1]);
     let shift = compare(&first, &boundary(&[None, None, None, None])).unwrap().boundary.unwrap();
-    assert_eq!((shift.mean_range(), shift.unmatched_lines.len()), (None, 3));
+    assert_eq!((shift.mean_shift_range(), shift.unmatched_lines.len()), (None, 3));
 }
 
 #[test]
@@ -256,9 +258,9 @@ fn a_boundary_of_maps_lies_between_neighbours() {
     let mut ratios = RATIOS;
     ratios[1] = Some(2.2);
     let shift = compare(&map(&RATIOS), &map(&ratios)).unwrap().boundary.unwrap();
-    let lighter = &shift.crossings[0];
-    assert_eq!(lighter.bracket, [[70.0, 80.0], [60.0, 70.0]]);
-    assert_eq!((lighter.shift_range(), lighter.certain_shift()), ([-20.0, 0.0], 0.0));
+    let first_crossing = &shift.crossings[0];
+    assert_eq!(first_crossing.bracket, [[70.0, 80.0], [60.0, 70.0]]);
+    assert_eq!((first_crossing.shift_range(), first_crossing.certain_shift()), ([-20.0, 0.0], 0.0));
 }
 
 #[test]

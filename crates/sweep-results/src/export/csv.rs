@@ -6,7 +6,7 @@ use sweep_files::{Cell, EXPORTED_CSV, FileError, ResultTable, key};
 
 use super::column_names;
 
-/// Number of bytes that are collected before they are written. Basis: it need only be far greater
+/// Number of bytes that are collected before they are written. Basis: it only has to be far greater
 /// than a row. Doubling it halves the number of writes.
 const WRITE_SIZE: usize = 1 << 16;
 
@@ -124,15 +124,18 @@ mod tests {
         let path = home.path().join("x.parquet");
         let word = "a".repeat(1 << 18);
         sample::write(&path, vec![("status", "", sample::texts(&vec![word.as_str(); 100]))], &[]);
-        let mut longest = 0;
-        let mut total = 0;
+        let mut longest_part_bytes = 0;
+        let mut total_bytes = 0;
         let mut count_bytes = |text: &str| {
-            longest = text.len().max(longest);
-            total += text.len();
+            longest_part_bytes = text.len().max(longest_part_bytes);
+            total_bytes += text.len();
             Ok(())
         };
         write(&ResultTable::open(&path).unwrap(), &mut count_bytes).unwrap();
-        assert!(total > 100 << 18 && longest < 2 << 18, "{total} {longest}");
+        assert!(
+            total_bytes > 100 << 18 && longest_part_bytes < 2 << 18,
+            "{total_bytes} {longest_part_bytes}"
+        );
     }
 
     #[test]

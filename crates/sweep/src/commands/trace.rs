@@ -180,12 +180,12 @@ fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Resu
     let point = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
     let mut text = format!("{amplitude}, {window} s{point}:\n{}", table(&headings, &rows, ""));
     // The decisive ratio is one that is beyond its limit, or else the greatest.
-    let too_low = limits.least.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
+    let too_low = limits.lower.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
     let decisive = match (verdict.greatest, too_low) {
-        (Some((_, ratio)), Some((limit, least))) if ratio < limits.most => {
+        (Some((_, ratio)), Some((limit, least))) if ratio < limits.upper => {
             Some((least, "least", limit))
         }
-        (greatest, _) => greatest.map(|greatest| (greatest, "greatest", limits.most)),
+        (greatest, _) => greatest.map(|greatest| (greatest, "greatest", limits.upper)),
     };
     let verdict_text = match (verdict.reliable, decisive) {
         (Some(reliable), Some(((channel, ratio), which, limit))) => {

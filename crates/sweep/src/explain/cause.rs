@@ -67,7 +67,7 @@ pub(super) fn find_cause<'p>(
     let speeds_rpm: Vec<f64> = spin.speeds_rpm(times_s).collect();
     let passage_growths: Vec<PassageGrowth> =
         passages.map(|(passage, growths)| passage_growth(passage, growths, &speeds_rpm)).collect();
-    let limit = swept.limits.most;
+    let limit = swept.limits.upper;
     let remainder =
         remove_growth(&values, &passage_growths, window, (amplitude, limit), has_passed)?;
     Some(Cause {

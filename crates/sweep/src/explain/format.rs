@@ -176,7 +176,7 @@ fn push_verdict(text: &mut String, swept: &SweptResult) {
         channel.name(),
         significant(ratio),
         amplitudes.join(" against "),
-        match (decimal(swept.limits.most), swept.limits.least) {
+        match (decimal(swept.limits.upper), swept.limits.lower) {
             (most, None) => format!("the limit is {most}"),
             (most, Some(least)) => format!("the limits are {} and {most}", decimal(least)),
         }
@@ -370,7 +370,7 @@ fn push_conclusion(text: &mut String, found: &Explanation) {
         push_line(text, "so", "there is no verdict to explain");
         return;
     };
-    let is_within = greatest < swept.limits.most;
+    let is_within = greatest < swept.limits.upper;
     let words = match &found.without_departures {
         None if is_within && !over_estimates(swept) => {
             "no tongue is crossed before the window ends, and the models agree".to_owned()
@@ -395,7 +395,7 @@ fn push_conclusion(text: &mut String, found: &Explanation) {
                 );
                 let growth = growth_until(found.cause.as_ref());
                 let is_cause = found.cause.is_some_and(|cause| cause.is_enough);
-                match (is_within, ratio < swept.limits.most) {
+                match (is_within, ratio < swept.limits.upper) {
                     (false, true) if is_cause => format!(
                         "{same}, within the limit: the verdict is due to motion left over from \
                          before the tongue, and would change with the ramp; {growth}"

@@ -71,8 +71,8 @@ fn swept_json(swept: &SweptResult) -> Value {
         "status": swept.status,
         "fail_time_s": swept.fail_time_s,
         "reliable": swept.verdict.reliable,
-        "ratio_limit": swept.limits.most,
-        "ratio_min": swept.limits.least,
+        "ratio_limit": swept.limits.upper,
+        "ratio_min": swept.limits.lower,
         "ratio_max": greatest.map(|(_, ratio)| ratio),
         "ratio_max_channel": greatest.map(|(channel, _)| swept.channels[channel].name()),
         "ratios": ratios

@@ -131,7 +131,7 @@ impl OnMap<'_> {
         Ok(FittedVerdict {
             reliable: verdicts.first().and_then(|verdict| verdict.reliable),
             ratio_max: verdicts.first().and_then(ratio),
-            ratio_limit: limits.most,
+            ratio_limit: limits.upper,
             probability_reliable: (!drawn.is_empty()).then(|| reliable as f64 / drawn.len() as f64),
             ratio_max_95: middle_95(drawn.iter().filter_map(ratio)),
             draws: drawn.len(),

@@ -122,10 +122,10 @@ impl Target {
     fn check_exists(self, machine: &Machine, spin: &Spin) -> Result<(), UnknownParameter> {
         match self {
             Self::Spin if matches!(spin, Spin::Table { .. }) => {
-                Err(UnknownParameter::not_here("a spin given as a table has no such number"))
+                Err(UnknownParameter::in_other_models("a spin given as a table has no such number"))
             }
             Self::Cabinet if machine.cabinet.is_none() => {
-                Err(UnknownParameter::not_here("the machine has no [cabinet]"))
+                Err(UnknownParameter::in_other_models("the machine has no [cabinet]"))
             }
             _ => Ok(()),
         }
@@ -172,7 +172,7 @@ impl MachineParameter {
                 let row = list
                     .rows()
                     .find(|row| row.name == rest)
-                    .ok_or_else(UnknownParameter::strange)?;
+                    .ok_or_else(UnknownParameter::in_no_model)?;
                 let count = list.element_count(machine, spin);
                 return match number.checked_sub(list.first) {
                     Some(k) if k < count => Ok(list.parameter(row, k)),
@@ -183,14 +183,14 @@ impl MachineParameter {
                         };
                         let last = list.first + count - 1;
                         let existing_numbers = format!("{owner} has {last} {}", plural(noun, last));
-                        Err(UnknownParameter::not_here(format!(
+                        Err(UnknownParameter::in_other_models(format!(
                             "{existing_numbers}, numbered from 1"
                         )))
                     }
                 };
             }
         }
-        Err(UnknownParameter::strange())
+        Err(UnknownParameter::in_no_model())
     }
 
     /// Returns the name in grid files, on the command line and of the result's column.

@@ -225,7 +225,7 @@ fn range_violations(machine: &Machine, spin: &Spin) -> Vec<Violation> {
             return None;
         }
         let title = format!("{name} = {} is out of range", decimal(value));
-        Some(Violation::new(title, [name.to_owned()], range.instead_of(value)))
+        Some(Violation::new(title, [name.to_owned()], range.describe_for(value)))
     };
     MachineParameter::all(machine, spin).into_iter().filter_map(check).collect()
 }
@@ -260,7 +260,7 @@ impl Spin {
                 let number = decimal(value);
                 let entry = index + 1;
                 let expected = match column {
-                    "time_s" => range.instead_of(value),
+                    "time_s" => range.describe_for(value),
                     _ => range.to_string(),
                 };
                 Violation::new(

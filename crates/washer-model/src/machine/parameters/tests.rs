@@ -120,12 +120,15 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
     let machine = Machine::paper();
     let spin = spin();
     let find = |name: &str| MachineParameter::find(name, &machine, &spin).map(|p| p.index);
-    let not_here = |reason: &str| Err(UnknownParameter::not_here(reason));
+    let in_other_models = |reason: &str| Err(UnknownParameter::in_other_models(reason));
     assert_eq!(find("spring_4_tub_z_m"), Ok(3));
-    assert_eq!(find("spring_5_tub_z_m"), not_here("the machine has 4 springs, numbered from 1"));
+    assert_eq!(
+        find("spring_5_tub_z_m"),
+        in_other_models("the machine has 4 springs, numbered from 1")
+    );
     assert_eq!(
         find("damper_3_damping_n_s_per_m"),
-        not_here("the machine has 2 dampers, numbered from 1")
+        in_other_models("the machine has 2 dampers, numbered from 1")
     );
     let mut extended = machine.clone();
     extended.further_unbalances = vec![crate::Unbalance::default(); 2];
@@ -136,10 +139,13 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
     assert_eq!(find_extended("unbalance_3_mass_kg"), Ok(1));
     assert_eq!(find_extended("stop_1_direction_y"), Ok(0));
     for name in ["unbalance_1_mass_kg", "unbalance_4_mass_kg"] {
-        let expected = not_here("the machine has 3 unbalances, numbered from 1");
+        let expected = in_other_models("the machine has 3 unbalances, numbered from 1");
         assert_eq!(find_extended(name), expected, "{name}");
     }
-    assert_eq!(find("stop_1_clearance_m"), not_here("the machine has 0 stops, numbered from 1"));
+    assert_eq!(
+        find("stop_1_clearance_m"),
+        in_other_models("the machine has 0 stops, numbered from 1")
+    );
     for name in [
         "spring_0_tub_z_m",
         "spring_01_tub_z_m",
@@ -154,7 +160,7 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
     }
     let table = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 100.0] };
     let find = |name: &str| MachineParameter::find(name, &machine, &table).map(|p| p.index);
-    assert_eq!(find("spin_ramp_s"), not_here("a spin given as a table has no such number"));
+    assert_eq!(find("spin_ramp_s"), in_other_models("a spin given as a table has no such number"));
     let points: Vec<_> = MachineParameter::all(&machine, &table)
         .into_iter()
         .filter(|p| p.source() == "the grid file's [spin]")
@@ -174,7 +180,7 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
     assert_eq!(changed, Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 90.0] });
     assert_eq!(
         find("spin_table_3_time_s"),
-        not_here("the spin's table has 2 points, numbered from 1")
+        in_other_models("the spin's table has 2 points, numbered from 1")
     );
     let edges = ["window_from_s", "window_to_s", "tub_mass_kg"];
     let edges = edges.map(|name| MachineParameter::find(name, &machine, &table).unwrap().target());
