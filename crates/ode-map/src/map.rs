@@ -10,7 +10,7 @@ use sweep_engine::columns::{
 };
 use sweep_engine::config::Keys;
 use sweep_engine::method::{ACCURACY, DOPRI5, IntegrationMethod, RK4, StepRule, Steps};
-use sweep_engine::store::{Done, Layout, axis_columns};
+use sweep_engine::store::{Layout, PointRows, axis_columns};
 use sweep_engine::{
     About, Build, Engine, Error, Evaluator, GridInput, GridTable, Model, ModelParameter, Plan,
     RowSink, RowSource, RunContext, Scenario,
@@ -361,7 +361,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eva
                     break;
                 }
                 for (&point, compared) in points.iter().zip(&rows) {
-                    sink(Done { point, rows: vec![row(&columns, compared)] });
+                    sink(PointRows { point, rows: vec![row(&columns, compared)] });
                 }
             }
         });

@@ -101,7 +101,7 @@ pub struct Edge {
 
 /// All that is known about one value of the first axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TracedRow {
+pub struct BoundaryRow {
     /// The value of the first axis.
     pub first: f64,
     /// The edges from the least to the greatest value of the second axis; never empty.
@@ -112,9 +112,9 @@ pub struct TracedRow {
 
 /// The traced curves.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Traced {
+pub struct TracedBoundary {
     /// The rows of each curve, in the first axis's order.
-    pub curves: Vec<Vec<TracedRow>>,
+    pub curves: Vec<Vec<BoundaryRow>>,
     /// The number of points evaluated.
     pub trials: usize,
     /// The number of batches in which they were evaluated.

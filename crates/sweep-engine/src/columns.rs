@@ -3,7 +3,7 @@
 
 use sweep_parameter::{Channel, Limit, RatioLimits, Worse};
 
-use crate::store::{DeclaredColumn, Holds, RowCells};
+use crate::store::{CellType, DeclaredColumn, RowCells};
 
 /// The names of the two models.
 pub const MODELS: [&str; 2] = ["nonlinear", "linear"];
@@ -60,7 +60,7 @@ impl<R> ResultColumn<R> {
         name: impl Into<String>,
         unit: &str,
         description: impl Into<String>,
-        kind: Holds,
+        kind: CellType,
         cell: impl Fn(&R) -> Option<u64> + Send + Sync + 'static,
     ) -> Self {
         Self { declared: DeclaredColumn::new(name, unit, description, kind), cell: Box::new(cell) }
@@ -74,7 +74,7 @@ impl<R> ResultColumn<R> {
         get: impl Fn(&R) -> Option<f64> + Send + Sync + 'static,
     ) -> Self {
         let cell = move |row: &R| get(row).map(f64::to_bits);
-        Self::new(name, unit, description, Holds::Measured, cell)
+        Self::new(name, unit, description, CellType::Measured, cell)
     }
 
     /// Creates a column of names, null where there is none.
@@ -85,7 +85,7 @@ impl<R> ResultColumn<R> {
         get: impl Fn(&R) -> Option<usize> + Send + Sync + 'static,
     ) -> Self {
         let cell = move |row: &R| get(row).map(|name| name as u64);
-        Self::new(name, "", description, Holds::Name(names), cell)
+        Self::new(name, "", description, CellType::Name(names), cell)
     }
 
     /// Creates a column of truth values, null where they are unknown.
@@ -94,7 +94,7 @@ impl<R> ResultColumn<R> {
         description: impl Into<String>,
         get: impl Fn(&R) -> Option<bool> + Send + Sync + 'static,
     ) -> Self {
-        Self::new(name, "", description, Holds::Flag, move |row| get(row).map(u64::from))
+        Self::new(name, "", description, CellType::Flag, move |row| get(row).map(u64::from))
     }
 
     /// Sets the direction in which values are worse.
@@ -220,7 +220,7 @@ pub fn run_columns<R: AsRef<Compared>>(statuses: Vec<&'static str>) -> Vec<Resul
     let fail_time_cell = |row: &R| row.as_ref().fail_time_s.map(f64::to_bits);
     let mut columns = vec![
         ResultColumn::name("status", status, statuses, |row: &R| Some(row.as_ref().status)),
-        ResultColumn::new("fail_time_s", "s", fail_time, Holds::Time, fail_time_cell)
+        ResultColumn::new("fail_time_s", "s", fail_time, CellType::Time, fail_time_cell)
             .worse(Worse::Less),
     ];
     let counts: [(&str, &str, fn(&Compared) -> [u64; 2]); 2] =
@@ -230,7 +230,7 @@ pub fn run_columns<R: AsRef<Compared>>(statuses: Vec<&'static str>) -> Vec<Resul
             let text = format!("{kind} integration steps, {model} model");
             let name = format!("{name}_{model}");
             let cell = move |row: &R| Some(count(row.as_ref())[k]);
-            columns.push(ResultColumn::new(name, "1", text, Holds::Count, cell));
+            columns.push(ResultColumn::new(name, "1", text, CellType::Count, cell));
         }
     }
     columns

@@ -27,9 +27,9 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::program::call_program;
 use crate::{Error, Exit, Model, expect_random_numbers, survive_file_size_limits};
-use cells::{Lines, clipped, short, span, table, word};
+use cells::{Lines, format_cell, format_number, format_range, format_table, shorten};
 use grid::{GridArgs, ResultArgs, quoted};
-use run::installed;
+use run::install_interrupt;
 use sweep_plot::CommonFigures;
 
 /// The arguments of the general subcommands to which a program may add options.
@@ -122,10 +122,10 @@ fn run<M: Model>(command: &GeneralCommand<Unextended>) -> Result<Exit, Error> {
         GeneralCommand::Check(args) => check::run::<M>(args),
         GeneralCommand::Boundary(args) => boundary::run::<M>(args),
         GeneralCommand::Optimise(args) => optimise::run::<M>(args),
-        GeneralCommand::Show(args) => show::run(args, &show::Further::NONE),
+        GeneralCommand::Show(args) => show::run(args, &show::ModelSummary::NONE),
         GeneralCommand::Plot(args) => plot::run(args),
         GeneralCommand::Report(args) => {
-            report::run::<M>(args, &show::Further::NONE, &|_| Vec::new(), &CommonFigures)
+            report::run::<M>(args, &show::ModelSummary::NONE, &|_| Vec::new(), &CommonFigures)
         }
         GeneralCommand::Require(args) => require::run(args),
         GeneralCommand::Compare(args) => compare::run::<M>(args),

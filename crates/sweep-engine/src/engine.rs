@@ -6,17 +6,17 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::interrupt::Interrupt;
-use crate::store::Done;
+use crate::store::PointRows;
 use sweep_files::panics::lock;
 
 /// A source of rows: returns a row's number and the values of the plan's axes there.
 pub type RowSource<'a> = dyn Fn() -> Option<(u64, Vec<f64>)> + Sync + 'a;
 
 /// A sink of evaluated rows.
-pub type RowSink<'a> = dyn Fn(Done) + Sync + 'a;
+pub type RowSink<'a> = dyn Fn(PointRows) + Sync + 'a;
 
 /// A lookup of a row that was evaluated before.
-pub type RowLookup<'a> = dyn Fn(u64) -> Option<Done> + Sync + 'a;
+pub type RowLookup<'a> = dyn Fn(u64) -> Option<PointRows> + Sync + 'a;
 
 /// An evaluator of the rows of a plan.
 pub trait Evaluator: Sync {
@@ -93,7 +93,7 @@ impl<'a> RunContext<'a> {
     }
 
     /// Returns a row that any process has stored.
-    pub fn known(&self, row: u64) -> Option<Done> {
+    pub fn known(&self, row: u64) -> Option<PointRows> {
         self.known.and_then(|known| known(row))
     }
 
@@ -122,12 +122,12 @@ impl<'a> RunContext<'a> {
 
 /// Results in incomplete groups, by the group's number.
 #[derive(Debug, Default)]
-pub struct IncompleteGroups(pub Mutex<BTreeMap<u64, Vec<Done>>>);
+pub struct IncompleteGroups(pub Mutex<BTreeMap<u64, Vec<PointRows>>>);
 
 impl IncompleteGroups {
     /// Adds a result to a group of `size` results. Returns the group's results, sorted by point, if
     /// that completes it.
-    pub fn add(&self, group: u64, size: u64, result: Done) -> Option<Vec<Done>> {
+    pub fn add(&self, group: u64, size: u64, result: PointRows) -> Option<Vec<PointRows>> {
         let mut groups = lock(&self.0);
         let results = groups.entry(group).or_default();
         results.push(result);

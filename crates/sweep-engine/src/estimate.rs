@@ -6,8 +6,8 @@ use std::time::Instant;
 use sweep_files::panics::{lock, unlocked};
 
 use crate::method::Steps;
-use crate::store::read::{NameCounts, add};
-use crate::store::{Done, Holds};
+use crate::store::read::{NameCounts, count_name};
+use crate::store::{CellType, PointRows};
 use crate::{Error, Interrupt, Model, Plan, RunContext, threads};
 
 /// The estimated time, memory and disk space of a run.
@@ -63,7 +63,7 @@ impl Estimate {
         let next = Mutex::new(0..points);
         let source = || lock(&next).next().map(|point| (point, plan.axis_values(point)));
         let rows = Mutex::new(Vec::new());
-        let sink = |done: Done| lock(&rows).extend(done.rows);
+        let sink = |done: PointRows| lock(&rows).extend(done.rows);
         let interrupt = Interrupt::new();
         let context = RunContext::new(&interrupt);
         let pool = threads::pool(1)?;
@@ -72,17 +72,17 @@ impl Estimate {
         let core_s_per_point = began.elapsed().as_secs_f64() / points as f64;
         let layout = M::layout(plan);
         let status = layout.columns.iter().enumerate().find_map(|(k, column)| match &column.kind {
-            Holds::Name(names) if column.name == "status" => Some((k, names)),
+            CellType::Name(names) if column.name == "status" => Some((k, names)),
             _ => None,
         });
         let mut sampled = NameCounts::new();
         if let Some((k, names)) = status {
             for row in unlocked(rows) {
                 let name = row.get(k).copied().flatten().and_then(|name| names.get(name as usize));
-                name.iter().for_each(|name| add(&mut sampled, name));
+                name.iter().for_each(|name| count_name(&mut sampled, name));
             }
         }
-        let result_bytes = plan.points() as f64 * layout.bytes_a_row() as f64;
+        let result_bytes = plan.points() as f64 * layout.bytes_per_row() as f64;
         let steps = match plan.integrator.steps() {
             Steps::Checked(_) => ", until two runs agree",
             Steps::Fixed(_) => ", two trajectories per point",

@@ -8,20 +8,20 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use rayon::ThreadPool;
 
 use crate::engine::IncompleteGroups;
-use crate::store::{Done, TrialKey, Trials, WRITE_INTERVAL};
+use crate::store::{PointRows, TrialKey, Trials, WRITE_INTERVAL};
 use crate::{Engine, Interrupt, RunContext, StoreError, ThreadsError, threads};
 use sweep_files::panics::{lock, unlocked};
 
 /// A reason why a search stopped before its end. The responses up to then are in the cache.
 #[derive(Debug)]
-pub enum Stopped {
+pub enum SearchStop {
     /// The interrupt stopped the search.
     Interrupted,
     /// A response could not be stored.
     Failed(StoreError),
 }
 
-impl Stopped {
+impl SearchStop {
     /// Returns the result of a search, `None` where the interrupt stopped it.
     ///
     /// # Errors
@@ -83,14 +83,14 @@ impl<'a> CachedEvaluator<'a> {
     /// reduces the results of a request's points, in order, to its response.
     ///
     /// # Errors
-    /// Any [`Stopped`].
+    /// Any [`SearchStop`].
     pub fn evaluate(
         &self,
         keys: &[TrialKey],
         rows: u64,
         axis_values: &(dyn Fn(usize, u64) -> Vec<f64> + Sync),
-        respond: &(dyn Fn(usize, Vec<Done>) -> Result<RequestValues, StoreError> + Sync),
-    ) -> Result<Vec<RequestValues>, Stopped> {
+        respond: &(dyn Fn(usize, Vec<PointRows>) -> Result<RequestValues, StoreError> + Sync),
+    ) -> Result<Vec<RequestValues>, SearchStop> {
         let cached: Vec<Option<RequestValues>> = keys.iter().map(|key| self.look_up(key)).collect();
         let missing: Vec<usize> = (0..keys.len()).filter(|&k| cached[k].is_none()).collect();
         self.count_responses((keys.len() - missing.len()) as u64);
@@ -113,7 +113,7 @@ impl<'a> CachedEvaluator<'a> {
             } else {
                 scope.spawn(|_| {
                     let sender = sender;
-                    let sink = |result: Done| {
+                    let sink = |result: PointRows| {
                         let request = result.point / rows;
                         let Some(results) = groups.add(request, rows, result) else { return };
                         let k = request as usize;
@@ -144,14 +144,14 @@ impl<'a> CachedEvaluator<'a> {
         });
         let written = self.write(|_| true);
         if let Some(error) = failure.or(written.err()) {
-            return Err(Stopped::Failed(error));
+            return Err(SearchStop::Failed(error));
         }
-        responses.into_iter().collect::<Option<_>>().ok_or(Stopped::Interrupted)
+        responses.into_iter().collect::<Option<_>>().ok_or(SearchStop::Interrupted)
     }
 
     fn look_up(&self, key: &TrialKey) -> Option<RequestValues> {
         let cache = lock(&self.cache);
-        let cells = cache.as_ref()?.recall(key)?;
+        let cells = cache.as_ref()?.find_response(key)?;
         Some(cells.iter().map(|cell| cell.map(f64::from_bits)).collect())
     }
 

@@ -22,7 +22,8 @@ use crate::engine::IncompleteGroups;
 use crate::store::provenance::{self, Session};
 use crate::store::read::NameCounts;
 use crate::store::{
-    Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally, idle_shards,
+    OpenOptions, OpenOutcome, OpenRun, PointRows, ResultFile, Shard, ShardRequest, Tally,
+    idle_shards,
 };
 use crate::threads::{self};
 use crate::{Engine, Environment, Interrupt, Job, Progress, ProgressMode, RunContext, StoreError};
@@ -51,7 +52,7 @@ pub struct RunOptions<'a> {
 
 /// The end of a run, other than an error.
 #[derive(Debug)]
-pub enum Ended {
+pub enum RunEnd {
     /// The result existed already.
     Already(Box<ResultFile>, Box<Tally>),
     /// The run was completed.
@@ -74,7 +75,7 @@ pub enum Ended {
 #[derive(Debug)]
 pub struct RunReport {
     /// The end of the run.
-    pub ended: Ended,
+    pub end: RunEnd,
     /// The work of this process, if there was any to do.
     pub session: Option<Session>,
     /// The notes for the user.
@@ -94,11 +95,11 @@ pub fn run(
 ) -> Result<RunReport, StoreError> {
     let RunOptions { threads, fresh, shard, environment, .. } = options;
     let mut run = match OpenRun::open(output, job, OpenOptions { fresh, shard, environment })? {
-        Opened::Finished((file, tally)) => {
-            let ended = Ended::Already(Box::new(file), Box::new(tally));
-            return Ok(RunReport { ended, session: None, notes: Vec::new() });
+        OpenOutcome::Finished((file, tally)) => {
+            let end = RunEnd::Already(Box::new(file), Box::new(tally));
+            return Ok(RunReport { end, session: None, notes: Vec::new() });
         }
-        Opened::Open(run) => run,
+        OpenOutcome::Open(run) => run,
     };
     let (points, stored) = run.own_points();
     if let Some(shard) = run.shard() {
@@ -136,25 +137,25 @@ pub fn run(
     match result {
         Ok(Some(tally)) => {
             let notes = run.complete(job, &tally, Some(session.clone()))?;
-            let ended = Ended::Finished(Box::new(tally));
-            Ok(RunReport { ended, session: Some(session), notes })
+            let end = RunEnd::Finished(Box::new(tally));
+            Ok(RunReport { end, session: Some(session), notes })
         }
         Ok(None) => {
             let mut notes = run.take_notes();
             // A failure concerns the sidecar's list of sessions only, not the rows.
-            notes.extend(run.record(&session).err().map(|error| error.to_string()));
+            notes.extend(run.record_session(&session).err().map(|error| error.to_string()));
             let (points, kept) = run.own_points();
-            let ended = match (interrupt.signal(), run.shard()) {
-                (None, Some(shard)) => Ended::Shard(shard, run.statuses()?),
+            let end = match (interrupt.signal(), run.shard()) {
+                (None, Some(shard)) => RunEnd::Shard(shard, run.statuses()?),
                 (signal, _) => {
-                    Ended::Interrupted { signal: signal.unwrap_or_default(), kept, points }
+                    RunEnd::Interrupted { signal: signal.unwrap_or_default(), kept, points }
                 }
             };
-            Ok(RunReport { ended, session: Some(session), notes })
+            Ok(RunReport { end, session: Some(session), notes })
         }
         Err(error) => {
             // The first error is the one to report, not one of recording the session.
-            let _ = run.record(&session);
+            let _ = run.record_session(&session);
             Err(error)
         }
     }
@@ -192,7 +193,7 @@ impl Runner<'_> {
     /// Computes and writes the missing chunks of this process's shard, until a signal or an error.
     fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
         let pool = threads::pool(self.threads)?;
-        let known = |point| run.known(point);
+        let known = |point| run.stored_rows(point);
         let context = RunContext::with_known_rows(self.interrupt, &known);
         let (_, start) = run.own_points();
         // A bounded channel makes the engine wait for a slower disk instead of filling memory.
@@ -234,7 +235,7 @@ struct ChunkCollector<'a> {
     queue: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
     /// The rows of incomplete chunks, including those that an interrupted process has stored.
     incomplete: IncompleteGroups,
-    writer: SyncSender<(u64, Vec<Done>)>,
+    writer: SyncSender<(u64, Vec<PointRows>)>,
 }
 
 impl<'a> ChunkCollector<'a> {
@@ -242,7 +243,7 @@ impl<'a> ChunkCollector<'a> {
         runner: &'a Runner<'a>,
         run: &'a OpenRun,
         context: &'a RunContext<'a>,
-        writer: SyncSender<(u64, Vec<Done>)>,
+        writer: SyncSender<(u64, Vec<PointRows>)>,
     ) -> Self {
         let incomplete = run.take_incomplete();
         let stored: BTreeSet<u64> = incomplete.values().flatten().map(|row| row.point).collect();
@@ -301,7 +302,7 @@ impl<'a> ChunkCollector<'a> {
     }
 
     /// Adds a row to its chunk, and sends the chunk to the writer if it is complete.
-    fn collect(&self, row: Done) {
+    fn collect(&self, row: PointRows) {
         self.context.add_points(1);
         let chunk = self.run.chunk_of(row.point);
         let points = self.run.chunk_range(chunk);

@@ -45,12 +45,12 @@ pub use differences::PlanDifference;
 pub use error::{Holder, StoreError};
 use lock::Lock;
 pub use merge::write_map;
-pub use open::{OpenOptions, OpenRun, Opened};
+pub use open::{OpenOptions, OpenOutcome, OpenRun};
 pub use provenance::Session;
 pub use read::{ResultFile, Tally};
-pub use schema::{BATCH_ROWS, DeclaredColumn, Done, Holds, Layout, ResultRows, RowCells};
+pub use schema::{BATCH_ROWS, CellType, DeclaredColumn, Layout, PointRows, ResultRows, RowCells};
 pub use shard::{Shard, ShardRequest, list as shard_list};
-pub use status::{FolderStatus, State, status};
+pub use status::{FolderStatus, RunStage, status};
 pub use trials::{TrialColumns, TrialKey, Trials, WRITE_INTERVAL};
 pub use unfinished::{Unfinished, refuse_unfinished, unfinished};
 
@@ -108,7 +108,7 @@ impl<'a> Job<'a> {
 pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<DeclaredColumn> {
     let column = |axis: &Axis<M>| {
         let parameter = &axis.parameter;
-        DeclaredColumn::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
+        DeclaredColumn::new(&*parameter.name, parameter.unit, parameter.description, CellType::Axis)
     };
     plan.axes.iter().map(column).collect()
 }

@@ -14,7 +14,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use serde_json::Value;
 
-use crate::store::schema::{DeclaredColumn, Holds, writer};
+use crate::store::schema::{CellType, DeclaredColumn, writer};
 use crate::{Build, StoreError};
 use sweep_files::batches::from_arrow;
 use sweep_files::{Writer, key, panics, seal};
@@ -42,7 +42,7 @@ impl Table {
         values: impl IntoIterator<Item = Option<f64>>,
     ) {
         let array: Float64Array = values.into_iter().collect();
-        self.add(name, unit, description, Holds::Measured, Arc::new(array));
+        self.add(name, unit, description, CellType::Measured, Arc::new(array));
     }
 
     /// Adds a column of a parameter's values.
@@ -64,7 +64,7 @@ impl Table {
     /// Adds a column of counts.
     pub fn counts(&mut self, name: &str, description: &str, values: impl IntoIterator<Item = u64>) {
         let array = UInt64Array::from_iter_values(values);
-        self.add(name, "1", description, Holds::Count, Arc::new(array));
+        self.add(name, "1", description, CellType::Count, Arc::new(array));
     }
 
     /// Adds a column of words, of which a file has few different ones.
@@ -75,16 +75,16 @@ impl Table {
         values: impl IntoIterator<Item = &'a str>,
     ) {
         let array: DictionaryArray<Int32Type> = values.into_iter().collect();
-        self.add(name, "", description, Holds::Name(Vec::new()), Arc::new(array));
+        self.add(name, "", description, CellType::Name(Vec::new()), Arc::new(array));
     }
 
     /// Adds a column of truth values.
     pub fn flags(&mut self, name: &str, description: &str, values: impl Iterator<Item = bool>) {
         let array: BooleanArray = values.map(Some).collect();
-        self.add(name, "", description, Holds::Flag, Arc::new(array));
+        self.add(name, "", description, CellType::Flag, Arc::new(array));
     }
 
-    fn add(&mut self, name: &str, unit: &str, description: &str, kind: Holds, array: ArrayRef) {
+    fn add(&mut self, name: &str, unit: &str, description: &str, kind: CellType, array: ArrayRef) {
         self.columns.push((DeclaredColumn::new(name, unit, description, kind), array));
     }
 
@@ -125,7 +125,7 @@ impl Table {
         let field = |(column, array): (DeclaredColumn, ArrayRef)| {
             let data_type = array.data_type().clone();
             let nullable = data_type == DataType::Float64;
-            (column.declared(data_type, nullable), array)
+            (column.arrow_field(data_type, nullable), array)
         };
         let (fields, arrays): (Vec<Field>, _) = self.columns.into_iter().map(field).unzip();
         let schema = Arc::new(Schema::new(fields));

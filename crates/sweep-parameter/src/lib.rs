@@ -21,9 +21,9 @@ pub struct Parameter<H> {
     pub range: Range,
     /// The source of the model's own value, in words.
     pub source: &'static str,
-    /// The names of the single numbers that the parameter writes; usually its own name alone.
+    /// The model's own value, if it has one number for the parameter.
     pub value: Option<f64>,
-    /// The names of the single numbers that the parameter writes; mostly its own name.
+    /// The names of the single numbers that the parameter writes; usually its own name alone.
     pub parts: Vec<Cow<'static, str>>,
     /// The edge of the window that this parameter sets (0: the beginning, 1: the end), if it sets
     /// one. The window is part of the plan, not of the model.

@@ -5,7 +5,7 @@ use std::mem::take;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
-use sweep_engine::store::{DeclaredColumn, Done, Holds};
+use sweep_engine::store::{CellType, DeclaredColumn, PointRows};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Attractor, Channel, Disturbance, GeometryLimit, ModeMotion, StabilityKind};
 use washer_row::{
@@ -89,10 +89,10 @@ impl Columns {
     }
 
     /// Returns the rows of a point's outcome.
-    pub(crate) fn done(&self, outcome: Outcome) -> Done {
+    pub(crate) fn done(&self, outcome: Outcome) -> PointRows {
         let point = outcome.point;
         let rows = outcome.into_rows().map(|outcome| row(&self.columns, &self.result(outcome)));
-        Done { point, rows: rows.collect() }
+        PointRows { point, rows: rows.collect() }
     }
 
     fn result(&self, mut outcome: Outcome) -> ResultRow {
@@ -311,7 +311,7 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     let number = |row: &ResultRow| Some(u64::from(growth(row)?.branch));
     // In files of responses the branch tells the rows of a speed apart, so it is never null there.
     let tells_rows_apart = prefix.is_empty();
-    let kind = if tells_rows_apart { Holds::Count } else { Holds::KnownCount };
+    let kind = if tells_rows_apart { CellType::Count } else { CellType::KnownCount };
     let branch = move |row: &ResultRow| number(row).or(tells_rows_apart.then_some(0));
     let folds = "how many folds the point's curve of responses has before this one, followed from \
                  a low speed up; of those on the curve, a machine that runs up is on the least \
@@ -348,7 +348,7 @@ fn growing_mode_columns(prefix: &str, rank: usize) -> [WasherColumn; 3] {
     let names = ModeMotion::NAMES.to_vec();
     let frequency = "its damped natural frequency at this speed in cycles per minute";
     [
-        ResultColumn::new(name.clone(), "1", text, Holds::KnownCount, number),
+        ResultColumn::new(name.clone(), "1", text, CellType::KnownCount, number),
         ResultColumn::name(format!("{name}_name"), moves, names, move |row| {
             Some(mode(row)?.name as usize)
         }),

@@ -118,7 +118,7 @@ fn find_examples(name: &str) -> Examples {
 
 /// Returns the command line with the examples and the headings of its help.
 pub(crate) fn command() -> clap::Command {
-    let with = |command: clap::Command, lines: Examples| match examples::shown(&lines) {
+    let with = |command: clap::Command, lines: Examples| match examples::format_examples(&lines) {
         Some(examples) => command.before_help(examples),
         None => command,
     };
@@ -228,11 +228,11 @@ fn run_general(command: &GeneralCommand<WasherArguments>) -> Result<Exit, Error>
         GeneralCommand::Check(args) => check::run(args),
         GeneralCommand::Boundary(args) => boundary::run::<crate::Washer>(args),
         GeneralCommand::Optimise(args) => optimise::run::<crate::Washer>(args),
-        GeneralCommand::Show(args) => show_engine::run(args, &show::FURTHER),
+        GeneralCommand::Show(args) => show_engine::run(args, &show::MODEL_SUMMARY),
         GeneralCommand::Plot(args) => plot::run(args),
         GeneralCommand::Report(args) => {
             let figures = WasherFigures::default();
-            report::run(args, &show::FURTHER, &crate::live::resonance_rows, &figures)
+            report::run(args, &show::MODEL_SUMMARY, &crate::live::resonance_rows, &figures)
         }
         GeneralCommand::Require(args) => require::run(args),
         GeneralCommand::Compare(args) => compare::run::<crate::Washer>(args),
@@ -313,8 +313,8 @@ mod tests {
     fn no_example_is_wider_than_a_terminal_or_changed_by_folding() {
         for name in command().get_subcommands().map(clap::Command::get_name).chain(["sweep"]) {
             let lines = find_examples(name);
-            let shown = examples::shown(&lines).unwrap_or_default();
-            assert!(shown.lines().all(|line| line.len() <= examples::WIDEST), "{shown}");
+            let shown = examples::format_examples(&lines).unwrap_or_default();
+            assert!(shown.lines().all(|line| line.len() <= examples::MAX_LINE_WIDTH), "{shown}");
             // A shell joins folded lines.
             let words = shown.replace("\\\n", "").split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(lines.iter().all(|[line, _]| words.contains(line)), "{shown}");
@@ -331,7 +331,7 @@ mod tests {
         let help = command().render_help().to_string();
         let list = help.split("Run:\n").nth(1).and_then(|rest| rest.split("Options:").next());
         for line in list.expect("the list of commands").lines() {
-            assert!(line.len() <= examples::WIDEST, "{line}");
+            assert!(line.len() <= examples::MAX_LINE_WIDTH, "{line}");
         }
         assert!(help.contains("\nSet up:\n  init "), "{help}");
     }

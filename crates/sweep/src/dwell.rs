@@ -18,7 +18,7 @@ use crate::engine::{Carried, find_motions};
 use crate::plan::{Plan, compared_channels};
 use columns::{DwellColumn, DwellRow};
 use sweep_engine::columns::{declared, row};
-use sweep_engine::store::{DeclaredColumn, Done};
+use sweep_engine::store::{DeclaredColumn, PointRows};
 use sweep_engine::{Error, RunContext};
 
 /// Maximum number of rows that a thread computes together. Basis: their starts fill the lanes.
@@ -200,9 +200,9 @@ impl AttractorEngine {
     }
 
     /// Returns the row of a point at a speed for which no motion was found.
-    pub(crate) fn failed_row(&self, row_index: u64, status: Status) -> Done {
+    pub(crate) fn failed_row(&self, row_index: u64, status: Status) -> PointRows {
         let failed = DwellRow { found: Err(status), motion: 0, turn: 0 };
-        Done { point: row_index, rows: vec![row(&self.columns, &failed)] }
+        PointRows { point: row_index, rows: vec![row(&self.columns, &failed)] }
     }
 
     /// Finds the motions of the requested points at held speeds, each with its row's index, and
@@ -212,7 +212,7 @@ impl AttractorEngine {
         simd: Simd,
         speeds_rpm: &[f64],
         requested: &[(u64, HeldSpeed<'_>)],
-        sink: &dyn Fn(Done),
+        sink: &dyn Fn(PointRows),
         context: &RunContext<'_>,
     ) {
         let is_stopped = || context.stopped();
@@ -265,7 +265,7 @@ impl AttractorEngine {
     }
 
     /// Returns the rows of the motions of a point at a speed.
-    fn rows_of_motions(&self, row_index: u64, found: Result<Attractors, Status>) -> Done {
+    fn rows_of_motions(&self, row_index: u64, found: Result<Attractors, Status>) -> PointRows {
         let mut found = match found {
             Ok(found) => found,
             Err(status) => return self.failed_row(row_index, status),
@@ -282,7 +282,7 @@ impl AttractorEngine {
                 rows.push(row(&self.columns, &dwell_row));
             }
         }
-        Done { point: row_index, rows }
+        PointRows { point: row_index, rows }
     }
 }
 
@@ -328,7 +328,7 @@ mod tests {
                 &RunContext::with_known_rows(&interrupt, known),
             );
             let mut finished = unlocked(finished);
-            finished.sort_by_key(|row: &Done| row.point);
+            finished.sort_by_key(|row: &PointRows| row.point);
             finished
         };
         let all_rows = evaluate(0..3, &|_| None);

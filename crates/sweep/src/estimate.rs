@@ -11,7 +11,7 @@ use crate::plan::Plan;
 use sweep_engine::method::Steps;
 use sweep_engine::plan::shortest_step_s;
 use sweep_engine::store::chunk_points;
-use sweep_engine::store::read::{NameCounts, add};
+use sweep_engine::store::read::{NameCounts, count_name};
 use sweep_engine::{Error, Estimate, Interrupt, Job, RunContext};
 
 /// Time (s) that the integration of beginnings must take: they become longer until it does. Basis:
@@ -77,7 +77,7 @@ fn estimate_within(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate
         MeasuredCost::measure_batch(&engine, &first).unwrap_or(first);
     let chunk = chunk_points(plan.points());
     let layout = &Job::new(plan).layout;
-    let row_bytes = plan.points() as f64 * layout.bytes_a_row() as f64;
+    let row_bytes = plan.points() as f64 * layout.bytes_per_row() as f64;
     let columns = layout.schema().fields().len() as f64;
     let parts = plan.points().div_ceil(chunk) as f64;
     // A chunk is one thread's work, so the last round of chunks may leave threads without any.
@@ -200,7 +200,9 @@ fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<(f6
         .evaluate_in_context(&axis_values, &RunContext::with_time_limit(&interrupt, &is_late))?;
     let cost_s = thread_time_s() - began_s;
     let mut sampled = NameCounts::new();
-    outcomes.iter().for_each(|outcome| add(&mut sampled, ROW_STATUSES[row_status(outcome).0]));
+    outcomes
+        .iter()
+        .for_each(|outcome| count_name(&mut sampled, ROW_STATUSES[row_status(outcome).0]));
     Some((cost_s, sampled))
 }
 

@@ -19,7 +19,7 @@ use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
 use crate::plan::{self, Plan, Scenario, compared_channels};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
-use sweep_engine::{Effort, Error, Interrupt, Progress, RunContext, threads};
+use sweep_engine::{Error, Execution, Interrupt, Progress, RunContext, threads};
 
 pub(crate) use cause::Cause;
 use sweep_parameter::RatioLimits;
@@ -110,16 +110,16 @@ pub(crate) fn explain(
     plan: &Plan,
     at: NamedValues,
     speeds: Option<Speeds>,
-    effort: Effort<'_>,
+    execution: Execution<'_>,
 ) -> Result<Explanation, Error> {
-    threads::pool(effort.threads()?)?.install(|| explain_in_pool(plan, at, speeds, effort))
+    threads::pool(execution.threads()?)?.install(|| explain_in_pool(plan, at, speeds, execution))
 }
 
 fn explain_in_pool(
     plan: &Plan,
     at: NamedValues,
     speeds: Option<Speeds>,
-    Effort { progress, interrupt, .. }: Effort<'_>,
+    Execution { progress, interrupt, .. }: Execution<'_>,
 ) -> Result<Explanation, Error> {
     let simd = simd_from_environment()?;
     let scenario = plan.scenario(0);

@@ -67,7 +67,7 @@ pub use engine::ModelEngine;
 pub use fit::FitOptions;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
-    BoundaryOptions, Effort, EvaluationTask, Explained, MemoryTable, PlanEvaluator, PointTable,
+    BoundaryOptions, EvaluationTask, Execution, Explained, MemoryTable, PlanEvaluator, PointTable,
     RanToFile, TraceOptions, explain_point, find_boundary, find_modes, fit_tables, hold_speeds,
     list_parameters, optimise_study, trace_point,
 };
@@ -75,9 +75,9 @@ pub use method::{Integrator, rk4, rk4_mass_scaled};
 pub use model::Washer;
 pub use plan::Plan;
 pub use sweep_engine::progress::ProgressMode;
-pub use sweep_engine::run::{Ended, RunOptions, run};
+pub use sweep_engine::run::{RunEnd, RunOptions, run};
 pub use sweep_engine::store::{
-    Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, State, StoreError, status,
+    Job, OpenOptions, OpenOutcome, OpenRun, RunStage, Shard, ShardRequest, StoreError, status,
 };
 pub use sweep_engine::{
     Error, Exit, Interrupt, expect_random_numbers, survive_file_size_limits, tell,

@@ -26,8 +26,8 @@ pub use stability::hold_speeds;
 pub use trace::{TraceOptions, trace_point};
 
 use sweep_engine::Error;
-use sweep_engine::commands::parameters::{as_json, listed};
-pub use sweep_engine::effort::Effort;
+use sweep_engine::commands::parameters::{self, as_json};
+pub use sweep_engine::execution::Execution;
 
 use crate::model::Washer;
 use crate::plan::Plan;
@@ -37,7 +37,7 @@ use crate::speeds::MAX_SPEEDS;
 /// `range` and `source`. The values are those of the plan without its axes, or those of the
 /// built-in machine.
 pub fn list_parameters(plan: Option<&Plan>) -> String {
-    as_json(&listed::<Washer>(plan))
+    as_json(&parameters::list_parameters::<Washer>(plan))
 }
 
 /// Returns the error for a list of speeds that is refused.

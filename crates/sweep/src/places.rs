@@ -1,6 +1,6 @@
 //! Names and texts of the points of rows at held speeds.
 
-use sweep_engine::commands::cells::short;
+use sweep_engine::commands::cells::format_number;
 use sweep_files::{ParquetFile, key};
 
 /// Returns the names of the plan's axes that a file has columns of.
@@ -14,8 +14,8 @@ pub(crate) fn axis_names(file: &ParquetFile) -> Vec<String> {
 /// Returns the values of a point's axes as text, such as `unbalance_mass_kg 0.4, 250 rpm`.
 pub(crate) fn point_text(axis_names: &[String], values: &[f64]) -> String {
     let text = |(name, value): (&String, &f64)| match name.as_str() {
-        "speed_rpm" => format!("{} rpm", short(*value)),
-        _ => format!("{name} {}", short(*value)),
+        "speed_rpm" => format!("{} rpm", format_number(*value)),
+        _ => format!("{name} {}", format_number(*value)),
     };
     axis_names.iter().zip(values).map(text).collect::<Vec<_>>().join(", ")
 }

@@ -19,7 +19,7 @@ use crate::engine::{
     Engine, Evaluator, RunContext, find_responses, map_isolating_panics, simd_from_environment,
 };
 use crate::plan::{Plan, compared_channels, failure_reason, timing};
-use sweep_engine::store::{DeclaredColumn, Holds, Layout, axis_columns};
+use sweep_engine::store::{CellType, DeclaredColumn, Layout, axis_columns};
 use sweep_engine::{Error, Job, RowSink, RowSource};
 use sweep_files::{FileKind, key};
 
@@ -116,15 +116,15 @@ impl<'a> HeldPlan<'a> {
             "speed_rpm",
             "rpm",
             "constant spin of the shaft",
-            Holds::Axis,
+            CellType::Axis,
         ));
         let speeds = speeds_rpm.len() as u64;
         let layout = Layout {
             axes,
             columns,
             kind: self.kind(),
-            rows_a_point: speeds,
-            has_several: true,
+            tasks_per_point: speeds,
+            has_several_rows: true,
             metadata: vec![metadata],
         };
         let mut job = Job::new(plan);

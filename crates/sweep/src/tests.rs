@@ -5,10 +5,10 @@ use crate::engine::ModelEngine;
 use crate::model::Washer;
 use crate::plan::Plan;
 use sweep_engine::boundary::{
-    BoundaryOptions, BoundaryTask, Edge, EdgeKind, Traced, quantity, trace,
+    BoundaryOptions, BoundaryTask, Edge, EdgeKind, TracedBoundary, quantity, trace,
 };
-use sweep_engine::evaluator::{CachedEvaluator, Stopped};
-use sweep_engine::store::{Opened, Trials};
+use sweep_engine::evaluator::{CachedEvaluator, SearchStop};
+use sweep_engine::store::{OpenOutcome, Trials};
 use sweep_engine::{Interrupt, Model as _};
 use sweep_parameter::Worse;
 use sweep_plot::contour::zero_lines;
@@ -64,7 +64,11 @@ fn options_of_ratio(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
     BoundaryOptions { quantity: "ratio_max".to_owned(), limit: None, tolerance, lattice }
 }
 
-fn trace_boundary(task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
+fn trace_boundary(
+    task: &Task,
+    threads: usize,
+    interrupt: &Interrupt,
+) -> Result<TracedBoundary, SearchStop> {
     let engine = Washer::engine(&task.plan, task.column()).unwrap();
     let evaluator = CachedEvaluator::new(engine, threads, interrupt, None, &|_| {}).unwrap();
     trace(&task.distances(&evaluator), &task.firsts, task.curves, &task.search, &mut |_| {})
@@ -248,7 +252,7 @@ fn an_interrupt_stops_a_search_before_the_next_group() {
     assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
     let interrupt = Interrupt::new();
     interrupt.raise(2);
-    assert!(matches!(trace_boundary(&task, 2, &interrupt), Err(Stopped::Interrupted)));
+    assert!(matches!(trace_boundary(&task, 2, &interrupt), Err(SearchStop::Interrupted)));
 }
 
 #[test]
@@ -261,7 +265,8 @@ fn an_interrupted_search_repeats_no_trial_and_ends_the_same() {
     let job = task.job();
     let mut stops = 0;
     let (result, trials) = loop {
-        let Ok(Opened::Open(trials)) = Trials::open(&output, &job, task.trial_columns(), false)
+        let Ok(OpenOutcome::Open(trials)) =
+            Trials::open(&output, &job, task.trial_columns(), false)
         else {
             panic!()
         };
@@ -283,8 +288,8 @@ fn an_interrupted_search_repeats_no_trial_and_ends_the_same() {
         let trials = evaluator.into_cache().unwrap();
         match result {
             Ok(result) => break (result, trials),
-            Err(Stopped::Interrupted) => assert!(trials.count() > trials_before),
-            Err(Stopped::Failed(error)) => panic!("{error}"),
+            Err(SearchStop::Interrupted) => assert!(trials.count() > trials_before),
+            Err(SearchStop::Failed(error)) => panic!("{error}"),
         }
         stops += 1;
     };
@@ -370,7 +375,7 @@ fn plans_without_a_boundary_are_refused_with_the_reason() {
 #[test]
 fn every_column_that_is_worse_in_one_direction_has_a_boundary() {
     let plan = plan(&format!("{GRID_HEAD}{AXES}"));
-    let columns = quantity::offered(&plan);
+    let columns = quantity::traceable_columns(&plan);
     let names: Vec<&str> = columns.iter().map(|(column, _)| column.name.as_str()).collect();
     assert_eq!(names[0], "ratio_max");
     for name in [

@@ -134,13 +134,13 @@ mod tests {
     use washer_model::{Profile, Spin};
 
     use super::*;
-    use sweep_engine::commands::parameters::{as_json, listed};
+    use sweep_engine::commands::parameters::{as_json, list_parameters};
     use sweep_engine::plan::WrittenIn;
 
     #[test]
     fn json_has_every_parameter() {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 120.0, ramp_s: 2.0 };
-        let json: Value = serde_json::from_str(&as_json(&listed::<Washer>(None))).unwrap();
+        let json: Value = serde_json::from_str(&as_json(&list_parameters::<Washer>(None))).unwrap();
         assert_eq!(
             json.as_array().map(Vec::len),
             Some(MachineParameter::all(&Machine::paper(), &spin).len())
@@ -161,7 +161,7 @@ mod tests {
             let sets: Vec<String> = sets.iter().copied().map(str::to_owned).collect();
             let plan = crate::config::load(&grid, &sets).unwrap();
             move |name: &str| {
-                let rows = listed(Some(&plan));
+                let rows = list_parameters(Some(&plan));
                 rows.iter().find(|row| row.parameter.name == name).unwrap().source.clone()
             }
         };

@@ -38,10 +38,10 @@ pub(crate) fn rows_or_file(
 ) -> PyResult<PyResultTable> {
     let task = &task.map_err(|error| errors::error(py, &error))?;
     let Some(out) = out else {
-        return rows_or_raise(py, supervise(py, options, |effort| task.in_memory(effort))?);
+        return rows_or_raise(py, supervise(py, options, |execution| task.in_memory(execution))?);
     };
     let tell: fn(&str) = if options.progress { sweep::tell } else { |_| () };
-    let result = supervise(py, options, |effort| task.to_file(&out, fresh, &tell, effort))?;
+    let result = supervise(py, options, |execution| task.to_file(&out, fresh, &tell, execution))?;
     let result = result.value_or_raise(py, |result| match result {
         Err(error) => errors::error(py, &error),
         Ok(RanToFile::Complete(table)) => {

@@ -36,8 +36,8 @@ pub(crate) fn modes(
     }
     let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
     let input = plan.map(|plan| plan.get().input.clone());
-    let table = supervise_abandonable(py, None, move |effort| {
-        sweep::find_modes(input.as_ref(), &at, &speeds, effort.interrupt)
+    let table = supervise_abandonable(py, None, move |execution| {
+        sweep::find_modes(input.as_ref(), &at, &speeds, execution.interrupt)
     })?;
     Ok(PyResultTable::new(table))
 }
@@ -129,8 +129,8 @@ pub(crate) fn optimise(
     fresh: bool,
 ) -> PyResult<PyResultTable> {
     let sets = assignments(set)?;
-    let result = supervise(py, WorkOptions { threads, progress }, |effort| {
-        sweep::optimise_study(&study, &sets, out.as_deref(), fresh, effort)
+    let result = supervise(py, WorkOptions { threads, progress }, |execution| {
+        sweep::optimise_study(&study, &sets, out.as_deref(), fresh, execution)
     })?;
     finish::table_or_raise(py, result, || errors::interrupted_without_result(py))
 }
@@ -153,8 +153,8 @@ pub(crate) fn explain<'py>(
     let speeds_rpm = speeds_rpm.map(numbers).transpose()?;
     let at = assignments(at)?;
     let input = plan.get().input.clone();
-    let explained = supervise_abandonable(py, threads, move |effort| {
-        sweep::explain_point(&input, &at, speeds_rpm.as_deref(), effort)
+    let explained = supervise_abandonable(py, threads, move |execution| {
+        sweep::explain_point(&input, &at, speeds_rpm.as_deref(), execution)
     })?;
     explanation(py, explained)
 }
@@ -208,8 +208,8 @@ pub(crate) fn fit<'py>(
     let no_shift = !shift;
     let options = FitOptions { free, own, model, no_shift, starts, bootstrap, known, draws };
     let input = plan.get().input.clone();
-    let fitted = supervise_abandonable(py, threads, move |effort| {
-        sweep::fit_tables(&input, tables, &options, effort)
+    let fitted = supervise_abandonable(py, threads, move |execution| {
+        sweep::fit_tables(&input, tables, &options, execution)
     })?;
     explanation(py, fitted)
 }

@@ -134,8 +134,8 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         let py = table.py();
         let points = columns::points(table)?;
-        let evaluated = supervise(py, WorkOptions { threads, progress }, |effort| {
-            self.evaluator.evaluate(&points, effort)
+        let evaluated = supervise(py, WorkOptions { threads, progress }, |execution| {
+            self.evaluator.evaluate(&points, execution)
         })?;
         finish::rows_or_raise(py, evaluated)
     }
@@ -201,8 +201,8 @@ impl PyPlan {
         let extras = TraceExtras { rates, states, forces, angle };
         let options = TraceOptions { every_s, model, all, extras, start };
         let input = self.input.clone();
-        let (table, failures) = supervise_abandonable(py, None, move |effort| {
-            sweep::trace_point(&input, &at, &options, effort.interrupt)
+        let (table, failures) = supervise_abandonable(py, None, move |execution| {
+            sweep::trace_point(&input, &at, &options, execution.interrupt)
         })?;
         for failure in failures {
             py.import("warnings")?.call_method1("warn", (failure,))?;
@@ -238,8 +238,8 @@ impl PyPlan {
         let output = out.as_deref();
         let quantity = quantity.to_owned();
         let options = BoundaryOptions { quantity, limit, tolerance, lattice };
-        let search = supervise(py, WorkOptions { threads, progress }, |effort| {
-            sweep::find_boundary(self.evaluator.plan(), &options, output, fresh, effort)
+        let search = supervise(py, WorkOptions { threads, progress }, |execution| {
+            sweep::find_boundary(self.evaluator.plan(), &options, output, fresh, execution)
         })?;
         finish::table_or_raise(py, search, || {
             let text = match output {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
-use sweep::{Effort, Error, Interrupt, ProgressMode};
+use sweep::{Error, Execution, Interrupt, ProgressMode};
 
 use crate::errors;
 
@@ -23,9 +23,9 @@ pub(crate) struct WorkOptions {
 }
 
 impl WorkOptions {
-    fn effort(self, interrupt: &Interrupt) -> Effort<'_> {
+    fn execution(self, interrupt: &Interrupt) -> Execution<'_> {
         let progress = if self.progress { ProgressMode::Auto } else { ProgressMode::None };
-        Effort { threads: self.threads, progress, interrupt }
+        Execution { threads: self.threads, progress, interrupt }
     }
 }
 
@@ -86,7 +86,7 @@ fn wait_for_result<T>(
 pub(crate) fn supervise_abandonable<T: Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
-    work: impl FnOnce(Effort<'_>) -> Result<Option<T>, Error> + Send + 'static,
+    work: impl FnOnce(Execution<'_>) -> Result<Option<T>, Error> + Send + 'static,
 ) -> PyResult<T> {
     let result = py.detach(|| {
         let (sender, results) = channel();
@@ -94,8 +94,8 @@ pub(crate) fn supervise_abandonable<T: Send + 'static>(
         let work_interrupt = interrupt.clone();
         let work = move || {
             // The receiver no longer exists if the work was abandoned.
-            let _ =
-                sender.send(work(WorkOptions { threads, progress: false }.effort(&work_interrupt)));
+            let _ = sender
+                .send(work(WorkOptions { threads, progress: false }.execution(&work_interrupt)));
         };
         Builder::new().spawn(work).map_err(thread_error)?;
         match wait_for_result(&results, &interrupt, true) {
@@ -126,7 +126,7 @@ fn panic_error() -> PyErr {
 pub(crate) fn supervise<T: Send>(
     py: Python<'_>,
     options: WorkOptions,
-    work: impl FnOnce(Effort<'_>) -> Result<T, Error> + Send,
+    work: impl FnOnce(Execution<'_>) -> Result<T, Error> + Send,
 ) -> PyResult<Supervised<T>> {
     py.detach(|| {
         let interrupt = Interrupt::new();
@@ -135,7 +135,7 @@ pub(crate) fn supervise<T: Send>(
             let interrupt = &interrupt;
             let work = move || {
                 // The receiver exists, because this function waits for the work.
-                let _ = sender.send(work(options.effort(interrupt)));
+                let _ = sender.send(work(options.execution(interrupt)));
             };
             let worker = Builder::new().spawn_scoped(scope, work).map_err(thread_error)?;
             let (value, raised) = wait_for_result(&results, interrupt, false);

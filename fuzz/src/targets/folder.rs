@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use sweep::{
-    Ended, Interrupt, Job, ModelEngine, OpenOptions, OpenRun, Opened, Plan, ProgressMode,
+    Interrupt, Job, ModelEngine, OpenOptions, OpenOutcome, OpenRun, Plan, ProgressMode, RunEnd,
     RunOptions, Shard, ShardRequest, status,
 };
 use tempfile::TempDir;
@@ -51,8 +51,8 @@ pub(crate) fn run(bytes: &[u8]) {
     let _ = status(&output, &job);
     assert_eq!(fs::read(partial.join(name)).expect("the input is there"), content);
     let mut opened = match OpenRun::open(&output, &job, options()) {
-        Ok(Opened::Open(opened)) => opened,
-        Ok(Opened::Finished(..)) => panic!("there is no result"),
+        Ok(OpenOutcome::Open(opened)) => opened,
+        Ok(OpenOutcome::Finished(..)) => panic!("there is no result"),
         Err(error) => {
             assert!(error.to_string().contains("x."), "{error}");
             return;
@@ -137,11 +137,11 @@ fn home() -> &'static Home {
             let engine = ModelEngine::new(&plan).expect("there is an engine");
             sweep::run(&engine.into_engine(), &Job::new(&plan), &output, options, &Interrupt::new())
                 .expect("the run ends")
-                .ended
+                .end
         };
         // A shard of one leaves its folder.
         let shard = Some(ShardRequest::Given(Shard { index: 1, count: 1 }));
-        assert!(matches!(go(shard), Ended::Shard(..)));
+        assert!(matches!(go(shard), RunEnd::Shard(..)));
         let partial = folder.path().join("x.parquet.partial");
         let names = fs::read_dir(&partial).expect("the folder is there");
         let files: Vec<(String, Vec<u8>)> = names
@@ -151,7 +151,7 @@ fn home() -> &'static Home {
                 (name.to_owned(), fs::read(&path).expect("a file is read"))
             })
             .collect();
-        assert!(matches!(go(None), Ended::Finished(_)));
+        assert!(matches!(go(None), RunEnd::Finished(_)));
         let result = fs::read(&output).expect("there is a result");
         let (_, part) = files.iter().find(|(name, _)| name == PART).expect("there is a part");
         Home { part: part.clone(), plan, files, result, folder }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::Parser as _;
-use sweep::{Job, OpenRun, Plan, State, WasherCli, status};
+use sweep::{Job, OpenRun, Plan, RunStage, WasherCli, status};
 use tempfile::TempDir;
 
 /// Runs the target with an input; a panic is a finding.
@@ -21,7 +21,7 @@ pub(crate) fn run(bytes: &[u8]) {
     let job = Job::new(&files.plan);
     match status(&files.result, &job) {
         // An empty file is treated like a missing one.
-        Ok(found) => assert!(found.state == State::NotStarted && bytes.is_empty(), "{found:?}"),
+        Ok(found) => assert!(found.state == RunStage::NotStarted && bytes.is_empty(), "{found:?}"),
         Err(error) => assert!(error.to_string().contains("x.parquet"), "{error}"),
     }
     if !bytes.is_empty() {

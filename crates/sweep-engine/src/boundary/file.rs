@@ -4,14 +4,14 @@
 use serde_json::{Value, json};
 use sweep_parameter::unit_suffix;
 
-use super::{BoundaryTask, Edge, Traced, TracedQuantity, TracedRow};
+use super::{BoundaryRow, BoundaryTask, Edge, TracedBoundary, TracedQuantity};
 use crate::{Job, Model, Table};
 use sweep_files::{FileKind, key};
 
 /// A row of the file.
 struct EdgeRow<'a> {
     curve: usize,
-    row: &'a TracedRow,
+    row: &'a BoundaryRow,
     /// The number from 1; 0 where there is none in range.
     number: usize,
     edge: &'a Edge,
@@ -44,7 +44,7 @@ impl<M: Model> BoundaryTask<M> {
     }
 
     /// Returns the table of the traced curves.
-    pub fn table(&self, traced: &Traced) -> Table {
+    pub fn table(&self, traced: &TracedBoundary) -> Table {
         let mut about = self.settings();
         about["worse"] = self.quantity.worse.name().into();
         about["points"] = traced.trials.into();
@@ -58,7 +58,7 @@ impl<M: Model> BoundaryTask<M> {
         table
     }
 
-    fn add_columns(&self, table: &mut Table, traced: &Traced) {
+    fn add_columns(&self, table: &mut Table, traced: &TracedBoundary) {
         let TracedQuantity { name: quantity, unit, .. } = &self.quantity;
         let mut lines = Vec::new();
         for (curve, rows) in traced.curves.iter().enumerate() {

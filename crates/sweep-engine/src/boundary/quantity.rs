@@ -7,7 +7,7 @@ use sweep_parameter::{Channel, Worse};
 use sweep_results::{Column as KnownColumn, Goal, columns};
 
 use crate::config::{Diagnostic, Location, Report};
-use crate::store::{DeclaredColumn, Holds};
+use crate::store::{CellType, DeclaredColumn};
 use crate::{Error, Model, Plan, nearest};
 
 /// The prefix of the columns of ratios.
@@ -66,7 +66,7 @@ impl TracedQuantity {
 
 /// Returns every column whose limit can be traced, each with a plan that computes it. This includes
 /// channels and metrics that the grid file leaves out.
-pub fn offered<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<M>)> {
+pub fn traceable_columns<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<M>)> {
     // The plan of a channel's columns compares this channel alone.
     let channel_plan = |channel: &Channel| {
         let mut plan = plan.clone();
@@ -77,20 +77,22 @@ pub fn offered<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<M>)> {
     least.reliability.limits.lower = Some(plan.reliability.limits.over_estimate());
     let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
     let plans = M::ABOUT.channels.iter().map(channel_plan).chain(further.map(|plan| (plan, None)));
-    let mut offered: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
+    let mut traceable_columns: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
     for (plan, only) in plans {
         for column in M::layout(&plan).columns {
-            let is_number = matches!(column.kind, Holds::Measured | Holds::Time | Holds::Count);
+            let is_number =
+                matches!(column.kind, CellType::Measured | CellType::Time | CellType::Count);
             let is_asked = only.as_ref().is_none_or(|only| only.contains(&column.name));
-            let is_new = offered.iter().all(|(known, _)| known.name != column.name);
+            let is_new = traceable_columns.iter().all(|(known, _)| known.name != column.name);
             if is_number && column.worse.is_some() && is_asked && is_new {
-                offered.push((column, plan.clone()));
+                traceable_columns.push((column, plan.clone()));
             }
         }
     }
     // The ratios that decide on the verdict come first.
-    offered.sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO].contains(&&*column.name));
-    offered
+    traceable_columns
+        .sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO].contains(&&*column.name));
+    traceable_columns
 }
 
 /// Returns whether a text is the name of a column, not an expression.
@@ -230,9 +232,9 @@ pub fn traced<M: Model>(
     name: &str,
     limit: Option<f64>,
 ) -> Result<(TracedQuantity, Plan<M>), Error> {
-    let mut offered = offered(plan);
-    let Some(at) = offered.iter().position(|(column, _)| column.name == name) else {
-        let names = || offered.iter().map(|(column, _)| column.name.as_str());
+    let mut traceable_columns = traceable_columns(plan);
+    let Some(at) = traceable_columns.iter().position(|(column, _)| column.name == name) else {
+        let names = || traceable_columns.iter().map(|(column, _)| column.name.as_str());
         let kind = |name: &str| name.split('_').next().map(str::to_owned);
         let is_of_kind = |known: &str| kind(known) == kind(name);
         let needed =
@@ -252,7 +254,7 @@ pub fn traced<M: Model>(
         let expected = format!("one of {names}, {ratio}, {nonlinear}, {linear}{further}{meant}");
         return Err(Error::option("--quantity", name, expected));
     };
-    let (column, mut plan) = offered.swap_remove(at);
+    let (column, mut plan) = traceable_columns.swap_remove(at);
     let own = column.limit;
     let Some(value) = limit.or(own.map(|limit| limit.value)) else {
         let unit = &column.unit;

@@ -4,10 +4,10 @@ use super::lattice::{columns, lattice_ranks};
 use super::quantity::{Derived, derived, is_name, margin, traced};
 use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::written::finite;
-use crate::evaluator::{CachedEvaluator, RequestValues, Stopped};
+use crate::evaluator::{CachedEvaluator, RequestValues, SearchStop};
 use crate::optimise::search::defect;
 use crate::store::{
-    DeclaredColumn, Done, Holds, Layout, ResultRows, TrialColumns, TrialKey, axis_columns,
+    CellType, DeclaredColumn, Layout, PointRows, ResultRows, TrialColumns, TrialKey, axis_columns,
 };
 use crate::{AxisValues, Error, Model, Plan, StoreError};
 use sweep_results::Goal;
@@ -160,7 +160,7 @@ impl<M: Model> BoundaryTask<M> {
         &self,
         layout: &Layout,
         axis_values: Vec<f64>,
-        done: Done,
+        done: PointRows,
     ) -> Result<Option<f64>, StoreError> {
         let Some(expression) = &self.expression else {
             let place = layout.columns.iter().position(|one| one.name == self.quantity.name);
@@ -180,7 +180,7 @@ impl<M: Model> BoundaryTask<M> {
     pub fn distances<'a>(
         &'a self,
         evaluator: &'a CachedEvaluator<'_>,
-    ) -> impl Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, Stopped> + 'a {
+    ) -> impl Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, SearchStop> + 'a {
         let layout = M::layout(&self.plan);
         move |trials| {
             let values: Vec<Vec<f64>> =
@@ -188,8 +188,8 @@ impl<M: Model> BoundaryTask<M> {
             let key = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
             let keys: Vec<TrialKey> = values.iter().map(key).collect();
             let values = |k: usize, _: u64| values[k].clone();
-            let answer = |k: usize, points: Vec<Done>| -> Result<RequestValues, StoreError> {
-                let distance = |done: Done| -> Result<Option<f64>, StoreError> {
+            let answer = |k: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
+                let distance = |done: PointRows| -> Result<Option<f64>, StoreError> {
                     let value = self.value(&layout, values(k, 0), done)?;
                     Ok(value.map(|value| self.quantity.distance(value)))
                 };
@@ -214,7 +214,7 @@ impl<M: Model> BoundaryTask<M> {
             "signed distance of {name} from {limit}, negative on the good side; null where {name} \
              is not defined"
         );
-        let distance = DeclaredColumn::new("distance", "1", about, Holds::Measured);
-        TrialColumns { keys: axis_columns(&self.plan), answers: vec![distance] }
+        let distance = DeclaredColumn::new("distance", "1", about, CellType::Measured);
+        TrialColumns { keys: axis_columns(&self.plan), responses: vec![distance] }
     }
 }

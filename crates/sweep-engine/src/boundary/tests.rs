@@ -24,7 +24,7 @@ pub(crate) fn traced(
     distance: impl Fn(f64, f64) -> Option<f64>,
     firsts: &[f64],
     search: &SearchRange,
-) -> Traced {
+) -> TracedBoundary {
     let evaluated = RefCell::new(Vec::<BoundaryTrial>::new());
     let batches = RefCell::new(Vec::new());
     let evaluate = |trials: &[BoundaryTrial]| {
@@ -62,7 +62,7 @@ fn line(mass: f64) -> f64 {
 
 /// Checks that every edge has the right sides at its ends and is no wider than the tolerance.
 pub(crate) fn check_edges(
-    traced: &Traced,
+    traced: &TracedBoundary,
     distance: impl Fn(f64, f64) -> Option<f64>,
     tolerance: f64,
 ) {

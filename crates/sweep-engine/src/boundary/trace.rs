@@ -20,7 +20,7 @@ use super::lattice::{PlannedLine, columns, plan_lines};
 use super::line::LineSearch;
 use super::lipschitz;
 use super::sample::{LineSample, SideInterval, Span, position};
-use super::{BoundaryTrial, SearchRange, Traced, TracedRow};
+use super::{BoundaryRow, BoundaryTrial, SearchRange, TracedBoundary};
 
 /// Lines that are traced at once, in whole curves. Basis: some ten megabytes, and plenty to fill
 /// lanes. Doubling it doubles the memory.
@@ -45,8 +45,9 @@ pub fn trace<E>(
     curves: usize,
     search: &SearchRange,
     tell: &mut dyn FnMut(usize),
-) -> Result<Traced, E> {
-    let mut traced = Traced { curves: Vec::with_capacity(curves), ..Traced::default() };
+) -> Result<TracedBoundary, E> {
+    let mut traced =
+        TracedBoundary { curves: Vec::with_capacity(curves), ..TracedBoundary::default() };
     let at_once = (LINES_AT_ONCE / firsts.len().max(1)).max(1);
     while traced.curves.len() < curves {
         let begun = traced.curves.len();
@@ -263,7 +264,7 @@ impl<'a> Block<'a> {
     }
 
     /// Returns the traced rows of every curve, in the order of the first axis's values.
-    fn finish(self) -> Vec<Vec<TracedRow>> {
+    fn finish(self) -> Vec<Vec<BoundaryRow>> {
         let value = |at: f64| self.search.value(at);
         let mut ranks: Vec<usize> = (0..self.lines.len()).collect();
         ranks.sort_by_key(|rank| self.lines[*rank].index);
@@ -272,7 +273,7 @@ impl<'a> Block<'a> {
             let mut rows = Vec::with_capacity(ranks.len());
             for &rank in &ranks {
                 let Some(search) = &states[rank].search else { continue };
-                rows.push(TracedRow {
+                rows.push(BoundaryRow {
                     first: self.firsts[self.lines[rank].index],
                     edges: search.edges(&self.span, &value),
                     trials: search.samples().len(),

@@ -4,14 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use super::grid::typed;
-use super::{GridArgs, Lines as _, installed, short};
-use crate::boundary::quantity::offered;
-use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow, trace};
+use super::grid::resume_command;
+use super::{GridArgs, Lines as _, format_number, install_interrupt};
+use crate::boundary::quantity::traceable_columns;
+use crate::boundary::{
+    BoundaryOptions, BoundaryRow, BoundaryTask, EdgeKind, TracedBoundary, trace,
+};
 use crate::config::section::counted;
-use crate::evaluator::{CachedEvaluator, Stopped};
-use crate::store::{DeclaredColumn, Opened, Trials};
-use crate::{Effort, EffortArgs, Error, Exit, Model, Plan, Progress, duration, show, tell};
+use crate::evaluator::{CachedEvaluator, SearchStop};
+use crate::store::{DeclaredColumn, OpenOutcome, Trials};
+use crate::{Error, Execution, ExecutionArgs, Exit, Model, Plan, Progress, duration, show, tell};
 use sweep_files::{FileKind, Output};
 use sweep_parameter::Worse;
 
@@ -30,7 +32,7 @@ pub struct BoundaryArgs {
     pub options: BoundaryOptions,
     /// Threads and progress.
     #[command(flatten)]
-    pub effort: EffortArgs,
+    pub execution: ExecutionArgs,
     /// Start over, even if the boundary exists or the search of another plan has started
     #[arg(long)]
     pub fresh: bool,
@@ -55,54 +57,58 @@ there.";
 pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.grid.load()?;
     if args.options.quantity.is_empty() {
-        return show(&listing(&plan));
+        return show(&list_columns(&plan));
     }
     let task = BoundaryTask::new(&plan, &args.options)?;
-    let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
-    let output = args.out.clone().unwrap_or_else(default);
+    let default_path = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
+    let output = args.out.clone().unwrap_or_else(default_path);
     let file = Output::begin(&output, FileKind::Boundary)?;
-    let interrupt = installed()?;
+    let interrupt = install_interrupt()?;
     let mut trials = match Trials::open(&output, &task.job(), task.trial_columns(), args.fresh)? {
-        Opened::Open(trials) => trials,
-        Opened::Finished(()) => {
-            let there = "the boundary is there already (--fresh traces it again)";
-            return Ok(print_summary(format!("{}: {there}\n", plan.name), &output));
+        OpenOutcome::Open(trials) => trials,
+        OpenOutcome::Finished(()) => {
+            let finished_note = "the boundary is there already (--fresh traces it again)";
+            return Ok(print_summary(format!("{}: {finished_note}\n", plan.name), &output));
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
-    let there = trials.count() as u64;
-    if there > 0 {
-        tell(&format!("going on: {} there", counted(there as usize, "point")));
+    let stored_points = trials.count() as u64;
+    if stored_points > 0 {
+        tell(&format!("going on: {} there", counted(stored_points as usize, "point")));
     }
     let began = Instant::now();
-    let effort = args.effort.with(&interrupt);
-    let (found, trials) = search(&task, Some(trials), effort)?;
-    let Some(found) = found else {
-        let kept = counted(trials.map_or(0, |trials| trials.count()), "point");
+    let execution = args.execution.with(&interrupt);
+    let (traced, trials) = search(&task, Some(trials), execution)?;
+    let Some(traced) = traced else {
+        let stored_points = counted(trials.map_or(0, |trials| trials.count()), "point");
         let wall = duration(began.elapsed().as_secs_f64());
-        let mut text = format!("{}: interrupted with {kept} kept, after {wall}\n", plan.name);
-        text.line("go on", typed());
+        let mut text =
+            format!("{}: interrupted with {stored_points} kept, after {wall}\n", plan.name);
+        text.line("go on", resume_command());
         tell(text.trim_end());
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    file.finish(&task.table(&found).into_bytes(&output)?)?;
+    file.finish(&task.table(&traced).into_bytes(&output)?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let text = summary(&task, &found, began.elapsed().as_secs_f64());
+    let text = summary(&task, &traced, began.elapsed().as_secs_f64());
     Ok(print_summary(text, &output))
 }
 
 /// Lists every column whose limit can be traced, with unit, worse side, limit and description.
-fn listing<M: Model>(plan: &Plan<M>) -> String {
-    let columns = offered(plan);
+fn list_columns<M: Model>(plan: &Plan<M>) -> String {
+    let columns = traceable_columns(plan);
     let width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
     let row = |(column, _): &(DeclaredColumn, Plan<M>)| {
-        let side = column.worse.map_or("", Worse::name);
-        let limit = column.limit.map_or_else(|| "--limit".to_owned(), |of| short(of.value));
-        let meaning = column.description.split(';').next().unwrap_or_default();
+        let worse_side = column.worse.map_or("", Worse::name);
+        let limit =
+            column.limit.map_or_else(|| "--limit".to_owned(), |limit| format_number(limit.value));
+        let description = column.description.split(';').next().unwrap_or_default();
         let DeclaredColumn { name, unit, .. } = column;
-        format!("{name:width$}  {unit:>4}  worse the {side:7}  limit {limit:7}  {meaning}\n")
+        format!(
+            "{name:width$}  {unit:>4}  worse the {worse_side:7}  limit {limit:7}  {description}\n"
+        )
     };
     columns.iter().map(row).collect()
 }
@@ -110,16 +116,16 @@ fn listing<M: Model>(plan: &Plan<M>) -> String {
 /// Prints a summary, with the file and the command that draws it.
 fn print_summary(mut text: String, output: &Path) -> Exit {
     text.line("file", output.display());
-    text.next("plot", output);
+    text.suggest_command("plot", output);
     tell(text.trim_end());
     Exit::Done
 }
 
-fn summary<M: Model>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> String {
+fn summary<M: Model>(task: &BoundaryTask<M>, traced: &TracedBoundary, wall_s: f64) -> String {
     let BoundaryTask { plan, quantity, search, .. } = task;
-    let grid: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
+    let grid_points: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
     let mut text = format!(
-        "{}: {} = {} traced with {} (the grid has {grid}) in {}, {}\n",
+        "{}: {} = {} traced with {} (the grid has {grid_points}) in {}, {}\n",
         plan.name,
         quantity.name,
         quantity.limit,
@@ -129,43 +135,44 @@ fn summary<M: Model>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
     );
     let rows = || traced.curves.iter().flatten();
     let count_kind =
-        |row: &TracedRow, kind| row.edges.iter().filter(|edge| edge.kind == kind).count();
-    let found = EdgeKind::ALL.into_iter().filter_map(|kind| {
+        |row: &BoundaryRow, kind| row.edges.iter().filter(|edge| edge.kind == kind).count();
+    let edge_counts = EdgeKind::ALL.into_iter().filter_map(|kind| {
         let count: usize = rows().map(|row| count_kind(row, kind)).sum();
-        let [noun, rest] = in_words(kind);
-        (count > 0).then(|| counted(count, noun) + rest)
+        let [noun, qualifier] = noun_and_qualifier(kind);
+        (count > 0).then(|| counted(count, noun) + qualifier)
     });
-    text.line("found", found.collect::<Vec<_>>().join(", "));
-    let several = rows().filter(|row| count_kind(row, EdgeKind::Crossing) > 1).count();
-    if several > 0 {
-        let values = counted(several, "value");
-        text.line("folds", format!("several crossings at {values} of the first axis"));
+    text.line("found", edge_counts.collect::<Vec<_>>().join(", "));
+    let folded_values = rows().filter(|row| count_kind(row, EdgeKind::Crossing) > 1).count();
+    if folded_values > 0 {
+        let value_count = counted(folded_values, "value");
+        text.line("folds", format!("several crossings at {value_count} of the first axis"));
     }
     let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);
-    let width = |[low, high]: [f64; 2]| match search.second_log {
+    let bracket_width = |[low, high]: [f64; 2]| match search.second_log {
         true => (high / low).ln(),
         false => high - low,
     };
-    if let Some(widest) = brackets.map(width).reduce(f64::max) {
+    if let Some(widest) = brackets.map(bracket_width).reduce(f64::max) {
         let unit = match search.second_log {
             true => "of its value",
             false => plan.axes.get(1).map_or("", |axis| axis.parameter.unit),
         };
-        let widest = short(widest);
-        let tolerance = short(search.tolerance);
+        let widest = format_number(widest);
+        let tolerance = format_number(search.tolerance);
         text.line("brackets", format!("at most {widest} {unit} wide (tolerance: {tolerance})"));
     }
-    let cell = task.cell().into_iter().zip(&plan.axes);
+    let cell_sizes = task.cell().into_iter().zip(&plan.axes);
     let cell: Vec<String> =
-        cell.map(|(size, axis)| format!("{size:.3} {}", axis.parameter.unit)).collect();
+        cell_sizes.map(|(size, axis)| format!("{size:.3} {}", axis.parameter.unit)).collect();
     let cell = cell.join(" by ");
-    let found = format!("of {cell} or more are found; smaller ones may be missed (--lattice)");
-    text.line("islands", found);
+    let island_note =
+        format!("of {cell} or more are found; smaller ones may be missed (--lattice)");
+    text.line("islands", island_note);
     text
 }
 
-/// Returns an edge of this kind in words: a noun, and the words that follow it.
-const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
+/// Returns the noun for edges of this kind, and the words that follow the noun.
+const fn noun_and_qualifier(kind: EdgeKind) -> [&'static str; 2] {
     match kind {
         EdgeKind::Crossing => ["crossing", ""],
         EdgeKind::Jump => ["jump", ""],
@@ -176,8 +183,8 @@ const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
     }
 }
 
-/// Traces the boundary. Stored trials are used and extended, if there are any, and returned. The
-/// curves are `None` after an interrupt.
+/// Traces the boundary with the stored trials, if there are any, and returns the curves and the
+/// trials, including new ones. The curves are `None` after an interrupt.
 ///
 /// # Errors
 /// Threads that cannot be started, a value of `SWEEP_SIMD` that this machine does not support, and
@@ -185,20 +192,21 @@ const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
 pub fn search<M: Model>(
     task: &BoundaryTask<M>,
     trials: Option<Trials>,
-    effort: Effort<'_>,
-) -> Result<(Option<Traced>, Option<Trials>), Error> {
-    let there = trials.as_ref().map_or(0, |trials| trials.count() as u64);
+    execution: Execution<'_>,
+) -> Result<(Option<TracedBoundary>, Option<Trials>), Error> {
+    let stored_points = trials.as_ref().map_or(0, |trials| trials.count() as u64);
     let rows = (task.firsts.len() * task.curves) as u64;
     let rows_done = AtomicU64::new(0);
-    let progress = Progress::for_search(effort.progress, rows, "rows", there);
-    let shown = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
-    let threads = effort.threads()?;
+    let progress = Progress::for_search(execution.progress, rows, "rows", stored_points);
+    let show_points = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
+    let threads = execution.threads()?;
     let engine = M::engine(&task.plan, task.column())?;
-    let asking = CachedEvaluator::new(engine, threads, effort.interrupt, trials, &shown)?;
-    let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
-    let distances = task.distances(&asking);
-    let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut standing);
+    let evaluator =
+        CachedEvaluator::new(engine, threads, execution.interrupt, trials, &show_points)?;
+    let mut record_rows_done = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
+    let distances = task.distances(&evaluator);
+    let traced = trace(&distances, &task.firsts, task.curves, &task.search, &mut record_rows_done);
     drop(distances);
     progress.finish();
-    Ok((Stopped::interrupted_to_none(found)?, asking.into_cache()))
+    Ok((SearchStop::interrupted_to_none(traced)?, evaluator.into_cache()))
 }

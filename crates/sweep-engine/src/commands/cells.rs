@@ -13,7 +13,7 @@ pub trait Lines {
     fn line(&mut self, name: &str, text: impl Display);
 
     /// Adds a line with the command that the user may run next on a file.
-    fn next(&mut self, verb: &str, file: &Path) {
+    fn suggest_command(&mut self, verb: &str, file: &Path) {
         let file = quoted(&file.display().to_string());
         self.line("next", format!("{} {verb} {file}", program()));
     }
@@ -27,7 +27,7 @@ impl Lines for String {
 }
 
 /// Formats a number with six digits, and with an exponent only if it is very large or small.
-pub fn short(value: f64) -> String {
+pub fn format_number(value: f64) -> String {
     if value == 0.0 || (1e-4..1e9).contains(&value.abs()) {
         // Small numbers keep their digits behind the zeros.
         let decimals = 5 - value.abs().max(1e-300).log10().floor().min(0.0) as i32;
@@ -40,24 +40,24 @@ pub fn short(value: f64) -> String {
 
 /// Formats a range by a function. If both ends become the same text, they are written with all
 /// digits.
-pub fn span([from, to]: [f64; 2], format: impl Fn(f64) -> String) -> String {
+pub fn format_range([from, to]: [f64; 2], format: impl Fn(f64) -> String) -> String {
     let is_distinct = from == to || format(from) != format(to);
     let [from, to] = [from, to].map(|end| if is_distinct { format(end) } else { end.to_string() });
     format!("{from} to {to}")
 }
 
 /// Formats a cell.
-pub fn word(cell: &Cell) -> String {
+pub fn format_cell(cell: &Cell) -> String {
     match cell {
         Cell::Null => "null".to_owned(),
-        Cell::Number(number) => short(*number),
-        Cell::Text(text) => clipped(text),
+        Cell::Number(number) => format_number(*number),
+        Cell::Text(text) => shorten(text),
         Cell::Flag(flag) => flag.to_string(),
     }
 }
 
 /// Shortens a text to fit a line, because a file of another program may have very long texts.
-pub fn clipped(text: &str) -> String {
+pub fn shorten(text: &str) -> String {
     /// The maximum number of characters. Basis: the width of a terminal.
     const MAX_CHARACTERS: usize = 80;
     match text.char_indices().nth(MAX_CHARACTERS) {
@@ -68,7 +68,7 @@ pub fn clipped(text: &str) -> String {
 
 /// Formats a table with headings. Each column is as wide as its widest cell, and each line begins
 /// with `indent`.
-pub fn table(headings: &[String], rows: &[Vec<String>], indent: &str) -> String {
+pub fn format_table(headings: &[String], rows: &[Vec<String>], indent: &str) -> String {
     let width = |column: usize| {
         let cells = rows.iter().filter_map(|row| row.get(column)).chain(headings.get(column));
         cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
@@ -88,33 +88,36 @@ mod tests {
 
     #[test]
     fn numbers_have_six_digits() {
-        let shown: Vec<String> =
+        let formatted: Vec<String> =
             [0.0, 0.05, 300.0, -1.5e-7, 2e12, 1.0 / 3.0, 0.549_999_999_999_999_9, 0.001_234_567_8]
                 .into_iter()
-                .map(short)
+                .map(format_number)
                 .collect();
         let expected =
             ["0", "0.05", "300", "-1.50000e-7", "2.00000e12", "0.333333", "0.55", "0.00123457"];
-        assert_eq!(shown, expected);
+        assert_eq!(formatted, expected);
     }
 
     #[test]
     fn the_ends_of_a_range_are_distinct() {
-        let said = [[0.6, 0.600_000_1], [0.6, 0.6], [1.0, 2.0]].map(|ends| span(ends, short));
-        assert_eq!(said, ["0.6 to 0.6000001", "0.6 to 0.6", "1 to 2"]);
+        let formatted = [[0.6, 0.600_000_1], [0.6, 0.6], [1.0, 2.0]]
+            .map(|ends| format_range(ends, format_number));
+        assert_eq!(formatted, ["0.6 to 0.6000001", "0.6 to 0.6", "1 to 2"]);
     }
 
     #[test]
     fn long_words_are_clipped_between_characters() {
-        assert_eq!(word(&Cell::Text("\u{e4}".repeat(80))), "\u{e4}".repeat(80));
-        let said = word(&Cell::Text("\u{e4}".repeat(1000)));
-        assert_eq!(said, format!("{}... (1000 characters)", "\u{e4}".repeat(80)));
+        assert_eq!(format_cell(&Cell::Text("\u{e4}".repeat(80))), "\u{e4}".repeat(80));
+        let formatted = format_cell(&Cell::Text("\u{e4}".repeat(1000)));
+        assert_eq!(formatted, format!("{}... (1000 characters)", "\u{e4}".repeat(80)));
     }
 
     #[test]
     fn columns_are_as_wide_as_their_widest_cell() {
-        let words = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect::<Vec<_>>();
-        let text = table(&words(&["a", "long"]), &[words(&["10", "1"]), words(&["2", "3"])], " ");
+        let cells =
+            |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
+        let text =
+            format_table(&cells(&["a", "long"]), &[cells(&["10", "1"]), cells(&["2", "3"])], " ");
         assert_eq!(text, "  a  long\n 10     1\n  2     3\n");
     }
 }

@@ -3,13 +3,13 @@
 
 use std::fmt::Write as _;
 
-use super::run::failed_words;
-use super::{GridArgs, short, span};
+use super::run::describe_failures;
+use super::{GridArgs, format_number, format_range};
 use crate::config::section::counted;
 use crate::design::{Design, Distribution};
 use crate::estimate::size;
 use crate::method::Steps;
-use crate::store::read::failed;
+use crate::store::read::count_failed;
 use crate::{Axis, AxisValues, Error, Estimate, Exit, Model, Plan, duration, show, threads};
 use sweep_parameter::RatioLimits;
 
@@ -35,7 +35,7 @@ pub fn run<M: Model>(args: &CheckArgs) -> Result<Exit, Error> {
     }
     let estimate = M::estimate(&plan, threads::count(None, &threads::process)?)?;
     show(&summary(&plan, &estimate))?;
-    // If every tried point fails, the run would be of no use.
+    // If every sampled point fails, the run would be of no use.
     Ok(if is_failed_throughout(&estimate) { Exit::Failed } else { Exit::Done })
 }
 
@@ -48,16 +48,16 @@ fn summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     };
     line("name", plan.name.clone());
     for (k, axis) in plan.axes.iter().enumerate() {
-        line(if k == 0 { "axes" } else { "" }, describe(axis, plan.design.as_ref()));
+        line(if k == 0 { "axes" } else { "" }, describe_axis(axis, plan.design.as_ref()));
     }
     let points = plan.points();
-    let laid_out = match &plan.design {
+    let points_text = match &plan.design {
         Some(Design::List { file, .. }) => format!("{points}, as listed in {file}"),
         Some(design) => format!("{points} by {}", design.method()),
         None if plan.axes.is_empty() => "1 (no axes)".to_owned(),
         None => points.to_string(),
     };
-    line("points", laid_out);
+    line("points", points_text);
     let (end_s, [from_s, to_s]) = (plan.end_s, plan.window_s);
     line("time", format!("0 to {end_s} s, window {from_s} to {to_s} s"));
     line("method", estimate.method.clone());
@@ -74,68 +74,81 @@ fn summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let Estimate { threads, simd, .. } = estimate;
     let threads = counted(*threads, "thread");
     line("runs on", format!("{threads}, instruction set {simd}"));
-    let tried = counted(estimate.sampled.values().sum::<u64>() as usize, "point");
-    line("takes", time_words(plan, estimate, &tried));
+    let sampled_points = counted(estimate.sampled.values().sum::<u64>() as usize, "point");
+    line("takes", describe_time(plan, estimate, &sampled_points));
     let [memory, disk, result] =
         [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
     let disk = format!("on disk {disk} while it runs, and at most {result} for the result");
     line("", format!("{memory} of memory; {disk}"));
-    if let Some(why) = failed_words(&estimate.sampled) {
-        line("failed", format!("{why}, of {tried} tried"));
+    if let Some(failures) = describe_failures(&estimate.sampled) {
+        line("failed", format!("{failures}, of {sampled_points} tried"));
     }
     text
 }
 
 /// Formats the estimated time and its basis.
-fn time_words<M: Model>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> String {
-    let part = match estimate.sampled_s {
+fn describe_time<M: Model>(plan: &Plan<M>, estimate: &Estimate, sampled_points: &str) -> String {
+    let sampled_time = match estimate.sampled_s {
         whole if whole >= plan.end_s => String::new(),
-        part => {
-            let is_even = matches!(plan.integrator.steps(), Steps::Fixed(_));
-            let off = if is_even { "" } else { "; as steps follow the motion, it may be far off" };
-            format!(", the first {part} s each{off}")
+        sampled_s => {
+            let has_fixed_steps = matches!(plan.integrator.steps(), Steps::Fixed(_));
+            let warning = if has_fixed_steps {
+                ""
+            } else {
+                "; as steps follow the motion, it may be far off"
+            };
+            format!(", the first {sampled_s} s each{warning}")
         }
     };
     if is_failed_throughout(estimate) {
-        return format!("not known: none of the {tried} tried could be computed");
+        return format!("not known: none of the {sampled_points} tried could be computed");
     }
-    let about = duration(estimate.wall_s);
-    format!("about {about}: an estimate, from {tried} integrated just now{part}")
+    let time = duration(estimate.wall_s);
+    format!("about {time}: an estimate, from {sampled_points} integrated just now{sampled_time}")
 }
 
-/// Whether points were tried, and every one of them failed.
+/// Whether points were sampled, and every one of them failed.
 fn is_failed_throughout(estimate: &Estimate) -> bool {
-    let tried = estimate.sampled.values().sum::<u64>();
-    tried > 0 && failed(&estimate.sampled) == tried
+    let sampled_points = estimate.sampled.values().sum::<u64>();
+    sampled_points > 0 && count_failed(&estimate.sampled) == sampled_points
 }
 
-fn describe<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> String {
+fn describe_axis<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> String {
     let name = &axis.parameter.name;
     let count = counted(axis.values.len() as usize, "value");
-    let values = if design.is_some() { String::new() } else { format!("{count} ") };
+    let value_count = if design.is_some() { String::new() } else { format!("{count} ") };
     match &axis.values {
         AxisValues::Linear { from, to, .. } => {
-            format!("{name}: {values}from {}", span([*from, *to], plain))
+            format!(
+                "{name}: {value_count}from {}",
+                format_range([*from, *to], format_without_rounding_error)
+            )
         }
         AxisValues::Log { from, to, .. } => {
-            format!("{name}: {values}from {}, logarithmic", span([*from, *to], plain))
+            format!(
+                "{name}: {value_count}from {}, logarithmic",
+                format_range([*from, *to], format_without_rounding_error)
+            )
         }
         AxisValues::Distributed(Distribution { shape, from, to }) => {
-            let numbers = shape.numbers().map(|(key, number)| format!("{key} {}", plain(number)));
-            let range = span([*from, *to], short);
+            let numbers = shape
+                .numbers()
+                .map(|(key, number)| format!("{key} {}", format_without_rounding_error(number)));
+            let range = format_range([*from, *to], format_number);
             format!("{name}: {}, {}, from {range}", shape.name(), numbers.join(", "))
         }
         AxisValues::List(values) => {
-            let shown: Vec<_> = values.iter().take(8).copied().map(plain).collect();
-            let more = if values.len() > shown.len() { ", ..." } else { "" };
-            format!("{name}: {count}, {}{more}", shown.join(", "))
+            let first_values: Vec<_> =
+                values.iter().take(8).copied().map(format_without_rounding_error).collect();
+            let ellipsis = if values.len() > first_values.len() { ", ..." } else { "" };
+            format!("{name}: {count}, {}{ellipsis}", first_values.join(", "))
         }
     }
 }
 
-/// Formats a number with at most 12 significant digits, so that computed ends of a range are
-/// without rounding errors.
-fn plain(value: f64) -> String {
+/// Formats a number with at most 12 significant digits, which hides the rounding errors of computed
+/// ends of a range.
+fn format_without_rounding_error(value: f64) -> String {
     format!("{value:.11e}").parse().unwrap_or(value).to_string()
 }
 
@@ -145,8 +158,11 @@ mod tests {
 
     #[test]
     fn numbers_are_without_rounding_errors() {
-        assert_eq!(plain(0.4 - 0.1), "0.3");
-        assert_eq!(plain(28.0 / 3.0), "9.33333333333");
-        assert_eq!([1e9, 60.0, 0.05, -2.5].map(plain), ["1000000000", "60", "0.05", "-2.5"]);
+        assert_eq!(format_without_rounding_error(0.4 - 0.1), "0.3");
+        assert_eq!(format_without_rounding_error(28.0 / 3.0), "9.33333333333");
+        assert_eq!(
+            [1e9, 60.0, 0.05, -2.5].map(format_without_rounding_error),
+            ["1000000000", "60", "0.05", "-2.5"]
+        );
     }
 }

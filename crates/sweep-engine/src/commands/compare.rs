@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::{Lines as _, quoted, short, span, table};
+use super::{Lines as _, format_number, format_range, format_table, quoted};
 use crate::config::section::{counted, cut};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, Model, show, tell};
@@ -83,62 +83,66 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
     let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Differences)).transpose()?;
-    let found = compare(&tables[0], &tables[1])?;
-    if let Some([given, of]) =
-        args.fail_on.iter().find_map(|fail_on| fail_on.unmet_need(&found, &tables))
+    let comparison = compare(&tables[0], &tables[1])?;
+    if let Some([check, needed_files]) =
+        args.fail_on.iter().find_map(|fail_on| fail_on.unmet_need(&comparison, &tables))
     {
-        return Err(Error::option("--fail-on", given, of));
+        return Err(Error::option("--fail-on", check, needed_files));
     }
     if let (Some(output), Some(path)) = (output, &args.out) {
-        if !found.has_verdicts {
+        if !comparison.has_verdicts {
             let expected = "two maps: other files have no differences row by row";
             return Err(Error::option("--out", path.display(), expected));
         }
-        output
-            .finish(&differences::table(args, &found, &tables, M::ABOUT.build).into_bytes(path)?)?;
+        output.finish(
+            &differences::table(args, &comparison, &tables, M::ABOUT.build).into_bytes(path)?,
+        )?;
     }
-    let broken: Vec<String> =
-        args.fail_on.iter().filter_map(|fail_on| fail_on.violation(&found)).collect();
-    let overridden = overridden::<M>(&tables, &found);
+    let violations: Vec<String> =
+        args.fail_on.iter().filter_map(|fail_on| fail_on.violation(&comparison)).collect();
+    let overridden = overridden::<M>(&tables, &comparison);
     if args.json {
-        show(&format!("{:#}\n", to_json(args, &found, &overridden, &broken)))?;
+        show(&format!("{:#}\n", to_json(args, &comparison, &overridden, &violations)))?;
     } else if args.markdown {
-        show(&markdown(args, &found, &overridden, &broken))?;
+        show(&format_markdown(args, &comparison, &overridden, &violations))?;
     } else {
-        let broken = broken.iter().map(|broken| format!("--fail-on: {broken}\n"));
-        show(&(text(args, &found, &overridden) + &broken.collect::<String>()))?;
+        let violation_lines =
+            violations.iter().map(|violation| format!("--fail-on: {violation}\n"));
+        show(
+            &(format_text(args, &comparison, &overridden) + &violation_lines.collect::<String>()),
+        )?;
         if let Some(out) = &args.out {
             let out = out.display();
             tell(&format!("wrote {out}: sweep plot {}", quoted(&out.to_string())));
         }
     }
-    Ok(if broken.is_empty() { Exit::Done } else { Exit::NotHeld })
+    Ok(if violations.is_empty() { Exit::Done } else { Exit::NotHeld })
 }
 
-/// Formats a value of a plan, cut if it is long.
-fn brief(value: &Value) -> String {
+/// Formats a value of a plan, and shortens it if it is long.
+fn format_plan_value(value: &Value) -> String {
     match value {
         Value::Null => "absent".to_owned(),
         Value::String(text) => text.clone(),
-        Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
+        Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), format_number),
         other => cut(&other.to_string(), 48),
     }
 }
 
-fn number(value: Option<f64>) -> String {
-    value.map_or_else(|| "null".to_owned(), short)
+fn format_optional(value: Option<f64>) -> String {
+    value.map_or_else(|| "null".to_owned(), format_number)
 }
 
-fn verdict(row: &SharedRow, limit_side: usize) -> &'static str {
+fn verdict_text(row: &SharedRow, side: usize) -> &'static str {
     // The flip determines the verdict of either side.
-    match (row.flip, limit_side) {
+    match (row.flip, side) {
         (Flip::Lost, 0) | (Flip::Gained, 1) => "reliable",
         (Flip::Lost, _) | (Flip::Gained, _) => "not",
         _ => "undefined",
     }
 }
 
-/// The cells of both files, and the change between them if it is shown.
+/// The cells of both files, and the change between them if the table has a column for it.
 type ComparedCells = ([String; 2], Option<String>);
 
 /// A table with a title, which every output format shows.
@@ -149,234 +153,263 @@ struct TitledTable {
 }
 
 /// Returns the tables of rows that differ, without empty ones.
-fn lists(args: &CompareArgs, found: &Comparison) -> Vec<TitledTable> {
-    let most = usize::from(args.rows);
-    let mut lists = Vec::new();
-    let mut list =
-        |title: String, rows: Vec<&SharedRow>, cells: &dyn Fn(&SharedRow) -> ComparedCells| {
-            if rows.is_empty() {
-                return;
-            }
-            let whole = |row: &SharedRow| -> Vec<String> {
-                let (sides, change) = cells(row);
-                row.key.iter().map(|value| short(*value)).chain(sides).chain(change).collect()
-            };
-            let rows: Vec<_> = rows.into_iter().map(whole).collect();
-            let headings = found.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
-            let headings = headings.take(rows[0].len()).map(str::to_owned).collect();
-            lists.push(TitledTable { title, headings, rows });
+fn difference_tables(args: &CompareArgs, comparison: &Comparison) -> Vec<TitledTable> {
+    let max_rows = usize::from(args.rows);
+    let mut tables = Vec::new();
+    let mut add_table = |title: String,
+                         rows: Vec<&SharedRow>,
+                         cells: &dyn Fn(&SharedRow) -> ComparedCells| {
+        if rows.is_empty() {
+            return;
+        }
+        let table_row = |row: &SharedRow| -> Vec<String> {
+            let (sides, change) = cells(row);
+            row.key.iter().map(|value| format_number(*value)).chain(sides).chain(change).collect()
         };
+        let rows: Vec<_> = rows.into_iter().map(table_row).collect();
+        let headings = comparison.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
+        let headings = headings.take(rows[0].len()).map(str::to_owned).collect();
+        tables.push(TitledTable { title, headings, rows });
+    };
     // If results have a lower limit of ratios, the least ratio decides on the verdict too.
-    let two_sided = found.columns.iter().any(|column| column.name == "ratio_min");
+    let has_lower_limit = comparison.columns.iter().any(|column| column.name == "ratio_min");
     let verdict_cell = |row: &SharedRow, side: usize| {
-        let ratio = match two_sided {
-            true => format!("{} to {}", number(row.least_ratio[side]), number(row.ratio[side])),
-            false => number(row.ratio[side]),
+        let ratio = match has_lower_limit {
+            true => format!(
+                "{} to {}",
+                format_optional(row.least_ratio[side]),
+                format_optional(row.ratio[side])
+            ),
+            false => format_optional(row.ratio[side]),
         };
         match row.flip {
             Flip::Defined => ratio,
-            _ => format!("{ratio} {}", verdict(row, side)),
+            _ => format!("{ratio} {}", verdict_text(row, side)),
         }
     };
-    for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
-        let title = format!("verdicts that flipped{which}: {}", found.flips(sensitive).count());
-        let rows = found.flips(sensitive).take(most).collect();
-        list(title, rows, &|row| ([0, 1].map(|side| verdict_cell(row, side)), None));
+    for (sensitive, row_kind) in [(false, ""), (true, " of sensitive rows")] {
+        let title =
+            format!("verdicts that flipped{row_kind}: {}", comparison.flips(sensitive).count());
+        let rows = comparison.flips(sensitive).take(max_rows).collect();
+        add_table(title, rows, &|row| ([0, 1].map(|side| verdict_cell(row, side)), None));
     }
-    for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
-        let rows = found.most_deviating(most, sensitive, SharedRow::ratio_deviation);
-        list(format!("greatest changes of the ratio{which}"), rows, &|row| {
+    for (sensitive, row_kind) in [(false, ""), (true, " of sensitive rows")] {
+        let rows = comparison.most_deviating(max_rows, sensitive, SharedRow::ratio_deviation);
+        add_table(format!("greatest changes of the ratio{row_kind}"), rows, &|row| {
             let change = row.ratio_quotient().map(|change| 100.0 * (change - 1.0));
-            let change = change.map_or_else(|| number(None), |change| format!("{change:+.3} %"));
-            (row.ratio.map(number), Some(change))
+            let change =
+                change.map_or_else(|| format_optional(None), |change| format!("{change:+.3} %"));
+            (row.ratio.map(format_optional), Some(change))
         });
-        let rows = found.most_deviating(most, sensitive, SharedRow::gap_deviation_m);
-        list(format!("greatest changes of the least gap{which}, m"), rows, &|row| {
+        let rows = comparison.most_deviating(max_rows, sensitive, SharedRow::gap_deviation_m);
+        add_table(format!("greatest changes of the least gap{row_kind}, m"), rows, &|row| {
             let sign = if row.gap_difference_m() > Some(0.0) { "+" } else { "" };
-            let change = format!("{sign}{}", number(row.gap_difference_m()));
-            (row.gap_m.map(number), Some(change))
+            let change = format!("{sign}{}", format_optional(row.gap_difference_m()));
+            (row.gap_m.map(format_optional), Some(change))
         });
     }
-    lists.extend(args.fail_on.iter().filter_map(|fail_on| column_list(fail_on, found, most)));
-    lists
+    tables.extend(
+        args.fail_on.iter().filter_map(|fail_on| column_table(fail_on, comparison, max_rows)),
+    );
+    tables
 }
 
 /// Returns the table of the greatest changes of a column that `--fail-on` names.
-fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<TitledTable> {
+fn column_table(fail_on: &FailOn, comparison: &Comparison, max_rows: usize) -> Option<TitledTable> {
     let FailOn::Column(name, _) = fail_on else { return None };
-    let column = found.columns.iter().find(|column| column.name == *name)?;
-    let rows = column.worst.iter().take(most).map(|worst| {
+    let column = comparison.columns.iter().find(|column| column.name == *name)?;
+    let rows = column.worst.iter().take(max_rows).map(|worst| {
         let [first, second] = worst.values;
         let change = first.zip(second).map(|(first, second)| second - first);
         let sign = if change > Some(0.0) { "+" } else { "" };
-        let key = found.shared[worst.row].key.iter().map(|value| short(*value));
-        let own = [number(first), number(second), format!("{sign}{}", number(change))];
-        key.chain(own).collect()
+        let key = comparison.shared[worst.row].key.iter().map(|value| format_number(*value));
+        let value_cells = [
+            format_optional(first),
+            format_optional(second),
+            format!("{sign}{}", format_optional(change)),
+        ];
+        key.chain(value_cells).collect()
     });
     let rows: Vec<Vec<String>> = rows.collect();
     let unit = if column.unit.is_empty() { "" } else { ", " };
     let title = format!("greatest changes of {name}{unit}{}", column.unit);
-    let headings = found.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
+    let headings = comparison.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
     let headings = headings.map(str::to_owned).collect();
     (!rows.is_empty()).then_some(TitledTable { title, headings, rows })
 }
 
 /// Returns the lines of the summary, each with a name: overridden numbers, shared rows, columns,
 /// verdicts, the boundary.
-fn facts(found: &Comparison, overridden: &[Overridden]) -> Vec<(&'static str, String)> {
-    let mut facts = Vec::new();
+fn summary_lines(
+    comparison: &Comparison,
+    overridden: &[Overridden],
+) -> Vec<(&'static str, String)> {
+    let mut lines = Vec::new();
     for Overridden { axis, paths } in overridden {
-        let shown = paths.iter().take(PLAN_SHOWN).map(String::as_str).collect::<Vec<_>>();
-        let more = if paths.len() > shown.len() { ", ..." } else { "" };
-        let shown = shown.join(", ");
-        let told = format!(
-            "{shown}{more}: the axis {axis} sets this in both, so that the change does not show"
+        let first_paths = paths.iter().take(MAX_PLAN_LINES).map(String::as_str).collect::<Vec<_>>();
+        let ellipsis = if paths.len() > first_paths.len() { ", ..." } else { "" };
+        let first_paths = first_paths.join(", ");
+        let description = format!(
+            "{first_paths}{ellipsis}: the axis {axis} sets this in both, so that the change \
+             does not \
+             show"
         );
-        facts.push(("overridden", told));
+        lines.push(("overridden", description));
     }
-    let [first, second] = found.unmatched_rows;
-    let alone = match (first, second) {
+    let [first, second] = comparison.unmatched_rows;
+    let unmatched = match (first, second) {
         (0, 0) => String::new(),
         _ => format!(", {first} only in A, {second} only in B"),
     };
-    facts.push(("rows", format!("{} in both{alone}", found.shared.len())));
-    if found.is_matched_by_point {
-        let told = "rows are matched by point: the axes have tolerances about other numbers; \
+    lines.push(("rows", format!("{} in both{unmatched}", comparison.shared.len())));
+    if comparison.is_matched_by_point {
+        let description = "rows are matched by point: the axes have tolerances about other \
+                    numbers; \
                     tables have the values in A";
-        facts.push(("matched", told.to_owned()));
+        lines.push(("matched", description.to_owned()));
     }
-    for (place, name, value) in &found.single_valued_axes {
-        let which = ["A", "B"][*place];
-        facts.push(("axis", format!("{name} = {} in {which} alone, left out", short(*value))));
+    for (file, name, value) in &comparison.single_valued_axes {
+        let file_name = ["A", "B"][*file];
+        lines.push((
+            "axis",
+            format!("{name} = {} in {file_name} alone, left out", format_number(*value)),
+        ));
     }
-    for (names, which) in found.unmatched_columns.iter().zip(["A", "B"]) {
+    for (names, file_name) in comparison.unmatched_columns.iter().zip(["A", "B"]) {
         if !names.is_empty() {
-            facts.push(("columns", format!("only in {which}: {}", names.join(", "))));
+            lines.push(("columns", format!("only in {file_name}: {}", names.join(", "))));
         }
     }
-    if found.has_verdicts {
-        let count = |flip: Flip| found.flips(false).filter(|row| row.flip == flip).count();
+    if comparison.has_verdicts {
+        let count = |flip: Flip| comparison.flips(false).filter(|row| row.flip == flip).count();
         let [lost, gained, defined] = [Flip::Lost, Flip::Gained, Flip::Defined].map(count);
         let flips = format!("{lost} lost, {gained} gained, {defined} defined in one file alone");
-        let sensitive = found.flips(true).count();
-        facts.push(("verdicts", format!("{flips}; of sensitive rows {sensitive}")));
+        let sensitive = comparison.flips(true).count();
+        lines.push(("verdicts", format!("{flips}; of sensitive rows {sensitive}")));
     }
-    if let Some([first, second]) = found.over_estimated.filter(|of| *of != [0, 0]) {
-        let told = format!(
+    if let Some([first, second]) = comparison.over_estimated.filter(|counts| *counts != [0, 0]) {
+        let description = format!(
             "in {first} rows of A, {second} of B the linear model over-estimates: a ratio is below \
              1 / ratio_limit, or ratio_min"
         );
-        facts.push(("too high", told));
+        lines.push(("too high", description));
     }
-    if let Some(moved) = &found.boundary {
-        facts.push(("boundary", boundary(moved)));
+    if let Some(shift) = &comparison.boundary {
+        lines.push(("boundary", describe_shift(shift)));
     }
-    let differing = found.shared.iter().filter(|row| row.differs).count();
-    let told = match differing {
+    let differing = comparison.shared.iter().filter(|row| row.differs).count();
+    let description = match differing {
         0 => "every shared cell is the same, bit for bit".to_owned(),
         count => {
             let name = |column: &ColumnChange| format!("{} ({})", column.name, column.rows);
-            let names: Vec<String> = found.columns.iter().take(6).map(name).collect();
-            let more = if found.columns.len() > 6 { ", ..." } else { "" };
-            format!("{count} rows, in {}{more}", names.join(", "))
+            let names: Vec<String> = comparison.columns.iter().take(6).map(name).collect();
+            let ellipsis = if comparison.columns.len() > 6 { ", ..." } else { "" };
+            format!("{count} rows, in {}{ellipsis}", names.join(", "))
         }
     };
-    facts.push(("differ", told));
-    facts
+    lines.push(("differ", description));
+    lines
 }
 
 /// Describes the shift of the boundary.
-fn boundary(moved: &BoundaryShift) -> String {
-    let BoundaryShift { axis, unit, crossings, .. } = moved;
+fn describe_shift(shift: &BoundaryShift) -> String {
+    let BoundaryShift { axis, unit, crossings, .. } = shift;
     let count = counted(crossings.len(), "crossing");
-    let mut told = match (moved.most_shifted(), moved.mean_shift_range()) {
+    let mut description = match (shift.most_shifted(), shift.mean_shift_range()) {
         (Some(_), _) if crossings.iter().all(|crossing| crossing.shift_range() == [0.0; 2]) => {
             format!("{count} along {axis}, none moved")
         }
-        (Some(_), _) if crossings.iter().all(|one| one.bracket[0] == one.bracket[1]) => {
+        (Some(_), _)
+            if crossings.iter().all(|crossing| crossing.bracket[0] == crossing.bracket[1]) =>
+        {
             format!("{count} along {axis}, none moved out of its bracket")
         }
-        (Some(farthest), Some([least, greatest])) => {
-            let place = moved.keys.iter().zip(&farthest.key_values);
-            let place: Vec<String> =
-                place.map(|(name, value)| format!("{name} {}", short(*value))).collect();
-            let [from, to] = farthest.bracket.map(|ends| span(ends, short));
-            let certain = moved.count_certain_shifts();
-            let place = place.join(", ");
+        (Some(most_shifted), Some([least, greatest])) => {
+            let axis_values = shift.keys.iter().zip(&most_shifted.key_values);
+            let axis_values: Vec<String> = axis_values
+                .map(|(name, value)| format!("{name} {}", format_number(*value)))
+                .collect();
+            let [from, to] = most_shifted.bracket.map(|ends| format_range(ends, format_number));
+            let certain = shift.count_certain_shifts();
+            let axis_values = axis_values.join(", ");
             format!(
                 "{count} along {axis}, {certain} moved farther than brackets explain; in the mean \
-                 by {least:+.3} to {greatest:+.3} {unit}; farthest at {place}: from within {from} \
+                 by {least:+.3} to {greatest:+.3} {unit}; farthest at {axis_values}: from \
+                 within {from} \
                  to within {to}"
             )
         }
         _ => "no crossing in both".to_owned(),
     };
-    if !moved.unmatched_lines.is_empty() {
-        let lines = counted(moved.unmatched_lines.len(), "line");
-        let _ = write!(told, "; other numbers of crossings in {lines}");
+    if !shift.unmatched_lines.is_empty() {
+        let lines = counted(shift.unmatched_lines.len(), "line");
+        let _ = write!(description, "; other numbers of crossings in {lines}");
     }
-    told
+    description
 }
 
 /// Formats the differences as text.
-fn text(args: &CompareArgs, found: &Comparison, overridden: &[Overridden]) -> String {
+fn format_text(args: &CompareArgs, comparison: &Comparison, overridden: &[Overridden]) -> String {
     let mut text = String::new();
     text.line("A", args.first.display());
     text.line("B", args.second.display());
-    if found.is_empty() {
+    if comparison.is_empty() {
         text.line("differ", "not at all");
         return text;
     }
-    for PlanChange { path, first, second } in found.plan.iter().take(PLAN_SHOWN) {
-        text.line("plan", format!("{path}: {} -> {}", brief(first), brief(second)));
+    for PlanChange { path, first, second } in comparison.plan.iter().take(MAX_PLAN_LINES) {
+        text.line(
+            "plan",
+            format!("{path}: {} -> {}", format_plan_value(first), format_plan_value(second)),
+        );
     }
-    if found.plan.len() > PLAN_SHOWN {
-        text.line("", format!("and {} more (--json)", found.plan.len() - PLAN_SHOWN));
+    if comparison.plan.len() > MAX_PLAN_LINES {
+        text.line("", format!("and {} more (--json)", comparison.plan.len() - MAX_PLAN_LINES));
     }
-    for (name, told) in facts(found, overridden) {
-        text.line(name, &told);
+    for (name, description) in summary_lines(comparison, overridden) {
+        text.line(name, &description);
     }
-    for TitledTable { title, headings, rows } in lists(args, found) {
+    for TitledTable { title, headings, rows } in difference_tables(args, comparison) {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{title}");
-        text.push_str(&table(&headings, &rows, "  "));
+        text.push_str(&format_table(&headings, &rows, "  "));
     }
     text
 }
 
-/// The maximum number of differences of the plans that are shown. Basis: half a screen. Doubling it
-/// shows twice as many.
-const PLAN_SHOWN: usize = 12;
+/// The maximum number of differences of the plans that are shown. Basis: half of the lines of a
+/// terminal. Doubling it shows twice as many.
+const MAX_PLAN_LINES: usize = 12;
 
 /// Formats the differences as Markdown.
-fn markdown(
+fn format_markdown(
     args: &CompareArgs,
-    found: &Comparison,
+    comparison: &Comparison,
     overridden: &[Overridden],
-    broken: &[String],
+    violations: &[String],
 ) -> String {
     let names = [&args.first, &args.second].map(|path| code(&path.display().to_string()));
     let mut text = format!("### {} compared with {}\n\n", names[1], names[0]);
-    if found.is_empty() {
+    if comparison.is_empty() {
         text.push_str("They do not differ.\n");
         return text;
     }
-    for broken in broken {
+    for violation in violations {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "- **`--fail-on`: {broken}**");
+        let _ = writeln!(text, "- **`--fail-on`: {violation}**");
     }
-    for PlanChange { path, first, second } in found.plan.iter().take(PLAN_SHOWN) {
-        let first = code(&brief(first));
-        let second = code(&brief(second));
+    for PlanChange { path, first, second } in comparison.plan.iter().take(MAX_PLAN_LINES) {
+        let first = code(&format_plan_value(first));
+        let second = code(&format_plan_value(second));
         let _ = writeln!(text, "- plan: {} from {first} to {second}", code(path));
     }
-    if found.plan.len() > PLAN_SHOWN {
-        let _ = writeln!(text, "- plan: {} more", found.plan.len() - PLAN_SHOWN);
+    if comparison.plan.len() > MAX_PLAN_LINES {
+        let _ = writeln!(text, "- plan: {} more", comparison.plan.len() - MAX_PLAN_LINES);
     }
-    for (name, told) in facts(found, overridden) {
-        let _ = writeln!(text, "- {name}: {}", escaped(&told));
+    for (name, description) in summary_lines(comparison, overridden) {
+        let _ = writeln!(text, "- {name}: {}", escaped(&description));
     }
-    for TitledTable { title, headings, rows } in lists(args, found) {
+    for TitledTable { title, headings, rows } in difference_tables(args, comparison) {
         let row = |cells: &[String]| {
             let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
             format!("| {} |\n", cells.join(" | "))
@@ -409,68 +442,68 @@ fn escaped(text: &str) -> String {
 /// Returns the differences as JSON.
 fn to_json(
     args: &CompareArgs,
-    found: &Comparison,
+    comparison: &Comparison,
     overridden: &[Overridden],
-    broken: &[String],
+    violations: &[String],
 ) -> Value {
     let row = |row: &SharedRow| {
-        let place: serde_json::Map<String, Value> =
-            found.keys.iter().cloned().zip(row.key.iter().map(|value| json!(value))).collect();
+        let axis_values: serde_json::Map<String, Value> =
+            comparison.keys.iter().cloned().zip(row.key.iter().map(|value| json!(value))).collect();
         json!({
-            "rows": row.rows, "place": place, "ratio": row.ratio, "gap_m": row.gap_m,
+            "rows": row.rows, "place": axis_values, "ratio": row.ratio, "gap_m": row.gap_m,
             "flip": row.flip, "sensitive": row.sensitive,
         })
     };
-    let most = usize::from(args.rows);
-    let all = |rows: Vec<&SharedRow>| rows.into_iter().map(row).collect::<Value>();
-    let greatest = |sensitive| {
+    let max_rows = usize::from(args.rows);
+    let row_list = |rows: Vec<&SharedRow>| rows.into_iter().map(row).collect::<Value>();
+    let greatest_changes = |sensitive| {
         let [ratio, gap] = [SharedRow::ratio_deviation, SharedRow::gap_deviation_m]
-            .map(|by| all(found.most_deviating(most, sensitive, by)));
+            .map(|deviation| row_list(comparison.most_deviating(max_rows, sensitive, deviation)));
         json!({ "ratio": ratio, "gap": gap })
     };
     json!({
         "first": args.first.display().to_string(),
         "second": args.second.display().to_string(),
-        "differ": !found.is_empty(),
-        "fail_on": broken,
-        "plan": found.plan,
-        "overridden": overridden.iter().map(|one| json!({
-            "axis": one.axis, "paths": one.paths,
+        "differ": !comparison.is_empty(),
+        "fail_on": violations,
+        "plan": comparison.plan,
+        "overridden": overridden.iter().map(|overridden| json!({
+            "axis": overridden.axis, "paths": overridden.paths,
         })).collect::<Value>(),
-        "matched_by": if found.is_matched_by_point { "point" } else { "axes" },
+        "matched_by": if comparison.is_matched_by_point { "point" } else { "axes" },
         "rows": {
-            "in_both": found.shared.len(),
-            "over_estimated": found.over_estimated,
-            "only_in_first": found.unmatched_rows[0],
-            "only_in_second": found.unmatched_rows[1],
-            "differing": found.shared.iter().filter(|row| row.differs).count(),
+            "in_both": comparison.shared.len(),
+            "over_estimated": comparison.over_estimated,
+            "only_in_first": comparison.unmatched_rows[0],
+            "only_in_second": comparison.unmatched_rows[1],
+            "differing": comparison.shared.iter().filter(|row| row.differs).count(),
         },
-        "axes_left_out": found.single_valued_axes.iter().map(|(place, name, value)| json!({
-            "file": (["first", "second"][*place]), "parameter": name, "value": value,
+        "axes_left_out": comparison.single_valued_axes.iter().map(|(file, name, value)| json!({
+            "file": (["first", "second"][*file]), "parameter": name, "value": value,
         })).collect::<Value>(),
-        "columns": found.columns,
+        "columns": comparison.columns,
         "columns_only_in": {
-            "first": found.unmatched_columns[0],
-            "second": found.unmatched_columns[1],
+            "first": comparison.unmatched_columns[0],
+            "second": comparison.unmatched_columns[1],
         },
-        "flips": found.flips(false).map(row).collect::<Value>(),
-        "greatest": greatest(false),
+        "flips": comparison.flips(false).map(row).collect::<Value>(),
+        "greatest": greatest_changes(false),
         "sensitive": {
-            "flips": found.flips(true).map(row).collect::<Value>(),
-            "greatest": greatest(true),
+            "flips": comparison.flips(true).map(row).collect::<Value>(),
+            "greatest": greatest_changes(true),
         },
-        "boundary": found.boundary.as_ref().map(|moved| json!({
-            "axis": moved.axis,
-            "unit": moved.unit,
-            "mean": moved.mean_shift_range(),
-            "certain": moved.count_certain_shifts(),
-            "crossings": moved.crossings.iter().map(|crossing| json!({
+        "boundary": comparison.boundary.as_ref().map(|shift| json!({
+            "axis": shift.axis,
+            "unit": shift.unit,
+            "mean": shift.mean_shift_range(),
+            "certain": shift.count_certain_shifts(),
+            "crossings": shift.crossings.iter().map(|crossing| json!({
                 "place": crossing.key_values, "number": crossing.number, "at": crossing.positions,
                 "bracket": crossing.bracket,
                 "by": crossing.shift_range(),
                 "at_least": crossing.certain_shift(),
             })).collect::<Value>(),
-            "other_numbers_of_crossings": moved.unmatched_lines.len(),
+            "other_numbers_of_crossings": shift.unmatched_lines.len(),
         })),
     })
 }

@@ -17,8 +17,8 @@ pub fn parse(
     let parse = |text: &String| match Condition::parse(text, table) {
         Ok(condition) => Some(condition),
         Err(mistake) => {
-            let at = Location::new(report.add(option, text.as_str()), mistake.span.clone());
-            report.push(Diagnostic::from_expression(mistake, &at));
+            let location = Location::new(report.add(option, text.as_str()), mistake.span.clone());
+            report.push(Diagnostic::from_expression(mistake, &location));
             None
         }
     };
@@ -35,7 +35,9 @@ pub fn parse_filter(
     table: &ResultTable,
 ) -> Result<Option<Condition>, Error> {
     let condition = parse("--where", text.map_or(&[], std::slice::from_ref), table)?.pop();
-    if let Some(Condition { text, .. }) = condition.as_ref().filter(|one| one.has_aggregates()) {
+    if let Some(Condition { text, .. }) =
+        condition.as_ref().filter(|condition| condition.has_aggregates())
+    {
         let expected =
             "an expression without count(), share(), min(), max(), mean() and quantile()";
         return Err(Error::option("--where", text, expected));

@@ -1,34 +1,36 @@
-//! Examples, printed by `--help` before everything else: most readers want to see one line that
-//! works. Each subcommand's are in its module.
+//! Examples of command lines, which `--help` prints before everything else because most readers
+//! look for one that works. The examples of a subcommand are in its module.
 
-/// Lines to type, each with what it does.
+/// Command lines, each with a description.
 pub type Examples = Vec<[&'static str; 2]>;
 
-/// Widest line of help that an ordinary terminal shows as it is.
-pub const WIDEST: usize = 80;
+/// The width of the widest line of help, in characters. Basis: the width of a terminal. Doubling it
+/// prints lines that a terminal breaks.
+pub const MAX_LINE_WIDTH: usize = 80;
 
-/// Examples as help shows them; `None` if there are none.
-pub fn shown(lines: &[[&str; 2]]) -> Option<String> {
+/// Formats examples for the help; `None` if there are none.
+pub fn format_examples(lines: &[[&str; 2]]) -> Option<String> {
     let width = lines.iter().map(|[line, _]| line.len()).max()?;
-    let fits = lines.iter().all(|[_, does]| 2 + width + 3 + does.len() <= WIDEST);
+    let fit_on_one_line =
+        lines.iter().all(|[_, description]| 2 + width + 3 + description.len() <= MAX_LINE_WIDTH);
     let mut text = String::from("Examples:");
-    for [line, does] in lines {
-        text += &if fits {
-            format!("\n  {line:width$}   {does}")
+    for [line, description] in lines {
+        text += &if fit_on_one_line {
+            format!("\n  {line:width$}   {description}")
         } else {
-            format!("\n  {}\n      {does}", folded(line))
+            format!("\n  {}\n      {description}", break_line(line))
         };
     }
     Some(text)
 }
 
-/// A line to type, on as many as it takes, so that it can still be copied.
-fn folded(line: &str) -> String {
+/// Breaks a long command line before its options, with backslashes so that it can be copied.
+fn break_line(line: &str) -> String {
     let mut text = String::new();
     let mut column = 2;
     for (i, part) in line.split(" --").enumerate() {
         let part = if i == 0 { part.to_owned() } else { format!(" --{part}") };
-        if i > 0 && column + part.len() + 2 > WIDEST {
+        if i > 0 && column + part.len() + 2 > MAX_LINE_WIDTH {
             text += " \\\n   ";
             column = 3;
         }

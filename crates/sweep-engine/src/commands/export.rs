@@ -15,7 +15,7 @@ pub struct ExportArgs {
     file: PathBuf,
     /// File to write; its extension selects the format
     #[arg(value_name = "OUT", required_unless_present = "output")]
-    #[arg(help = format!("File to write; its extension {} selects the format", endings()))]
+    #[arg(help = format!("File to write; its extension {} selects the format", extensions()))]
     out: Option<PathBuf>,
 
     /// File to write, as an option instead of the second argument
@@ -25,31 +25,31 @@ pub struct ExportArgs {
 
 impl ExportArgs {
     /// Returns the file to write, which is either an argument or an option.
-    fn to_write(&self) -> &Path {
+    fn output_path(&self) -> &Path {
         self.out.as_ref().or(self.output.as_ref()).expect("required")
     }
 }
 
-/// Writes the result in the format of the output's ending.
+/// Writes the result in the format that the extension of the output names.
 ///
 /// # Errors
-/// An ending of no format, a file that cannot be read or is too large for the format, an output
-/// that cannot be written.
+/// An unknown extension, a file that cannot be read or is too large for the format, an output that
+/// cannot be written.
 pub fn run(args: &ExportArgs) -> Result<Exit, Error> {
-    let out = args.to_write();
-    let Some(format) = ExportFormat::from_path(out) else {
-        let expected = format!("a name that ends in {}", endings());
-        return Err(Error::option("OUT", out.display(), &expected));
+    let output_path = args.output_path();
+    let Some(format) = ExportFormat::from_path(output_path) else {
+        let expected = format!("a name that ends in {}", extensions());
+        return Err(Error::option("OUT", output_path.display(), &expected));
     };
     refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
-    let output = Output::begin(out, format.kind())?;
+    let output = Output::begin(output_path, format.kind())?;
     export(&file, format, output)?;
-    tell(&format!("wrote {}: {} rows", out.display(), file.rows()));
+    tell(&format!("wrote {}: {} rows", output_path.display(), file.rows()));
     Ok(Exit::Done)
 }
 
-/// Returns the endings of all formats in words: `.csv or .xlsx`.
-fn endings() -> String {
+/// Returns the extensions of all formats in words: `.csv or .xlsx`.
+fn extensions() -> String {
     ExportFormat::ALL.map(|format| format!(".{}", format.name())).join(" or ")
 }

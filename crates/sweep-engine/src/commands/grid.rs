@@ -31,8 +31,9 @@ pub struct GridArgs {
 impl GridArgs {
     /// Returns the values of `--set` and `--ratio-limit` in one list.
     pub fn sets(&self) -> Vec<String> {
-        let limit = self.ratio_limit.map(|limit| format!("ratio_limit={limit}"));
-        self.sets.iter().cloned().chain(limit).collect()
+        let ratio_limit_set =
+            self.ratio_limit.map(|ratio_limit_set| format!("ratio_limit={ratio_limit_set}"));
+        self.sets.iter().cloned().chain(ratio_limit_set).collect()
     }
 
     /// Returns the grid with all changes except those of `--at`.
@@ -97,28 +98,29 @@ impl ResultArgs {
     /// Returns a command line with these arguments, for the user to copy.
     pub fn command(&self, verb: &str) -> String {
         let grid = &self.grid;
-        let shown = |path: &PathBuf| path.display().to_string();
+        let path_text = |path: &PathBuf| path.display().to_string();
         let sets = grid.sets().into_iter().map(|set| ("set", set));
-        let further = grid.at.iter().map(|at| ("at", at.clone()));
-        let further = further.chain(grid.name.iter().map(|name| ("name", name.clone())));
-        let further = further.chain(self.out.iter().map(|out| ("out", shown(out))));
-        let line = format!("{} {verb} {}", program(), quoted(&shown(&grid.grid)));
-        sets.chain(further)
+        let other_options = grid.at.iter().map(|at| ("at", at.clone()));
+        let other_options =
+            other_options.chain(grid.name.iter().map(|name| ("name", name.clone())));
+        let other_options = other_options.chain(self.out.iter().map(|out| ("out", path_text(out))));
+        let line = format!("{} {verb} {}", program(), quoted(&path_text(&grid.grid)));
+        sets.chain(other_options)
             .fold(line, |line, (name, value)| line + &format!(" --{name} {}", quoted(&value)))
     }
 }
 
 /// Returns the command line of this process without `--fresh`, for the user to resume it.
-pub fn typed() -> String {
-    let words = std::env::args_os().skip(1).filter(|word| word != "--fresh");
-    let words = words.map(|word| quoted(&word.to_string_lossy()));
-    std::iter::once(program().to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+pub fn resume_command() -> String {
+    let arguments = std::env::args_os().skip(1).filter(|word| word != "--fresh");
+    let arguments = arguments.map(|word| quoted(&word.to_string_lossy()));
+    std::iter::once(program().to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
 /// Quotes a word for the shell, if it needs quotes.
 pub fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
+    let is_unquoted = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);
+    if !word.is_empty() && word.chars().all(is_unquoted) {
         word.to_owned()
     } else {
         format!("'{}'", word.replace('\'', r"'\''"))

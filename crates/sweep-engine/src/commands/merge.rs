@@ -1,9 +1,9 @@
 //! `sweep merge GRID.toml`: joins the finished shards of a run to its result.
 
-use super::run::{done, rows};
-use super::{Lines as _, ResultArgs, installed};
+use super::run::{count_lines, exit_code_by_status};
+use super::{Lines as _, ResultArgs, install_interrupt};
 use crate::config::section::counted;
-use crate::store::{OpenRun, Opened, Tally};
+use crate::store::{OpenOutcome, OpenRun, Tally};
 use crate::{Error, Exit, Job, Model, Plan, tell};
 use std::path::Path;
 
@@ -26,7 +26,7 @@ pub struct MergeArgs {
 pub fn run<M: Model>(args: &MergeArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let job = Job::new(&plan);
-    let content = |tally: &Tally| Ok(rows(tally, &job));
+    let content = |tally: &Tally| Ok(count_lines(tally, &job));
     merge_job(args, &plan.name, &job, &args.target.output(&plan), &content)
 }
 
@@ -41,13 +41,13 @@ pub fn merge_job(
     output: &Path,
     content: &dyn Fn(&Tally) -> Result<String, Error>,
 ) -> Result<Exit, Error> {
-    let interrupt = installed()?;
+    let interrupt = install_interrupt()?;
     let mut run = match OpenRun::open_for_merge(output, job)? {
-        Opened::Open(run) => run,
-        Opened::Finished((file, tally)) => {
-            let there = format!("{name}: all {} points are there already\n", file.points);
-            tell((there + &content(&tally)?).trim_end());
-            return Ok(done(args.fail_on_error, &tally.by_status));
+        OpenOutcome::Open(run) => run,
+        OpenOutcome::Finished((file, tally)) => {
+            let finished_note = format!("{name}: all {} points are there already\n", file.points);
+            tell((finished_note + &content(&tally)?).trim_end());
+            return Ok(exit_code_by_status(args.fail_on_error, &tally.by_status));
         }
     };
     run.take_notes().iter().for_each(|note| tell(note));
@@ -60,5 +60,5 @@ pub fn merge_job(
     text += &content(&tally)?;
     text.line("file", output.display());
     tell(text.trim_end());
-    Ok(done(args.fail_on_error, &tally.by_status))
+    Ok(exit_code_by_status(args.fail_on_error, &tally.by_status))
 }

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::cells::table as text_table;
-use super::grid::typed;
-use super::{Lines as _, installed, short, word};
+use super::cells::format_table;
+use super::grid::resume_command;
+use super::{Lines as _, format_cell, format_number, install_interrupt};
 use crate::config::section::counted;
 use crate::optimise::file::{own_file, parameters, table, trial_columns};
 use crate::optimise::search::{search, slacks};
 use crate::optimise::study::{Objective, SearchedParameter, Study};
-use crate::store::{Opened, Trials};
-use crate::{Effort, EffortArgs, Error, Exit, Model, duration, tell};
+use crate::store::{OpenOutcome, Trials};
+use crate::{Error, Execution, ExecutionArgs, Exit, Model, duration, tell};
 use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
 use sweep_results::{Cell, ResultTable, Slack};
 
@@ -36,7 +36,7 @@ pub struct OptimiseArgs {
     #[arg(long, value_name = "N", requires = "best")]
     candidate: Option<u64>,
     #[command(flatten)]
-    effort: EffortArgs,
+    execution: ExecutionArgs,
     /// Start over, even if the file exists or another study has started
     #[arg(long)]
     fresh: bool,
@@ -55,9 +55,9 @@ The file is a pure function of its input, whatever the number of threads and int
 interrupted search leaves its evaluations in FILE.partial, and the same command continues from \
 there.";
 
-/// The number of candidates at which the summary begins to leave some out. Basis: half a screen.
-/// Doubling it lists twice as many.
-const LISTED: usize = 12;
+/// The number of candidates at which the summary begins to leave some out. Basis: half of the lines
+/// of a terminal. Doubling it lists twice as many.
+const MAX_LISTED: usize = 12;
 
 /// Runs the search of a study, and prints a summary.
 ///
@@ -65,64 +65,78 @@ const LISTED: usize = 12;
 /// Mistakes in the study and its grid file, and errors of evaluating candidates or writing a file.
 pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
     let study = Study::<M>::load(&args.study, &args.sets)?;
-    let default = || PathBuf::from(format!("results/{}.parquet", study.name));
-    let output = args.out.clone().unwrap_or_else(default);
+    let default_path = || PathBuf::from(format!("results/{}.parquet", study.name));
+    let output = args.out.clone().unwrap_or_else(default_path);
     let file = Output::begin(&output, FileKind::Optimise)?;
-    let own = own_output(&study, args, &output)?;
-    let interrupt = installed()?;
+    let own_file_output = claim_own_file(&study, args, &output)?;
+    let interrupt = install_interrupt()?;
     let mut trials = match Trials::open(&output, &study.job(), trial_columns(&study), args.fresh)? {
-        Opened::Open(trials) => trials,
-        Opened::Finished(()) => {
-            let how = "it is there already (--fresh searches again)";
-            let effort = args.effort.with(&interrupt);
-            return summarise(&study, args.candidate, own, &output, how, effort);
+        OpenOutcome::Open(trials) => trials,
+        OpenOutcome::Finished(()) => {
+            let search_note = "it is there already (--fresh searches again)";
+            let execution = args.execution.with(&interrupt);
+            return summarise(
+                &study,
+                args.candidate,
+                own_file_output,
+                &output,
+                search_note,
+                execution,
+            );
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
     let began = Instant::now();
-    let effort = args.effort.with(&interrupt);
-    let (tried, trials) = search(&study, Some(trials), effort)?;
+    let execution = args.execution.with(&interrupt);
+    let (candidates, trials) = search(&study, Some(trials), execution)?;
     let wall_s = began.elapsed().as_secs_f64();
-    let Some(tried) = tried else {
+    let Some(candidates) = candidates else {
         let wall = duration(wall_s);
         let mut text = format!("{}: interrupted after {wall}\n", study.name);
-        text.line("go on", typed());
+        text.line("go on", resume_command());
         tell(text.trim_end());
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    file.finish(&table(&study, &tried).into_bytes(&output)?)?;
+    file.finish(&table(&study, &candidates).into_bytes(&output)?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let candidates = tried.len() as u64;
+    let candidate_count = candidates.len() as u64;
     let rows = study.rows();
-    let how = format!(
-        "{candidates} candidates of {} in {}, {:.0} points/s",
+    let search_note = format!(
+        "{candidate_count} candidates of {} in {}, {:.0} points/s",
         counted(rows as usize, "point"),
         duration(wall_s),
-        (candidates * rows) as f64 / wall_s
+        (candidate_count * rows) as f64 / wall_s
     );
-    summarise(&study, args.candidate, own, &output, &how, args.effort.with(&interrupt))
+    summarise(
+        &study,
+        args.candidate,
+        own_file_output,
+        &output,
+        &search_note,
+        args.execution.with(&interrupt),
+    )
 }
 
-/// Returns a line for each condition with a candidate's slack: its distance from the limit,
-/// negative if the condition is violated. The least slack comes first. Returns `None` after an
-/// interrupt.
+/// Returns a line for each condition with the slack of a candidate: the distance from the limit,
+/// which is negative if the condition is violated. The least slack comes first. Returns `None`
+/// after an interrupt.
 fn slack_lines<M: Model>(
     study: &Study<M>,
     values: &[f64],
-    effort: Effort<'_>,
+    execution: Execution<'_>,
 ) -> Result<Option<String>, Error> {
-    let Some(slacks) = slacks(study, values, effort)? else { return Ok(None) };
-    let known = study.conditions.iter().zip(slacks);
-    let mut known: Vec<(&str, Slack)> =
-        known.filter_map(|(goal, slack)| Some((goal.text(), slack?))).collect();
-    known.sort_by(|a, b| a.1.relative.total_cmp(&b.1.relative));
+    let Some(slacks) = slacks(study, values, execution)? else { return Ok(None) };
+    let known_slacks = study.conditions.iter().zip(slacks);
+    let mut known_slacks: Vec<(&str, Slack)> =
+        known_slacks.filter_map(|(goal, slack)| Some((goal.text(), slack?))).collect();
+    known_slacks.sort_by(|a, b| a.1.relative.total_cmp(&b.1.relative));
     let mut text = String::new();
-    for (k, (condition, Slack { distance, relative })) in known.into_iter().enumerate() {
-        let percent = short(100.0 * relative);
+    for (k, (condition, Slack { distance, relative })) in known_slacks.into_iter().enumerate() {
+        let percent = format_number(100.0 * relative);
         let name = if k == 0 { "binds" } else { "" };
-        text.line(name, format!("{condition}: slack {}, {percent} %", short(distance)));
+        text.line(name, format!("{condition}: slack {}, {percent} %", format_number(distance)));
     }
     Ok(Some(text))
 }
@@ -131,7 +145,10 @@ fn slack_lines<M: Model>(
 /// violation is the sum of the excesses over the conditions, each divided by the greatest excess of
 /// all candidates. Returns the candidate's number with the description; `None` if no candidate has
 /// all excesses.
-fn nearest<M: Model>(study: &Study<M>, file: &ResultTable) -> Result<Option<(u64, String)>, Error> {
+fn find_nearest<M: Model>(
+    study: &Study<M>,
+    file: &ResultTable,
+) -> Result<Option<(u64, String)>, Error> {
     let names: Vec<String> = (1..=study.conditions.len()).map(|k| format!("excess_{k}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let mut rows: Vec<(u64, Vec<f64>)> = Vec::new();
@@ -142,46 +159,47 @@ fn nearest<M: Model>(study: &Study<M>, file: &ResultTable) -> Result<Option<(u64
         }
         Ok::<(), Error>(())
     })?;
-    let greatest: Vec<f64> = (0..names.len())
-        .map(|k| rows.iter().map(|(_, all)| all[k]).fold(f64::MIN_POSITIVE, f64::max))
+    let greatest_excesses: Vec<f64> = (0..names.len())
+        .map(|k| rows.iter().map(|(_, excesses)| excesses[k]).fold(f64::MIN_POSITIVE, f64::max))
         .collect();
-    let broken =
-        |all: &[f64]| -> f64 { all.iter().zip(&greatest).map(|(own, most)| own / most).sum() };
-    let least = rows.iter().min_by(|a, b| broken(&a.1).total_cmp(&broken(&b.1)));
-    let Some((candidate, excesses)) = least else { return Ok(None) };
+    let violation = |excesses: &[f64]| -> f64 {
+        excesses.iter().zip(&greatest_excesses).map(|(excess, greatest)| excess / greatest).sum()
+    };
+    let least_violated = rows.iter().min_by(|a, b| violation(&a.1).total_cmp(&violation(&b.1)));
+    let Some((candidate, excesses)) = least_violated else { return Ok(None) };
     let mut text = String::new();
     text.line("nearest", format!("candidate {candidate}, which breaks"));
     for (goal, excess) in study.conditions.iter().zip(excesses).filter(|(_, excess)| **excess > 0.0)
     {
-        text.line("", format!("{} by {}", goal.text(), short(*excess)));
+        text.line("", format!("{} by {}", goal.text(), format_number(*excess)));
     }
     Ok(Some((*candidate, text)))
 }
 
-/// Claims the path of the model's own file, if one is asked for, before the search.
-fn own_output<'a, M: Model>(
+/// Claims the path of the model's own file before the search, if `--best` requests the file.
+fn claim_own_file<'a, M: Model>(
     study: &Study<M>,
     args: &'a OptimiseArgs,
     output: &Path,
 ) -> Result<Option<(&'a Path, Output<'a>)>, Error> {
     let Some(path) = args.best.as_deref() else { return Ok(None) };
-    let refused = |expected: &str| Err(Error::option("--best", path.display(), expected));
+    let refuse = |expected: &str| Err(Error::option("--best", path.display(), expected));
     if M::ABOUT.own_file.is_none() {
-        return refused("a model with a file of its own");
+        return refuse("a model with a file of its own");
     }
     let candidates = study.evolution.candidates;
-    if let Some(candidate) = args.candidate.filter(|&one| one >= candidates) {
+    if let Some(candidate) = args.candidate.filter(|&candidate| candidate >= candidates) {
         let expected = format!("a number from 0 to {}", candidates - 1);
         return Err(Error::option("--candidate", candidate, expected));
     }
-    let own = Output::begin(path, FileKind::Own)?;
+    let own_file_output = Output::begin(path, FileKind::Own)?;
     // The files may not exist yet, so the paths of their folders are compared.
-    let place =
+    let resolved_path =
         |path: &Path| Some(atomic::parent(path).canonicalize().ok()?.join(path.file_name()?));
-    if place(path) == place(output) {
-        return refused("another file than that of all candidates");
+    if resolved_path(path) == resolved_path(output) {
+        return refuse("another file than that of all candidates");
     }
-    Ok(Some((path, own)))
+    Ok(Some((path, own_file_output)))
 }
 
 /// Prints a summary of the file of candidates, and writes the model's own file of a candidate if it
@@ -189,111 +207,128 @@ fn own_output<'a, M: Model>(
 fn summarise<M: Model>(
     study: &Study<M>,
     candidate: Option<u64>,
-    own: Option<(&Path, Output<'_>)>,
+    own_file_output: Option<(&Path, Output<'_>)>,
     output: &Path,
-    how: &str,
-    effort: Effort<'_>,
+    search_note: &str,
+    execution: Execution<'_>,
 ) -> Result<Exit, Error> {
-    let mut text = format!("{}: {how}\n", study.name);
+    let mut text = format!("{}: {search_note}\n", study.name);
     let file = ResultTable::open(output)?;
-    let about = file.file().json(key::OPTIMISE).unwrap_or_default();
-    let sought = parameters(study).iter().map(|axis| &*axis.parameter.name);
-    let objectives = study.objectives.iter().map(|one| one.name.as_str());
-    let names: Vec<&str> =
-        ["candidate", "feasible", "on_front"].into_iter().chain(sought).chain(objectives).collect();
-    let best = about["best"].as_u64();
-    let chosen = candidate.or(best);
-    let nearest = if best.is_none() { nearest(study, &file)? } else { None };
+    let optimum = file.file().json(key::OPTIMISE).unwrap_or_default();
+    let parameter_names = parameters(study).iter().map(|axis| &*axis.parameter.name);
+    let objective_names = study.objectives.iter().map(|objective| objective.name.as_str());
+    let names: Vec<&str> = ["candidate", "feasible", "on_front"]
+        .into_iter()
+        .chain(parameter_names)
+        .chain(objective_names)
+        .collect();
+    let best = optimum["best"].as_u64();
+    let chosen_candidate = candidate.or(best);
+    let nearest = if best.is_none() { find_nearest(study, &file)? } else { None };
     let mut feasible = 0;
     let mut front = Vec::new();
     let mut nearest_cells = None;
     let mut values = None;
     // The least value of the first objective before and in the last third of the candidates.
-    let mut least = [f64::INFINITY; 2];
-    let mut late = 0;
+    let mut least_objective = [f64::INFINITY; 2];
+    let mut late_on_front = 0;
     let first_late = study.evolution.first_late();
     file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
         if cells[1] == Cell::Flag(true) {
             feasible += 1;
-            let number = cells.get(3 + study.parameters.len()).and_then(Cell::number);
-            let own = &mut least[usize::from(row.index() >= first_late)];
-            *own = own.min(number.map_or(f64::INFINITY, |one| study.objectives[0].sign * one));
+            let objective = cells.get(3 + study.parameters.len()).and_then(Cell::number);
+            let period_least = &mut least_objective[usize::from(row.index() >= first_late)];
+            *period_least = period_least.min(
+                objective.map_or(f64::INFINITY, |objective| study.objectives[0].sign * objective),
+            );
         }
-        if Some(row.index()) == chosen {
-            let own = cells[3..].iter().take(study.parameters.len());
-            values = own.map(Cell::number).collect::<Option<Vec<f64>>>();
+        if Some(row.index()) == chosen_candidate {
+            let value_cells = cells[3..].iter().take(study.parameters.len());
+            values = value_cells.map(Cell::number).collect::<Option<Vec<f64>>>();
         }
         if nearest.as_ref().is_some_and(|(candidate, _)| *candidate == row.index()) {
             nearest_cells = Some(cells.clone());
         }
         if cells[2] == Cell::Flag(true) {
-            late += usize::from(row.index() >= first_late);
+            late_on_front += usize::from(row.index() >= first_late);
             front.push(cells);
         }
         Ok::<(), Error>(())
     })?;
-    let all = file.rows();
-    let several = study.objectives.len() > 1;
-    let ended = match front.len() {
-        count if several => format!(", {count} on the front"),
+    let candidate_count = file.rows();
+    let has_several_objectives = study.objectives.len() > 1;
+    let front_note = match front.len() {
+        count if has_several_objectives => format!(", {count} on the front"),
         count @ 2.. => format!(", {count} of them equally good"),
         _ => String::new(),
     };
-    text.line("feasible", format!("{feasible} of {all}{ended}"));
+    text.line("feasible", format!("{feasible} of {candidate_count}{front_note}"));
     if let Some(best) = best {
         text.line("best", format!("candidate {best}"));
     }
     text.extend(nearest.map(|(_, described)| described));
     if let Some(values) = values.as_ref().filter(|_| !study.conditions.is_empty()) {
-        text.extend(slack_lines(study, values, effort)?);
+        text.extend(slack_lines(study, values, execution)?);
     }
-    if least[0].is_finite() && first_late < all {
+    if least_objective[0].is_finite() && first_late < candidate_count {
         let Objective { name, sign, .. } = &study.objectives[0];
-        let farther = "; more may take it farther";
-        let gained = match [least[0], least[0].min(least[1])].map(|one| short(sign * one)) {
-            _ if several => format!("put {late} of {} on the front{farther}", front.len()),
+        let advice = "; more may take it farther";
+        let progress = match [least_objective[0], least_objective[0].min(least_objective[1])]
+            .map(|value| format_number(sign * value))
+        {
+            _ if has_several_objectives => {
+                format!("put {late_on_front} of {} on the front{advice}", front.len())
+            }
             [before, after] if before == after => "found none better".to_owned(),
-            [from, to] => format!("took {name} from {from} to {to}{farther}"),
+            [from, to] => format!("took {name} from {from} to {to}{advice}"),
         };
-        text.line("search", format!("the last {} candidates {gained}", all - first_late));
-    }
-    front.sort_by(|a, b| {
-        let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
-        of(a).unwrap_or(f64::NAN).total_cmp(&of(b).unwrap_or(f64::NAN))
-    });
-    let is_at_end = |(sought, value): &(&SearchedParameter, &f64)| {
-        [0.0, 1.0].into_iter().any(|end| sought.bounds.between(end) == **value)
-    };
-    let bounded = study.parameters.iter().zip(values.iter().flatten());
-    let ends: Vec<&str> = bounded
-        .zip(parameters(study))
-        .filter(|(bounded, _)| is_at_end(bounded))
-        .map(|(_, axis)| &*axis.parameter.name)
-        .collect();
-    if !ends.is_empty() {
         text.line(
-            "bounds",
-            format!("reached by {}: a wider range may have better", ends.join(", ")),
+            "search",
+            format!("the last {} candidates {progress}", candidate_count - first_late),
         );
     }
-    let apart = front.len().div_ceil(LISTED).max(1);
-    let is_best = |cells: &[Cell]| cells[0].number() == about["best"].as_f64();
+    front.sort_by(|a, b| {
+        let first_objective =
+            |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
+        first_objective(a).unwrap_or(f64::NAN).total_cmp(&first_objective(b).unwrap_or(f64::NAN))
+    });
+    let is_at_end = |(searched_parameter, value): &(&SearchedParameter, &f64)| {
+        [0.0, 1.0].into_iter().any(|end| searched_parameter.bounds.between(end) == **value)
+    };
+    let parameter_values = study.parameters.iter().zip(values.iter().flatten());
+    let parameters_at_bounds: Vec<&str> = parameter_values
+        .zip(parameters(study))
+        .filter(|(parameter_value, _)| is_at_end(parameter_value))
+        .map(|(_, axis)| &*axis.parameter.name)
+        .collect();
+    if !parameters_at_bounds.is_empty() {
+        text.line(
+            "bounds",
+            format!(
+                "reached by {}: a wider range may have better",
+                parameters_at_bounds.join(", ")
+            ),
+        );
+    }
+    let listing_interval = front.len().div_ceil(MAX_LISTED).max(1);
+    let is_best = |cells: &[Cell]| cells[0].number() == optimum["best"].as_f64();
     // The best candidate is always listed, and the nearest one if none is feasible.
     let listed = front.iter().enumerate();
-    let listed = listed.filter(|(k, cells)| k % apart == 0 || is_best(cells));
+    let listed = listed.filter(|(k, cells)| k % listing_interval == 0 || is_best(cells));
     let listed = listed.map(|(_, cells)| cells).chain(&nearest_cells);
-    let shown = |cells: &[Cell]| cells.iter().take(1).chain(&cells[3..]).map(word).collect();
+    let row_texts =
+        |cells: &[Cell]| cells.iter().take(1).chain(&cells[3..]).map(format_cell).collect();
     let headings: Vec<String> =
         names.iter().take(1).chain(&names[3..]).map(|&name| name.to_owned()).collect();
-    let listed: Vec<Vec<String>> = listed.map(|cells| shown(cells)).collect();
-    text.push_str(&text_table(&headings, &listed, "  "));
-    if let Some((path, file)) = own {
-        let own = values.as_deref().and_then(|values| own_file(study, values));
-        match chosen.zip(own) {
-            Some((chosen, own)) => {
-                let of = format!("candidate {chosen} of {}", study.name);
-                file.finish(format!("{OWN_FILE}{of}\n{own}").as_bytes())?;
+    let listed: Vec<Vec<String>> = listed.map(|cells| row_texts(cells)).collect();
+    text.push_str(&format_table(&headings, &listed, "  "));
+    if let Some((path, file)) = own_file_output {
+        let own_text = values.as_deref().and_then(|values| own_file(study, values));
+        match chosen_candidate.zip(own_text) {
+            Some((chosen_candidate, own_text)) => {
+                let origin = format!("candidate {chosen_candidate} of {}", study.name);
+                file.finish(format!("{OWN_FILE}{origin}\n{own_text}").as_bytes())?;
                 text.line("wrote", path.display());
             }
             None => {
@@ -302,7 +337,7 @@ fn summarise<M: Model>(
         }
     }
     text.line("file", output.display());
-    text.next("plot", output);
+    text.suggest_command("plot", output);
     tell(text.trim_end());
     // An empty front means that no candidate is feasible.
     Ok(if front.is_empty() { Exit::NotHeld } else { Exit::Done })

@@ -25,7 +25,7 @@ pub struct ParametersArgs {
 pub fn run<M: Model>(args: &ParametersArgs) -> Result<Exit, Error> {
     let plan =
         args.grid.clone().map(|grid| GridInput::<M>::file(grid, Vec::new()).load()).transpose()?;
-    let rows = listed(plan.as_ref());
+    let rows = list_parameters(plan.as_ref());
     show(&if args.json { as_json(&rows) } else { as_text(&rows) })
 }
 
@@ -40,42 +40,43 @@ pub struct ListedParameter<M: Model> {
 }
 
 /// Returns the lines of the listing; without a plan, those of the model's default values.
-pub fn listed<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<M>> {
-    let line = |parameter: ModelParameter<M>| {
+pub fn list_parameters<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<M>> {
+    let list_parameter = |parameter: ModelParameter<M>| {
         let value = match parameter.window_edge {
             Some(edge) => plan.map(|plan| plan.window_s[edge]),
             None => parameter.value.filter(|_| plan.is_some() || !parameter.is_in_grid),
         };
         // A parameter of several numbers has the sources of all of them.
-        let written = plan.filter(|_| !parameter.is_in_grid);
-        let written = written.and_then(|plan| plan.written.source(&parameter.parts));
-        let source = written.unwrap_or_else(|| parameter.source.to_owned());
+        let plan_source = plan.filter(|_| !parameter.is_in_grid);
+        let plan_source = plan_source.and_then(|plan| plan.written.source(&parameter.parts));
+        let source = plan_source.unwrap_or_else(|| parameter.source.to_owned());
         ListedParameter { parameter, value, source }
     };
     let parameters = match plan {
         Some(plan) => plan.model.parameters(),
         None => M::blank().parameters(),
     };
-    parameters.into_iter().map(line).collect()
+    parameters.into_iter().map(list_parameter).collect()
 }
 
 fn as_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
-    let value = |row: &ListedParameter<M>| {
-        row.value.map_or_else(|| "-".to_owned(), |value| value.to_string())
+    let value_text = |row: &ListedParameter<M>| {
+        row.value.map_or_else(|| "-".to_owned(), |value_text| value_text.to_string())
     };
-    let width =
+    let max_width =
         |length: &dyn Fn(&ListedParameter<M>) -> usize| rows.iter().map(length).max().unwrap_or(0);
-    let name_width = width(&|row| row.parameter.name.len());
-    let value_width = width(&|row| value(row).len());
-    let unit_width = width(&|row| row.parameter.unit.len());
+    let name_width = max_width(&|row| row.parameter.name.len());
+    let value_width = max_width(&|row| value_text(row).len());
+    let unit_width = max_width(&|row| row.parameter.unit.len());
     let line = |row: &ListedParameter<M>| {
         let name = &row.parameter.name;
-        let value = value(row);
+        let value_text = value_text(row);
         let unit = row.parameter.unit;
-        let meaning = row.parameter.description;
+        let description = row.parameter.description;
         let source = &row.source;
         format!(
-            "{name:name_width$}  {value:>value_width$} {unit:unit_width$}  {meaning} [{source}]\n"
+            "{name:name_width$}  {value_text:>value_width$} {unit:unit_width$}  {description} \
+             [{source}]\n"
         )
     };
     rows.iter().map(line).collect()
@@ -96,8 +97,8 @@ pub fn as_json<M: Model>(rows: &[ListedParameter<M>]) -> String {
     format!("{:#}\n", rows.iter().map(row).collect::<Value>())
 }
 
-/// Returns the bounds of a range as JSON, `null` for an end that only the common greatest magnitude
-/// limits.
+/// Returns the bounds of a range as JSON. An end that only the greatest magnitude of all parameters
+/// limits is `null`.
 fn range(range: Range) -> Value {
     let [least, greatest] = range.bounds();
     json!({ "least": least, "greatest": greatest, "zero_excluded": range.excludes_zero() })

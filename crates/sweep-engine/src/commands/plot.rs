@@ -34,7 +34,7 @@ pub struct PlotArgs<V: ValueEnum + Send + Sync + 'static = DesignView> {
 
     /// Map of three or more axes: cut an axis beyond the second at this value. Other files: show
     /// only the points at this value
-    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = parse_assignment)]
     pub at: Vec<(String, f64)>,
 
     /// Map as .svg, .pdf or .png: draw the line of this boundary file too
@@ -56,7 +56,7 @@ pub fn run(args: &PlotArgs) -> Result<Exit, Error> {
 /// The errors of [`render`], and a result that is not finished.
 pub fn draw<V: ValueEnum + Send + Sync>(
     args: &PlotArgs<V>,
-    further: PlotOptions,
+    model_options: PlotOptions,
     model: &dyn Figures,
 ) -> Result<Exit, Error> {
     let output = args.output.clone().unwrap_or_else(|| beside(&args.file, "svg"));
@@ -64,7 +64,7 @@ pub fn draw<V: ValueEnum + Send + Sync>(
         quantity: args.quantity.clone(),
         fixed_values: args.at.clone(),
         boundary: args.boundary.clone(),
-        ..further
+        ..model_options
     };
     refuse_unfinished(&args.file)?;
     render(&args.file, &options, model, &output).map_err(suggest_name)?;
@@ -76,12 +76,14 @@ pub fn draw<V: ValueEnum + Send + Sync>(
 fn suggest_name(error: PlotError) -> PlotError {
     let PlotError::NotThere { refusal, given, valid } = &error else { return error };
     match nearest(given, valid.iter().map(String::as_str)) {
-        Some(near) => PlotError::Unfit(format!("{refusal}\n  = help: is `{near}` meant?")),
+        Some(nearest_name) => {
+            PlotError::Unfit(format!("{refusal}\n  = help: is `{nearest_name}` meant?"))
+        }
         None => error,
     }
 }
 
-fn assignment(text: &str) -> Result<(String, f64), String> {
+fn parse_assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, as in mass_kg=3.5")?;
     Ok((name.trim().to_owned(), finite(value)?))
 }

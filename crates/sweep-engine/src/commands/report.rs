@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::show::Further;
-use super::{conditions, short, word};
+use super::show::ModelSummary;
+use super::{conditions, format_cell, format_number};
 use crate::columns::MODELS;
 use crate::store::read::{Tally, tally};
 use crate::store::refuse_unfinished;
@@ -47,7 +47,7 @@ pub type Resonances<M> = dyn Fn(&Plan<M>) -> Vec<[String; 3]>;
 /// written.
 pub fn run<M: Model>(
     args: &ReportArgs,
-    further: &Further<'_>,
+    model_summary: &ModelSummary<'_>,
     resonances: &Resonances<M>,
     model: &dyn Figures,
 ) -> Result<Exit, Error> {
@@ -64,7 +64,7 @@ pub fn run<M: Model>(
         return Err(Error::option("RESULT", args.result.display(), expected));
     }
     let requirements = conditions::parse("--require", &args.requirements, &file)?;
-    let (picture, about) = describe_as_html(&args.result, model)?;
+    let (picture, description) = describe_as_html(&args.result, model)?;
     let plan = file.plan.clone().unwrap_or_default();
     let name = plan["name"].as_str().unwrap_or_default();
 
@@ -73,61 +73,65 @@ pub fn run<M: Model>(
     let tally = tally(file.file())?;
     let limits = ratio_limits(&plan);
     // Rows without a verdict count on neither side, as in share().
-    let judged = tally.points.saturating_sub(tally.undefined);
-    let share = 100.0 * tally.reliable as f64 / (judged as f64).max(1.0);
+    let points_with_verdict = tally.points.saturating_sub(tally.undefined);
+    let share = 100.0 * tally.reliable as f64 / (points_with_verdict as f64).max(1.0);
     let Tally { reliable, points, sensitive, undefined, over_estimated, .. } = &tally;
-    let range = limits.map_or_else(String::new, within);
-    let over = |limits: RatioLimits| {
-        let below = short(limits.over_estimate());
+    let range = limits.map_or_else(String::new, describe_range);
+    let describe_over_estimates = |limits: RatioLimits| {
+        let below = format_number(limits.over_estimate());
         format!(" At {over_estimated}, the linear model over-estimates: a ratio is below {below}.")
     };
-    let over = limits.filter(|_| *over_estimated > 0).map_or_else(String::new, over);
+    let over_estimate_note =
+        limits.filter(|_| *over_estimated > 0).map_or_else(String::new, describe_over_estimates);
     body += &format!(
-        "<p class=\"share\">{share:.1} %</p>\n<p>{reliable} of {judged} points with a verdict are \
+        "<p class=\"share\">{share:.1} %</p>\n<p>{reliable} of {points_with_verdict} points with a \
+         verdict are \
          reliable: every ratio of the nonlinear model to the linear one is {range}. Of all \
-         {points} points, {sensitive} are chaotic, and {undefined} have no verdict.{over}</p>\n"
+         {points} points, {sensitive} are chaotic, and {undefined} have no \
+         verdict.{over_estimate_note}</p>\n"
     );
-    let heads = ["", "worst", "limit", "at"];
-    body += &html_table("The worst of it", &heads, &worst(&file)?);
-    let mut held = true;
-    let mut claims = Vec::new();
+    let headings = ["", "worst", "limit", "at"];
+    body += &html_table("The worst of it", &headings, &worst_values(&file)?);
+    let mut all_hold = true;
+    let mut requirement_rows = Vec::new();
     for condition in &requirements {
         let checked = check(&file, condition, None, false, 1)?;
-        held &= checked.holds;
-        let folded: Vec<String> = checked.folded.iter().map(word).collect();
-        let broken = checked.failing + checked.undefined;
-        let found = match checked.by_row {
-            true => format!("{broken} of {} rows break it", checked.rows),
-            false => folded.join(", "),
+        all_hold &= checked.holds;
+        let aggregate_values: Vec<String> =
+            checked.aggregate_values.iter().map(format_cell).collect();
+        let violating_rows = checked.failing + checked.undefined;
+        let outcome = match checked.by_row {
+            true => format!("{violating_rows} of {} rows break it", checked.rows),
+            false => aggregate_values.join(", "),
         };
         let verdict = if checked.holds { "holds" } else { "FAILS" };
         if !checked.holds {
-            tell(&format!("FAILS  {}: {found}", checked.expression));
+            tell(&format!("FAILS  {}: {outcome}", checked.expression));
         }
-        claims.push(vec![checked.expression, found, verdict.to_owned()]);
+        requirement_rows.push(vec![checked.expression, outcome, verdict.to_owned()]);
     }
-    body += &html_table("What is required", &["", "found", ""], &claims);
+    body += &html_table("What is required", &["", "found", ""], &requirement_rows);
     body += &format!("<figure>{picture}</figure>\n");
     for path in &args.further {
-        let opened = ParquetFile::open(path)?;
+        let further_file = ParquetFile::open(path)?;
         let (picture, _) = describe_as_html(path, model)?;
-        let lines = further.listed(&opened)?;
+        let lines = model_summary.shortened_lines(&further_file)?;
         let lines: Vec<_> =
             lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();
-        let shown = path.file_stem().unwrap_or_default().to_string_lossy();
-        body += &html_table(&shown, &["", ""], &lines);
+        let file_stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        body += &html_table(&file_stem, &["", ""], &lines);
         body += &format!("<figure>{picture}</figure>\n");
     }
-    let run = GridInput::<M>::from_plan(name, &plan).load();
-    if let Ok(run) = &run {
-        let found: Vec<_> = resonances(run).into_iter().map(Vec::from).collect();
-        let heads = ["motion", "resonance", "damping ratio"];
-        let middle: Vec<_> =
-            run.axes.iter().map(|axis| Cell::Number(axis.values.between(0.5))).collect();
-        let title = format!("Resonances at {}", place(&file, &middle));
-        body += &html_table(title.trim_end_matches(" at "), &heads, &found);
+    let loaded_plan = GridInput::<M>::from_plan(name, &plan).load();
+    if let Ok(loaded_plan) = &loaded_plan {
+        let resonance_rows: Vec<_> = resonances(loaded_plan).into_iter().map(Vec::from).collect();
+        let headings = ["motion", "resonance", "damping ratio"];
+        let middle_values: Vec<_> =
+            loaded_plan.axes.iter().map(|axis| Cell::Number(axis.values.between(0.5))).collect();
+        let title = format!("Resonances at {}", format_axis_values(&file, &middle_values));
+        body += &html_table(title.trim_end_matches(" at "), &headings, &resonance_rows);
     }
-    body += &about;
+    body += &description;
     // A result does not have the sources of its numbers.
     body += "<p>Where each number is from: sweep parameters, with the grid file.</p>\n";
     let hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
@@ -139,7 +143,7 @@ pub fn run<M: Model>(
     body += &format!("<p>{path}</p><p>{hashes}</p></details>\n");
     page.finish(printable_page(&args.question, &body).as_bytes())?;
     tell(&format!("wrote {}", output.display()));
-    Ok(if held { Exit::Done } else { Exit::NotHeld })
+    Ok(if all_hold { Exit::Done } else { Exit::NotHeld })
 }
 
 /// Returns whether an argument looks like an expression and is not a file.
@@ -149,20 +153,20 @@ fn is_expression(path: &Path) -> bool {
 }
 
 /// Describes the range of reliable ratios.
-fn within(limits: RatioLimits) -> String {
-    let most = short(limits.upper);
+fn describe_range(limits: RatioLimits) -> String {
+    let upper = format_number(limits.upper);
     limits.lower.map_or_else(
-        || format!("below {most}"),
-        |least| format!("between {} and {most}", short(least)),
+        || format!("below {upper}"),
+        |lower| format!("between {} and {upper}", format_number(lower)),
     )
 }
 
-/// Returns the worst value, its limit and its point for every column that has a worse side. Columns
-/// of the linear model are left out, and columns of numbered elements, whose extremes other columns
-/// have.
-fn worst(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
+/// Returns the worst value, its limit and its point for every column that has a worse side, except
+/// the columns of the linear model, and those of numbered elements, whose extremes are in other
+/// columns.
+fn worst_values(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
     let axes = file.axes();
-    let mut found = Vec::new();
+    let mut table_rows = Vec::new();
     for column in &file.columns {
         let name = column.name.as_str();
         let is_numbered =
@@ -171,25 +175,25 @@ fn worst(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
         let Some(worse) = column.worse.filter(|_| is_shown) else { continue };
         let columns: Vec<&str> = [name].into_iter().chain(axes.iter().copied()).collect();
         let rows = top(file, &columns, None, Some((name, worse)), 1)?;
-        let Some([value, at @ ..]) = rows.first().map(Vec::as_slice) else { continue };
+        let Some([value, axis_cells @ ..]) = rows.first().map(Vec::as_slice) else { continue };
         let Cell::Number(number) = value else { continue };
-        let shown = |value: f64| with_unit(format_significant(value, 4), &column.unit);
-        found.push(vec![
+        let format_value = |value: f64| with_unit(format_significant(value, 4), &column.unit);
+        table_rows.push(vec![
             quantity_in_words(name),
-            shown(*number),
-            column.limit.map_or_else(String::new, shown),
-            place(file, at),
+            format_value(*number),
+            column.limit.map_or_else(String::new, format_value),
+            format_axis_values(file, axis_cells),
         ]);
     }
-    Ok(found)
+    Ok(table_rows)
 }
 
 /// Formats the values of the axes.
-fn place(file: &ResultTable, at: &[Cell]) -> String {
+fn format_axis_values(file: &ResultTable, axis_cells: &[Cell]) -> String {
     let unit_of = |name: &str| file.column(name).map_or("", |column| column.unit.as_str());
-    let axes = file.axes().into_iter().zip(at);
-    let values = axes.map(|(axis, at)| {
-        format!("{} {}", name_in_words(axis), with_unit(word(at), unit_of(axis)))
+    let axes = file.axes().into_iter().zip(axis_cells);
+    let values = axes.map(|(axis, cell)| {
+        format!("{} {}", name_in_words(axis), with_unit(format_cell(cell), unit_of(axis)))
     });
     values.collect::<Vec<_>>().join(", ")
 }

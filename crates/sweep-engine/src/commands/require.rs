@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use serde_json::json;
 
-use super::{conditions, table, word};
+use super::{conditions, format_cell, format_table};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, show};
 use sweep_plot::Share;
@@ -24,7 +24,7 @@ pub struct RequireArgs {
     expressions: Vec<String>,
     /// Check only the rows for which this expression is true
     #[arg(long = "where", value_name = "EXPRESSION")]
-    keep: Option<String>,
+    filter: Option<String>,
     /// Accept rows for which an expression is neither true nor false because a value is missing,
     /// and skip them in functions over all rows
     #[arg(long)]
@@ -65,28 +65,29 @@ pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
     refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
     let conditions = conditions::parse("EXPRESSION", &args.expressions, &file)?;
-    let keep = conditions::parse_filter(args.keep.as_ref(), &file)?;
-    let shown = usize::from(args.rows);
+    let filter = conditions::parse_filter(args.filter.as_ref(), &file)?;
+    let max_rows = usize::from(args.rows);
     let is_random = is_random(&file);
-    let checked = conditions
+    let gates = conditions
         .iter()
         .map(|condition| {
-            let whole = check(&file, condition, keep.as_ref(), args.allow_null, shown)?;
-            let parts = parts(&file, condition, keep.as_ref(), args.allow_null, whole.holds)?;
-            Ok(Gate { intervals: intervals(&whole, is_random), whole, parts })
+            let whole = check(&file, condition, filter.as_ref(), args.allow_null, max_rows)?;
+            let parts =
+                check_parts(&file, condition, filter.as_ref(), args.allow_null, whole.holds)?;
+            Ok(Gate { intervals: share_intervals(&whole, is_random), whole, parts })
         })
         .collect::<Result<Vec<Gate>, Error>>()?;
-    let holds = checked.iter().all(|gate| gate.whole.holds);
+    let holds = gates.iter().all(|gate| gate.whole.holds);
     if args.json {
-        let said = json!({
+        let json = json!({
             "file": args.file.display().to_string(),
-            "where": args.keep,
+            "where": args.filter,
             "holds": holds,
-            "expressions": checked,
+            "expressions": gates,
         });
-        show(&format!("{said:#}\n"))?;
+        show(&format!("{json:#}\n"))?;
     } else {
-        show(&checked.iter().map(|gate| format_gate(args, gate, is_random)).collect::<String>())?;
+        show(&gates.iter().map(|gate| format_gate(args, gate, is_random)).collect::<String>())?;
     }
     Ok(if holds { Exit::Done } else { Exit::NotHeld })
 }
@@ -112,7 +113,7 @@ fn is_random(file: &ResultTable) -> bool {
 }
 
 /// Computes Wilson's interval of every share.
-fn intervals(checked: &ConditionCheck, is_random: bool) -> Vec<Option<[f64; 2]>> {
+fn share_intervals(checked: &ConditionCheck, is_random: bool) -> Vec<Option<[f64; 2]>> {
     let interval = |(count, rows): (&Option<u64>, &u64)| {
         let share = Share::wilson((*count)?, *rows).filter(|_| is_random)?;
         Some([share.low, share.high])
@@ -121,10 +122,10 @@ fn intervals(checked: &ConditionCheck, is_random: bool) -> Vec<Option<[f64; 2]>>
 }
 
 /// Checks each part that an expression joins by `and`, if the expression fails.
-fn parts(
+fn check_parts(
     file: &ResultTable,
     condition: &Condition,
-    keep: Option<&Condition>,
+    filter: Option<&Condition>,
     allow_null: bool,
     holds: bool,
 ) -> Result<Vec<ConditionCheck>, Error> {
@@ -134,28 +135,28 @@ fn parts(
     }
     let texts: Vec<String> = texts.into_iter().map(str::to_owned).collect();
     let parts = conditions::parse("EXPRESSION", &texts, file)?;
-    let checked = parts.iter().map(|part| check(file, part, keep, allow_null, 0));
-    Ok(checked.collect::<Result<Vec<_>, _>>()?)
+    let checks = parts.iter().map(|part| check(file, part, filter, allow_null, 0));
+    Ok(checks.collect::<Result<Vec<_>, _>>()?)
 }
 
 /// Formats the result of an expression and of its parts.
 fn format_gate(args: &RequireArgs, gate: &Gate, is_random: bool) -> String {
     let mut text = format_checked(args, &gate.whole, &gate.intervals);
     for part in &gate.parts {
-        let own = format_checked(args, part, &intervals(part, is_random));
-        text.push_str(&format!("       {own}"));
+        let part_text = format_checked(args, part, &share_intervals(part, is_random));
+        text.push_str(&format!("       {part_text}"));
     }
     text
 }
 
 /// Formats a value with its confidence interval, if it has one.
-fn with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> String {
+fn format_with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> String {
     match interval {
         Some(Some([low, high])) => {
             let [low, high] = [low, high].map(|end| format!("{end:.3}"));
-            format!("{} (95 % confidence {low} to {high}, Wilson)", word(cell))
+            format!("{} (95 % confidence {low} to {high}, Wilson)", format_cell(cell))
         }
-        _ => word(cell),
+        _ => format_cell(cell),
     }
 }
 
@@ -163,7 +164,7 @@ fn with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> String {
 fn format_checked(
     args: &RequireArgs,
     checked: &ConditionCheck,
-    intervals: &[Option<[f64; 2]>],
+    share_intervals: &[Option<[f64; 2]>],
 ) -> String {
     let verdict = if checked.holds { "holds" } else { "FAILS" };
     let mut text = format!("{verdict}  {}", checked.expression);
@@ -183,17 +184,20 @@ fn format_checked(
         }
         (rows, false) => {
             let values = checked.aggregate_values.iter().enumerate();
-            let values = values.map(|(k, cell)| with_interval(cell, intervals.get(k)));
+            let values = values.map(|(k, cell)| format_with_interval(cell, share_intervals.get(k)));
             let values: Vec<String> = values.collect();
             let values = values.join(", ");
             match checked.aggregate_rows.iter().min() {
-                Some(&over) if over < rows => {
-                    let missing = rows - over;
-                    let say = match args.allow_null {
+                Some(&complete_rows) if complete_rows < rows => {
+                    let missing = rows - complete_rows;
+                    let null_note = match args.allow_null {
                         true => "left out",
                         false => "(`status` says why; --allow-null leaves them out)",
                     };
-                    writeln!(text, ": {values} over {over} of {rows} rows, {missing} null {say}")
+                    writeln!(
+                        text,
+                        ": {values} over {complete_rows} of {rows} rows, {missing} null {null_note}"
+                    )
                 }
                 _ => writeln!(text, ": {values} over {rows} rows"),
             }
@@ -201,15 +205,15 @@ fn format_checked(
     };
     let Some(first) = checked.offenders.first() else { return text };
     let headings: Vec<String> = first.cells.iter().map(|(name, _)| name.clone()).collect();
-    let cells = |offender: &sweep_results::ViolatingRow| {
-        offender.cells.iter().map(|(_, cell)| word(cell)).collect()
+    let cells = |violating_row: &sweep_results::ViolatingRow| {
+        violating_row.cells.iter().map(|(_, cell)| format_cell(cell)).collect()
     };
     let rows: Vec<Vec<String>> = checked.offenders.iter().map(cells).collect();
-    text.push_str(&table(&headings, &rows, "       "));
-    let all = checked.failing + if args.allow_null { 0 } else { checked.undefined };
-    let more = all - checked.offenders.len() as u64;
-    if more > 0 {
-        let _ = writeln!(text, "       and {more} more (--rows)");
+    text.push_str(&format_table(&headings, &rows, "       "));
+    let violation_count = checked.failing + if args.allow_null { 0 } else { checked.undefined };
+    let hidden_rows = violation_count - checked.offenders.len() as u64;
+    if hidden_rows > 0 {
+        let _ = writeln!(text, "       and {hidden_rows} more (--rows)");
     }
     text
 }

@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use super::{Lines as _, ResultArgs, short};
+use super::{Lines as _, ResultArgs, format_number};
 use crate::config::section::counted;
 use crate::progress::per_second;
-use crate::run::{self as runner, Ended, RunOptions, RunReport};
-use crate::store::read::{ColumnExtreme, NameCounts, failed, failures};
+use crate::run::{self as runner, RunEnd, RunOptions, RunReport};
+use crate::store::read::{ColumnExtreme, NameCounts, count_failed, failure_counts};
 use crate::store::{Session, ShardRequest, Tally};
 use crate::{
-    Design, EffortArgs, Engine, Error, Exit, Interrupt, Job, Model, Plan, duration, tell, threads,
+    Design, Engine, Error, ExecutionArgs, Exit, Interrupt, Job, Model, Plan, duration, tell,
+    threads,
 };
 use sweep_parameter::RatioLimits;
 use sweep_plot::Share;
@@ -31,7 +32,7 @@ pub struct RunArgs {
 pub struct WorkArgs {
     /// The threads and the progress.
     #[command(flatten)]
-    pub effort: EffortArgs,
+    pub execution: ExecutionArgs,
     /// Compute only one of N equal shards, which `sweep merge` joins; `auto/N` takes the number
     /// from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that
     /// array's task and count (--shard 1/1 computes the whole)
@@ -49,10 +50,10 @@ impl WorkArgs {
     /// Returns the options for the runner.
     fn options(&self) -> Result<RunOptions<'static>, Error> {
         Ok(RunOptions {
-            threads: threads::count(self.effort.threads, &threads::process)?,
+            threads: threads::count(self.execution.threads, &threads::process)?,
             fresh: self.fresh,
             shard: self.shard,
-            progress: self.effort.progress,
+            progress: self.execution.progress,
             environment: &threads::process,
             tell: &tell,
         })
@@ -66,7 +67,7 @@ impl WorkArgs {
 pub fn run<M: Model>(args: &RunArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let engine = M::engine(&plan, None)?;
-    let report = execute(args, &plan, &engine, &installed()?, "")?;
+    let report = execute(args, &plan, &engine, &install_interrupt()?, "")?;
     Ok(exit(&args.work, &report))
 }
 
@@ -74,7 +75,7 @@ pub fn run<M: Model>(args: &RunArgs) -> Result<Exit, Error> {
 ///
 /// # Errors
 /// Handlers that the system refuses.
-pub fn installed() -> Result<Interrupt, Error> {
+pub fn install_interrupt() -> Result<Interrupt, Error> {
     Interrupt::install().map_err(Error::signals)
 }
 
@@ -92,14 +93,14 @@ pub fn execute<M: Model>(
 ) -> Result<RunReport, Error> {
     let job = &Job::new(plan);
     let output = &args.target.output(plan);
-    let finished = |text: &mut String, tally: &Tally| {
-        text.push_str(&rows(tally, job));
+    let add_result_lines = |text: &mut String, tally: &Tally| {
+        text.push_str(&count_lines(tally, job));
         text.push_str(&failure_reasons(engine, tally, job));
         text.line("file", output.display());
         if matches!(plan.design, Some(Design::Spread { .. })) {
-            text.line("share", share(tally));
+            text.line("share", format_share(tally));
         }
-        text.next("plot", output);
+        text.suggest_command("plot", output);
         Ok(())
     };
     let run = RunCommand {
@@ -110,22 +111,22 @@ pub fn execute<M: Model>(
         work: &args.work,
         options: [options, ""],
     };
-    run.execute(engine, job, output, interrupt, &finished)
+    run.execute(engine, job, output, interrupt, &add_result_lines)
 }
 
 /// Returns the exit code of a run.
 pub fn exit(work: &WorkArgs, report: &RunReport) -> Exit {
-    let by_status = match &report.ended {
-        Ended::Interrupted { signal, .. } => return Exit::interrupted(Some(*signal)),
-        Ended::Already(_, tally) | Ended::Finished(tally) => &tally.by_status,
-        Ended::Shard(_, by_status) => by_status,
+    let by_status = match &report.end {
+        RunEnd::Interrupted { signal, .. } => return Exit::interrupted(Some(*signal)),
+        RunEnd::Already(_, tally) | RunEnd::Finished(tally) => &tally.by_status,
+        RunEnd::Shard(_, by_status) => by_status,
     };
-    done(work.fail_on_error, by_status)
+    exit_code_by_status(work.fail_on_error, by_status)
 }
 
 /// Returns the exit code of finished work, by the statuses of its rows.
-pub(super) fn done(fail_on_error: bool, by_status: &NameCounts) -> Exit {
-    let is_failure = fail_on_error && failed(by_status) > 0;
+pub(super) fn exit_code_by_status(fail_on_error: bool, by_status: &NameCounts) -> Exit {
+    let is_failure = fail_on_error && count_failed(by_status) > 0;
     if is_failure { Exit::PointsFailed } else { Exit::Done }
 }
 
@@ -148,7 +149,7 @@ pub struct RunCommand<'a> {
 
 /// A function that adds lines about a finished file to the summary: its content, its path, and the
 /// next command.
-type Finished<'a> = &'a dyn Fn(&mut String, &Tally) -> Result<(), Error>;
+type ResultLines<'a> = &'a dyn Fn(&mut String, &Tally) -> Result<(), Error>;
 
 impl RunCommand<'_> {
     /// Computes the rows and prints a summary.
@@ -161,45 +162,51 @@ impl RunCommand<'_> {
         job: &Job<'_>,
         output: &Path,
         interrupt: &Interrupt,
-        finished: Finished<'_>,
+        add_result_lines: ResultLines<'_>,
     ) -> Result<RunReport, Error> {
         let report = runner::run(engine, job, output, self.work.options()?, interrupt)?;
         report.notes.iter().for_each(|note| tell(note));
-        tell(self.summary(&report, finished)?.trim_end());
+        tell(self.summary(&report, add_result_lines)?.trim_end());
         Ok(report)
     }
 
     /// Returns the summary of the run, at most twelve lines.
-    fn summary(&self, report: &RunReport, finished: Finished<'_>) -> Result<String, Error> {
-        let Self { name, rows, target, options: [own, merge_options], .. } = self;
+    fn summary(
+        &self,
+        report: &RunReport,
+        add_result_lines: ResultLines<'_>,
+    ) -> Result<String, Error> {
+        let Self { name, rows, target, options: [run_options, merge_options], .. } = self;
         let session = report.session.as_ref();
-        let work = session.map(work).unwrap_or_default();
+        let work_text = session.map(describe_work).unwrap_or_default();
         let mut text;
-        match &report.ended {
-            Ended::Already(file, tally) => {
-                let there = format!("all {} {rows} are there already", file.points);
-                text = format!("{name}: {there} (--fresh computes them again)\n");
-                finished(&mut text, tally)?;
+        match &report.end {
+            RunEnd::Already(file, tally) => {
+                let computed_note = format!("all {} {rows} are there already", file.points);
+                text = format!("{name}: {computed_note} (--fresh computes them again)\n");
+                add_result_lines(&mut text, tally)?;
             }
-            Ended::Finished(tally) => {
-                text = format!("{name}: {work}\n");
-                finished(&mut text, tally)?;
+            RunEnd::Finished(tally) => {
+                text = format!("{name}: {work_text}\n");
+                add_result_lines(&mut text, tally)?;
             }
-            Ended::Shard(shard, by_status) => {
-                text = format!("{name}, shard {} of {}: {work}\n", shard.index, shard.count);
-                if let Some(failed) = failed_words(by_status) {
+            RunEnd::Shard(shard, by_status) => {
+                text = format!("{name}, shard {} of {}: {work_text}\n", shard.index, shard.count);
+                if let Some(failed) = describe_failures(by_status) {
                     text.line("failed", failed);
                 }
                 let merge = target.command("merge") + merge_options;
                 text.line("next", format!("{merge}, when all shards are done"));
             }
-            Ended::Interrupted { kept, points, .. } => {
-                let after = session.map(|it| format!(", after {}", duration(it.wall_s)));
-                let after = after.unwrap_or_default();
-                text = format!("{name}: interrupted with {kept} of {points} {rows} kept{after}\n");
+            RunEnd::Interrupted { kept, points, .. } => {
+                let wall_time =
+                    session.map(|session| format!(", after {}", duration(session.wall_s)));
+                let wall_time = wall_time.unwrap_or_default();
+                text =
+                    format!("{name}: interrupted with {kept} of {points} {rows} kept{wall_time}\n");
                 let shard = session.and_then(|session| session.shard.as_deref());
                 let shard = shard.map(|shard| format!(" --shard {shard}")).unwrap_or_default();
-                text.line("go on", format!("{}{own}{shard}", target.command(self.verb)));
+                text.line("go on", format!("{}{run_options}{shard}", target.command(self.verb)));
             }
         }
         Ok(text)
@@ -207,7 +214,7 @@ impl RunCommand<'_> {
 }
 
 /// Describes the work of this process.
-fn work(session: &Session) -> String {
+fn describe_work(session: &Session) -> String {
     let Session { simd, .. } = session;
     let wall = duration(session.wall_s);
     let rate = per_second(session.points_per_s);
@@ -217,8 +224,8 @@ fn work(session: &Session) -> String {
 }
 
 /// Formats the counts of a result in at most six lines: verdicts, failures, extremes.
-pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
-    counts(tally, job.limits, &|point| place(point, job))
+pub fn count_lines(tally: &Tally, job: &Job<'_>) -> String {
+    count_lines_at(tally, job.limits, &|point| format_axis_values(point, job))
 }
 
 /// Formats the reasons why the first points of each status failed, as far as the engine knows them.
@@ -226,25 +233,26 @@ pub fn failure_reasons(engine: &Engine<'_>, tally: &Tally, job: &Job<'_>) -> Str
     let mut text = String::new();
     for (status, point) in &tally.first_failed {
         if let Some(reason) = (engine.failure_reason)(*point) {
-            let place = place(*point * job.layout.rows_a_point, job);
-            let at = if place.is_empty() { place } else { format!(" at {place}") };
-            text.line("reason", format!("{status}{at}: {reason}"));
+            let axis_values = format_axis_values(*point * job.layout.tasks_per_point, job);
+            let location =
+                if axis_values.is_empty() { axis_values } else { format!(" at {axis_values}") };
+            text.line("reason", format!("{status}{location}: {reason}"));
         }
     }
     text
 }
 
 /// Formats the values of the axes at a point.
-fn place(point: u64, job: &Job<'_>) -> String {
+fn format_axis_values(point: u64, job: &Job<'_>) -> String {
     let values = (job.axis_values)(point);
-    let named = job.layout.axes.iter().zip(values);
-    let words = named.map(|(axis, value)| format!("{} {}", axis.name, short(value)));
+    let named_values = job.layout.axes.iter().zip(values);
+    let words = named_values.map(|(axis, value)| format!("{} {}", axis.name, format_number(value)));
     words.collect::<Vec<_>>().join(", ")
 }
 
 /// Formats the share of reliable points among those with a verdict, with its 95 % confidence
 /// interval for independent random points.
-fn share(tally: &Tally) -> String {
+fn format_share(tally: &Tally) -> String {
     match Share::wilson(tally.reliable, tally.reliable + tally.unreliable) {
         None => "no point has a verdict".to_owned(),
         Some(Share { fraction, low, high }) => {
@@ -257,15 +265,19 @@ fn share(tally: &Tally) -> String {
     }
 }
 
-/// Formats the counts of a result like [`rows`]. `at` returns the values of the axes at a point, in
-/// words.
-pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) -> String {
+/// Formats the counts of a result like [`count_lines`]. `axis_values` returns the values of the
+/// axes at a point, in words.
+pub fn count_lines_at(
+    tally: &Tally,
+    limits: RatioLimits,
+    axis_values: &dyn Fn(u64) -> String,
+) -> String {
     let mut text = String::new();
     let percent = |count: u64| 100.0 * count as f64 / tally.points.max(1) as f64;
-    let most = limits.upper;
+    let upper = limits.upper;
     let range = limits.lower.map_or_else(
-        || format!("below ratio {most}"),
-        |least| format!("with ratios from {least} to {most}"),
+        || format!("below ratio {upper}"),
+        |lower| format!("with ratios from {lower} to {upper}"),
     );
     let Tally { reliable, unreliable, undefined, over_estimated, sensitive, unconverged, .. } =
         tally;
@@ -274,13 +286,14 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
     text.line("reliable", format!("{reliable} ({share:.1} %) {range}, {others}"));
     if *over_estimated > 0 {
         let share = percent(*over_estimated);
-        let below = short(limits.over_estimate());
+        let below = format_number(limits.over_estimate());
         let rows = format!("in {over_estimated} ({share:.1} %)");
-        let which = format!("{rows}, {} of them reliable", tally.over_estimated_reliable);
-        let told = format!("{which}: the linear model over-estimates, a ratio is below {below}");
-        text.line("too high", told);
+        let row_counts = format!("{rows}, {} of them reliable", tally.over_estimated_reliable);
+        let description =
+            format!("{row_counts}: the linear model over-estimates, a ratio is below {below}");
+        text.line("too high", description);
     }
-    if let Some(failed) = failed_words(&tally.by_status) {
+    if let Some(failed) = describe_failures(&tally.by_status) {
         text.line("failed", failed);
     }
     if *sensitive > 0 {
@@ -290,31 +303,34 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         );
     }
     if *unconverged > 0 {
-        let told = format!("all but {unconverged}, whose error is above the accuracy or unknown");
-        text.line("converged", told);
+        let description =
+            format!("all but {unconverged}, whose error is above the accuracy or unknown");
+        text.line("converged", description);
     }
     if let Some(greatest) = &tally.greatest_error {
         let methods: Vec<String> =
             tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
         // Rows of failed models have an infinite error.
         let error = Some(greatest.value).filter(|error| error.is_finite());
-        let left = error.map(|error| format!("at most {error:.1e} left in a row; "));
-        let left = left.unwrap_or_default();
-        text.line("error", format!("{left}rows by method: {}", methods.join(", ")));
+        let error_note = error.map(|error| format!("at most {error:.1e} left in a row; "));
+        let error_note = error_note.unwrap_or_default();
+        text.line("error", format!("{error_note}rows by method: {}", methods.join(", ")));
     }
-    let place = |point: u64| match at(point) {
-        place if place.is_empty() => place,
-        place => format!(" at {place}"),
+    let location = |point: u64| match axis_values(point) {
+        values if values.is_empty() => values,
+        values => format!(" at {values}"),
     };
     if let Some(greatest) = &tally.greatest_ratio {
-        text.line("greatest", format!("ratio {:.3}{}", greatest.value, place(greatest.point)));
+        text.line("greatest", format!("ratio {:.3}{}", greatest.value, location(greatest.point)));
     }
-    for ColumnExtreme { column, worse, limit, beyond, worst } in &tally.extremes {
+    for ColumnExtreme { column, worse, limit, rows_beyond_limit: rows_beyond, worst } in
+        &tally.extremes
+    {
         let Some(worst) = worst else { continue };
-        let mut words = format!("{column} {}{}", short(worst.value), place(worst.point));
-        if let Some(limit) = limit.filter(|_| *beyond > 0) {
-            let rows = counted(*beyond as usize, "row");
-            words += &format!("; {rows} {} {}", worse.bad_side(), short(limit));
+        let mut words = format!("{column} {}{}", format_number(worst.value), location(worst.point));
+        if let Some(limit) = limit.filter(|_| *rows_beyond > 0) {
+            let rows = counted(*rows_beyond as usize, "row");
+            words += &format!("; {rows} {} {}", worse.bad_side(), format_number(limit));
         }
         text.line(worse.extreme(), words);
     }
@@ -322,8 +338,8 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
 }
 
 /// Returns the number of failed rows of each status, in words; `None` if there are none.
-pub(super) fn failed_words(by_status: &NameCounts) -> Option<String> {
-    let failed = failures(by_status).map(|(status, count)| format!("{count} {status}"));
+pub(super) fn describe_failures(by_status: &NameCounts) -> Option<String> {
+    let failed = failure_counts(by_status).map(|(status, count)| format!("{count} {status}"));
     let failed = failed.collect::<Vec<_>>().join(", ");
     (!failed.is_empty()).then_some(failed)
 }
@@ -339,30 +355,38 @@ mod tests {
         let greatest_error = Some(Extreme { value: f64::INFINITY, point: 0 });
         let by_method = [("capped_1".to_owned(), 1)].into();
         let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
-        let said = counts(&tally, 2.0.into(), &|_| String::new());
-        assert!(said.contains("error  rows by method: 1 capped_1"), "{said}");
+        let summary = count_lines_at(&tally, 2.0.into(), &|_| String::new());
+        assert!(summary.contains("error  rows by method: 1 capped_1"), "{summary}");
     }
 
     #[test]
     fn rows_beyond_the_limit_of_a_marked_column_are_counted() {
-        let said = |beyond| {
+        let summary = |rows_beyond_limit| {
             let worst = Some(Extreme { value: 2.5, point: 0 });
             let column = "speed_off".to_owned();
             let limit = Some(2.0);
-            let extreme = ColumnExtreme { column, worse: Worse::Greater, limit, beyond, worst };
+            let extreme =
+                ColumnExtreme { column, worse: Worse::Greater, limit, rows_beyond_limit, worst };
             let tally = Tally { extremes: vec![extreme], ..Tally::default() };
-            counts(&tally, 2.0.into(), &|_| String::new())
+            count_lines_at(&tally, 2.0.into(), &|_| String::new())
         };
-        assert!(said(0).contains("  greatest  speed_off 2.5\n"), "{}", said(0));
-        assert!(said(1).contains("  greatest  speed_off 2.5; 1 row above 2\n"), "{}", said(1));
-        assert!(said(2).contains("; 2 rows above 2\n"), "{}", said(2));
+        assert!(summary(0).contains("  greatest  speed_off 2.5\n"), "{}", summary(0));
+        assert!(
+            summary(1).contains("  greatest  speed_off 2.5; 1 row above 2\n"),
+            "{}",
+            summary(1)
+        );
+        assert!(summary(2).contains("; 2 rows above 2\n"), "{}", summary(2));
     }
 
     #[test]
     fn the_share_counts_only_points_with_a_verdict() {
         let tally = |reliable, unreliable| Tally { reliable, unreliable, ..Tally::default() };
-        let said = share(&tally(8, 2));
-        assert!(said.starts_with("80.0 % reliable, with 95 % confidence 49.0 to 94.3 %"), "{said}");
-        assert_eq!(share(&tally(0, 0)), "no point has a verdict");
+        let summary = format_share(&tally(8, 2));
+        assert!(
+            summary.starts_with("80.0 % reliable, with 95 % confidence 49.0 to 94.3 %"),
+            "{summary}"
+        );
+        assert_eq!(format_share(&tally(0, 0)), "no point has a verdict");
     }
 }

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::run::counts;
-use super::{Lines as _, clipped, conditions, short, span, table, word};
+use super::run::count_lines_at;
+use super::{
+    Lines as _, conditions, format_cell, format_number, format_range, format_table, shorten,
+};
 use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, overview, tally};
 use crate::store::{Holder, Unfinished, refuse_unfinished, unfinished};
 use crate::{Error, Exit, show};
@@ -14,12 +16,13 @@ use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, Condition, ResultTable, ratio_limits, top};
 
-/// The number of rows that are shown without `--top`.
+/// The number of rows that are shown without `--top`. Basis: they fit a terminal. Doubling it shows
+/// twice as many.
 const ROWS_SHOWN: u16 = 10;
 
-/// The maximum number of lines of one name that are shown. Basis: half a screen. Doubling it shows
-/// twice as many.
-const MOST_LISTED: usize = 12;
+/// The maximum number of lines of one name that are shown. Basis: half of the lines of a terminal.
+/// Doubling it shows twice as many.
+const MAX_LISTED: usize = 12;
 
 /// Arguments of `sweep show`.
 #[derive(Debug, clap::Args)]
@@ -43,13 +46,13 @@ pub struct ShowArgs {
     descending: bool,
     /// Show only rows for which this expression is true (expressions as in `sweep require`)
     #[arg(long = "where", value_name = "EXPRESSION")]
-    keep: Option<String>,
+    filter: Option<String>,
     /// Columns of the rows, separated by commas [default: the axes, the verdict, and the columns of
     /// the other options]
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     columns: Vec<String>,
     /// Show the unit and range of every column, not only of the metrics
-    #[arg(long, conflicts_with_all = ["top", "by", "keep", "columns", "json"])]
+    #[arg(long, conflicts_with_all = ["top", "by", "filter", "columns", "json"])]
     all: bool,
     /// Print the summary or the rows as JSON, with every column
     #[arg(long)]
@@ -57,31 +60,35 @@ pub struct ShowArgs {
 }
 
 /// The lines that a model adds to the summary of its files.
-pub struct Further<'a> {
+pub struct ModelSummary<'a> {
     /// The function that returns lines about a file other than a map, each with a name.
     pub lines: &'a dyn Fn(&ParquetFile) -> Result<Vec<(&'static str, String)>, Error>,
     /// The function that returns whether a column of a map is that of a metric, and is shown.
-    pub is_of_a_metric: fn(&str) -> bool,
+    pub is_metric_column: fn(&str) -> bool,
 }
 
-impl Further<'_> {
-    /// No lines and no metrics.
-    pub const NONE: Further<'static> =
-        Further { lines: &|_| Ok(Vec::new()), is_of_a_metric: |_| false };
+impl ModelSummary<'_> {
+    /// A summary without further lines and metrics.
+    pub const NONE: ModelSummary<'static> =
+        ModelSummary { lines: &|_| Ok(Vec::new()), is_metric_column: |_| false };
 
-    /// Returns the lines about a file, of lines of one name only the first.
+    /// Returns the lines about a file. Of lines with the same name only the first ones are
+    /// returned, with a count of the others.
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub fn listed(&self, file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
-        let mut listed = Vec::new();
-        for alike in (self.lines)(file)?.chunk_by(|a, b| a.0 == b.0) {
-            listed.extend(alike.iter().take(MOST_LISTED).cloned());
-            if alike.len() > MOST_LISTED {
-                listed.push(("", format!("and {} more", alike.len() - MOST_LISTED)));
+    pub fn shortened_lines(
+        &self,
+        file: &ParquetFile,
+    ) -> Result<Vec<(&'static str, String)>, Error> {
+        let mut lines = Vec::new();
+        for same_name_lines in (self.lines)(file)?.chunk_by(|a, b| a.0 == b.0) {
+            lines.extend(same_name_lines.iter().take(MAX_LISTED).cloned());
+            if same_name_lines.len() > MAX_LISTED {
+                lines.push(("", format!("and {} more", same_name_lines.len() - MAX_LISTED)));
             }
         }
-        Ok(listed)
+        Ok(lines)
     }
 }
 
@@ -91,84 +98,95 @@ impl Further<'_> {
 /// # Errors
 /// A file that cannot be read, or is not Parquet; a column that it does not have; rows of a result
 /// that is not finished.
-pub fn run(args: &ShowArgs, further: &Further<'_>) -> Result<Exit, Error> {
-    let asks_for_rows = args.top.is_some() || args.by.is_some() || args.keep.is_some();
-    if asks_for_rows || !args.columns.is_empty() {
+pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Error> {
+    let shows_rows = args.top.is_some() || args.by.is_some() || args.filter.is_some();
+    if shows_rows || !args.columns.is_empty() {
         refuse_unfinished(&args.file)?;
-        return rows(args);
+        return show_rows(args);
     }
-    if let Some(found) = unfinished(&args.file)? {
-        return show(&if args.json { format!("{:#}\n", json!(found)) } else { progress(&found) });
+    if let Some(unfinished_work) = unfinished(&args.file)? {
+        return show(&if args.json {
+            format!("{:#}\n", json!(unfinished_work))
+        } else {
+            progress(&unfinished_work)
+        });
     }
-    let opened = ParquetFile::open(&args.file)?;
-    let file = overview(&opened)?;
+    let parquet_file = ParquetFile::open(&args.file)?;
+    let overview = overview(&parquet_file)?;
     if args.json {
-        let mut said = to_json(args, &opened, &file)?;
-        said["lines"] = json!((further.lines)(&opened)?);
-        return show(&format!("{said:#}\n"));
+        let mut json = to_json(args, &parquet_file, &overview)?;
+        json["lines"] = json!((model_summary.lines)(&parquet_file)?);
+        return show(&format!("{json:#}\n"));
     }
     let mut text = String::new();
     text.line("file", args.file.display());
-    match &file.result {
+    match &overview.result {
         Some(result) => {
             provenance(&mut text, result);
-            if opened.is_copy() {
-                let writer = opened.created_by().unwrap_or("another program");
+            if parquet_file.is_copy() {
+                let writer = parquet_file.created_by().unwrap_or("another program");
                 text.line("checked", format!("no: a copy that {writer} wrote"));
-            } else if !opened.is_sealed() {
+            } else if !parquet_file.is_sealed() {
                 text.line("checked", "no: it carries no digest, as files of older builds do not");
             }
-            let tally = tally(&opened)?;
+            let tally = tally(&parquet_file)?;
             let limits = ratio_limits(&result.plan).unwrap_or(f64::NAN.into());
-            let places = extremes_at(&opened, result, &tally)?;
-            let at = |point| {
-                let place = places.iter().find(|(known, _)| *known == point);
-                place.map_or(String::new(), |(_, values)| {
-                    let said =
-                        values.iter().map(|(axis, value)| format!("{axis} {}", short(*value)));
-                    said.collect::<Vec<_>>().join(", ")
+            let locations = extreme_locations(&parquet_file, result, &tally)?;
+            let axis_values = |point| {
+                let location = locations.iter().find(|(extreme, _)| *extreme == point);
+                location.map_or(String::new(), |(_, values)| {
+                    let assignments = values
+                        .iter()
+                        .map(|(axis, value)| format!("{axis} {}", format_number(*value)));
+                    assignments.collect::<Vec<_>>().join(", ")
                 })
             };
-            text.push_str(&counts(&tally, limits, &at));
+            text.push_str(&count_lines_at(&tally, limits, &axis_values));
         }
         None => {
-            text.line("made by", opened.created_by().unwrap_or("unknown"));
-            for (name, words) in further.listed(&opened)? {
+            text.line("made by", parquet_file.created_by().unwrap_or("unknown"));
+            for (name, words) in model_summary.shortened_lines(&parquet_file)? {
                 text.line(name, &words);
             }
-            if let Some(traced) = opened.json(key::BOUNDARY) {
-                let quantity = traced["quantity"].as_str().unwrap_or("unknown");
-                let limit = traced["limit"].as_f64().map_or("unknown".to_owned(), short);
+            if let Some(boundary_settings) = parquet_file.json(key::BOUNDARY) {
+                let quantity = boundary_settings["quantity"].as_str().unwrap_or("unknown");
+                let limit =
+                    boundary_settings["limit"].as_f64().map_or("unknown".to_owned(), format_number);
                 text.line("boundary", format!("where {quantity} = {limit}"));
             }
         }
     }
-    columns(&mut text, &file, args.all || file.result.is_none(), further.is_of_a_metric);
+    add_columns(
+        &mut text,
+        &overview,
+        args.all || overview.result.is_none(),
+        model_summary.is_metric_column,
+    );
     show(&text)
 }
 
 /// Formats the progress of a run or a search that has no result yet.
-fn progress(found: &Unfinished) -> String {
+fn progress(unfinished_work: &Unfinished) -> String {
     let mut text = String::new();
-    text.line("file", found.output.display());
-    text.line("state", format!("unfinished: {}", found.progress()));
-    text.line("name", &found.name);
-    text.line("kept in", found.folder.display());
-    for Holder { pid, host, shard } in &found.running {
+    text.line("file", unfinished_work.output.display());
+    text.line("state", format!("unfinished: {}", unfinished_work.progress()));
+    text.line("name", &unfinished_work.name);
+    text.line("kept in", unfinished_work.folder.display());
+    for Holder { pid, host, shard } in &unfinished_work.running {
         let shard = shard.map_or(String::new(), |shard| format!(", shard {shard}"));
         text.line("running", format!("process {pid} on {host}{shard}"));
     }
-    if found.running.is_empty() {
+    if unfinished_work.running.is_empty() {
         text.line("next", "the command again that began it: it goes on from there");
     }
     text
 }
 
 /// Shows some rows of the file.
-fn rows(args: &ShowArgs) -> Result<Exit, Error> {
+fn show_rows(args: &ShowArgs) -> Result<Exit, Error> {
     let file = ResultTable::open(&args.file)?;
-    let keep = conditions::parse_filter(args.keep.as_ref(), &file)?;
-    let columns = shown_columns(args, &file, keep.as_ref());
+    let filter = conditions::parse_filter(args.filter.as_ref(), &file)?;
+    let columns = shown_columns(args, &file, filter.as_ref());
     let order = |by| match (args.ascending, args.descending) {
         (true, _) => Worse::Less,
         (_, true) => Worse::Greater,
@@ -177,38 +195,43 @@ fn rows(args: &ShowArgs) -> Result<Exit, Error> {
     let by = args.by.as_deref().map(|by| (by, order(by)));
     let count = usize::from(args.top.unwrap_or(ROWS_SHOWN));
     let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let rows = top(&file, &names, keep.as_ref(), by, count)?;
+    let rows = top(&file, &names, filter.as_ref(), by, count)?;
     if args.json {
         let object = |row: &Vec<Cell>| -> Value {
             columns.iter().zip(row).map(|(name, cell)| (name.as_str(), json!(cell))).collect()
         };
         return show(&format!("{:#}\n", rows.iter().map(object).collect::<Value>()));
     }
-    let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(word).collect()).collect();
+    let rows: Vec<Vec<String>> =
+        rows.iter().map(|row| row.iter().map(format_cell).collect()).collect();
     if rows.is_empty() {
         return show("no rows\n");
     }
-    show(&table(&columns, &rows, ""))
+    show(&format_table(&columns, &rows, ""))
 }
 
 /// Returns the columns of the rows to show: those of `--columns`, or else the axes, the verdict
 /// with its ratio, and the columns of `--by` and `--where`.
-fn shown_columns(args: &ShowArgs, file: &ResultTable, keep: Option<&Condition>) -> Vec<String> {
+fn shown_columns(args: &ShowArgs, file: &ResultTable, filter: Option<&Condition>) -> Vec<String> {
     if !args.columns.is_empty() {
         return args.columns.clone();
     }
-    let places = file.places();
-    let verdict = ["ratio_max", "ratio_max_channel", "reliable", "min_gap_nonlinear_m", "status"];
-    let asked = args.by.iter().map(String::as_str);
-    let filtered = keep.into_iter().flat_map(|keep| keep.columns.iter().map(String::as_str));
-    let own = verdict.into_iter().filter(|name| file.column(name).is_some());
+    let key_columns = file.places();
+    let verdict_names =
+        ["ratio_max", "ratio_max_channel", "reliable", "min_gap_nonlinear_m", "status"];
+    let order_columns = args.by.iter().map(String::as_str);
+    let filter_columns =
+        filter.into_iter().flat_map(|filter| filter.columns.iter().map(String::as_str));
+    let verdict_columns = verdict_names.into_iter().filter(|name| file.column(name).is_some());
     let mut columns: Vec<String> = Vec::new();
-    for name in places.into_iter().chain(own).chain(asked).chain(filtered) {
-        if !columns.iter().any(|known| known == name) {
+    for name in
+        key_columns.into_iter().chain(verdict_columns).chain(order_columns).chain(filter_columns)
+    {
+        if !columns.iter().any(|shown| shown == name) {
             columns.push(name.to_owned());
         }
     }
-    // Files without places or verdict show what they have, and so does JSON.
+    // Files without key columns or a verdict show all of their columns, and so does JSON.
     if columns.is_empty() || args.json {
         columns = file.columns.iter().map(|column| column.name.clone()).collect();
     }
@@ -229,7 +252,7 @@ fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Val
             "counts": (!column.names.is_empty()).then(counts),
         })
     };
-    let mut said = json!({
+    let mut json = json!({
         "file": args.file.display().to_string(),
         "rows": file.rows,
         "made_by": opened.created_by(),
@@ -240,40 +263,40 @@ fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Val
     });
     if let Some(result) = &file.result {
         let tally = tally(opened)?;
-        let places = extremes_at(opened, result, &tally)?;
+        let places = extreme_locations(opened, result, &tally)?;
         let places = places
             .into_iter()
             .map(|(point, values)| (point.to_string(), values.into_iter().collect::<Value>()));
-        said["version"] = json!(result.version);
-        said["numerics"] = json!(result.numerics);
-        said["plan_hash"] = json!(result.plan_hash);
-        said["summary"] = json!(tally);
-        said["points"] = places.collect();
+        json["version"] = json!(result.version);
+        json["numerics"] = json!(result.numerics);
+        json["plan_hash"] = json!(result.plan_hash);
+        json["summary"] = json!(tally);
+        json["points"] = places.collect();
     }
-    Ok(said)
+    Ok(json)
 }
 
 /// Reads the values of the axes at the points of the extremes.
-fn extremes_at(
+fn extreme_locations(
     file: &ParquetFile,
     result: &ResultFile,
     tally: &Tally,
 ) -> Result<Vec<(u64, Vec<(String, f64)>)>, Error> {
     let axes: Vec<&str> =
         axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
-    let worst = tally.extremes.iter().filter_map(|column| column.worst.as_ref());
-    let shown: Vec<u64> =
-        tally.greatest_ratio.iter().chain(worst).map(|extreme| extreme.point).collect();
-    let mut found = Vec::new();
+    let worst_of_columns = tally.extremes.iter().filter_map(|column| column.worst.as_ref());
+    let extreme_points: Vec<u64> =
+        tally.greatest_ratio.iter().chain(worst_of_columns).map(|extreme| extreme.point).collect();
+    let mut locations = Vec::new();
     file.each_row(&axes, |row| {
-        if shown.contains(&row.index()) {
+        if extreme_points.contains(&row.index()) {
             let values =
                 axes.iter().enumerate().map(|(k, axis)| ((*axis).to_owned(), row.value(k)));
-            found.push((row.index(), values.collect()));
+            locations.push((row.index(), values.collect()));
         }
         Ok::<(), Error>(())
     })?;
-    Ok(found)
+    Ok(locations)
 }
 
 fn provenance(text: &mut String, result: &ResultFile) {
@@ -281,45 +304,46 @@ fn provenance(text: &mut String, result: &ResultFile) {
     text.line("name", plan["name"].as_str().unwrap_or_default());
     let build = crate::build::words(&result.version, result.numerics);
     text.line("made by", format!("{build}, plan {}", &result.plan_hash));
-    let told =
+    let plan_sections =
         [("spin", "spin"), ("values", "parameters"), ("time", "time"), ("method", "integrator")];
-    for (name, key) in told.into_iter().filter(|(_, key)| !plan[*key].is_null()) {
-        text.line(name, brief(&plan[key]));
+    for (name, key) in plan_sections.into_iter().filter(|(_, key)| !plan[*key].is_null()) {
+        text.line(name, format_json_value(&plan[key]));
     }
     if let Some(criterion) = plan["reliability"]["criterion"].as_str() {
         text.line("criterion", criterion);
     }
     if let Some(design) = plan.get("design") {
-        text.line("design", brief(design));
+        text.line("design", format_json_value(design));
     }
     for axis in axes(plan) {
         let name = axis["parameter"].as_str().unwrap_or_default();
-        // The axes of a list are its columns, whose ranges stand below.
+        // The axes of a list are its columns, whose ranges are listed with the columns.
         let values = ["range", "values", "distribution"].iter().find_map(|key| axis.get(key));
-        let values = values.map(brief);
+        let values = values.map(format_json_value);
         let values = values.map_or(String::new(), |values| format!(": {values}"));
         text.line("axis", format!("{name}{values}"));
     }
     if let Some(set) = plan["set"].as_object() {
-        let told = set.iter().map(|(name, value)| format!("{name} = {}", brief(value)));
-        text.line("--set", told.collect::<Vec<_>>().join(", "));
+        let assignments =
+            set.iter().map(|(name, value)| format!("{name} = {}", format_json_value(value)));
+        text.line("--set", assignments.collect::<Vec<_>>().join(", "));
     }
 }
 
 /// Formats a JSON value on one line, without quotes and brackets.
-fn brief(value: &Value) -> String {
+fn format_json_value(value: &Value) -> String {
     let list = |parts: Vec<String>| parts.join(", ");
     match value {
-        Value::Object(map) => {
-            list(map.iter().map(|(key, value)| format!("{key} {}", brief(value))).collect())
-        }
+        Value::Object(map) => list(
+            map.iter().map(|(key, value)| format!("{key} {}", format_json_value(value))).collect(),
+        ),
         Value::Array(values) if values.len() > 12 => {
-            let first = list(values.iter().take(12).map(brief).collect());
+            let first = list(values.iter().take(12).map(format_json_value).collect());
             format!("{first}, ... ({} values)", values.len())
         }
-        Value::Array(values) => list(values.iter().map(brief).collect()),
+        Value::Array(values) => list(values.iter().map(format_json_value).collect()),
         Value::String(text) => text.clone(),
-        Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
+        Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), format_number),
         other => other.to_string(),
     }
 }
@@ -330,14 +354,14 @@ fn axes(plan: &Value) -> &[Value] {
 
 /// Adds lines about columns with their units and ranges: all columns, or those of metrics and the
 /// number of others.
-fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> bool) {
+fn add_columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> bool) {
     text.line("rows", file.rows);
     let shown: Vec<&ColumnRange> =
         file.columns.iter().filter(|column| all || is_shown(&column.name)).collect();
     let width = shown.iter().map(|column| column.name.len()).max().unwrap_or(0);
     for column in &shown {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "    {:width$}  {}", column.name, range(column));
+        let _ = writeln!(text, "    {:width$}  {}", column.name, describe_range(column));
     }
     let others = file.columns.len() - shown.len();
     if others > 0 {
@@ -345,15 +369,15 @@ fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> 
     }
 }
 
-fn range(column: &ColumnRange) -> String {
+fn describe_range(column: &ColumnRange) -> String {
     let mut parts = Vec::new();
     if let Some((least, greatest)) = column.range {
         let unit = column.unit.as_deref().filter(|unit| *unit != "1");
         let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
-        parts.push(span([least, greatest], short) + &unit);
+        parts.push(format_range([least, greatest], format_number) + &unit);
     }
     let names = column.names.iter();
-    parts.extend(names.map(|(name, count)| format!("{count} {}", clipped(name))));
+    parts.extend(names.map(|(name, count)| format!("{count} {}", shorten(name))));
     if column.nulls > 0 {
         parts.push(format!("{} null", column.nulls));
     }
@@ -367,9 +391,9 @@ mod tests {
     #[test]
     fn json_values_are_shown_without_quotes_and_brackets() {
         let spin = serde_json::json!({ "profile": "ramp", "peak": 350.0 });
-        assert_eq!(brief(&spin), "peak 350, profile ramp");
-        assert_eq!(brief(&serde_json::json!([1, 2.5])), "1, 2.5");
+        assert_eq!(format_json_value(&spin), "peak 350, profile ramp");
+        assert_eq!(format_json_value(&serde_json::json!([1, 2.5])), "1, 2.5");
         let long: Vec<u32> = (0..40).collect();
-        assert!(brief(&serde_json::json!(long)).ends_with("10, 11, ... (40 values)"));
+        assert!(format_json_value(&serde_json::json!(long)).ends_with("10, 11, ... (40 values)"));
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{Lines as _, ResultArgs};
-use crate::store::{FolderStatus, State, shard_list, status};
+use crate::store::{FolderStatus, RunStage, shard_list, status};
 use crate::{Error, Exit, Job, Model, Plan, show};
 
 /// Arguments of `sweep status`.
@@ -28,8 +28,8 @@ pub fn run<M: Model>(args: &StatusArgs) -> Result<Exit, Error> {
     show_job(args, &Job::new(&plan), &args.target.output(&plan), ["run", "", ""])
 }
 
-/// Shows the progress of a job. `again` has the command that continues it, further options of that
-/// command, and further options of `merge`.
+/// Shows the progress of a job. `continuation` has the command that continues the job, further
+/// options of that command, and further options of `merge`.
 ///
 /// # Errors
 /// The errors of [`run`].
@@ -37,60 +37,69 @@ pub fn show_job(
     args: &StatusArgs,
     job: &Job<'_>,
     output: &Path,
-    again: [&str; 3],
+    continuation: [&str; 3],
 ) -> Result<Exit, Error> {
-    let found = status(output, job)?;
-    show(&if args.json { format!("{:#}\n", json!(found)) } else { summary(args, &found, again) })
+    let folder_status = status(output, job)?;
+    show(&if args.json {
+        format!("{:#}\n", json!(folder_status))
+    } else {
+        summary(args, &folder_status, continuation)
+    })
 }
 
 fn summary(
     args: &StatusArgs,
-    found: &FolderStatus,
-    [verb, own, merge_options]: [&str; 3],
+    folder_status: &FolderStatus,
+    [verb, run_options, merge_options]: [&str; 3],
 ) -> String {
     let mut text = String::new();
-    let state = match found.state {
-        State::NotStarted => "not started",
-        State::Unfinished => "unfinished",
-        State::Complete => "complete, to be merged",
-        State::Finished => "finished",
+    let state = match folder_status.state {
+        RunStage::NotStarted => "not started",
+        RunStage::Unfinished => "unfinished",
+        RunStage::Complete => "complete, to be merged",
+        RunStage::Finished => "finished",
     };
     text.line("state", state);
-    text.line("file", found.output.display());
+    text.line("file", folder_status.output.display());
     text.line(
         "points",
-        format!("{} of {} done, {} failed", found.points_done, found.points, found.points_failed),
+        format!(
+            "{} of {} done, {} failed",
+            folder_status.points_done, folder_status.points, folder_status.points_failed
+        ),
     );
-    if found.state == State::Finished || found.state == State::NotStarted {
+    if folder_status.state == RunStage::Finished || folder_status.state == RunStage::NotStarted {
         return text;
     }
-    let damaged = match found.chunks_damaged.len() {
+    let damaged = match folder_status.chunks_damaged.len() {
         0 => String::new(),
         count => format!(" ({count} of them damaged)"),
     };
     let chunks = format!(
         "{} of {} done, {} missing{damaged}",
-        found.chunks_done, found.chunks, found.chunks_missing
+        folder_status.chunks_done, folder_status.chunks, folder_status.chunks_missing
     );
     text.line("chunks", &chunks);
-    for holder in &found.running {
+    for holder in &folder_status.running {
         let shard = holder.shard.map(|shard| format!(", shard {shard}")).unwrap_or_default();
         text.line("running", format!("process {} on {}{shard}", holder.pid, holder.host));
     }
-    if let Some(shards) = found.shards {
+    if let Some(shards) = folder_status.shards {
         text.line("shards", shards);
-        let missing = shard_list(found.missing_shard_numbers.iter().copied());
+        let missing = shard_list(folder_status.missing_shard_numbers.iter().copied());
         if !missing.is_empty() {
-            let run = format!("{}{own} --shard I/{shards}", args.target.command(verb));
+            let run = format!("{}{run_options} --shard I/{shards}", args.target.command(verb));
             text.line("again", format!("{run}, for I = {missing}"));
-            text.line("on Slurm", format!("sbatch --array={} ...", found.missing_shards));
+            text.line("on Slurm", format!("sbatch --array={} ...", folder_status.missing_shards));
         }
     }
-    let next = match found.state {
-        State::Complete => args.target.command("merge") + merge_options,
-        _ => args.target.command(verb) + own,
+    let next = match folder_status.state {
+        RunStage::Complete => args.target.command("merge") + merge_options,
+        _ => args.target.command(verb) + run_options,
     };
-    if found.running.is_empty() && (found.shards.is_none() || found.state == State::Complete) {
+    if folder_status.running.is_empty()
+        && (folder_status.shards.is_none() || folder_status.state == RunStage::Complete)
+    {
         text.line("next", &next);
     }
     text

@@ -46,7 +46,7 @@ pub struct Candidate {
     /// The position in the unit box.
     pub place: Vec<f64>,
     /// The objectives, then the constraint violations; `None` if one of them is missing.
-    pub answers: Option<Vec<f64>>,
+    pub responses: Option<Vec<f64>>,
     /// The generation, from 0.
     pub generation: u64,
 }
@@ -63,7 +63,7 @@ impl Evolution {
 impl Candidate {
     /// Returns whether the candidate has every number and violates no constraint.
     pub fn is_feasible(&self, objectives: usize) -> bool {
-        self.answers.as_ref().is_some_and(|all| all[objectives..].iter().all(|&one| one <= 0.0))
+        self.responses.as_ref().is_some_and(|all| all[objectives..].iter().all(|&one| one <= 0.0))
     }
 }
 
@@ -98,9 +98,9 @@ pub fn evolve<E>(
             mutant(&tried, &members, (k as usize, near), number, evolution)
         };
         let places: Vec<Vec<f64>> = (0..count).map(place).collect();
-        let answers = evaluate(&places)?;
-        let trials = places.into_iter().zip(answers);
-        tried.extend(trials.map(|(place, answers)| Candidate { place, answers, generation }));
+        let responses = evaluate(&places)?;
+        let trials = places.into_iter().zip(responses);
+        tried.extend(trials.map(|(place, responses)| Candidate { place, responses, generation }));
         if generation == 0 {
             members = (0..tried.len()).collect();
             continue;
@@ -177,12 +177,13 @@ struct Ranks<'a> {
 
 impl<'a> Ranks<'a> {
     fn new(tried: &'a [Candidate], objectives: usize) -> Self {
-        let excesses = || tried.iter().filter_map(|one| Some(&one.answers.as_ref()?[objectives..]));
+        let excesses =
+            || tried.iter().filter_map(|one| Some(&one.responses.as_ref()?[objectives..]));
         let conditions = excesses().next().map_or(0, <[f64]>::len);
         let greatest: Vec<f64> = (0..conditions)
             .map(|k| excesses().map(|all| all[k]).fold(f64::MIN_POSITIVE, f64::max))
             .collect();
-        let violation = |one: &Candidate| match &one.answers {
+        let violation = |one: &Candidate| match &one.responses {
             Some(all) => {
                 all[objectives..].iter().zip(&greatest).map(|(own, most)| own / most).sum()
             }
@@ -192,7 +193,7 @@ impl<'a> Ranks<'a> {
     }
 
     fn objectives(&self, candidate: usize) -> &[f64] {
-        self.tried[candidate].answers.as_ref().map_or(&[], |all| &all[..self.objectives])
+        self.tried[candidate].responses.as_ref().map_or(&[], |all| &all[..self.objectives])
     }
 
     /// Compares two candidates: `Less` if the first is better, `None` if neither dominates.
@@ -291,7 +292,7 @@ mod tests {
             (at[0] <= 0.9).then_some(number)
         });
         let best = &found[front(&found, 1)[0]];
-        let sum = best.answers.as_ref().unwrap()[0];
+        let sum = best.responses.as_ref().unwrap()[0];
         assert!(best.is_feasible(1) && (1.0..1.0005).contains(&sum), "{best:?}");
         assert_eq!(front(&found[..0], 1), [0; 0]);
     }
@@ -306,7 +307,7 @@ mod tests {
         });
         let mut roots: Vec<f64> = front(&found, 2)
             .iter()
-            .map(|&k| found[k].answers.as_ref().unwrap()[0].sqrt())
+            .map(|&k| found[k].responses.as_ref().unwrap()[0].sqrt())
             .collect();
         roots.sort_by(f64::total_cmp);
         assert!(roots.len() > 100 && roots[0] < 0.02 && roots[roots.len() - 1] > 1.98, "{roots:?}");

@@ -5,7 +5,7 @@ use sweep_results::Goal;
 
 use super::study::Objective;
 use super::{Candidate, Study, front};
-use crate::store::{DeclaredColumn, Holds, TrialColumns};
+use crate::store::{CellType, DeclaredColumn, TrialColumns};
 use crate::{Axis, GridInput, Model, Table};
 
 /// Returns the table of a study's candidates.
@@ -21,7 +21,7 @@ pub fn table<M: Model>(study: &Study<M>, tried: &[Candidate]) -> Table {
         table.parameter(parameter, column);
     }
     let answer = |k: usize, sign: f64| {
-        tried.iter().map(move |one| one.answers.as_ref().map(|answers| sign * answers[k]))
+        tried.iter().map(move |one| one.responses.as_ref().map(|responses| sign * responses[k]))
     };
     for (k, one) in study.objectives.iter().enumerate() {
         let unit = objective_unit(&one.goal);
@@ -51,19 +51,24 @@ pub fn table<M: Model>(study: &Study<M>, tried: &[Candidate]) -> Table {
 /// excesses over the conditions.
 pub fn trial_columns<M: Model>(study: &Study<M>) -> TrialColumns {
     let number =
-        DeclaredColumn::new("candidate", "1", "index, in the order of trial", Holds::Count);
+        DeclaredColumn::new("candidate", "1", "index, in the order of trial", CellType::Count);
     let mut keys = vec![number];
     keys.extend(parameters(study).iter().map(|Axis { parameter, .. }| {
-        DeclaredColumn::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
+        DeclaredColumn::new(&*parameter.name, parameter.unit, parameter.description, CellType::Axis)
     }));
-    let mut answers = Vec::with_capacity(study.answers());
+    let mut responses = Vec::with_capacity(study.responses());
     for Objective { name, goal, .. } in &study.objectives {
-        answers.push(DeclaredColumn::new(name, objective_unit(goal), goal.text(), Holds::Measured));
+        responses.push(DeclaredColumn::new(
+            name,
+            objective_unit(goal),
+            goal.text(),
+            CellType::Measured,
+        ));
     }
     for (k, goal) in study.conditions.iter().enumerate() {
-        answers.push(DeclaredColumn::new(excess_name(k), "1", goal.text(), Holds::Measured));
+        responses.push(DeclaredColumn::new(excess_name(k), "1", goal.text(), CellType::Measured));
     }
-    TrialColumns { keys, answers }
+    TrialColumns { keys, responses }
 }
 
 /// Returns the unit of an objective.
@@ -85,7 +90,7 @@ pub fn parameters<M: Model>(study: &Study<M>) -> &[Axis<M>] {
 /// share of its range over the front.
 fn best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize> {
     let value = |candidate: usize, k: usize| {
-        tried[candidate].answers.as_ref().map_or(f64::INFINITY, |answers| answers[k])
+        tried[candidate].responses.as_ref().map_or(f64::INFINITY, |responses| responses[k])
     };
     let extents: Vec<[f64; 2]> = (0..objectives)
         .map(|k| {

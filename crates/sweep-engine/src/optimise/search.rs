@@ -6,9 +6,9 @@ use arrow_array::RecordBatch;
 use arrow_schema::ArrowError;
 
 use super::{Candidate, Study, evolve};
-use crate::evaluator::{CachedEvaluator, RequestValues, Stopped};
-use crate::store::{Done, Layout, ResultRows, RowCells, TrialKey, Trials};
-use crate::{Effort, Error, Model, Progress, StoreError};
+use crate::evaluator::{CachedEvaluator, RequestValues, SearchStop};
+use crate::store::{Layout, PointRows, ResultRows, RowCells, TrialKey, Trials};
+use crate::{Error, Execution, Model, Progress, StoreError};
 use sweep_files::panics::{lock, unlocked};
 use sweep_results::{Goal, Slack};
 
@@ -20,14 +20,14 @@ use sweep_results::{Goal, Slack};
 pub fn search<M: Model>(
     study: &Study<M>,
     trials: Option<Trials>,
-    effort: Effort<'_>,
+    execution: Execution<'_>,
 ) -> Result<(Option<Vec<Candidate>>, Option<Trials>), Error> {
     let there = trials.as_ref().map_or(0, Trials::count) as u64;
-    let progress = Progress::new(effort.progress, study.evolution.candidates, there);
+    let progress = Progress::new(execution.progress, study.evolution.candidates, there);
     let shown = |candidates| progress.show(candidates);
-    let threads = effort.threads()?;
+    let threads = execution.threads()?;
     let engine = M::engine(&study.plan, None)?;
-    let evaluator = CachedEvaluator::new(engine, threads, effort.interrupt, trials, &shown)?;
+    let evaluator = CachedEvaluator::new(engine, threads, execution.interrupt, trials, &shown)?;
     let layout = M::layout(&study.plan);
     let mut count = 0;
     let found = evolve(&study.evolution, &mut |places| {
@@ -48,7 +48,7 @@ pub fn search<M: Model>(
         Ok(found.into_iter().map(minimised).collect())
     });
     progress.finish();
-    Ok((Stopped::interrupted_to_none(found)?, evaluator.into_cache()))
+    Ok((SearchStop::interrupted_to_none(found)?, evaluator.into_cache()))
 }
 
 /// Computes the slack of each condition for the rows of a candidate; `None` after an interrupt.
@@ -58,15 +58,15 @@ pub fn search<M: Model>(
 pub fn slacks<M: Model>(
     study: &Study<M>,
     values: &[f64],
-    effort: Effort<'_>,
+    execution: Execution<'_>,
 ) -> Result<Option<Vec<Option<Slack>>>, Error> {
-    let threads = effort.threads()?;
+    let threads = execution.threads()?;
     let engine = M::engine(&study.plan, None)?;
     let silent = |_: u64| {};
-    let evaluator = CachedEvaluator::new(engine, threads, effort.interrupt, None, &silent)?;
+    let evaluator = CachedEvaluator::new(engine, threads, execution.interrupt, None, &silent)?;
     let layout = M::layout(&study.plan);
     let found = Mutex::new(Vec::new());
-    let answer = |_: usize, points: Vec<Done>| -> Result<RequestValues, StoreError> {
+    let answer = |_: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
         let batch = batch(study, &layout, values, points)?;
         let slacks = study.conditions.iter().map(|goal| goal.slack(&batch));
         *lock(&found) = slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(defect)?;
@@ -75,7 +75,7 @@ pub fn slacks<M: Model>(
     let keys = [key(0, values)];
     let evaluated =
         evaluator.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &answer);
-    Ok(Stopped::interrupted_to_none(evaluated)?.map(|_| unlocked(found)))
+    Ok(SearchStop::interrupted_to_none(evaluated)?.map(|_| unlocked(found)))
 }
 
 /// Returns the error of rows that do not fit their own columns, which is a defect of the program.
@@ -88,7 +88,7 @@ fn answer<M: Model>(
     study: &Study<M>,
     layout: &Layout,
     values: &[f64],
-    points: Vec<Done>,
+    points: Vec<PointRows>,
 ) -> Result<RequestValues, StoreError> {
     let batch = batch(study, layout, values, points)?;
     let objectives = study.objectives.iter().map(|one| &one.goal);
@@ -104,10 +104,10 @@ fn batch<M: Model>(
     study: &Study<M>,
     layout: &Layout,
     values: &[f64],
-    points: Vec<Done>,
+    points: Vec<PointRows>,
 ) -> Result<RecordBatch, StoreError> {
     let mut rows = ResultRows::new(layout);
-    let keyed_rows = |done: Done| {
+    let keyed_rows = |done: PointRows| {
         let row = done.point % study.rows();
         done.rows.into_iter().map(move |cells: RowCells| (row, cells))
     };

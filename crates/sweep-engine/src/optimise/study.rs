@@ -146,7 +146,7 @@ impl<M: Model> Study<M> {
     }
 
     /// Returns the number of numbers of a candidate: objectives and constraint violations.
-    pub fn answers(&self) -> usize {
+    pub fn responses(&self) -> usize {
         self.objectives.len() + self.conditions.len()
     }
 

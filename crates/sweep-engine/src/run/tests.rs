@@ -32,7 +32,7 @@ impl<F: Fn(u64) + Sync> Evaluator for &FormulaEngine<F> {
                     return;
                 }
                 self.evaluated.fetch_add(1, Ordering::Relaxed);
-                sink(synthetic::done(point));
+                sink(synthetic::point_rows(point));
             }
         });
     }
@@ -75,7 +75,7 @@ fn whole_run(points: u64, threads: usize) -> Vec<u8> {
         &Interrupt::new(),
     )
     .unwrap();
-    assert!(matches!(report.ended, Ended::Finished(_)), "{report:?}");
+    assert!(matches!(report.end, RunEnd::Finished(_)), "{report:?}");
     assert_eq!(report.session.unwrap().points, points);
     fs::read(output(&home)).unwrap()
 }
@@ -119,7 +119,7 @@ fn results_do_not_depend_on_the_number_of_shards() {
             )
             .unwrap();
             assert!(
-                matches!(report.ended, Ended::Shard(done, _) if done.index == index),
+                matches!(report.end, RunEnd::Shard(done, _) if done.index == index),
                 "{report:?}"
             );
         }
@@ -145,7 +145,7 @@ fn a_run_interrupted_at_any_point_is_resumed_to_the_same_bytes() {
             }
         });
         let report = run(&stopping, &job, &output(&home), options(1), &interrupt).unwrap();
-        let Ended::Interrupted { signal: 15, kept, points: POINTS } = report.ended else {
+        let RunEnd::Interrupted { signal: 15, kept, points: POINTS } = report.end else {
             panic!("{report:?}")
         };
         let evaluated = stopping.evaluated.into_inner();
@@ -165,7 +165,7 @@ fn a_finished_run_is_not_repeated() {
     run(&FormulaEngine::new(|_| {}), &job, &output(&home), options(2), &Interrupt::new()).unwrap();
     let again = FormulaEngine::new(|_| {});
     let report = run(&again, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    assert!(matches!(report.ended, Ended::Already(..)), "{report:?}");
+    assert!(matches!(report.end, RunEnd::Already(..)), "{report:?}");
     assert_eq!(again.evaluated.into_inner(), 0);
 }
 

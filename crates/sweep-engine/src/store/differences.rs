@@ -13,36 +13,52 @@ pub struct PlanDifference {
     /// The JSON pointer to the value in the plan.
     pub pointer: String,
     /// The value in the older plan; `None` if it has none.
-    pub was: Option<String>,
+    pub older: Option<String>,
     /// The value in the present plan; `None` if it has none.
-    pub is: Option<String>,
+    pub present: Option<String>,
 }
 
 impl fmt::Display for PlanDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let side = |value: &Option<String>| value.clone().unwrap_or_else(|| "absent".into());
-        write!(f, "{}: was {}, is {}", self.pointer, side(&self.was), side(&self.is))
+        let value_or_absent =
+            |value: &Option<String>| value.clone().unwrap_or_else(|| "absent".into());
+        write!(
+            f,
+            "{}: was {}, is {}",
+            self.pointer,
+            value_or_absent(&self.older),
+            value_or_absent(&self.present)
+        )
     }
 }
 
 /// Returns every leaf at which two JSON values differ.
-pub(super) fn differences(was: &Value, is: &Value) -> Vec<PlanDifference> {
-    let mut found = Vec::new();
-    leaves([Some(was), Some(is)], |_, _| true, &mut Vec::new(), &mut |path, [was, is]| {
-        if was != is {
-            let step = |step: &Step<'_>| match step {
-                Step::Name(name) => format!("/{}", name.replace('~', "~0").replace('/', "~1")),
-                Step::Place(place) => format!("/{place}"),
-            };
-            let pointer = path.iter().map(step).collect();
-            found.push(PlanDifference { pointer, was: was.map(brief), is: is.map(brief) });
-        }
-    });
-    found
+pub(super) fn differences(older: &Value, present: &Value) -> Vec<PlanDifference> {
+    let mut found_differences = Vec::new();
+    leaves(
+        [Some(older), Some(present)],
+        |_, _| true,
+        &mut Vec::new(),
+        &mut |path, [older, present]| {
+            if older != present {
+                let pointer_step = |step: &Step<'_>| match step {
+                    Step::Name(name) => format!("/{}", name.replace('~', "~0").replace('/', "~1")),
+                    Step::Place(place) => format!("/{place}"),
+                };
+                let pointer = path.iter().map(pointer_step).collect();
+                found_differences.push(PlanDifference {
+                    pointer,
+                    older: older.map(format_value),
+                    present: present.map(format_value),
+                });
+            }
+        },
+    );
+    found_differences
 }
 
-/// Returns a value on one line, cut if it is long.
-fn brief(value: &Value) -> String {
+/// Formats a value on one line, and shortens it if it is long.
+fn format_value(value: &Value) -> String {
     cut(&value.to_string(), 60)
 }
 
@@ -54,9 +70,11 @@ mod tests {
 
     #[test]
     fn differences_name_every_leaf_by_pointer() {
-        let was = json!({ "axes": [{ "count": 39 }, { "count": 33 }], "gone": 1, "a/b": [1, 2] });
-        let is = json!({ "axes": [{ "count": 40 }, { "count": 33 }], "new": true, "a/b": [1] });
-        let lines: Vec<String> = differences(&was, &is).iter().map(ToString::to_string).collect();
+        let older = json!({ "axes": [{ "count": 39 }, { "count": 33 }], "gone": 1, "a/b": [1, 2] });
+        let present =
+            json!({ "axes": [{ "count": 40 }, { "count": 33 }], "new": true, "a/b": [1] });
+        let lines: Vec<String> =
+            differences(&older, &present).iter().map(ToString::to_string).collect();
         assert_eq!(
             lines,
             [
@@ -66,13 +84,13 @@ mod tests {
                 "/new: was absent, is true",
             ]
         );
-        assert!(differences(&was, &was).is_empty());
+        assert!(differences(&older, &older).is_empty());
     }
 
     #[test]
     fn long_values_are_cut_on_a_character() {
-        let was = json!({ "name": "ä".repeat(100) });
-        let shown = differences(&was, &json!({}))[0].was.clone().unwrap();
-        assert!(shown.ends_with("...") && shown.chars().count() == 63, "{shown}");
+        let older = json!({ "name": "ä".repeat(100) });
+        let formatted = differences(&older, &json!({}))[0].older.clone().unwrap();
+        assert!(formatted.ends_with("...") && formatted.chars().count() == 63, "{formatted}");
     }
 }

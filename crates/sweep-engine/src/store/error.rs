@@ -15,7 +15,7 @@ pub enum StoreError {
     File(#[from] FileError),
     /// Another process has locked this output.
     #[error("{} is in use by {}\n  = help: wait for it to end, or give another \
-             --out", output.display(), holder_names(holders))]
+             --out", output.display(), describe_holders(holders))]
     Busy {
         /// The output.
         output: PathBuf,
@@ -28,7 +28,7 @@ pub enum StoreError {
          and build, give another --out, or start over with --fresh (which deletes that folder's \
          finished chunks)",
         folder.display(),
-        listed(differences)
+        list_differences(differences)
     )]
     PlanDiffers {
         /// The run folder.
@@ -41,7 +41,7 @@ pub enum StoreError {
         "{} already holds the result of another plan or build:\n{}  = help: give another --out, or \
          replace it with --fresh",
         output.display(),
-        listed(differences)
+        list_differences(differences)
     )]
     OutputDiffers {
         /// The result.
@@ -54,7 +54,7 @@ pub enum StoreError {
     Refused(String),
     /// Chunks are missing, so that the result cannot be written.
     #[error("{} is incomplete: {missing} of {chunks} chunks are missing{}\n  = help: \
-         {}", folder.display(), shard_words(missing_shards), how_to_complete(missing_shards))]
+         {}", folder.display(), describe_shards(missing_shards), completion_advice(missing_shards))]
     Incomplete {
         /// The run folder.
         folder: PathBuf,
@@ -131,8 +131,8 @@ pub struct Holder {
 impl StoreError {
     /// Returns a function that turns an I/O error at a file into an error of the store.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
-        let failed = FileError::io(action, path);
-        move |source| Self::File(failed(source))
+        let to_file_error = FileError::io(action, path);
+        move |source| Self::File(to_file_error(source))
     }
 
     /// Returns a function that turns an error of the Parquet library into an error of the store. An
@@ -171,42 +171,44 @@ impl StoreError {
     }
 }
 
-fn how_to_complete(missing_shards: &Option<String>) -> &'static str {
+fn completion_advice(missing_shards: &Option<String>) -> &'static str {
     match missing_shards {
         Some(_) => "run those shards again, or run the same command as `sweep run` without --shard",
         None => "run `sweep run` with the same grid: it computes what is missing",
     }
 }
 
-fn shard_words(missing: &Option<String>) -> String {
+fn describe_shards(missing: &Option<String>) -> String {
     missing.as_ref().map_or(String::new(), |list| format!(", of shards {list}"))
 }
 
-fn holder_names(holders: &[Holder]) -> String {
-    /// The number of processes that are named. Basis: a message of one line.
-    const SHOWN: usize = 4;
+fn describe_holders(holders: &[Holder]) -> String {
+    /// The number of processes that are named. Basis: a message of one line. Doubling it names
+    /// twice as many.
+    const MAX_NAMED: usize = 4;
     let name = |Holder { pid, host, shard }: &Holder| {
         let shard = shard.map_or(String::new(), |shard| format!(" (shard {shard})"));
         format!("process {pid} on {host}{shard}")
     };
-    let first: Vec<String> = holders.iter().take(SHOWN).map(name).collect();
+    let names: Vec<String> = holders.iter().take(MAX_NAMED).map(name).collect();
     match holders.len() {
         0 => "another run".to_owned(),
-        1..=SHOWN => first.join(", "),
-        all => format!("{} and {} more", first.join(", "), all - SHOWN),
+        1..=MAX_NAMED => names.join(", "),
+        all => format!("{} and {} more", names.join(", "), all - MAX_NAMED),
     }
 }
 
 /// Returns differences, one per line.
-fn listed(differences: &[PlanDifference]) -> String {
-    /// The number of differences that are shown. Basis: half a screen.
-    const SHOWN: usize = 12;
-    let shown = differences.iter().take(SHOWN);
+fn list_differences(differences: &[PlanDifference]) -> String {
+    /// The number of differences that are shown. Basis: half of the lines of a terminal. Doubling
+    /// it shows twice as many.
+    const MAX_LISTED: usize = 12;
+    let shown = differences.iter().take(MAX_LISTED);
     let mut text: String = shown.map(|difference| format!("  {difference}\n")).collect();
-    if differences.len() > SHOWN {
-        let more = differences.len() - SHOWN;
-        let plural = if more == 1 { "" } else { "s" };
-        text += &format!("  and {more} more difference{plural}\n");
+    if differences.len() > MAX_LISTED {
+        let hidden_count = differences.len() - MAX_LISTED;
+        let plural = if hidden_count == 1 { "" } else { "s" };
+        text += &format!("  and {hidden_count} more difference{plural}\n");
     }
     text
 }

@@ -20,11 +20,12 @@ use sweep_files::{FileError, atomic, regular};
 /// Doubling it accepts longer names.
 const MAX_LOCK_BYTES: u64 = 300;
 
-/// The number of attempts to lock a file before it counts as locked. Basis: `sweep status` locks it
-/// for less than a millisecond. Doubling it doubles the time after which a run is refused.
-const ATTEMPTS: u32 = 5;
-/// The time between two attempts. Basis: 0.2 s in all. Doubling it doubles that time.
-const PAUSE: Duration = Duration::from_millis(40);
+/// The number of attempts to lock a file before it counts as locked by another process. Basis:
+/// `sweep status` holds the lock for less than a millisecond. Doubling it doubles the time after
+/// which a run is refused.
+const MAX_ATTEMPTS: u32 = 5;
+/// The time between two attempts. Basis: five attempts take 0.2 s. Doubling it doubles that time.
+const ATTEMPT_INTERVAL: Duration = Duration::from_millis(40);
 
 /// A held lock. It is released when the value is dropped or the process ends.
 #[derive(Debug)]
@@ -43,23 +44,27 @@ impl Lock {
     /// Creates the folder if it does not exist, and locks it: for the whole run, or for one shard.
     pub fn acquire(folder: &Folder, shard: Option<u64>) -> Result<Self, StoreError> {
         let path = folder.file(LOCK);
-        for attempt in 0..ATTEMPTS {
+        for attempt in 0..MAX_ATTEMPTS {
             if attempt > 0 {
-                std::thread::sleep(PAUSE);
+                std::thread::sleep(ATTEMPT_INTERVAL);
             }
             fs::create_dir_all(&folder.path)
                 .map_err(StoreError::io("make the folder", &folder.path))?;
             let mut file = match regular::open_or_create(&path) {
                 Ok(file) => file,
-                // A run that just finished has removed the folder since the line above created it.
-                Err(error) if error.kind() == io::ErrorKind::NotFound && attempt + 1 < ATTEMPTS => {
+                // A run that has just finished may have removed the folder after the line above
+                // created it.
+                Err(error)
+                    if error.kind() == io::ErrorKind::NotFound && attempt + 1 < MAX_ATTEMPTS =>
+                {
                     continue;
                 }
                 Err(error) => return Err(StoreError::io("open the lock", &path)(error)),
             };
             refuse_foreign(&mut file, &path)?;
-            let locked = if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
-            match locked {
+            let lock_result =
+                if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
+            match lock_result {
                 Ok(()) if !atomic::is_named(&file, &path) => continue,
                 Ok(()) => {
                     let shard = match shard {
@@ -165,7 +170,7 @@ fn write_holder(file: &mut File, path: &Path) -> Result<(), StoreError> {
         .map_err(StoreError::io("write the process id to", path))
 }
 
-/// Returns whether an error says that the file system has no locks, as some of clusters.
+/// Returns whether an error says that the file system has no locks, as on some clusters.
 fn is_unsupported(error: &io::Error) -> bool {
     /// The number of the error "no locks available" on Linux.
     const ENOLCK: i32 = 37;
@@ -231,11 +236,14 @@ mod tests {
         let shards: Vec<Lock> =
             [1, 2, 2].iter().map(|&shard| Lock::acquire(&folder, Some(shard)).unwrap()).collect();
         let holders = busy_holders(Lock::acquire(&folder, None));
-        assert_eq!(holders.iter().map(|h| h.shard).collect::<Vec<_>>(), [Some(1), Some(2)]);
+        assert_eq!(
+            holders.iter().map(|holder| holder.shard).collect::<Vec<_>>(),
+            [Some(1), Some(2)]
+        );
         drop(shards);
-        let whole = Lock::acquire(&folder, None).unwrap();
+        let run_lock = Lock::acquire(&folder, None).unwrap();
         busy_holders(Lock::acquire(&folder, Some(1)));
-        drop(whole);
+        drop(run_lock);
         assert!(super::holders(&folder).is_empty());
     }
 
@@ -245,20 +253,20 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         fs::create_dir_all(&folder.path).unwrap();
-        let mine = home.path().join("thesis.tex");
-        fs::write(&mine, "my thesis").unwrap();
+        let foreign_file = home.path().join("thesis.tex");
+        fs::write(&foreign_file, "my thesis").unwrap();
         for (name, shard) in [(folder.file(LOCK), None), (folder.file("shard-3.lock"), Some(3))] {
-            std::os::unix::fs::symlink(&mine, &name).unwrap();
+            std::os::unix::fs::symlink(&foreign_file, &name).unwrap();
             let error = Lock::acquire(&folder, shard).unwrap_err().to_string();
             assert!(error.contains("it is a symbolic link"), "{error}");
             fs::remove_file(&name).unwrap();
-            fs::hard_link(&mine, &name).unwrap();
+            fs::hard_link(&foreign_file, &name).unwrap();
             let error = Lock::acquire(&folder, shard).unwrap_err();
             assert!(error.to_string().contains("is no lock of `sweep run`"), "{error}");
             assert!(error.is_refusal());
             fs::remove_file(&name).unwrap();
         }
-        assert_eq!(fs::read_to_string(&mine).unwrap(), "my thesis");
+        assert_eq!(fs::read_to_string(&foreign_file).unwrap(), "my thesis");
         for text in [" my thesis", "2026 pages", "2026", "12 a\nnotes\n", "12 a\n\n"] {
             fs::write(folder.file(LOCK), text).unwrap();
             let error = Lock::acquire(&folder, None).unwrap_err();
@@ -274,10 +282,10 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         let first = Lock::acquire(&folder, None).unwrap();
-        let stale = regular::open_or_create(&folder.file(LOCK)).unwrap();
+        let deleted_file = regular::open_or_create(&folder.file(LOCK)).unwrap();
         first.delete().unwrap();
-        stale.try_lock().unwrap();
-        assert!(!atomic::is_named(&stale, &folder.file(LOCK)));
+        deleted_file.try_lock().unwrap();
+        assert!(!atomic::is_named(&deleted_file, &folder.file(LOCK)));
         Lock::acquire(&folder, None).unwrap();
     }
 }

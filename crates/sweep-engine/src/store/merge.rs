@@ -30,9 +30,9 @@ impl<'a> MapWriter<'a> {
     fn begin(job: &Job<'_>, file: NamedTempFile, output: &'a Path) -> Result<Self, StoreError> {
         let schema = job.layout.schema();
         let properties = schema::properties(job);
-        let handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
-        let begin = || Writer::new(BufWriter::new(handle), &schema, properties);
-        let writer = write_to(output, begin)?;
+        let file_handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
+        let create_writer = || Writer::new(BufWriter::new(file_handle), &schema, properties);
+        let writer = write_to(output, create_writer)?;
         Ok(Self { output, schema, file, writer })
     }
 
@@ -115,13 +115,13 @@ impl OpenRun {
             }
             let Some(batches) = self.read_whole(chunk, |part| part.result_batches())? else {
                 self.rescan()?;
-                return Err(self.incomplete()?);
+                return Err(self.incomplete_error()?);
             };
             batches.iter().try_for_each(|batch| writer.write_part(batch))?;
         }
         let file = writer.finish()?;
-        // The file is read before it is moved to the output, because an unreadable one must not
-        // replace a file.
+        // The file is read before it is moved to the output, because an unreadable file must not
+        // replace another one.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
         files::judge(&output, job.layout.kind)?;
         atomic::publish(file, &output)?;

@@ -16,11 +16,11 @@ use super::differences::PlanDifference;
 use super::lock::Lock;
 use super::own;
 use super::part::{Damage, PartError};
-use super::plan_file::{FoundPlan, PlanFile, pretty, set_aside};
+use super::plan_file::{PlanFile, StoredPlan, pretty, rename_damaged};
 use super::point_parts::{PointPart, PointParts};
 use super::provenance::Session;
 use super::read::{self, NameCounts, ResultFile, Tally};
-use super::schema::Done;
+use super::schema::PointRows;
 use super::shard::{self, Shard, ShardLayout, ShardRequest};
 use super::{Folder, Job, PLAN, part_index, part_name};
 use crate::{Environment, StoreError};
@@ -41,7 +41,7 @@ pub struct OpenOptions<'a> {
 
 /// The outcome of opening an output.
 #[derive(Debug)]
-pub enum Opened<F, T> {
+pub enum OpenOutcome<F, T> {
     /// The output exists, complete and of the same plan.
     Finished(F),
     /// There is work left; the value holds the lock.
@@ -60,9 +60,9 @@ pub struct OpenRun {
     shard: Option<(Shard, ShardLayout)>,
     /// The chunks of this process that are complete; behind a mutex because workers read the set
     /// while the writer adds to it.
-    present: Mutex<BTreeSet<u64>>,
+    complete_chunks: Mutex<BTreeSet<u64>>,
     /// The rows of this process's incomplete chunks, until [`OpenRun::take_incomplete`].
-    incomplete: Mutex<BTreeMap<u64, Vec<Done>>>,
+    incomplete: Mutex<BTreeMap<u64, Vec<PointRows>>>,
     notes: Vec<String>,
 }
 
@@ -79,9 +79,10 @@ impl OpenRun {
         output: &Path,
         job: &Job<'_>,
         options: OpenOptions<'_>,
-    ) -> Result<Opened<(ResultFile, Tally), Self>, StoreError> {
+    ) -> Result<OpenOutcome<(ResultFile, Tally), Self>, StoreError> {
         let folder = Folder::new(output, &job.layout)?;
-        let resolve = |frozen| shard::resolve(options.shard, options.environment, frozen);
+        let resolve =
+            |stored_layout| shard::resolve_shard(options.shard, options.environment, stored_layout);
         let mut shard = None;
         let shard_index = || {
             shard = resolve(ShardLayout::read(&folder)?)?;
@@ -94,26 +95,27 @@ impl OpenRun {
             }
             Ok(shard.map(|(shard, _)| shard.index))
         };
-        let finished = || finished_result(&folder, job);
-        let (lock, notes) = match claim(&folder, job, options.fresh, shard_index, finished)? {
-            Opened::Finished(found) => return Ok(Opened::Finished(found)),
-            Opened::Open(lock_and_notes) => lock_and_notes,
-        };
+        let find_finished = || finished_result(&folder, job);
+        let (lock, notes) =
+            match claim_folder(&folder, job, options.fresh, shard_index, find_finished)? {
+                OpenOutcome::Finished(found) => return Ok(OpenOutcome::Finished(found)),
+                OpenOutcome::Open(lock_and_notes) => lock_and_notes,
+            };
         if let Some((_, layout)) = shard {
-            let frozen = layout.freeze(&folder)?;
-            shard = resolve(Some(frozen))?;
+            let stored_layout = layout.write_if_absent(&folder)?;
+            shard = resolve(Some(stored_layout))?;
         }
         let mut run = Self {
             folder,
             lock,
             parts: PointParts::new(job),
             shard,
-            present: Mutex::default(),
+            complete_chunks: Mutex::default(),
             incomplete: Mutex::default(),
             notes,
         };
         run.rescan()?;
-        Ok(Opened::Open(run))
+        Ok(OpenOutcome::Open(run))
     }
 
     /// Opens the folder of a run in order to join the chunks of its shards. It never begins a run.
@@ -124,7 +126,7 @@ impl OpenRun {
     pub fn open_for_merge(
         output: &Path,
         job: &Job<'_>,
-    ) -> Result<Opened<(ResultFile, Tally), Self>, StoreError> {
+    ) -> Result<OpenOutcome<(ResultFile, Tally), Self>, StoreError> {
         let folder = Folder::new(output, &job.layout)?;
         if !folder.path.exists() && !output.exists() {
             return Err(StoreError::NoRun { output: output.to_path_buf(), folder: folder.path });
@@ -137,7 +139,7 @@ impl OpenRun {
     /// # Errors
     /// [`StoreError::File`].
     pub fn rescan(&mut self) -> Result<(), StoreError> {
-        let mut present = BTreeSet::new();
+        let mut complete_chunks = BTreeSet::new();
         let mut incomplete = BTreeMap::new();
         for chunk in part_indices(&self.folder)? {
             if chunk >= self.chunks() || !self.owns(chunk) {
@@ -149,7 +151,7 @@ impl OpenRun {
             })?;
             match outcomes {
                 Some(None) => {
-                    present.insert(chunk);
+                    complete_chunks.insert(chunk);
                 }
                 Some(Some(outcomes)) => {
                     incomplete.insert(chunk, outcomes);
@@ -157,7 +159,7 @@ impl OpenRun {
                 None => {}
             }
         }
-        *self.present() = present;
+        *self.complete_chunks() = complete_chunks;
         *lock(&self.incomplete) = incomplete;
         Ok(())
     }
@@ -170,18 +172,18 @@ impl OpenRun {
         read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
     ) -> Result<Option<T>, StoreError> {
         let length = self.chunk_length(chunk);
-        let found = self.read(chunk, |part| {
+        let value = self.read(chunk, |part| {
             if part.points() == length { read(part).map(Some) } else { Ok(None) }
         })?;
-        let whole = found.flatten();
-        if whole.is_none() {
-            self.present().remove(&chunk);
+        let value = value.flatten();
+        if value.is_none() {
+            self.complete_chunks().remove(&chunk);
         }
-        Ok(whole)
+        Ok(value)
     }
 
     /// Returns the stored rows of a point, whichever process has computed them.
-    pub fn known(&self, point: u64) -> Option<Done> {
+    pub fn stored_rows(&self, point: u64) -> Option<PointRows> {
         let part = self.parts.open(&self.folder, self.chunk_of(point)).ok()??;
         part.outcomes().ok()?.into_iter().find(|done| done.point == point)
     }
@@ -195,7 +197,7 @@ impl OpenRun {
         match read_part(&self.parts, &self.folder, chunk, read)? {
             Ok(found) => Ok(found),
             Err(damage) => {
-                let note = set_part_aside(&self.folder, chunk, damage)?;
+                let note = rename_damaged_part(&self.folder, chunk, damage)?;
                 self.notes.push(note);
                 Ok(None)
             }
@@ -211,23 +213,23 @@ impl OpenRun {
         &self,
         job: &Job<'_>,
         chunk: u64,
-        mut outcomes: Vec<Done>,
+        mut outcomes: Vec<PointRows>,
     ) -> Result<(), StoreError> {
         outcomes.sort_by_key(|outcome| outcome.point);
         let bytes = self.parts.encode(job, chunk, &outcomes)?;
         let count = outcomes.len() as u64;
-        let is_whole = count == self.chunk_length(chunk);
-        // Another process with the same shard may have written more of it.
-        if !is_whole
-            && let Ok(Some(known)) =
+        let is_complete = count == self.chunk_length(chunk);
+        // Another process with the same shard may have written more rows of this chunk.
+        if !is_complete
+            && let Ok(Some(stored_points)) =
                 read_part(&self.parts, &self.folder, chunk, |part| Ok(part.points()))?
-            && known > count
+            && stored_points > count
         {
             return Ok(());
         }
         atomic::write(&self.folder.path, &self.folder.file(part_name(chunk)), &bytes)?;
-        if is_whole {
-            self.present().insert(chunk);
+        if is_complete {
+            self.complete_chunks().insert(chunk);
         } else {
             lock(&self.incomplete).insert(chunk, outcomes);
         }
@@ -240,7 +242,7 @@ impl OpenRun {
     /// [`StoreError::File`].
     pub fn statuses(&mut self) -> Result<NameCounts, StoreError> {
         let mut counts = NameCounts::new();
-        let chunks = self.present().clone();
+        let chunks = self.complete_chunks().clone();
         for chunk in chunks {
             self.read_whole(chunk, |part| part.add_statuses(&mut counts))?;
         }
@@ -248,7 +250,7 @@ impl OpenRun {
     }
 
     /// Takes the stored rows of incomplete chunks, from which this process resumes them.
-    pub fn take_incomplete(&self) -> BTreeMap<u64, Vec<Done>> {
+    pub fn take_incomplete(&self) -> BTreeMap<u64, Vec<PointRows>> {
         std::mem::take(&mut *lock(&self.incomplete))
     }
 
@@ -284,11 +286,11 @@ impl OpenRun {
 
     /// Returns whether this process still has to compute a chunk.
     pub fn is_missing(&self, chunk: u64) -> bool {
-        self.owns(chunk) && !self.present().contains(&chunk)
+        self.owns(chunk) && !self.complete_chunks().contains(&chunk)
     }
 
-    fn present(&self) -> MutexGuard<'_, BTreeSet<u64>> {
-        lock(&self.present)
+    fn complete_chunks(&self) -> MutexGuard<'_, BTreeSet<u64>> {
+        lock(&self.complete_chunks)
     }
 
     /// Returns the number of points that this process has to compute, and how many of them are
@@ -296,17 +298,18 @@ impl OpenRun {
     pub fn own_points(&self) -> (u64, u64) {
         let chunks = self.chunks();
         let own_chunks = self.shard().map_or(chunks, |shard| shard.chunks(chunks));
-        let full = self.chunk_length(0);
+        let full_chunk_points = self.chunk_length(0);
         // Every chunk of a run is full, except perhaps the last.
         let missing_in_last = match chunks.checked_sub(1) {
-            Some(last) if self.owns(last) => full - self.chunk_length(last),
+            Some(last) if self.owns(last) => full_chunk_points - self.chunk_length(last),
             _ => 0,
         };
-        let mut stored: u64 = self.present().iter().map(|&chunk| self.chunk_length(chunk)).sum();
+        let mut stored: u64 =
+            self.complete_chunks().iter().map(|&chunk| self.chunk_length(chunk)).sum();
         for rows in lock(&self.incomplete).values() {
             stored += rows.len() as u64;
         }
-        (own_chunks.saturating_mul(full).saturating_sub(missing_in_last), stored)
+        (own_chunks.saturating_mul(full_chunk_points).saturating_sub(missing_in_last), stored)
     }
 
     /// Takes the notes for the user: damaged chunks, a file system without locks.
@@ -319,7 +322,7 @@ impl OpenRun {
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn record(&self, session: &Session) -> Result<(), StoreError> {
+    pub fn record_session(&self, session: &Session) -> Result<(), StoreError> {
         let name =
             format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
         let path = self.folder.file(name.replace(['/', '\0'], "_"));
@@ -327,15 +330,16 @@ impl OpenRun {
     }
 
     /// Returns the error about the missing chunks and the shards to which they belong.
-    pub fn incomplete(&self) -> Result<StoreError, StoreError> {
+    pub fn incomplete_error(&self) -> Result<StoreError, StoreError> {
         let chunks = self.chunks();
-        let present = self.present();
+        let complete_chunks = self.complete_chunks();
         let layout = ShardLayout::read(&self.folder)?;
         Ok(StoreError::Incomplete {
             folder: self.folder.path.clone(),
-            missing: chunks - present.len() as u64,
+            missing: chunks - complete_chunks.len() as u64,
             chunks,
-            missing_shards: layout.map(|layout| shard::list(layout.incomplete(chunks, &present))),
+            missing_shards: layout
+                .map(|layout| shard::list(layout.incomplete(chunks, &complete_chunks))),
         })
     }
 }
@@ -353,16 +357,16 @@ pub(super) fn read_part<T>(
 }
 
 /// Renames a damaged part to `*.damaged`, and returns a note about it.
-pub(super) fn set_part_aside(
+pub(super) fn rename_damaged_part(
     folder: &Folder,
     index: u64,
     damage: Damage,
 ) -> Result<String, StoreError> {
     let path = folder.file(part_name(index));
-    let aside = set_aside(&path)?;
-    let aside = aside.file_name().unwrap_or_default().to_string_lossy();
+    let new_path = rename_damaged(&path)?;
+    let new_path = new_path.file_name().unwrap_or_default().to_string_lossy();
     let path = path.display();
-    Ok(format!("{path}: {damage}; kept as {aside} and computed again"))
+    Ok(format!("{path}: {damage}; kept as {new_path} and computed again"))
 }
 
 /// Returns the indices of the parts in a folder.
@@ -402,7 +406,7 @@ pub(super) fn result_of_same_plan(
     match fs::metadata(&folder.output) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         // Some programs create an empty file before they write its content.
-        Ok(found) if found.len() == 0 => return Ok(None),
+        Ok(metadata) if metadata.len() == 0 => return Ok(None),
         _ => {}
     }
     let file = ParquetFile::open(&folder.output)?;
@@ -418,84 +422,89 @@ pub(super) fn result_of_same_plan(
         return Ok(Some((file, result)));
     }
     let ResultFile { plan, version, numerics, .. } = result;
-    let ours = PlanFile::new(job);
-    let differences = PlanFile { plan, version, numerics, ..ours.clone() }.differences(&ours);
+    let job_plan = PlanFile::new(job);
+    let differences =
+        PlanFile { plan, version, numerics, ..job_plan.clone() }.differences(&job_plan);
     Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
 }
 
 /// Returns the difference between the columns of two builds for the same plan, if there is one.
-fn column_difference(was: &Schema, is: &Schema) -> Option<PlanDifference> {
-    let [was, is] = [was, is].map(|schema| -> Vec<&str> {
+fn column_difference(older: &Schema, present: &Schema) -> Option<PlanDifference> {
+    let [older, present] = [older, present].map(|schema| -> Vec<&str> {
         schema.fields().iter().map(|field| field.name().as_str()).collect()
     });
-    let only = |names: &[&str], others: &[&str]| {
-        let mut further = names.to_vec();
-        further.retain(|name| !others.contains(name));
-        (!further.is_empty()).then(|| further.join(", "))
+    let names_without = |names: &[&str], others: &[&str]| {
+        let mut remaining = names.to_vec();
+        remaining.retain(|name| !others.contains(name));
+        (!remaining.is_empty()).then(|| remaining.join(", "))
     };
     let pointer = "/columns".to_owned();
-    (was != is).then(|| PlanDifference { pointer, was: only(&was, &is), is: only(&is, &was) })
+    (older != present).then(|| PlanDifference {
+        pointer,
+        older: names_without(&older, &present),
+        present: names_without(&present, &older),
+    })
 }
 
 /// Locks a folder, for a shard if `shard` returns one, and writes the plan to it, or checks that
-/// the plan there is the same. If there is no plan and the work is not to start over, `finished` is
-/// called first; if it returns a result, nothing is written. Returns the lock with notes for the
-/// user.
-pub(super) fn claim<T>(
+/// the stored plan is the same. If no plan is stored and the work is not to start over,
+/// `find_finished` is called first; if it returns a result, nothing is written. Returns the lock
+/// with notes for the user.
+pub(super) fn claim_folder<T>(
     folder: &Folder,
     job: &Job<'_>,
     fresh: bool,
     shard: impl FnOnce() -> Result<Option<u64>, StoreError>,
-    finished: impl Fn() -> Result<Option<T>, StoreError>,
-) -> Result<Opened<T, (Lock, Vec<String>)>, StoreError> {
+    find_finished: impl Fn() -> Result<Option<T>, StoreError>,
+) -> Result<OpenOutcome<T, (Lock, Vec<String>)>, StoreError> {
     if !fresh
         && !folder.path.exists()
-        && let Some(result) = finished()?
+        && let Some(result) = find_finished()?
     {
-        return Ok(Opened::Finished(result));
+        return Ok(OpenOutcome::Finished(result));
     }
     let lock = Lock::acquire(folder, shard()?)?;
     let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
     if fresh {
-        own::clear(folder)?;
+        own::delete_own_files(folder)?;
     }
     atomic::clear_leftovers(&folder.path);
-    let ours = PlanFile::new(job);
+    let job_plan = PlanFile::new(job);
     match PlanFile::read(folder)? {
-        FoundPlan::Plan(found) => refuse_other_plan(folder, &found, &ours)?,
-        FoundPlan::Damaged => {
-            let aside = set_aside(&folder.file(PLAN))?;
-            notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
-            ours.freeze(folder)?;
+        StoredPlan::Plan(stored_plan) => refuse_other_plan(folder, &stored_plan, &job_plan)?,
+        StoredPlan::Damaged => {
+            let new_path = rename_damaged(&folder.file(PLAN))?;
+            notes.push(format!("the frozen plan was damaged; kept as {}", new_path.display()));
+            job_plan.write_if_absent(folder)?;
         }
-        FoundPlan::Nothing => {
-            if !fresh && let Some(result) = finished()? {
+        StoredPlan::Nothing => {
+            if !fresh && let Some(result) = find_finished()? {
                 // A process that was killed after publishing its result has left the folder.
                 remove(folder, lock);
-                return Ok(Opened::Finished(result));
+                return Ok(OpenOutcome::Finished(result));
             }
-            ours.freeze(folder)?;
+            job_plan.write_if_absent(folder)?;
             // Another shard may have written another plan in the meantime.
-            if let FoundPlan::Plan(found) = PlanFile::read(folder)? {
-                refuse_other_plan(folder, &found, &ours)?;
+            if let StoredPlan::Plan(stored_plan) = PlanFile::read(folder)? {
+                refuse_other_plan(folder, &stored_plan, &job_plan)?;
             }
         }
     }
-    Ok(Opened::Open((lock, notes)))
+    Ok(OpenOutcome::Open((lock, notes)))
 }
 
 /// Refuses a folder in which a run of another plan has begun.
 pub(super) fn refuse_other_plan(
     folder: &Folder,
-    found: &PlanFile,
-    ours: &PlanFile,
+    stored_plan: &PlanFile,
+    job_plan: &PlanFile,
 ) -> Result<(), StoreError> {
-    if found == ours {
+    if stored_plan == job_plan {
         return Ok(());
     }
     Err(StoreError::PlanDiffers {
         folder: folder.path.clone(),
-        differences: found.differences(ours),
+        differences: stored_plan.differences(job_plan),
     })
 }
 
@@ -504,20 +513,20 @@ pub(super) fn refuse_other_plan(
 /// is returned as a note.
 pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
     let path = folder.path.display();
-    let removed = own::clear(folder).and_then(|others| {
+    let removal = own::delete_own_files(folder).and_then(|remaining_files| {
         lock.delete()?;
-        if others.is_empty() {
-            let removed = regular::if_there(fs::remove_dir(&folder.path));
-            removed.map_err(StoreError::io("remove the folder", &folder.path))?;
+        if remaining_files.is_empty() {
+            let removal = regular::if_there(fs::remove_dir(&folder.path));
+            removal.map_err(StoreError::io("remove the folder", &folder.path))?;
         }
-        Ok(others)
+        Ok(remaining_files)
     });
-    match removed {
-        Ok(others) if others.is_empty() => None,
-        Ok(others) => Some(format!(
+    match removal {
+        Ok(remaining_files) if remaining_files.is_empty() => None,
+        Ok(remaining_files) => Some(format!(
             "the result is whole; {path} stays, for it holds what this run did not write or has \
              set aside: {}; delete it when you do not need that",
-            abbreviated(&others)
+            abbreviate(&remaining_files)
         )),
         Err(error) => Some(format!(
             "the result is whole, but {path} could not be removed; delete it by hand ({})",
@@ -527,13 +536,14 @@ pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
 }
 
 /// Returns the first names of a list, and the number of further ones.
-fn abbreviated(names: &[OsString]) -> String {
-    /// The number of names that are shown. Basis: a note of one line.
-    const SHOWN: usize = 4;
-    let first: Vec<String> =
-        names.iter().take(SHOWN).map(|name| name.to_string_lossy().into_owned()).collect();
-    match names.len().saturating_sub(SHOWN) {
-        0 => first.join(", "),
-        more => format!("{} and {more} more", first.join(", ")),
+fn abbreviate(names: &[OsString]) -> String {
+    /// The number of names that are shown. Basis: a note of one line. Doubling it shows twice as
+    /// many.
+    const MAX_NAMES: usize = 4;
+    let first_names: Vec<String> =
+        names.iter().take(MAX_NAMES).map(|name| name.to_string_lossy().into_owned()).collect();
+    match names.len().saturating_sub(MAX_NAMES) {
+        0 => first_names.join(", "),
+        hidden_count => format!("{} and {hidden_count} more", first_names.join(", ")),
     }
 }

@@ -7,42 +7,42 @@ use std::path::Path;
 
 use super::lock;
 use super::part;
-use super::plan_file::{FoundPlan, PlanFile};
+use super::plan_file::{PlanFile, StoredPlan};
 use super::provenance::{self, Session};
 use super::shard::ShardLayout;
 use super::{Folder, LOCK, PLAN, SHARDS, StoreError, part_index};
 use sweep_files::{atomic, regular};
 
-/// Deletes the files that a run has written, the plan first, because a folder without a plan is not
-/// taken for a run. The lock stays, and so do files of other programs and damaged files. Returns
-/// the names of those others.
+/// Deletes the files that a run has written, the plan first, because a folder without a plan does
+/// not count as a run. The lock stays, and so do files of other programs and damaged files. Returns
+/// the names of the files that stay, without the lock.
 ///
 /// # Errors
 /// [`StoreError::File`].
-pub(super) fn clear(folder: &Folder) -> Result<Vec<OsString>, StoreError> {
+pub(super) fn delete_own_files(folder: &Folder) -> Result<Vec<OsString>, StoreError> {
     let names = regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))?;
-    let (own, others): (Vec<OsString>, Vec<OsString>) =
+    let (own, foreign): (Vec<OsString>, Vec<OsString>) =
         names.into_iter().filter(|name| name != LOCK).partition(|name| is_own(folder, name));
     let is_plan = |name: &&OsString| *name == PLAN;
     for name in own.iter().filter(is_plan).chain(own.iter().filter(|name| !is_plan(name))) {
         atomic::remove(&folder.file(name))?;
     }
     atomic::sync_folder(&folder.path)?;
-    Ok(others)
+    Ok(foreign)
 }
 
 /// Returns whether a run has written a file of the folder, judged by name and content. Empty files
 /// of such a name count too, because deleting them loses nothing.
 fn is_own(folder: &Folder, name: &OsStr) -> bool {
     let path = folder.file(name);
-    let (Some(name), Ok(found)) = (name.to_str(), fs::symlink_metadata(&path)) else {
+    let (Some(name), Ok(metadata)) = (name.to_str(), fs::symlink_metadata(&path)) else {
         return false;
     };
-    if !found.is_file() {
+    if !metadata.is_file() {
         return false;
     }
     let has_own_content = match name {
-        PLAN => matches!(PlanFile::read(folder), Ok(FoundPlan::Plan(_))),
+        PLAN => matches!(PlanFile::read(folder), Ok(StoredPlan::Plan(_))),
         SHARDS => matches!(ShardLayout::read(folder), Ok(Some(_))),
         _ if atomic::is_temporary(name) => true,
         _ if part_index(name).is_some() => part::is_part(&path),
@@ -50,7 +50,7 @@ fn is_own(folder: &Folder, name: &OsStr) -> bool {
         _ if provenance::is_session(name) => is_record(&path),
         _ => return false,
     };
-    has_own_content || found.len() == 0
+    has_own_content || metadata.len() == 0
 }
 
 /// Returns whether a file is a process's record of its work.

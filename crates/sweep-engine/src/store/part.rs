@@ -24,7 +24,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use parquet::schema::types::ColumnPath;
 
-use super::schema::{self, Holds};
+use super::schema::{self, CellType};
 use super::{DeclaredColumn, Job, RowCells, StoreError};
 use sweep_files::batches::from_arrow;
 use sweep_files::{CREATED_BY, FileError, ParquetFile, Writer, key, panics, seal};
@@ -71,7 +71,7 @@ impl PartError {
     /// A file that cannot be read.
     pub(super) fn damage<T>(result: Result<T, Self>) -> Result<Result<T, Damage>, StoreError> {
         match result {
-            Ok(found) => Ok(Ok(found)),
+            Ok(rows_or_value) => Ok(Ok(rows_or_value)),
             Err(Self::Damaged(damage)) => Ok(Err(damage)),
             Err(Self::Failed(error)) => Err(error),
         }
@@ -101,11 +101,11 @@ impl PartSchema {
             .set_max_row_group_row_count(None)
             .set_max_row_group_bytes(None)
             .set_dictionary_enabled(false);
-        let names = columns.iter().filter(|column| matches!(column.kind, Holds::Name(_)));
-        let coded = |builder: WriterPropertiesBuilder, column: &DeclaredColumn| {
+        let names = columns.iter().filter(|column| matches!(column.kind, CellType::Name(_)));
+        let enable_dictionary = |builder: WriterPropertiesBuilder, column: &DeclaredColumn| {
             builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), true)
         };
-        let properties = names.fold(builder, coded).build();
+        let properties = names.fold(builder, enable_dictionary).build();
         let fields: Vec<_> = columns.iter().map(DeclaredColumn::field).collect();
         Self { plan, schema: Arc::new(Schema::new(fields)), columns, properties }
     }
@@ -137,10 +137,14 @@ impl PartSchema {
     /// Opens the part at a path; `None` if there is no file. A part with another `entry` is damage.
     pub(super) fn open(&self, path: &Path, entry: &str) -> Result<Option<Part<'_>>, PartError> {
         let Some(file) = open_sealed(path)? else { return Ok(None) };
-        let is_ours = file.value(key::PLAN_HASH) == Some(&self.plan)
+        let has_same_plan = file.value(key::PLAN_HASH) == Some(&self.plan)
             && file.value(key::PART) == Some(entry)
             && *file.schema() == self.schema;
-        if is_ours { Ok(Some(Part { file, schema: self })) } else { Err(Damage::Foreign.into()) }
+        if has_same_plan {
+            Ok(Some(Part { file, schema: self }))
+        } else {
+            Err(Damage::Foreign.into())
+        }
     }
 
     /// Returns the number of columns.
@@ -200,9 +204,9 @@ fn open_sealed(path: &Path) -> Result<Option<ParquetFile>, PartError> {
 
 /// Returns whether a file is a part that this program wrote, of any plan, damaged or not.
 pub(super) fn is_part(path: &Path) -> bool {
-    let found = ParquetFile::look(path).ok();
-    found.is_some_and(|file| {
-        let is_ours = file.created_by().is_some_and(|by| by.starts_with(CREATED_BY));
+    let part = ParquetFile::look(path).ok();
+    part.is_some_and(|file| {
+        let is_ours = file.created_by().is_some_and(|creator| creator.starts_with(CREATED_BY));
         is_ours && file.value(key::PART).is_some()
     })
 }

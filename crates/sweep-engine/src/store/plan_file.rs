@@ -37,8 +37,8 @@ pub(super) struct PlanFile {
     pub plan: Value,
 }
 
-/// The result of reading `plan.json`.
-pub(super) enum FoundPlan {
+/// The outcome of reading `plan.json`.
+pub(super) enum StoredPlan {
     /// There is no file.
     Nothing,
     /// The file is a valid plan.
@@ -61,25 +61,26 @@ impl PlanFile {
     }
 
     /// Reads the plan of a run folder.
-    pub(super) fn read(folder: &Folder) -> Result<FoundPlan, StoreError> {
+    pub(super) fn read(folder: &Folder) -> Result<StoredPlan, StoreError> {
         let path = folder.file(PLAN);
         let text = regular::if_there(regular::read_json(&path));
         let Some(text) = text.map_err(StoreError::io("read", &path))? else {
-            return Ok(FoundPlan::Nothing);
+            return Ok(StoredPlan::Nothing);
         };
-        // A file of another format need not match its hash: it is refused with the differences.
-        let is_valid = |found: &Self| {
-            let hash = plan_hash(&found.version, found.numerics, &found.plan);
-            found.format != FORMAT || hash.to_hex().as_str() == found.plan_hash
+        // A file of another format does not have to match its hash. It is refused with the
+        // differences.
+        let is_valid = |stored_plan: &Self| {
+            let hash = plan_hash(&stored_plan.version, stored_plan.numerics, &stored_plan.plan);
+            stored_plan.format != FORMAT || hash.to_hex().as_str() == stored_plan.plan_hash
         };
         Ok(match serde_json::from_slice::<Self>(&text) {
-            Ok(found) if is_valid(&found) => FoundPlan::Plan(Box::new(found)),
-            _ => FoundPlan::Damaged,
+            Ok(stored_plan) if is_valid(&stored_plan) => StoredPlan::Plan(Box::new(stored_plan)),
+            _ => StoredPlan::Damaged,
         })
     }
 
     /// Writes the plan, unless another process has written one.
-    pub(super) fn freeze(&self, folder: &Folder) -> Result<(), StoreError> {
+    pub(super) fn write_if_absent(&self, folder: &Folder) -> Result<(), StoreError> {
         let text = pretty(&json!(self));
         if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
             return Err(StoreError::Refused(format!(
@@ -127,8 +128,8 @@ fn comparable(file: &PlanFile) -> Value {
 
 /// Renames an unreadable file to `*.damaged`, with a number if that name is taken, so that no file
 /// is lost. Returns the new path.
-pub(super) fn set_aside(path: &Path) -> Result<PathBuf, StoreError> {
-    let named = |number: u64| {
+pub(super) fn rename_damaged(path: &Path) -> Result<PathBuf, StoreError> {
+    let numbered_path = |number: u64| {
         let mut name = path.as_os_str().to_owned();
         name.push(".damaged");
         if number > 1 {
@@ -136,11 +137,12 @@ pub(super) fn set_aside(path: &Path) -> Result<PathBuf, StoreError> {
         }
         PathBuf::from(name)
     };
-    let is_free = |new_path: &PathBuf| fs::symlink_metadata(new_path).is_err();
-    let new_path = (1..=u64::MAX).map(named).find(is_free).unwrap_or_else(|| named(1));
+    let is_unused = |new_path: &PathBuf| fs::symlink_metadata(new_path).is_err();
+    let new_path =
+        (1..=u64::MAX).map(numbered_path).find(is_unused).unwrap_or_else(|| numbered_path(1));
     // Another shard of the same run may have renamed the file already.
-    let renamed = regular::if_there(fs::rename(path, &new_path));
-    renamed.map_err(StoreError::io("set aside", path)).map(|_| new_path)
+    let result = regular::if_there(fs::rename(path, &new_path));
+    result.map_err(StoreError::io("set aside", path)).map(|_| new_path)
 }
 
 #[cfg(test)]
@@ -150,9 +152,9 @@ mod tests {
     #[test]
     fn the_hash_of_a_plan_read_back_from_json_is_the_same() {
         let plan = json!({ "x": 0.1 + 0.2, "y": 1e-300 / 3.0, "z": 2.0e-4, "n": 5e-324 });
-        let back: Value =
+        let read_back: Value =
             serde_json::from_slice(&serde_json::to_vec_pretty(&plan).unwrap()).unwrap();
-        assert_eq!(plan_hash("1", 1, &plan), plan_hash("1", 1, &back));
+        assert_eq!(plan_hash("1", 1, &plan), plan_hash("1", 1, &read_back));
         assert_ne!(plan_hash("1", 1, &plan), plan_hash("2", 1, &plan));
         assert_ne!(plan_hash("1", 1, &plan), plan_hash("1", 2, &plan));
     }

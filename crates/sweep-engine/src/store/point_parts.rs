@@ -10,10 +10,10 @@ use arrow_array::RecordBatch;
 use serde_json::{Value, json};
 
 use super::part::{Damage, Part, PartError, PartSchema};
-use super::read::{NameCounts, add};
-use super::schema::{Holds, POINT};
+use super::read::{NameCounts, count_name};
+use super::schema::{CellType, POINT};
 use super::{
-    DeclaredColumn, Done, Folder, Job, Layout, RowCells, StoreError, chunk_points, part_name,
+    DeclaredColumn, Folder, Job, Layout, PointRows, RowCells, StoreError, chunk_points, part_name,
 };
 
 /// The name of the column of the numbers by which the engine identifies rows.
@@ -38,20 +38,20 @@ impl PointParts {
     /// Returns the schema and the chunks of a job.
     pub(super) fn new(job: &Job<'_>) -> Self {
         let layout = job.layout.clone();
-        let is_kept = |column: &&DeclaredColumn| column.kind == Holds::Kept;
-        let mut columns: Vec<DeclaredColumn> = layout.all().cloned().collect();
-        let mut in_result = 1 + layout.axes.len();
-        let mut kept = columns.len();
+        let is_kept = |column: &&DeclaredColumn| column.kind == CellType::Kept;
+        let mut columns: Vec<DeclaredColumn> = layout.all_columns().cloned().collect();
+        let mut next_in_result = 1 + layout.axes.len();
+        let mut next_kept = columns.len();
         let mut positions = Vec::with_capacity(layout.columns.len());
         for column in &layout.columns {
-            let next = if is_kept(&column) { &mut kept } else { &mut in_result };
-            positions.push(*next);
-            *next += 1;
+            let next_position = if is_kept(&column) { &mut next_kept } else { &mut next_in_result };
+            positions.push(*next_position);
+            *next_position += 1;
         }
         columns.extend(layout.columns.iter().filter(is_kept).cloned());
-        if layout.rows_a_point > 1 {
+        if layout.tasks_per_point > 1 {
             let description = "number that an unfinished run knows the row by";
-            columns.push(DeclaredColumn::new(ROW_INDEX, "1", description, Holds::Count));
+            columns.push(DeclaredColumn::new(ROW_INDEX, "1", description, CellType::Count));
         }
         let parts = PartSchema::new(job, columns);
         let chunk_points = chunk_points(job.points);
@@ -88,7 +88,7 @@ impl PointParts {
         &self,
         job: &Job<'_>,
         chunk: u64,
-        outcomes: &[Done],
+        outcomes: &[PointRows],
     ) -> Result<Vec<u8>, StoreError> {
         let points = self.range(chunk);
         let reject = |reason: String| StoreError::Engine {
@@ -101,13 +101,13 @@ impl PointParts {
         }
         let columns = &self.layout.columns;
         let mut rows = Vec::with_capacity(outcomes.len());
-        for Done { point, rows: found } in outcomes {
-            if found.is_empty() || found.len() > MAX_POINT_ROWS {
-                let count = found.len();
+        for PointRows { point, rows: point_rows } in outcomes {
+            if point_rows.is_empty() || point_rows.len() > MAX_POINT_ROWS {
+                let count = point_rows.len();
                 return Err(reject(format!("point {point}: {count} rows of {MAX_POINT_ROWS}")));
             }
             let axes: Vec<f64> = (job.axis_values)(*point);
-            for cells in found {
+            for cells in point_rows {
                 let fits = cells.len() == columns.len()
                     && columns.iter().zip(cells).all(|(column, cell)| column.accepts(*cell));
                 if !fits {
@@ -123,14 +123,14 @@ impl PointParts {
     /// Returns a row with a cell for each column of a part.
     fn part_row(&self, point: u64, axes: &[f64], cells: &RowCells) -> RowCells {
         let mut row: RowCells = vec![None; self.parts.width()];
-        row[0] = Some(point / self.layout.rows_a_point);
+        row[0] = Some(point / self.layout.tasks_per_point);
         for (cell, value) in row[1..].iter_mut().zip(axes).take(self.layout.axes.len()) {
             *cell = Some(value.to_bits());
         }
         for (position, cell) in self.positions.iter().zip(cells) {
             row[*position] = *cell;
         }
-        if self.layout.rows_a_point > 1 {
+        if self.layout.tasks_per_point > 1 {
             row[self.number_position()] = Some(point);
         }
         row
@@ -151,7 +151,7 @@ impl PointParts {
         }
         let numbers = part.cells(&[self.number_position()])?;
         let mut points: Vec<u64> = numbers.into_iter().filter_map(|row| row[0]).collect();
-        if self.layout.has_several {
+        if self.layout.has_several_rows {
             points.dedup();
         }
         if !are_ordered(&range, points.iter().copied()) {
@@ -162,7 +162,7 @@ impl PointParts {
 
     /// Returns the position of the column of the numbers by which the engine identifies rows.
     const fn number_position(&self) -> usize {
-        if self.layout.rows_a_point > 1 { self.parts.width() - 1 } else { 0 }
+        if self.layout.tasks_per_point > 1 { self.parts.width() - 1 } else { 0 }
     }
 }
 
@@ -187,15 +187,15 @@ impl PointPart<'_> {
     }
 
     /// Reads the points with their rows.
-    pub(super) fn outcomes(&self) -> Result<Vec<Done>, PartError> {
+    pub(super) fn outcomes(&self) -> Result<Vec<PointRows>, PartError> {
         let positions = [&[self.parts.number_position()], &self.parts.positions[..]].concat();
-        let mut outcomes: Vec<Done> = Vec::with_capacity(self.points.len());
+        let mut outcomes: Vec<PointRows> = Vec::with_capacity(self.points.len());
         for mut row in self.part.cells(&positions)? {
             let cells = row.split_off(1);
             let point = row[0].unwrap_or_default();
             match outcomes.last_mut() {
                 Some(last) if last.point == point => last.rows.push(cells),
-                _ => outcomes.push(Done { point, rows: vec![cells] }),
+                _ => outcomes.push(PointRows { point, rows: vec![cells] }),
             }
         }
         Ok(outcomes)
@@ -205,17 +205,17 @@ impl PointPart<'_> {
     pub(super) fn add_statuses(&self, counts: &mut NameCounts) -> Result<(), PartError> {
         let PointParts { layout, positions, .. } = self.parts;
         let Some(status) = layout.position("status") else { return Ok(()) };
-        let Holds::Name(names) = &layout.columns[status].kind else { return Ok(()) };
+        let CellType::Name(names) = &layout.columns[status].kind else { return Ok(()) };
         for row in self.part.cells(&[positions[status]])? {
             let name = row[0].and_then(|name| names.get(name as usize));
-            name.into_iter().for_each(|name| add(counts, name));
+            name.into_iter().for_each(|name| count_name(counts, name));
         }
         Ok(())
     }
 
     /// Reads the rows in the columns of the result.
     pub(super) fn result_batches(&self) -> Result<Vec<RecordBatch>, PartError> {
-        self.part.batches((0..self.parts.layout.all().count()).collect())
+        self.part.batches((0..self.parts.layout.all_columns().count()).collect())
     }
 }
 
@@ -224,8 +224,8 @@ pub(super) fn is_part_of_run(entry: &str) -> bool {
     serde_json::from_str::<Value>(entry).is_ok_and(|entry| entry["from"].is_u64())
 }
 
-/// Returns the name of the column whose numbers differ between the points of a part. `has` returns
-/// whether the part has a column.
+/// Returns the name of the column that numbers the rows of a part: points, or tasks if a point has
+/// several. `has` returns whether the part has a column.
 pub(super) fn number_column(has: impl Fn(&str) -> bool) -> &'static str {
     if has(ROW_INDEX) { ROW_INDEX } else { POINT }
 }

@@ -41,7 +41,7 @@ pub struct Session {
 }
 
 /// Returns the content of the sidecar: the counts of the result, this session, and the recorded
-/// sessions of other processes. Killed processes have left no record.
+/// sessions of other processes. A killed process has no recorded session.
 pub fn sidecar(
     folder: &Folder,
     job: &Job<'_>,
@@ -54,7 +54,7 @@ pub fn sidecar(
         (a.started_unix_s, &a.host, a.pid).cmp(&(b.started_unix_s, &b.host, b.pid))
     });
     let wall_s: f64 = sessions.iter().map(|session| session.wall_s).sum();
-    let computed: u64 = sessions.iter().map(|session| session.points).sum();
+    let computed_points: u64 = sessions.iter().map(|session| session.points).sum();
     let mut sidecar = json!({
         "file": folder.output.file_name().unwrap_or_default().to_string_lossy(),
         "version": job.version,
@@ -63,13 +63,13 @@ pub fn sidecar(
         "points": job.points,
         // The sum over the sessions, as if shards had run one after the other.
         "wall_s": wall_s,
-        "points_per_s": if wall_s > 0.0 { computed as f64 / wall_s } else { 0.0 },
+        "points_per_s": if wall_s > 0.0 { computed_points as f64 / wall_s } else { 0.0 },
         "rows": tally,
         "sessions": sessions,
     });
-    let last = json!(sessions.last());
+    let last_session = json!(sessions.last());
     for key in ["host", "cpus", "cpu_model", "simd", "threads"] {
-        sidecar[key] = last[key].clone();
+        sidecar[key] = last_session[key].clone();
     }
     Ok(pretty(&sidecar))
 }
@@ -109,5 +109,5 @@ pub fn cpu_model() -> Option<String> {
 
 /// Returns the seconds since 1970.
 pub fn now_unix_s() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |duration| duration.as_secs())
 }

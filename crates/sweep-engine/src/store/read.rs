@@ -70,7 +70,8 @@ pub struct ColumnExtreme {
     /// The limit between good and bad values, if the column has one.
     pub limit: Option<f64>,
     /// The number of rows that are worse than the limit.
-    pub beyond: u64,
+    #[serde(rename = "beyond")]
+    pub rows_beyond_limit: u64,
     /// The worst value and its point; `None` if no row has a value.
     #[serde(flatten)]
     pub worst: Option<Extreme>,
@@ -81,13 +82,13 @@ impl ColumnExtreme {
     fn new(column: &Column) -> Option<Self> {
         let worse = column.worse.filter(|_| column.is_in_summary)?;
         let name = column.name.clone();
-        Some(Self { column: name, worse, limit: column.limit, beyond: 0, worst: None })
+        Some(Self { column: name, worse, limit: column.limit, rows_beyond_limit: 0, worst: None })
     }
 
     /// Adds the value at a point.
     fn add(&mut self, value: f64, point: u64) {
-        let is_worse = |than: f64| self.worse.excess(value, than) > 0.0;
-        self.beyond += u64::from(self.limit.is_some_and(is_worse));
+        let is_worse = |reference: f64| self.worse.excess(value, reference) > 0.0;
+        self.rows_beyond_limit += u64::from(self.limit.is_some_and(is_worse));
         if !value.is_nan() && self.worst.as_ref().is_none_or(|worst| is_worse(worst.value)) {
             self.worst = Some(Extreme { value, point });
         }
@@ -132,17 +133,17 @@ pub struct Tally {
 pub type NameCounts = BTreeMap<String, u64>;
 
 /// Returns the number of rows of each status except `ok`.
-pub fn failures(by_status: &NameCounts) -> impl Iterator<Item = (&String, &u64)> {
+pub fn failure_counts(by_status: &NameCounts) -> impl Iterator<Item = (&String, &u64)> {
     by_status.iter().filter(|(status, _)| *status != "ok")
 }
 
 /// Returns the number of rows whose status is not `ok`.
-pub fn failed(by_status: &NameCounts) -> u64 {
-    failures(by_status).map(|(_, count)| count).sum()
+pub fn count_failed(by_status: &NameCounts) -> u64 {
+    failure_counts(by_status).map(|(_, count)| count).sum()
 }
 
 /// Adds one occurrence of a name.
-pub fn add(counts: &mut NameCounts, name: &str) {
+pub fn count_name(counts: &mut NameCounts, name: &str) {
     *counts.entry(name.to_owned()).or_default() += 1;
 }
 
@@ -152,74 +153,78 @@ pub fn add(counts: &mut NameCounts, name: &str) {
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     let fields = file.schema().fields().iter().map(|field| field.name().as_str());
-    let ratios = fields.clone().filter(|name| name.starts_with("ratio_"));
-    let has = |name: &str| fields.clone().any(|field| field == name);
+    let ratio_names = fields.clone().filter(|name| name.starts_with("ratio_"));
+    let has_column = |name: &str| fields.clone().any(|field| field == name);
     // Files of other kinds, such as responses at held speeds, have no verdicts.
     let has_verdicts = file.kind() == Some(FileKind::Map);
-    let needed = match has_verdicts {
+    let required_columns = match has_verdicts {
         true => &["point", "status", "reliable", "sensitive", "method"][..],
         false => &["point", "status"],
     };
-    if let Some(name) = needed.iter().find(|name| !has(name)) {
+    if let Some(name) = required_columns.iter().find(|name| !has_column(name)) {
         return Err(refuse_content(file, format!("there is no column `{name}`")));
     }
     let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
-    let over = limits.map_or(0.0, RatioLimits::over_estimate);
+    let over_estimate_limit = limits.map_or(0.0, RatioLimits::over_estimate);
     // Files of other programs may mark a column that has no worse side.
     let all_columns = columns(file.schema());
     let (marked_names, mut extremes): (Vec<&str>, Vec<ColumnExtreme>) = all_columns
         .iter()
         .filter_map(|column| Some((column.name.as_str(), ColumnExtreme::new(column)?)))
         .unzip();
-    let mut names: Vec<&str> = ratios.collect();
-    let ratios = names.len();
+    let mut names: Vec<&str> = ratio_names.collect();
+    let ratio_count = names.len();
     names.extend(marked_names);
-    let mut column = |name| {
+    let mut add_column = |name| {
         names.push(name);
         names.len() - 1
     };
-    let [point, status, method] = ["point", "status", "method"].map(&mut column);
-    let [reliable, sensitive] = ["reliable", "sensitive"].map(&mut column);
-    let [error, converged, greatest] = ["error", "converged", "ratio_max"].map(&mut column);
+    let [point_column, status_column, method_column] =
+        ["point", "status", "method"].map(&mut add_column);
+    let [reliable_column, sensitive_column] = ["reliable", "sensitive"].map(&mut add_column);
+    let [error_column, converged_column, ratio_column] =
+        ["error", "converged", "ratio_max"].map(&mut add_column);
     let mut tally = Tally::default();
     file.each_row(&names, |row| {
         let flag = |column| row.cell(column).flag();
         tally.points += 1;
-        let point = row.value(point) as u64;
-        if let Some(name) = row.word(status) {
-            add(&mut tally.by_status, name);
+        let point = row.value(point_column) as u64;
+        if let Some(name) = row.word(status_column) {
+            count_name(&mut tally.by_status, name);
             if name != "ok" {
                 tally.first_failed.entry(name.to_owned()).or_insert(point);
             }
         }
         for (k, extreme) in extremes.iter_mut().enumerate() {
-            extreme.add(row.value(ratios + k), point);
+            extreme.add(row.value(ratio_count + k), point);
         }
         if !has_verdicts {
             return Ok(());
         }
-        let least = (0..ratios).map(|k| row.value(k)).fold(f64::INFINITY, f64::min);
-        let reliable = flag(reliable);
+        let least = (0..ratio_count).map(|k| row.value(k)).fold(f64::INFINITY, f64::min);
+        let reliable = flag(reliable_column);
         match reliable {
             Some(true) => tally.reliable += 1,
             Some(false) => tally.unreliable += 1,
             None => tally.undefined += 1,
         }
-        tally.over_estimated += u64::from(least < over);
-        tally.over_estimated_reliable += u64::from(least < over && reliable == Some(true));
-        tally.sensitive += u64::from(flag(sensitive) == Some(true));
-        tally.unconverged += u64::from(flag(converged) == Some(false));
-        row.word(method).into_iter().for_each(|name| add(&mut tally.by_method, name));
+        tally.over_estimated += u64::from(least < over_estimate_limit);
+        tally.over_estimated_reliable +=
+            u64::from(least < over_estimate_limit && reliable == Some(true));
+        tally.sensitive += u64::from(flag(sensitive_column) == Some(true));
+        tally.unconverged += u64::from(flag(converged_column) == Some(false));
+        row.word(method_column).into_iter().for_each(|name| count_name(&mut tally.by_method, name));
         let keep_greatest = |greatest: &mut Option<Extreme>, value: f64| {
             let is_greatest = greatest.as_ref().is_none_or(|greatest| value > greatest.value);
             if is_greatest && !value.is_nan() {
                 *greatest = Some(Extreme { value, point });
             }
         };
-        // The error of a failed row means nothing.
-        let error = if row.word(status) == Some("ok") { row.value(error) } else { f64::NAN };
+        // The error of a failed row has no meaning.
+        let error =
+            if row.word(status_column) == Some("ok") { row.value(error_column) } else { f64::NAN };
         keep_greatest(&mut tally.greatest_error, error);
-        keep_greatest(&mut tally.greatest_ratio, row.value(greatest));
+        keep_greatest(&mut tally.greatest_ratio, row.value(ratio_column));
         Ok::<(), StoreError>(())
     })?;
     tally.extremes = extremes;
@@ -230,7 +235,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
 ///
 /// # Errors
 /// [`StoreError::File`].
-pub fn methods(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreError> {
+pub fn read_methods(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreError> {
     let mut methods = Vec::new();
     file.each_row(&["method"], |row| {
         methods.push(row.word(0).map(str::to_owned));
@@ -277,7 +282,7 @@ pub struct Overview {
 /// # Errors
 /// [`StoreError::File`].
 pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
-    let new = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
+    let empty_range = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
         name: field.name().clone(),
         unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
         worse: field.metadata().get(key::WORSE).and_then(|name| Worse::named(name)),
@@ -285,12 +290,12 @@ pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
         range: None,
         names: Vec::new(),
     };
-    let mut ranges: Vec<ColumnRange> = file.schema().fields().iter().map(new).collect();
+    let mut ranges: Vec<ColumnRange> = file.schema().fields().iter().map(empty_range).collect();
     // Columns of types that files of this program do not have are not read.
-    let known = columns(file.schema());
-    let names: Vec<&str> = known.iter().map(|column| column.name.as_str()).collect();
+    let readable_columns = columns(file.schema());
+    let names: Vec<&str> = readable_columns.iter().map(|column| column.name.as_str()).collect();
     file.each_row(&names, |row| {
-        for (k, column) in known.iter().enumerate() {
+        for (k, column) in readable_columns.iter().enumerate() {
             ranges[column.field].add(row.value(k), row.word(k));
         }
         Ok::<(), StoreError>(())

@@ -36,7 +36,7 @@ pub(super) const POINT: &str = "point";
 
 /// The type of a column's cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Holds {
+pub enum CellType {
     /// A whole number, never null.
     Count,
     /// A whole number, or null.
@@ -66,7 +66,7 @@ pub struct DeclaredColumn {
     /// The description, in one line.
     pub description: String,
     /// The type of the cells.
-    pub kind: Holds,
+    pub kind: CellType,
     /// The direction in which values are worse, if there is one.
     pub worse: Option<Worse>,
     /// The limit between good and bad values, if there is a natural one.
@@ -86,9 +86,9 @@ pub struct Layout {
     pub kind: FileKind<'static>,
     /// The number of tasks that the engine computes for each point of the grid: more than 1 if, for
     /// example, a point is evaluated at several held speeds. Each task has a number of its own.
-    pub rows_a_point: u64,
+    pub tasks_per_point: u64,
     /// Whether a task may return several rows.
-    pub has_several: bool,
+    pub has_several_rows: bool,
     /// Further entries in the file's metadata.
     pub metadata: Vec<(&'static str, Value)>,
 }
@@ -99,7 +99,7 @@ pub type RowCells = Vec<Option<u64>>;
 
 /// A point with its rows: one, or several if the model finds several.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Done {
+pub struct PointRows {
     /// The number by which the engine identifies the point.
     pub point: u64,
     /// The rows, at least one.
@@ -110,7 +110,14 @@ impl Layout {
     /// Returns the layout of a map, which has one row for each point.
     pub fn map(axes: Vec<DeclaredColumn>, columns: Vec<DeclaredColumn>) -> Self {
         let kind = FileKind::Map;
-        Self { axes, columns, kind, rows_a_point: 1, has_several: false, metadata: Vec::new() }
+        Self {
+            axes,
+            columns,
+            kind,
+            tasks_per_point: 1,
+            has_several_rows: false,
+            metadata: Vec::new(),
+        }
     }
 }
 
@@ -120,7 +127,7 @@ impl DeclaredColumn {
         name: impl Into<String>,
         unit: &str,
         description: impl Into<String>,
-        kind: Holds,
+        kind: CellType,
     ) -> Self {
         Self {
             name: name.into(),
@@ -136,28 +143,30 @@ impl DeclaredColumn {
     /// Returns the number in a cell; `None` for null, flags and names.
     pub fn number(&self, cell: Option<u64>) -> Option<f64> {
         match self.kind {
-            Holds::Count | Holds::KnownCount => cell.map(|count| count as f64),
-            Holds::Measured | Holds::Axis | Holds::Time | Holds::Kept => cell.map(f64::from_bits),
-            Holds::Flag | Holds::Name(_) => None,
+            CellType::Count | CellType::KnownCount => cell.map(|count| count as f64),
+            CellType::Measured | CellType::Axis | CellType::Time | CellType::Kept => {
+                cell.map(f64::from_bits)
+            }
+            CellType::Flag | CellType::Name(_) => None,
         }
     }
 
     pub(super) fn field(&self) -> Field {
         let names = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         let (data_type, nullable) = match self.kind {
-            Holds::Count => (DataType::UInt64, false),
-            Holds::KnownCount => (DataType::UInt64, true),
-            Holds::Axis => (DataType::Float64, false),
-            Holds::Measured | Holds::Time | Holds::Kept => (DataType::Float64, true),
-            Holds::Flag => (DataType::Boolean, true),
-            Holds::Name(_) => (names(), true),
+            CellType::Count => (DataType::UInt64, false),
+            CellType::KnownCount => (DataType::UInt64, true),
+            CellType::Axis => (DataType::Float64, false),
+            CellType::Measured | CellType::Time | CellType::Kept => (DataType::Float64, true),
+            CellType::Flag => (DataType::Boolean, true),
+            CellType::Name(_) => (names(), true),
         };
-        self.declared(data_type, nullable)
+        self.arrow_field(data_type, nullable)
     }
 
     /// Returns the Arrow field of the column, with its unit, description, worse side, limit and
     /// mark for summaries as metadata.
-    pub(crate) fn declared(&self, data_type: DataType, nullable: bool) -> Field {
+    pub(crate) fn arrow_field(&self, data_type: DataType, nullable: bool) -> Field {
         let mut metadata = HashMap::from([
             ("unit".to_owned(), self.unit.clone()),
             ("description".to_owned(), self.description.clone()),
@@ -177,20 +186,20 @@ impl DeclaredColumn {
         cells: impl Iterator<Item = Option<u64>>,
     ) -> Result<ArrayRef, ArrowError> {
         Ok(match &self.kind {
-            Holds::Count => {
+            CellType::Count => {
                 Arc::new(UInt64Array::from_iter_values(cells.map(Option::unwrap_or_default)))
             }
-            Holds::KnownCount => Arc::new(cells.collect::<UInt64Array>()),
-            Holds::Axis => Arc::new(Float64Array::from_iter_values(
+            CellType::KnownCount => Arc::new(cells.collect::<UInt64Array>()),
+            CellType::Axis => Arc::new(Float64Array::from_iter_values(
                 cells.map(|cell| cell.map_or(f64::NAN, f64::from_bits)),
             )),
-            Holds::Measured | Holds::Time | Holds::Kept => {
+            CellType::Measured | CellType::Time | CellType::Kept => {
                 Arc::new(cells.map(|cell| cell.map(f64::from_bits)).collect::<Float64Array>())
             }
-            Holds::Flag => {
+            CellType::Flag => {
                 Arc::new(cells.map(|cell| cell.map(|flag| flag != 0)).collect::<BooleanArray>())
             }
-            Holds::Name(names) => {
+            CellType::Name(names) => {
                 let keys: Int32Array = cells.map(|name| i32::try_from(name?).ok()).collect();
                 let names = StringArray::from_iter_values(names);
                 Arc::new(DictionaryArray::<Int32Type>::try_new(keys, Arc::new(names))?)
@@ -202,23 +211,25 @@ impl DeclaredColumn {
     /// array of another type.
     pub(super) fn cells(&self, array: &dyn Array) -> Option<Vec<Option<u64>>> {
         let cells: Vec<Option<u64>> = match &self.kind {
-            Holds::Count | Holds::KnownCount => {
+            CellType::Count | CellType::KnownCount => {
                 array.as_primitive_opt::<UInt64Type>()?.iter().collect()
             }
-            Holds::Measured | Holds::Axis | Holds::Time | Holds::Kept => {
+            CellType::Measured | CellType::Axis | CellType::Time | CellType::Kept => {
                 let numbers = array.as_primitive_opt::<Float64Type>()?.iter();
                 numbers.map(|number| number.map(f64::to_bits)).collect()
             }
-            Holds::Flag => array.as_boolean_opt()?.iter().map(|flag| flag.map(u64::from)).collect(),
-            Holds::Name(names) => {
-                let coded = array.as_dictionary_opt::<Int32Type>()?;
-                let words = coded.values().as_string_opt::<i32>()?.iter();
+            CellType::Flag => {
+                array.as_boolean_opt()?.iter().map(|flag| flag.map(u64::from)).collect()
+            }
+            CellType::Name(names) => {
+                let dictionary = array.as_dictionary_opt::<Int32Type>()?;
+                let words = dictionary.values().as_string_opt::<i32>()?.iter();
                 let index = |word: Option<&str>| names.iter().position(|name| Some(*name) == word);
                 let indices: Vec<u64> = words
                     .map(|word| index(word).map(|index| index as u64))
                     .collect::<Option<_>>()?;
                 let cell = |key: Option<i32>| key.map(|key| indices[key as usize]);
-                coded.keys().iter().map(cell).collect()
+                dictionary.keys().iter().map(cell).collect()
             }
         };
         Some(cells)
@@ -227,36 +238,37 @@ impl DeclaredColumn {
     /// Returns whether a cell fits the type of the column.
     pub(super) fn accepts(&self, cell: Option<u64>) -> bool {
         match (&self.kind, cell) {
-            (Holds::Count | Holds::Axis, cell) => cell.is_some(),
-            (_, None) | (Holds::KnownCount | Holds::Measured | Holds::Time | Holds::Kept, _) => {
+            (CellType::Count | CellType::Axis, cell) => cell.is_some(),
+            (_, None)
+            | (CellType::KnownCount | CellType::Measured | CellType::Time | CellType::Kept, _) => {
                 true
             }
-            (Holds::Flag, Some(flag)) => flag <= 1,
-            (Holds::Name(names), Some(name)) => name < names.len() as u64,
+            (CellType::Flag, Some(flag)) => flag <= 1,
+            (CellType::Name(names), Some(name)) => name < names.len() as u64,
         }
     }
 }
 
 impl Layout {
     /// Returns the maximum number of bytes that a row takes in a part.
-    pub fn bytes_a_row(&self) -> usize {
+    pub fn bytes_per_row(&self) -> usize {
         8 * (1 + self.axes.len() + self.columns.len())
     }
 
     /// Iterates over all columns of the result: the point's index, the axes, and the model's
     /// columns.
-    pub(super) fn all(&self) -> impl Iterator<Item = &DeclaredColumn> + Clone {
+    pub(super) fn all_columns(&self) -> impl Iterator<Item = &DeclaredColumn> + Clone {
         /// The column of point indices.
         static POINTS: std::sync::LazyLock<DeclaredColumn> = std::sync::LazyLock::new(|| {
-            DeclaredColumn::new(POINT, "1", "index in grid order", Holds::Count)
+            DeclaredColumn::new(POINT, "1", "index in grid order", CellType::Count)
         });
-        let columns = self.columns.iter().filter(|column| column.kind != Holds::Kept);
+        let columns = self.columns.iter().filter(|column| column.kind != CellType::Kept);
         std::iter::once(&*POINTS).chain(&self.axes).chain(columns)
     }
 
     /// Returns the Arrow schema.
     pub fn schema(&self) -> SchemaRef {
-        Arc::new(Schema::new(self.all().map(DeclaredColumn::field).collect::<Vec<_>>()))
+        Arc::new(Schema::new(self.all_columns().map(DeclaredColumn::field).collect::<Vec<_>>()))
     }
 
     /// Returns the position of a column among those of the model.
@@ -268,23 +280,25 @@ impl Layout {
 /// Returns the settings of the writer and the metadata of a result. They do not depend on time,
 /// host or progress of the run.
 pub fn properties(job: &Job<'_>) -> WriterProperties {
-    let entry = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
+    let metadata_entry = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let mut metadata = vec![
-        entry(key::PLAN, job.plan.to_string()),
-        entry(key::PLAN_HASH, job.hash().to_hex().to_string()),
-        entry(key::VERSION, job.version.to_owned()),
-        entry(key::NUMERICS, job.numerics.to_string()),
+        metadata_entry(key::PLAN, job.plan.to_string()),
+        metadata_entry(key::PLAN_HASH, job.hash().to_hex().to_string()),
+        metadata_entry(key::VERSION, job.version.to_owned()),
+        metadata_entry(key::NUMERICS, job.numerics.to_string()),
     ];
-    metadata.extend(job.layout.metadata.iter().map(|(key, value)| entry(key, value.to_string())));
+    metadata.extend(
+        job.layout.metadata.iter().map(|(key, value)| metadata_entry(key, value.to_string())),
+    );
     let builder = writer(job.version, metadata)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_max_row_group_bytes(None);
     // A dictionary of numbers that hardly repeat would be built and then discarded.
-    let measured = job.layout.all().filter(|column| column.kind == Holds::Measured);
-    let plain = |builder: WriterPropertiesBuilder, column: &DeclaredColumn| {
+    let measured = job.layout.all_columns().filter(|column| column.kind == CellType::Measured);
+    let disable_dictionary = |builder: WriterPropertiesBuilder, column: &DeclaredColumn| {
         builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), false)
     };
-    measured.fold(builder, plain).build()
+    measured.fold(builder, disable_dictionary).build()
 }
 
 /// Returns the settings of the writer that all files of this program share.
@@ -332,19 +346,20 @@ impl<'a> ResultRows<'a> {
     /// Rows that do not fit the layout.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         let rows = &self.rows;
-        let rows_a_point = self.layout.rows_a_point;
+        let tasks_per_point = self.layout.tasks_per_point;
         let axes = self.layout.axes.len();
         let array = |(k, column): (usize, &DeclaredColumn)| match k.checked_sub(1) {
-            None => column.array(rows.iter().map(|(point, ..)| Some(point / rows_a_point))),
+            None => column.array(rows.iter().map(|(point, ..)| Some(point / tasks_per_point))),
             Some(axis) if axis < axes => column.array(
                 rows.iter().map(|(_, values, _)| values.get(axis).map(|value| value.to_bits())),
             ),
             Some(k) => {
-                let k = k - axes;
-                column.array(rows.iter().map(|(.., row)| row.get(k).copied().flatten()))
+                let model_column = k - axes;
+                column.array(rows.iter().map(|(.., row)| row.get(model_column).copied().flatten()))
             }
         };
-        let arrays = self.layout.all().enumerate().map(array).collect::<Result<Vec<_>, _>>()?;
+        let arrays =
+            self.layout.all_columns().enumerate().map(array).collect::<Result<Vec<_>, _>>()?;
         self.rows.clear();
         RecordBatch::try_new(self.schema(), arrays)
     }

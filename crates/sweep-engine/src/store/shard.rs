@@ -12,7 +12,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::plan_file::{pretty, set_aside};
+use super::plan_file::{pretty, rename_damaged};
 use super::{Folder, SHARDS, StoreError};
 use crate::Environment;
 use sweep_files::{atomic, regular};
@@ -97,47 +97,46 @@ impl ShardLayout {
     }
 
     /// Returns the shards, numbered from 1, of which a chunk is missing.
-    pub(super) fn incomplete(self, chunks: u64, present: &BTreeSet<u64>) -> Vec<u64> {
+    pub(super) fn incomplete(self, chunks: u64, complete_chunks: &BTreeSet<u64>) -> Vec<u64> {
         let mut done: BTreeMap<u64, u64> = BTreeMap::new();
-        for chunk in present {
+        for chunk in complete_chunks {
             *done.entry(chunk % self.shards + 1).or_default() += 1;
         }
-        let lacks = |index: &u64| {
-            let own = Shard { index: *index, count: self.shards }.chunks(chunks);
-            done.get(index).copied().unwrap_or(0) < own
+        let lacks_chunk = |index: &u64| {
+            let own_chunks = Shard { index: *index, count: self.shards }.chunks(chunks);
+            done.get(index).copied().unwrap_or(0) < own_chunks
         };
-        (1..=self.shards).filter(lacks).collect()
+        (1..=self.shards).filter(lacks_chunk).collect()
     }
 
-    /// Writes the division, unless another shard has written one. Returns the division that is in
-    /// the file.
-    pub(super) fn freeze(self, folder: &Folder) -> Result<Self, StoreError> {
+    /// Writes the division, unless another shard has written one. Returns the division in the file.
+    pub(super) fn write_if_absent(self, folder: &Folder) -> Result<Self, StoreError> {
         let text = pretty(&json!(self));
         let path = folder.file(SHARDS);
         if atomic::create(&folder.path, &path, &text)? {
             return Ok(self);
         }
-        if let Some(frozen) = Self::read(folder)? {
-            return Ok(frozen);
+        if let Some(stored_layout) = Self::read(folder)? {
+            return Ok(stored_layout);
         }
-        // The file is of another program, or damaged.
-        set_aside(&path)?;
+        // The file belongs to another program, or is damaged.
+        rename_damaged(&path)?;
         atomic::write(&folder.path, &path, &text)?;
         Ok(self)
     }
 }
 
 /// Returns the shard of this process and the division into shards; `None` for the whole run. The
-/// shard is that of the request, or else that of a Slurm array or a Kubernetes Indexed Job. The
-/// division is `frozen`, which an earlier process has written, if there is one.
+/// shard is that of the request, or else that of a Slurm array or a Kubernetes Indexed Job.
+/// `stored_layout` is the division that an earlier process has written, if there is one.
 ///
 /// # Errors
-/// [`StoreError::Refused`] if the request, the scheduler and the frozen division contradict each
+/// [`StoreError::Refused`] if the request, the scheduler and the stored division contradict each
 /// other.
-pub(super) fn resolve(
+pub(super) fn resolve_shard(
     request: Option<ShardRequest>,
     environment: Environment<'_>,
-    frozen: Option<ShardLayout>,
+    stored_layout: Option<ShardLayout>,
 ) -> Result<Option<(Shard, ShardLayout)>, StoreError> {
     let refuse = |text: String| Err(StoreError::Refused(text));
     let refuse_count = |shards: u64, requested: u64, help: String| {
@@ -147,7 +146,8 @@ pub(super) fn resolve(
         ))
     };
     if let Some(ShardRequest::Given(shard)) = request {
-        let layout = frozen.unwrap_or(ShardLayout { shards: shard.count, first_array_id: 1 });
+        let layout =
+            stored_layout.unwrap_or(ShardLayout { shards: shard.count, first_array_id: 1 });
         let shards = layout.shards;
         if shards != shard.count {
             let help = format!("I/{shards}, or run it whole without --shard");
@@ -166,7 +166,7 @@ pub(super) fn resolve(
             )),
         };
     };
-    let layout = match (frozen, requested.or(scheduler.count)) {
+    let layout = match (stored_layout, requested.or(scheduler.count)) {
         (Some(ShardLayout { shards, .. }), Some(count))
             if requested.is_some() && count != shards =>
         {
@@ -259,10 +259,13 @@ mod tests {
     fn values_of_the_shard_option_are_parsed() {
         assert_eq!("3/8".parse(), Ok(ShardRequest::Given(Shard { index: 3, count: 8 })));
         assert_eq!("auto/8".parse(), Ok(ShardRequest::Auto { count: 8 }));
-        for bad in
+        for invalid_text in
             ["0/8", "9/8", "1/0", "auto/0", "3", "a/8", "3/", "-1/8", "3/8/2", "", "1/1000001"]
         {
-            assert!(bad.parse::<ShardRequest>().unwrap_err().starts_with("expected"), "{bad}");
+            assert!(
+                invalid_text.parse::<ShardRequest>().unwrap_err().starts_with("expected"),
+                "{invalid_text}"
+            );
         }
     }
 
@@ -285,65 +288,75 @@ mod tests {
 
     #[test]
     fn without_option_and_scheduler_the_whole_run_is_computed() {
-        assert_eq!(resolve(None, &environment(&[]), None).unwrap(), None);
+        assert_eq!(resolve_shard(None, &environment(&[]), None).unwrap(), None);
     }
 
     #[test]
     fn a_slurm_array_numbers_the_shards_from_its_first_task() {
-        let zero_based = environment(&[
+        let zero_based_array = environment(&[
             ("SLURM_ARRAY_TASK_ID", "2"),
             ("SLURM_ARRAY_TASK_MIN", "0"),
             ("SLURM_ARRAY_TASK_COUNT", "8"),
         ]);
-        let (shard, layout) = resolve(None, &zero_based, None).unwrap().unwrap();
+        let (shard, layout) = resolve_shard(None, &zero_based_array, None).unwrap().unwrap();
         assert_eq!(shard, Shard { index: 3, count: 8 });
         assert_eq!(layout, ShardLayout { shards: 8, first_array_id: 0 });
     }
 
     #[test]
     fn resubmitted_tasks_keep_the_numbers_of_the_first_array() {
-        let resubmitted = environment(&[
+        let resubmitted_array = environment(&[
             ("SLURM_ARRAY_TASK_ID", "7"),
             ("SLURM_ARRAY_TASK_MIN", "3"),
             ("SLURM_ARRAY_TASK_COUNT", "2"),
         ]);
-        let frozen = ShardLayout { shards: 8, first_array_id: 1 };
-        let (shard, layout) = resolve(None, &resubmitted, Some(frozen)).unwrap().unwrap();
-        assert_eq!((shard, layout), (Shard { index: 7, count: 8 }, frozen));
+        let stored_layout = ShardLayout { shards: 8, first_array_id: 1 };
+        let (shard, layout) =
+            resolve_shard(None, &resubmitted_array, Some(stored_layout)).unwrap().unwrap();
+        assert_eq!((shard, layout), (Shard { index: 7, count: 8 }, stored_layout));
     }
 
     #[test]
     fn a_task_whose_number_is_outside_the_array_is_refused() {
-        let gaps = environment(&[
+        let array_with_gaps = environment(&[
             ("SLURM_ARRAY_TASK_ID", "20"),
             ("SLURM_ARRAY_TASK_MIN", "0"),
             ("SLURM_ARRAY_TASK_COUNT", "3"),
         ]);
-        assert!(refusal(resolve(None, &gaps, None)).contains("numbered 0 to 2"));
+        assert!(refusal(resolve_shard(None, &array_with_gaps, None)).contains("numbered 0 to 2"));
     }
 
     #[test]
     fn kubernetes_gives_the_index_and_the_option_the_count() {
-        let pod = environment(&[("JOB_COMPLETION_INDEX", "0")]);
-        let (shard, _) =
-            resolve(Some(ShardRequest::Auto { count: 4 }), &pod, None).unwrap().unwrap();
+        let kubernetes = environment(&[("JOB_COMPLETION_INDEX", "0")]);
+        let (shard, _) = resolve_shard(Some(ShardRequest::Auto { count: 4 }), &kubernetes, None)
+            .unwrap()
+            .unwrap();
         assert_eq!(shard, Shard { index: 1, count: 4 });
-        assert!(refusal(resolve(None, &pod, None)).contains("auto/N"));
-        let nowhere = resolve(Some(ShardRequest::Auto { count: 4 }), &environment(&[]), None);
-        assert!(refusal(nowhere).contains("--shard I/4"));
-        let garbled = environment(&[("SLURM_ARRAY_TASK_ID", "x")]);
-        assert!(refusal(resolve(None, &garbled, None)).contains("not a number"));
+        assert!(refusal(resolve_shard(None, &kubernetes, None)).contains("auto/N"));
+        let without_scheduler =
+            resolve_shard(Some(ShardRequest::Auto { count: 4 }), &environment(&[]), None);
+        assert!(refusal(without_scheduler).contains("--shard I/4"));
+        let invalid_id = environment(&[("SLURM_ARRAY_TASK_ID", "x")]);
+        assert!(refusal(resolve_shard(None, &invalid_id, None)).contains("not a number"));
     }
 
     #[test]
     fn a_count_of_shards_that_differs_from_the_file_is_refused() {
-        let frozen = Some(ShardLayout { shards: 4, first_array_id: 1 });
+        let stored_layout = Some(ShardLayout { shards: 4, first_array_id: 1 });
         let given = Some(ShardRequest::Given(Shard { index: 1, count: 8 }));
-        assert!(refusal(resolve(given, &environment(&[]), frozen)).contains("into 4 shards"));
-        let pod = environment(&[("JOB_COMPLETION_INDEX", "1")]);
         assert!(
-            refusal(resolve(Some(ShardRequest::Auto { count: 8 }), &pod, frozen))
+            refusal(resolve_shard(given, &environment(&[]), stored_layout))
                 .contains("into 4 shards")
+        );
+        let kubernetes = environment(&[("JOB_COMPLETION_INDEX", "1")]);
+        assert!(
+            refusal(resolve_shard(
+                Some(ShardRequest::Auto { count: 8 }),
+                &kubernetes,
+                stored_layout
+            ))
+            .contains("into 4 shards")
         );
     }
 

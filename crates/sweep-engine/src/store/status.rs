@@ -6,16 +6,16 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 
 use super::open::{self, part_indices, read_part};
-use super::plan_file::{FoundPlan, PlanFile};
+use super::plan_file::{PlanFile, StoredPlan};
 use super::point_parts::PointParts;
-use super::read::{NameCounts, failed};
+use super::read::{NameCounts, count_failed};
 use super::shard::{self, ShardLayout};
 use super::{Folder, Holder, Job, StoreError, lock};
 
 /// The stage of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum State {
+pub enum RunStage {
     /// There are no chunks.
     #[default]
     NotStarted,
@@ -34,7 +34,7 @@ pub struct FolderStatus {
     #[serde(serialize_with = "serialize_path")]
     pub output: PathBuf,
     /// The stage.
-    pub state: State,
+    pub state: RunStage,
     /// The number of all points.
     pub points: u64,
     /// The number of stored points.
@@ -83,24 +83,24 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         chunks_missing: chunks,
         ..FolderStatus::default()
     };
-    let ours = PlanFile::new(job);
+    let job_plan = PlanFile::new(job);
     match PlanFile::read(&folder)? {
-        FoundPlan::Plan(found) => open::refuse_other_plan(&folder, &found, &ours)?,
-        FoundPlan::Nothing => {
+        StoredPlan::Plan(found) => open::refuse_other_plan(&folder, &found, &job_plan)?,
+        StoredPlan::Nothing => {
             let Some((_, tally)) = open::finished_result(&folder, job)? else { return Ok(status) };
             return Ok(FolderStatus {
-                state: State::Finished,
+                state: RunStage::Finished,
                 points_done: tally.points,
-                points_failed: failed(&tally.by_status),
+                points_failed: count_failed(&tally.by_status),
                 by_status: tally.by_status,
                 chunks_done: chunks,
                 chunks_missing: 0,
                 ..status
             });
         }
-        FoundPlan::Damaged => {}
+        StoredPlan::Damaged => {}
     }
-    let mut present = BTreeSet::new();
+    let mut complete_chunks = BTreeSet::new();
     for chunk in part_indices(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
         let range = parts.range(chunk);
         let mut by_status = NameCounts::new();
@@ -111,7 +111,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         match points? {
             Ok(Some(points)) => {
                 if points == range.end - range.start {
-                    present.insert(chunk);
+                    complete_chunks.insert(chunk);
                 }
                 status.points_done += points;
                 for (name, count) in by_status {
@@ -123,17 +123,20 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
             Ok(None) => {}
         }
     }
-    status.chunks_done = present.len() as u64;
-    status.points_failed = failed(&status.by_status);
+    status.chunks_done = complete_chunks.len() as u64;
+    status.points_failed = count_failed(&status.by_status);
     status.chunks_missing = chunks - status.chunks_done;
-    status.state = if status.chunks_missing == 0 { State::Complete } else { State::Unfinished };
+    status.state =
+        if status.chunks_missing == 0 { RunStage::Complete } else { RunStage::Unfinished };
     status.running = lock::holders(&folder);
     if let Some(layout) = ShardLayout::read(&folder)? {
-        let running =
+        let is_running =
             |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
-        let missing =
-            layout.incomplete(chunks, &present).into_iter().filter(|shard| !running(shard));
-        status.missing_shard_numbers = missing.collect();
+        let missing_shards = layout
+            .incomplete(chunks, &complete_chunks)
+            .into_iter()
+            .filter(|shard| !is_running(shard));
+        status.missing_shard_numbers = missing_shards.collect();
         let array_ids =
             status.missing_shard_numbers.iter().map(|shard| shard - 1 + layout.first_array_id);
         status.missing_shards = shard::list(array_ids);

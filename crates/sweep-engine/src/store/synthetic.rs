@@ -3,7 +3,7 @@
 use serde_json::json;
 use sweep_files::FileKind;
 
-use super::{DeclaredColumn, Done, Holds, Job, Layout, RowCells};
+use super::{CellType, DeclaredColumn, Job, Layout, PointRows, RowCells};
 
 /// The statuses of rows.
 pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverged"];
@@ -12,25 +12,28 @@ pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverge
 pub fn layout() -> Layout {
     let column =
         |name: &str, unit: &str, kind| DeclaredColumn::new(name, unit, format!("the {name}"), kind);
-    let measured = |name: &str| column(name, "m", Holds::Measured);
+    let measured = |name: &str| column(name, "m", CellType::Measured);
     Layout {
-        axes: vec![column("mass_kg", "kg", Holds::Axis), column("damping", "N s/m", Holds::Axis)],
+        axes: vec![
+            column("mass_kg", "kg", CellType::Axis),
+            column("damping", "N s/m", CellType::Axis),
+        ],
         columns: vec![
             measured("nonlinear_a"),
             measured("linear_a"),
-            column("ratio_max", "1", Holds::Measured),
-            column("reliable", "", Holds::Flag),
-            column("sensitive", "", Holds::Flag),
-            column("method", "", Holds::Name(vec!["rk4", "dopri5"])),
-            column("error", "1", Holds::Measured),
-            column("converged", "", Holds::Flag),
-            column("status", "", Holds::Name(STATUSES.to_vec())),
-            column("fail_time_s", "s", Holds::Time),
-            column("steps", "1", Holds::Count),
+            column("ratio_max", "1", CellType::Measured),
+            column("reliable", "", CellType::Flag),
+            column("sensitive", "", CellType::Flag),
+            column("method", "", CellType::Name(vec!["rk4", "dopri5"])),
+            column("error", "1", CellType::Measured),
+            column("converged", "", CellType::Flag),
+            column("status", "", CellType::Name(STATUSES.to_vec())),
+            column("fail_time_s", "s", CellType::Time),
+            column("steps", "1", CellType::Count),
         ],
         kind: FileKind::Map,
-        rows_a_point: 1,
-        has_several: false,
+        tasks_per_point: 1,
+        has_several_rows: false,
         metadata: Vec::new(),
     }
 }
@@ -76,6 +79,6 @@ pub fn row(point: u64) -> RowCells {
 }
 
 /// Returns a point with its row.
-pub fn done(point: u64) -> Done {
-    Done { point, rows: vec![row(point)] }
+pub fn point_rows(point: u64) -> PointRows {
+    PointRows { point, rows: vec![row(point)] }
 }

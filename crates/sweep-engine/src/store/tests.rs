@@ -47,14 +47,14 @@ fn options() -> OpenOptions<'static> {
 
 fn open(output: &Path, job: &Job<'_>) -> OpenRun {
     match OpenRun::open(output, job, options()).unwrap() {
-        Opened::Open(run) => run,
-        Opened::Finished((file, _)) => panic!("finished: {file:?}"),
+        OpenOutcome::Open(run) => run,
+        OpenOutcome::Finished((file, _)) => panic!("finished: {file:?}"),
     }
 }
 
 /// Writes a complete chunk.
 fn write(run: &OpenRun, chunk: u64) {
-    let outcomes: Vec<_> = run.chunk_range(chunk).map(synthetic::done).collect();
+    let outcomes: Vec<_> = run.chunk_range(chunk).map(synthetic::point_rows).collect();
     run.write_chunk(&synthetic::job(POINTS), chunk, outcomes).unwrap();
 }
 
@@ -83,7 +83,7 @@ fn finish(mut run: OpenRun, job: &Job<'_>) -> (Tally, Vec<String>) {
 }
 
 /// Returns the bytes of a result that one process has computed without interruption.
-fn bytes_of_undisturbed_run(points: u64) -> Vec<u8> {
+fn uninterrupted_result(points: u64) -> Vec<u8> {
     let home = Home::new();
     let job = synthetic::job(points);
     let run = open(&home.output(), &job);
@@ -95,21 +95,21 @@ fn bytes_of_undisturbed_run(points: u64) -> Vec<u8> {
 
 /// Returns the columns of a search's trials.
 fn trial_columns() -> TrialColumns {
-    let axis = |name: &str| DeclaredColumn::new(name, "1", "a parameter", Holds::Axis);
-    let answers = vec![DeclaredColumn::new("distance", "1", "an answer", Holds::Measured)];
-    TrialColumns { keys: ["x", "y"].map(axis).to_vec(), answers }
+    let axis = |name: &str| DeclaredColumn::new(name, "1", "a parameter", CellType::Axis);
+    let responses = vec![DeclaredColumn::new("distance", "1", "an answer", CellType::Measured)];
+    TrialColumns { keys: ["x", "y"].map(axis).to_vec(), responses }
 }
 
 /// Opens the trials of a search.
 fn trials(output: &Path, job: &Job<'_>) -> Trials {
     match Trials::open(output, job, trial_columns(), false).unwrap() {
-        Opened::Open(trials) => trials,
-        Opened::Finished(()) => panic!("is not done"),
+        OpenOutcome::Open(trials) => trials,
+        OpenOutcome::Finished(()) => panic!("is not done"),
     }
 }
 
 fn batches(path: &Path) -> Vec<RecordBatch> {
     let file = ParquetFile::open(path).unwrap();
-    let all = (0..file.schema().fields().len()).collect();
-    file.batches(all).unwrap().map(Result::unwrap).collect()
+    let all_columns = (0..file.schema().fields().len()).collect();
+    file.batches(all_columns).unwrap().map(Result::unwrap).collect()
 }

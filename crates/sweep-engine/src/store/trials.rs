@@ -1,6 +1,6 @@
-//! The stored trials of a search. The next trials of a search follow from the answers so far. After
-//! an interruption the search therefore starts from its beginning, takes the answers of earlier
-//! trials from the store, and ends in the same bytes.
+//! The stored trials of a search. The next trials of a search follow from the responses so far.
+//! After an interruption the search therefore starts from its beginning, takes the responses of
+//! earlier trials from the store, and ends in the same bytes.
 //!
 //! A search on `x.parquet` works in the folder `x.parquet.partial`, with the same lock and plan
 //! file as a run. Its points are not known beforehand, so its parts are only numbered: the last
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 
-use super::open::{self, Opened};
+use super::open::{self, OpenOutcome};
 use super::part::{Damage, PartError, PartSchema};
 use super::{DeclaredColumn, Folder, Job, Lock, RowCells, StoreError, part_name};
 use sweep_files::{FileKind, atomic};
@@ -36,8 +36,8 @@ pub type TrialKey = Vec<u64>;
 pub struct TrialColumns {
     /// The columns that identify a trial.
     pub keys: Vec<DeclaredColumn>,
-    /// The columns of its answer.
-    pub answers: Vec<DeclaredColumn>,
+    /// The columns of a trial's response.
+    pub responses: Vec<DeclaredColumn>,
 }
 
 /// The stored trials of a search whose folder this process has locked.
@@ -46,8 +46,8 @@ pub struct Trials {
     folder: Folder,
     lock: Lock,
     parts: PartSchema,
-    /// The answers of all trials.
-    answers: BTreeMap<TrialKey, RowCells>,
+    /// The responses of all trials.
+    responses: BTreeMap<TrialKey, RowCells>,
     /// The index of the last part.
     last_part: u64,
     /// The rows of the last part.
@@ -73,25 +73,26 @@ impl Trials {
         job: &Job<'_>,
         columns: TrialColumns,
         fresh: bool,
-    ) -> Result<Opened<(), Self>, StoreError> {
+    ) -> Result<OpenOutcome<(), Self>, StoreError> {
         let folder = Folder::beside(output, job.layout.kind)?;
-        let finished = || match job.layout.kind {
+        let find_finished = || match job.layout.kind {
             // The model's own file does not record the search that made it.
             FileKind::Own => Ok(None),
             _ => Ok(open::result_of_same_plan(&folder, job)?.map(drop)),
         };
-        let (lock, notes) = match open::claim(&folder, job, fresh, || Ok(None), finished)? {
-            Opened::Finished(()) => return Ok(Opened::Finished(())),
-            Opened::Open(lock_and_notes) => lock_and_notes,
-        };
-        let TrialColumns { keys: mut columns, answers } = columns;
+        let (lock, notes) =
+            match open::claim_folder(&folder, job, fresh, || Ok(None), find_finished)? {
+                OpenOutcome::Finished(()) => return Ok(OpenOutcome::Finished(())),
+                OpenOutcome::Open(lock_and_notes) => lock_and_notes,
+            };
+        let TrialColumns { keys: mut columns, responses } = columns;
         let key_count = columns.len();
-        columns.extend(answers);
+        columns.extend(responses);
         let mut trials = Self {
             folder,
             lock,
             parts: PartSchema::new(job, columns),
-            answers: BTreeMap::new(),
+            responses: BTreeMap::new(),
             last_part: 0,
             rows: Vec::new(),
             is_dirty: false,
@@ -99,7 +100,7 @@ impl Trials {
             notes,
         };
         trials.read(key_count)?;
-        Ok(Opened::Open(trials))
+        Ok(OpenOutcome::Open(trials))
     }
 
     /// Reads the parts, and renames damaged ones. The first `key_count` columns identify a trial.
@@ -108,15 +109,15 @@ impl Trials {
             match PartError::damage(read_rows(&self.parts, &self.folder, index))? {
                 Ok(rows) => {
                     for row in &rows {
-                        let (key, answer) = row.split_at(key_count);
+                        let (key, response) = row.split_at(key_count);
                         let key = key.iter().map(|cell| cell.unwrap_or_default()).collect();
-                        self.answers.insert(key, answer.to_vec());
+                        self.responses.insert(key, response.to_vec());
                     }
                     self.last_part = index;
                     self.rows = rows;
                 }
                 Err(damage) => {
-                    let note = open::set_part_aside(&self.folder, index, damage)?;
+                    let note = open::rename_damaged_part(&self.folder, index, damage)?;
                     self.notes.push(note);
                 }
             }
@@ -126,37 +127,37 @@ impl Trials {
 
     /// Returns the number of stored trials.
     pub fn count(&self) -> usize {
-        self.answers.len()
+        self.responses.len()
     }
 
-    /// Returns the answer of an earlier trial.
-    pub fn recall(&self, key: &[u64]) -> Option<&RowCells> {
-        self.answers.get(key)
+    /// Returns the response of an earlier trial.
+    pub fn find_response(&self, key: &[u64]) -> Option<&RowCells> {
+        self.responses.get(key)
     }
 
-    /// Adds an answer, which the next [`Trials::write`] stores.
+    /// Adds a response, which the next [`Trials::write`] stores.
     ///
     /// # Errors
     /// [`StoreError::File`], if the last part is full and has to be written.
-    pub fn add(&mut self, key: TrialKey, answer: RowCells) -> Result<(), StoreError> {
+    pub fn add(&mut self, key: TrialKey, response: RowCells) -> Result<(), StoreError> {
         if self.rows.len() >= PART_ROWS {
             self.write()?;
             self.last_part += 1;
             self.rows.clear();
         }
-        self.rows.push(key.iter().copied().map(Some).chain(answer.iter().copied()).collect());
-        self.answers.insert(key, answer);
+        self.rows.push(key.iter().copied().map(Some).chain(response.iter().copied()).collect());
+        self.responses.insert(key, response);
         self.is_dirty = true;
         Ok(())
     }
 
-    /// Returns whether there are answers to write and the last write is at least [`WRITE_INTERVAL`]
-    /// ago.
+    /// Returns whether there are responses to write and the last write is at least
+    /// [`WRITE_INTERVAL`] ago.
     pub fn is_due(&self) -> bool {
         self.is_dirty && self.last_write.elapsed() >= WRITE_INTERVAL
     }
 
-    /// Writes the answers that were added since the last write. When this returns, they survive a
+    /// Writes the responses that were added since the last write. When this returns, they survive a
     /// power cut.
     ///
     /// # Errors

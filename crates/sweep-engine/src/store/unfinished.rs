@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::lock;
 use super::open::part_indices;
 use super::part;
-use super::plan_file::{FoundPlan, PlanFile};
+use super::plan_file::{PlanFile, StoredPlan};
 use super::point_parts::{is_part_of_run, number_column};
 use super::{Folder, Holder, StoreError, part_name};
 use sweep_files::ParquetFile;
@@ -41,7 +41,8 @@ pub struct Unfinished {
 /// # Errors
 /// [`StoreError::File`].
 pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
-    let is_folder = path.is_dir() && path.extension().is_some_and(|ending| ending == "partial");
+    let is_folder =
+        path.is_dir() && path.extension().is_some_and(|extension| extension == "partial");
     let output = if is_folder { path.with_extension("") } else { path.to_path_buf() };
     if output.exists() || output.file_name().is_none() {
         return Ok(None);
@@ -49,8 +50,8 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
     let mut folder = output.clone().into_os_string();
     folder.push(".partial");
     let folder = Folder { output, path: folder.into() };
-    let FoundPlan::Plan(plan) = PlanFile::read(&folder)? else { return Ok(None) };
-    let Ok(hash) = blake3::Hash::from_hex(&plan.plan_hash) else { return Ok(None) };
+    let StoredPlan::Plan(stored_plan) = PlanFile::read(&folder)? else { return Ok(None) };
+    let Ok(hash) = blake3::Hash::from_hex(&stored_plan.plan_hash) else { return Ok(None) };
     let mut points_done = 0;
     let mut is_search = false;
     for index in part_indices(&folder)? {
@@ -66,8 +67,8 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
         }
     }
     Ok(Some(Unfinished {
-        name: plan.plan["name"].as_str().unwrap_or_default().to_owned(),
-        points: (!is_search).then_some(plan.points),
+        name: stored_plan.plan["name"].as_str().unwrap_or_default().to_owned(),
+        points: (!is_search).then_some(stored_plan.points),
         points_done,
         running: lock::holders(&folder),
         output: folder.output,
@@ -81,13 +82,13 @@ fn count_points(part: &ParquetFile) -> u64 {
     let name = number_column(|name| fields.iter().any(|field| field.name() == name));
     let position = fields.iter().position(|field| field.name() == name);
     let batches = position.and_then(|position| part.batches(vec![position]).ok());
-    let mut last = None;
+    let mut last_number = None;
     let mut count = 0;
     for batch in batches.into_iter().flatten().flatten() {
         let numbers = batch.column(0).as_primitive_opt::<UInt64Type>();
         for number in numbers.into_iter().flatten() {
-            count += u64::from(number != last);
-            last = number;
+            count += u64::from(number != last_number);
+            last_number = number;
         }
     }
     count
@@ -99,10 +100,10 @@ fn count_points(part: &ParquetFile) -> u64 {
 /// [`StoreError::Unfinished`], and the errors of [`unfinished`].
 pub fn refuse_unfinished(path: &Path) -> Result<(), StoreError> {
     match unfinished(path)? {
-        Some(found) => Err(StoreError::Unfinished {
-            progress: found.progress(),
-            output: found.output,
-            folder: found.folder,
+        Some(unfinished_work) => Err(StoreError::Unfinished {
+            progress: unfinished_work.progress(),
+            output: unfinished_work.output,
+            folder: unfinished_work.folder,
         }),
         None => Ok(()),
     }
@@ -111,13 +112,13 @@ pub fn refuse_unfinished(path: &Path) -> Result<(), StoreError> {
 impl Unfinished {
     /// Returns the progress in words.
     pub fn progress(&self) -> String {
-        let done = self.points_done;
+        let points_done = self.points_done;
         match self.points {
             Some(points) => {
-                let percent = 100.0 * done as f64 / points.max(1) as f64;
-                format!("{done} of {points} points done ({percent:.1} %)")
+                let percent = 100.0 * points_done as f64 / points.max(1) as f64;
+                format!("{points_done} of {points} points done ({percent:.1} %)")
             }
-            None => format!("{done} trials of a search kept"),
+            None => format!("{points_done} trials of a search kept"),
         }
     }
 }

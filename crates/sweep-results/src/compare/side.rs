@@ -11,7 +11,7 @@ const MAX_CELLS: u64 = 100_000_000;
 /// The columns of a file that take part in a comparison.
 #[derive(Debug)]
 pub(super) struct ComparedFile {
-    /// The row groups: the key columns, further_names columns by which rows are matched, and the compared
+    /// The row groups: the key columns, further columns by which rows are matched, and the compared
     /// columns.
     row_groups: Vec<Rows>,
     /// The number of rows.

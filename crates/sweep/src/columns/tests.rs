@@ -1,7 +1,7 @@
 //! Tests of the names, the order and the descriptions of columns.
 
 use arrow_array::Float64Array;
-use sweep_engine::store::{Holds, ResultRows};
+use sweep_engine::store::{CellType, ResultRows};
 use washer_row::{Criterion, Status};
 
 use super::*;
@@ -14,7 +14,7 @@ fn columns(measures: &Measures) -> Columns {
 
 fn layout(measures: Measures) -> sweep_engine::store::Layout {
     let axis = |name: &str, unit: &str| {
-        DeclaredColumn::new(name, unit, format!("swept {name}"), Holds::Axis)
+        DeclaredColumn::new(name, unit, format!("swept {name}"), CellType::Axis)
     };
     let axes = vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")];
     sweep_engine::store::Layout::map(axes, columns(&measures).declared())

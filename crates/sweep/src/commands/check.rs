@@ -3,7 +3,9 @@
 
 use arrow_array::Array;
 use sweep_engine::commands::check as engine_check;
-use sweep_engine::{AxisValues, Design, Effort, Error, Exit, Interrupt, ProgressMode, show, tell};
+use sweep_engine::{
+    AxisValues, Design, Error, Execution, Exit, Interrupt, ProgressMode, show, tell,
+};
 use sweep_files::cells;
 use washer_model::{MachineParameter, Range, decimal};
 use washer_row::Metric;
@@ -44,8 +46,9 @@ pub(crate) fn run(args: &WasherCheckArgs) -> Result<Exit, Error> {
     let trial = Trial::new(&plan, assumed);
     tell(&format!("{} rows are computed", trial.rows()));
     let interrupt = Interrupt::install().map_err(Error::signals)?;
-    let effort = Effort { threads: None, progress: ProgressMode::default(), interrupt: &interrupt };
-    let Some(outcomes) = trial.outcomes(effort)? else {
+    let execution =
+        Execution { threads: None, progress: ProgressMode::default(), interrupt: &interrupt };
+    let Some(outcomes) = trial.outcomes(execution)? else {
         return Ok(Exit::interrupted(interrupt.signal()));
     };
     show(&trial.table(&outcomes))
@@ -172,9 +175,9 @@ impl Trial {
     }
 
     /// Computes every row. Returns `None` if the work was interrupted.
-    fn outcomes(&self, effort: Effort<'_>) -> Result<Option<Vec<TrialOutcome>>, Error> {
+    fn outcomes(&self, execution: Execution<'_>) -> Result<Option<Vec<TrialOutcome>>, Error> {
         let evaluator = PlanEvaluator::new(self.plan.clone());
-        let found = evaluator.all_points()?.in_memory(effort)?;
+        let found = evaluator.all_points()?.in_memory(execution)?;
         let mut outcomes: Vec<TrialOutcome> = Vec::new();
         for batch in found.batches() {
             let numbers = |name: &str| {
@@ -305,13 +308,13 @@ mod tests {
         let trial = Trial::new(&plan, Assumed::all(&plan));
         assert!(trial.assumed.len() > 10, "{}", trial.assumed.len());
         let interrupt = Interrupt::new();
-        let effort =
-            || Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
-        let outcomes = trial.outcomes(effort()).unwrap().expect("nobody interrupts");
+        let execution =
+            || Execution { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
+        let outcomes = trial.outcomes(execution()).unwrap().expect("nobody interrupts");
         assert_eq!(outcomes.len(), 2 * trial.stride);
         // The rows with all assumed values are those of the plan itself, except for their steps.
         let evaluator = PlanEvaluator::new(plan.clone());
-        let plan_rows = evaluator.all_points().unwrap().in_memory(effort()).unwrap();
+        let plan_rows = evaluator.all_points().unwrap().in_memory(execution()).unwrap();
         let column = plan_rows.batches()[0].column_by_name("ratio_max").expect("it is there");
         let ratios = cells::numbers(column).unwrap();
         for (point, ratio) in ratios.into_iter().enumerate() {

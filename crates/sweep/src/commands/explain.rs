@@ -3,7 +3,7 @@
 use crate::explain::{explain, format, json};
 use crate::speeds::{Speeds, parse_speeds_above_zero};
 use sweep_engine::commands::grid::GridArgs;
-use sweep_engine::{EffortArgs, Error, Exit, Interrupt, show};
+use sweep_engine::{Error, ExecutionArgs, Exit, Interrupt, show};
 
 /// Arguments of `sweep explain`.
 #[derive(Debug, clap::Args)]
@@ -20,7 +20,7 @@ pub struct ExplainArgs {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    effort: EffortArgs,
+    execution: ExecutionArgs,
 }
 
 /// The end of `sweep explain --help`.
@@ -38,7 +38,7 @@ pub(crate) fn run(args: &ExplainArgs) -> Result<Exit, Error> {
     let (plan, at) = args.grid.load_point(&args.grid.at)?;
     // A signal ends the process, because there are no partial results to keep.
     let interrupt = Interrupt::new();
-    let found = explain(&plan, at, args.speed, args.effort.with(&interrupt))?;
+    let found = explain(&plan, at, args.speed, args.execution.with(&interrupt))?;
     if args.json {
         return show(&format!("{:#}\n", json::to_json(&found)));
     }

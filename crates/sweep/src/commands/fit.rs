@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use crate::config::{self, WasherGridInput};
 use crate::fit::{self, Evaluations, FitOptions, FitWork, Measurement};
 use lane_ode::Cancel;
-use sweep_engine::commands::grid::{GridArgs, typed};
-use sweep_engine::{EffortArgs, Error, Exit, Interrupt, Progress, show, tell, threads};
+use sweep_engine::commands::grid::{GridArgs, resume_command};
+use sweep_engine::{Error, ExecutionArgs, Exit, Interrupt, Progress, show, tell, threads};
 use sweep_files::{FileKind, OWN_FILE, Output};
 
 /// Arguments of `sweep fit`.
@@ -37,7 +37,7 @@ pub struct FitArgs {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    effort: EffortArgs,
+    execution: ExecutionArgs,
     /// Start over, even if another fit with this --out was begun
     #[arg(long, requires = "out")]
     fresh: bool,
@@ -87,17 +87,17 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let begun = curves.iter().map(|path| Output::begin(path, FileKind::Fit));
     let begun = begun.collect::<Result<Vec<_>, _>>()?;
     let interrupt = Interrupt::install().map_err(Error::signals)?;
-    let progress = Progress::for_search(args.effort.progress, 0, "", 0);
+    let progress = Progress::for_search(args.execution.progress, 0, "", 0);
     let seen = |made: usize| progress.show_search(0, made as u64);
     let cancel = Cancel::Flag(interrupt.flag());
     let output = args.out.as_deref();
     let work = FitWork { cancel, seen: &seen, output, fresh: args.fresh };
-    let threads = threads::count(args.effort.threads, &threads::process)?;
+    let threads = threads::count(args.execution.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
     progress.finish();
     let Some(mut fitted) = found else {
         let kept = "with --out, what was found out is kept";
-        tell(&format!("interrupted: {kept}\n     go on  {}", typed()));
+        tell(&format!("interrupted: {kept}\n     go on  {}", resume_command()));
         return Ok(Exit::interrupted(interrupt.signal()));
     };
     if let (Some(path), Some(out)) = (&args.out, out) {

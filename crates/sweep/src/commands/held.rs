@@ -3,14 +3,16 @@
 
 use std::path::{Path, PathBuf};
 
-use super::show::FURTHER;
+use super::show::MODEL_SUMMARY;
 use crate::dwell::AttractorSearch;
 use crate::plan::Plan;
 use crate::speeds::SpeedList;
 use crate::stability::{HeldPlan, check};
 use sweep_engine::commands::cells::Lines as _;
 use sweep_engine::commands::grid::ResultArgs;
-use sweep_engine::commands::run::{RunCommand, WorkArgs, exit, failure_reasons, installed, rows};
+use sweep_engine::commands::run::{
+    RunCommand, WorkArgs, count_lines, exit, failure_reasons, install_interrupt,
+};
 use sweep_engine::commands::{merge, status};
 use sweep_engine::store::Tally;
 use sweep_engine::{Error, Exit, Job};
@@ -93,10 +95,10 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<O
             text.push_str(&content(&output)?);
             text.push_str(&failure_reasons(&engine, tally, &job));
             text.line("file", output.display());
-            text.next("show", &output);
+            text.suggest_command("show", &output);
             Ok(())
         };
-        let report = command.execute(&engine, &job, &output, &installed()?, &finished)?;
+        let report = command.execute(&engine, &job, &output, &install_interrupt()?, &finished)?;
         Ok(exit(work, &report))
     }
 }
@@ -104,7 +106,7 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<O
 /// Describes the content of a finished file about held speeds.
 fn content(output: &Path) -> Result<String, Error> {
     let mut text = String::new();
-    for (name, words) in FURTHER.listed(&ParquetFile::open(output)?)? {
+    for (name, words) in MODEL_SUMMARY.shortened_lines(&ParquetFile::open(output)?)? {
         text.line(name, words);
     }
     Ok(text)
@@ -154,7 +156,7 @@ impl JobArgs<merge::MergeArgs> {
         let (job, output, _) = self.held.job(&plan, target);
         let content = |tally: &Tally| match self.held.speed {
             Some(_) => content(&output),
-            None => Ok(rows(tally, &job)),
+            None => Ok(count_lines(tally, &job)),
         };
         merge::merge_job(&self.command, &plan.name, &job, &output, &content)
     }

@@ -16,7 +16,7 @@ use crate::method::METHODS;
 use arrow_schema::Schema;
 use sweep_engine::Model as _;
 use sweep_engine::columns::declared;
-use sweep_engine::store::{DeclaredColumn, Holds, Layout};
+use sweep_engine::store::{CellType, DeclaredColumn, Layout};
 use sweep_files::key;
 
 /// Returns the head of a page, with a comment that it is generated.
@@ -135,7 +135,7 @@ fn columns() -> String {
                 parameter.name(),
                 parameter.unit(),
                 parameter.description(),
-                Holds::Axis,
+                CellType::Axis,
             )
         })
         .collect();

@@ -7,8 +7,8 @@ use crate::plan::Plan;
 use crate::trace::{MAX_POINT_TRACES, write_point_traces};
 use lane_ode::Cancel;
 use sweep_engine::commands::run as engine_run;
-use sweep_engine::commands::run::{execute, exit, installed};
-use sweep_engine::run::Ended;
+use sweep_engine::commands::run::{execute, exit, install_interrupt};
+use sweep_engine::run::RunEnd;
 use sweep_engine::{Error, Exit, Progress, tell, threads};
 use sweep_files::{self as files, ParquetFile};
 
@@ -37,16 +37,16 @@ pub(crate) fn run(args: &WasherRunArgs) -> Result<Exit, Error> {
             format!("at most {MAX_POINT_TRACES}; `sweep trace` writes those of single points");
         return Err(Error::option("--keep-traces", given, expected));
     }
-    let interrupt = installed()?;
+    let interrupt = install_interrupt()?;
     let options = if args.keep_traces { " --keep-traces" } else { "" };
     let report =
         execute(&args.run, &plan, &engine.for_plan(&plan).into_engine(), &interrupt, options)?;
     let output = args.run.target.output(&plan);
-    if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
-        let threads = threads::count(args.run.work.effort.threads, &threads::process)?;
+    if args.keep_traces && matches!(report.end, RunEnd::Already(..) | RunEnd::Finished(_)) {
+        let threads = threads::count(args.run.work.execution.threads, &threads::process)?;
         let folder = files::beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
-        let progress = Progress::new(args.run.work.effort.progress, plan.points(), 0);
+        let progress = Progress::new(args.run.work.execution.progress, plan.points(), 0);
         let kept = AtomicU64::new(0);
         let done = || progress.show(kept.fetch_add(1, Ordering::Relaxed) + 1);
         let map = ParquetFile::open(&output)?;

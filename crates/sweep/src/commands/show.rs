@@ -3,12 +3,13 @@
 use crate::dwell;
 use crate::stability::tongues;
 use sweep_engine::Error;
-use sweep_engine::commands::show::Further;
+use sweep_engine::commands::show::ModelSummary;
 use sweep_files::{FileKind, ParquetFile};
 use washer_row::Metric;
 
 /// The additions of this model to the engine's `sweep show`.
-pub(super) const FURTHER: Further<'static> = Further { lines: &lines, is_of_a_metric };
+pub(super) const MODEL_SUMMARY: ModelSummary<'static> =
+    ModelSummary { lines: &lines, is_metric_column };
 
 /// Returns the lines of the summary of a file about held speeds, each with its name.
 fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
@@ -20,7 +21,7 @@ fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
 }
 
 /// Whether a column belongs to a metric.
-fn is_of_a_metric(column: &str) -> bool {
+fn is_metric_column(column: &str) -> bool {
     // The name of a column of one stop or foot has a number after the first word.
     let words = column.split('_').filter(|word| word.parse::<u32>().is_err());
     let name = words.collect::<Vec<_>>().join("_");
@@ -35,10 +36,10 @@ mod tests {
     fn columns_of_metrics_are_told_from_others() {
         let metrics = ["cabinet_force_linear_n", "static_sag_m", "stop_2_force_nonlinear_n"];
         for name in [metrics.as_slice(), &["foot_load_linear_n", "growth_mode_1_name"]].concat() {
-            assert!(is_of_a_metric(name), "{name}");
+            assert!(is_metric_column(name), "{name}");
         }
         for name in ["ratio_max", "stop_2_clearance_m", "min_gap_linear_m", "status"] {
-            assert!(!is_of_a_metric(name), "{name}");
+            assert!(!is_metric_column(name), "{name}");
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::trace::{
     start_from, trace_in_pool,
 };
 use lane_ode::Cancel;
-use sweep_engine::commands::cells::{Lines as _, short, span, table};
+use sweep_engine::commands::cells::{Lines as _, format_number, format_range, format_table};
 use sweep_engine::commands::grid::quoted;
 use sweep_engine::{Error, Exit, Job, tell};
 use sweep_files::{FileKind, Output, key};
@@ -162,7 +162,7 @@ fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Resu
     let channels = &compared_channels(&plan);
     let limits = plan.reliability.limits;
     let verdict = Verdict::new(&outcome, channels.len(), limits);
-    let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
+    let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), format_number);
     let row = |(k, channel): (usize, &Channel)| {
         let amplitude = |model: &Trajectory| number(model.amplitudes.get(k).copied());
         vec![
@@ -175,10 +175,11 @@ fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Resu
     };
     let rows: Vec<Vec<String>> = channels.iter().enumerate().map(row).collect();
     let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
-    let window = span(plan.window_s, short);
+    let window = format_range(plan.window_s, format_number);
     let amplitude = plan.model.measures.criterion.amplitude_description();
     let point = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
-    let mut text = format!("{amplitude}, {window} s{point}:\n{}", table(&headings, &rows, ""));
+    let mut text =
+        format!("{amplitude}, {window} s{point}:\n{}", format_table(&headings, &rows, ""));
     // The decisive ratio is one that is beyond its limit, or else the greatest.
     let too_low = limits.lower.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
     let decisive = match (verdict.greatest, too_low) {
@@ -191,8 +192,8 @@ fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Resu
         (Some(reliable), Some(((channel, ratio), which, limit))) => {
             let word = if reliable { "reliable" } else { "not reliable" };
             let channel = channels[channel].name();
-            let ratio = short(ratio);
-            let limit = short(limit);
+            let ratio = format_number(ratio);
+            let limit = format_number(limit);
             format!("{word}: the {which} ratio is {ratio} ({channel}), the limit {limit}")
         }
         _ => "undefined: no ratio is defined".to_owned(),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sweep_engine::columns::{MODELS, ResultColumn};
-use sweep_engine::store::{Done, Holds};
+use sweep_engine::store::{CellType, PointRows};
 use washer_model::{
     Attractor, AttractorStatus, Attractors, COORDINATES, Channel, MotionKind, Response, STATE_LEN,
 };
@@ -110,7 +110,7 @@ impl DwellRow {
 
 /// Returns a column of counts, which are null where they are unknown.
 fn count_column(name: &str, description: &str, count: fn(&DwellRow) -> Option<u64>) -> DwellColumn {
-    ResultColumn::new(name, "1", description, Holds::KnownCount, count)
+    ResultColumn::new(name, "1", description, CellType::KnownCount, count)
 }
 
 /// Returns the columns of the amplitudes of both models, by channel.
@@ -150,7 +150,7 @@ pub(crate) fn columns(
     let motion = |row: &DwellRow| Some(row.motion as u64);
     let description = "number of the motion at this speed: 0 is the one that the disturbed \
                 periodic response ends in";
-    let mut columns = vec![ResultColumn::new("motion", "1", description, Holds::Count, motion)];
+    let mut columns = vec![ResultColumn::new("motion", "1", description, CellType::Count, motion)];
     let description = "how many starts ended in it; 0 where only a transient did";
     columns.push(count_column("starts", description, |row| Some(u64::from(row.motion()?.starts))));
     let description = "how many starts there were: the disturbed periodic responses, then kicks, \
@@ -261,11 +261,11 @@ pub(crate) fn columns(
 pub(super) fn carried_columns() -> impl Iterator<Item = DwellColumn> {
     let bits = |i: usize| move |row: &DwellRow| Some(final_state(row.found()?)?[i].to_bits());
     (0..STATE_LEN)
-        .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", Holds::Kept, bits(i)))
+        .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", CellType::Kept, bits(i)))
 }
 
 /// Returns the state of a known row that the search carries to the next speed.
-pub(super) fn carried_state(known: &Done) -> Carried {
+pub(super) fn carried_state(known: &PointRows) -> Carried {
     let cells = known.rows.first()?.last_chunk::<STATE_LEN>()?;
     let state: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
     state?.try_into().ok()

@@ -4,7 +4,7 @@ use washer_model::{
     Attractor, AttractorStatus, Channel, LeftRangeError, MotionKind, StabilityKind, decimal,
 };
 
-use sweep_engine::commands::cells::short;
+use sweep_engine::commands::cells::format_number;
 
 use super::{
     Cause, Closing, Explanation, ModeResonance, Passage, SpeedScan, SweptResult, Tongue, TongueEnd,
@@ -69,7 +69,7 @@ fn push_scan(text: &mut String, found: &Explanation, scan: &SpeedScan) {
         push_line(text, "off curve", format!("{direction}{words}"));
     }
     if let (Some((from, limit)), Some((to, _))) = (scan.beyond.first(), scan.beyond.last()) {
-        let [from, to] = [from, to].map(|rpm| short(*rpm));
+        let [from, to] = [from, to].map(|rpm| format_number(*rpm));
         let count = scan.beyond.len();
         let limit = limit.name().replace('_', " ");
         let words = format!(
@@ -118,7 +118,7 @@ fn stable_speeds(found: &Explanation, scan: &SpeedScan) -> String {
 
 /// Returns a sentence on the speeds (rpm) at which the response is not on the curve of a run-up.
 fn off_curve_words(speeds_rpm: &[f64]) -> Option<String> {
-    let [from, to] = [speeds_rpm.first()?, speeds_rpm.last()?].map(|rpm| short(*rpm));
+    let [from, to] = [speeds_rpm.first()?, speeds_rpm.last()?].map(|rpm| format_number(*rpm));
     Some(format!(
         "at {} of the speeds, from {from} to {to} rpm, the response is off the curve: a machine \
          that runs up may be in another motion there (`sweep dwell`)",
@@ -183,7 +183,7 @@ fn push_verdict(text: &mut String, swept: &SweptResult) {
     );
     push_line(text, "swept", words);
     if over_estimates(swept) {
-        let below = short(swept.limits.over_estimate());
+        let below = format_number(swept.limits.over_estimate());
         let words = format!("the linear model over-estimates: a ratio is below {below}");
         push_line(text, "too high", words);
     }

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 use sweep_engine::store::{
-    DeclaredColumn, Holds, Job, Opened, RowCells, StoreError, TrialColumns, TrialKey, Trials,
+    CellType, DeclaredColumn, Job, OpenOutcome, RowCells, StoreError, TrialColumns, TrialKey,
+    Trials,
 };
 use sweep_engine::tell;
 use sweep_files::FileKind;
@@ -37,7 +38,7 @@ impl Evaluations {
         problem: &Problem<'_>,
         fresh: bool,
     ) -> Result<Self, StoreError> {
-        let Opened::Open(mut trials) =
+        let OpenOutcome::Open(mut trials) =
             Trials::open(output, &job(problem), columns(problem), fresh)?
         else {
             let path = output.display();
@@ -62,7 +63,7 @@ impl Evaluations {
         find: impl FnOnce() -> Result<Option<Summary>, E>,
     ) -> Result<Option<Summary>, E> {
         let key: TrialKey = x.iter().map(|x| x.to_bits()).collect();
-        if let Some(cells) = lock(&self.trials).recall(&key) {
+        if let Some(cells) = lock(&self.trials).find_response(&key) {
             return Ok(self.summary(cells));
         }
         let began = Instant::now();
@@ -126,30 +127,31 @@ fn columns(problem: &Problem<'_>) -> TrialColumns {
             Some(case) => format!("file_{}_{}", case + 1, parameter.name()),
         };
         let about = parameter.description();
-        keys.push(DeclaredColumn::new(name, parameter.unit(), about, Holds::Axis));
+        keys.push(DeclaredColumn::new(name, parameter.unit(), about, CellType::Axis));
     }
     if problem.with_shift {
         let about = "shift of the file's clock";
         let shift =
-            |case| DeclaredColumn::new(format!("file_{case}_shift_s"), "s", about, Holds::Axis);
+            |case| DeclaredColumn::new(format!("file_{case}_shift_s"), "s", about, CellType::Axis);
         keys.extend((1..=problem.cases.len()).map(shift));
     }
     let unknowns = 1..=problem.unknowns();
-    let number = |name: String, about: &str| DeclaredColumn::new(name, "1", about, Holds::Measured);
-    let mut answers = vec![number("cost".to_owned(), "twice the negative log-likelihood")];
+    let number =
+        |name: String, about: &str| DeclaredColumn::new(name, "1", about, CellType::Measured);
+    let mut responses = vec![number("cost".to_owned(), "twice the negative log-likelihood")];
     for signal in 1..=problem.signals().count() {
-        answers.push(number(format!("noise_{signal}"), "noise of a signal, in its unit"));
+        responses.push(number(format!("noise_{signal}"), "noise of a signal, in its unit"));
     }
     for row in unknowns.clone() {
         for column in unknowns.clone() {
             let about = "entry of the normal matrix J'WJ";
-            answers.push(number(format!("normal_{row}_{column}"), about));
+            responses.push(number(format!("normal_{row}_{column}"), about));
         }
     }
     for row in unknowns {
-        answers.push(number(format!("gradient_{row}"), "entry of J'Wr"));
+        responses.push(number(format!("gradient_{row}"), "entry of J'Wr"));
     }
-    TrialColumns { keys, answers }
+    TrialColumns { keys, responses }
 }
 
 /// Returns the job of a problem: the plans of its cases, and a hash of what was measured.

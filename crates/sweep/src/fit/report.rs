@@ -14,7 +14,7 @@ use super::statistics::{Statistics, Z_975};
 use super::verdict::{FittedVerdict, OnMap};
 use crate::config;
 use sweep_engine::Error;
-use sweep_engine::commands::cells::{Lines as _, span, table};
+use sweep_engine::commands::cells::{Lines as _, format_range, format_table};
 use sweep_engine::config::section::counted;
 
 /// Between which share of two units a signal is taken for one in the other.
@@ -352,7 +352,7 @@ impl FitReport {
                 format!("{value:.4e}")
             }
         };
-        let interval = |ends| span(ends, short);
+        let interval = |ends| format_range(ends, short);
         let row = |fit: &Fit| {
             let unknown = if fit.at_bound { "at its bound" } else { "not known" };
             let known = fit.interval_95.map_or_else(|| unknown.to_owned(), interval);
@@ -376,7 +376,7 @@ impl FitReport {
         text.line("model", model);
         // Without a free number the model is compared alone.
         if !rows.is_empty() {
-            text.push_str(&table(&headings, &rows, ""));
+            text.push_str(&format_table(&headings, &rows, ""));
         }
         let mut say = |what: &str, said: &str| text.line(what, said);
         self.untold.iter().for_each(|untold| say("untold", untold));

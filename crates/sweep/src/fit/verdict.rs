@@ -13,7 +13,7 @@ use super::statistics::{Statistics, Z_975};
 use crate::engine::{ModelEngine, fastest_growth, find_responses};
 use crate::plan::{Axis, AxisValues, Plan, axis_between, prepare_point, timing};
 use sweep_engine::Error;
-use sweep_engine::commands::cells::span;
+use sweep_engine::commands::cells::format_range;
 
 /// Speeds at which the fitted machine's stability is looked at.
 const SPEEDS: u32 = 120;
@@ -62,7 +62,7 @@ impl FittedVerdict {
         let way = if is_growing { "grow" } else { "die away" };
         let interval = self.growth_95.map_or_else(String::new, |ends| {
             let [from, to] = if is_growing { ends } else { [-ends[1], -ends[0]] };
-            format!(" ({} in 95 %)", span([from, to], short))
+            format!(" ({} in 95 %)", format_range([from, to], short))
         });
         let off = match self.growth_on_curve {
             Some(false) => {

@@ -9,14 +9,14 @@ use arrow_schema::{ArrowError, SchemaRef};
 use once_cell::sync::OnceCell;
 use serde_json::json;
 
-use super::Effort;
+use super::Execution;
 use super::points::PointTable;
 use super::result::MemoryTable;
 use super::run::EvaluationTask;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use sweep_engine::engine::IncompleteGroups;
-use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
+use sweep_engine::store::{BATCH_ROWS, Layout, PointRows, ResultRows};
 use sweep_engine::{Error, Job, Progress, RunContext, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::RefinementLevels;
@@ -48,7 +48,11 @@ impl PlanEvaluator {
     ///
     /// Returns an error if columns or values do not fit the plan's axes, if no threads can be
     /// started, and if `SWEEP_SIMD` names no instruction set of this processor.
-    pub fn evaluate(&self, table: &PointTable, effort: Effort<'_>) -> Result<MemoryTable, Error> {
+    pub fn evaluate(
+        &self,
+        table: &PointTable,
+        execution: Execution<'_>,
+    ) -> Result<MemoryTable, Error> {
         let points = table.assign_to_axes(&self.plan)?;
         let mut job = Job::new(&self.plan);
         job.points = table.rows() as u64;
@@ -56,7 +60,7 @@ impl PlanEvaluator {
             "method": "table", "points": job.points, "hash": points.hash(),
         });
         job.axis_values = Box::new(|point| points.axis_values(point));
-        self.run_task(job)?.in_memory(effort)
+        self.run_task(job)?.in_memory(execution)
     }
 
     /// Returns the task to compute all points of the plan.
@@ -79,10 +83,10 @@ impl EvaluationTask<'_> {
     ///
     /// # Errors
     /// Returns an error if no threads can be started, and if the engine panics.
-    pub fn in_memory(&self, effort: Effort<'_>) -> Result<MemoryTable, Error> {
+    pub fn in_memory(&self, execution: Execution<'_>) -> Result<MemoryTable, Error> {
         let Self { job, engine } = self;
-        let pool = threads::pool(effort.threads()?)?;
-        let context = RunContext::new(effort.interrupt);
+        let pool = threads::pool(execution.threads()?)?;
+        let context = RunContext::new(execution.interrupt);
         let rows = Mutex::new(0..job.points);
         let source = || {
             let row = if context.stopped() { None } else { lock(&rows).next() }?;
@@ -92,7 +96,7 @@ impl EvaluationTask<'_> {
         // A panic is a defect of this program.
         let engine_error = |reason| StoreError::Engine { first: 0, last, reason };
         let collector = BatchCollector::new(job);
-        let progress = Progress::new(effort.progress, job.points, 0);
+        let progress = Progress::new(execution.progress, job.points, 0);
         let sink = |outcome| {
             collector.add(outcome, &context);
             progress.show(context.points_done());
@@ -125,7 +129,7 @@ impl<'a> BatchCollector<'a> {
     }
 
     /// Adds a row, and completes its batch if the row is the last one.
-    fn add(&self, outcome: Done, context: &RunContext<'_>) {
+    fn add(&self, outcome: PointRows, context: &RunContext<'_>) {
         let rows = BATCH_ROWS as u64;
         let batch_index = outcome.point / rows;
         let size = rows.min(self.job.points - batch_index * rows);
@@ -136,7 +140,7 @@ impl<'a> BatchCollector<'a> {
         context.add_points(1);
     }
 
-    fn batch(&self, mut outcomes: Vec<Done>) -> Result<RecordBatch, ArrowError> {
+    fn batch(&self, mut outcomes: Vec<PointRows>) -> Result<RecordBatch, ArrowError> {
         outcomes.sort_by_key(|outcome| outcome.point);
         let layout: &Layout = &self.job.layout;
         let mut rows = ResultRows::with_schema(layout, SchemaRef::clone(&self.schema));
@@ -175,9 +179,9 @@ mod tests {
         let grid = WasherGridInput::text("grid", text.to_owned(), Vec::new());
         let evaluator = PlanEvaluator::new(grid.load().unwrap());
         let interrupt = Interrupt::new();
-        let effort =
-            Effort { threads: Some(2), progress: ProgressMode::None, interrupt: &interrupt };
-        let table = evaluator.all_points().unwrap().in_memory(effort).unwrap();
+        let execution =
+            Execution { threads: Some(2), progress: ProgressMode::None, interrupt: &interrupt };
+        let table = evaluator.all_points().unwrap().in_memory(execution).unwrap();
         let [first, second] = table.batches() else { panic!("{table:?}") };
         assert_eq!([first.num_rows(), second.num_rows()], [BATCH_ROWS, 1]);
         assert!(Arc::ptr_eq(&first.schema(), &second.schema()));

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Effort, refused_speeds};
+use super::{Execution, refused_speeds};
 use crate::config::WasherGridInput;
 use crate::explain::{explain, format, json};
 use crate::speeds::Speeds;
@@ -31,7 +31,7 @@ pub fn explain_point(
     grid: &WasherGridInput,
     at: &[String],
     speeds_rpm: Option<&[f64]>,
-    effort: Effort<'_>,
+    execution: Execution<'_>,
 ) -> Result<Option<Explained>, Error> {
     let (plan, at) = grid.load_point(at)?;
     let parse = |speeds: &[f64]| {
@@ -42,8 +42,8 @@ pub fn explain_point(
         })
     };
     let speeds = speeds_rpm.map(parse).transpose()?;
-    let found = explain(&plan, at, speeds, effort)?;
-    if effort.interrupt.stopped() {
+    let found = explain(&plan, at, speeds, execution)?;
+    if execution.interrupt.stopped() {
         return Ok(None);
     }
     Ok(Some(Explained { found: json::to_json(&found), text: format::to_text(&found) }))
@@ -65,10 +65,10 @@ mod tests {
         // An explanation at all these speeds would take minutes.
         let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
         let interrupt = Interrupt::new();
-        let effort =
-            Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
+        let execution =
+            Execution { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
         let explanation = std::thread::scope(|scope| {
-            let work = scope.spawn(|| explain_point(&grid, &[], Some(&speeds), effort));
+            let work = scope.spawn(|| explain_point(&grid, &[], Some(&speeds), execution));
             std::thread::sleep(Duration::from_millis(500));
             assert!(!work.is_finished(), "it is too short");
             let raised = Instant::now();

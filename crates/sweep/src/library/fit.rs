@@ -3,7 +3,7 @@
 use lane_ode::Cancel;
 use serde_json::json;
 
-use super::{Effort, Explained, PointTable};
+use super::{Execution, Explained, PointTable};
 use crate::config::WasherGridInput;
 use crate::fit::{self, FitOptions, FitWork, Measurement};
 use sweep_engine::{Error, threads};
@@ -18,7 +18,7 @@ pub fn fit_tables(
     grid: &WasherGridInput,
     tables: Vec<(PointTable, Vec<String>)>,
     options: &FitOptions,
-    effort: Effort<'_>,
+    execution: Execution<'_>,
 ) -> Result<Option<Explained>, Error> {
     if tables.is_empty() {
         return Err(Error::option("table", "[]", "a table or more"));
@@ -33,9 +33,10 @@ pub fn fit_tables(
         }
         cases.push(fit::case(grid, &constants, measured)?);
     }
-    let cancel = Cancel::Flag(effort.interrupt.flag());
+    let cancel = Cancel::Flag(execution.interrupt.flag());
     let work = FitWork { cancel, seen: &|_| {}, output: None, fresh: false };
-    let fitted = threads::pool(effort.threads()?)?.install(|| fit::fit(cases, options, &work))?;
+    let fitted =
+        threads::pool(execution.threads()?)?.install(|| fit::fit(cases, options, &work))?;
     Ok(fitted.map(|fit| Explained { found: json!(fit.report), text: fit.report.text() }))
 }
 
@@ -47,8 +48,8 @@ mod tests {
     #[test]
     fn no_table_and_too_many_draws_are_refused() {
         let interrupt = Interrupt::new();
-        let effort =
-            || Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
+        let execution =
+            || Execution { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
         let options = FitOptions {
             free: Vec::new(),
             own: Vec::new(),
@@ -61,7 +62,7 @@ mod tests {
         };
         let grid = WasherGridInput::text("fit", String::new(), Vec::new());
         let message = |options: &FitOptions| {
-            fit_tables(&grid, Vec::new(), options, effort()).unwrap_err().to_string()
+            fit_tables(&grid, Vec::new(), options, execution()).unwrap_err().to_string()
         };
         assert!(message(&options).contains("a table or more"));
         let too_many = 1_000_000_000;

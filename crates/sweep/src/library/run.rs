@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::Effort;
+use super::Execution;
 use super::result::MemoryTable;
-use sweep_engine::run::{Ended, RunOptions};
+use sweep_engine::run::{RunEnd, RunOptions};
 use sweep_engine::{Engine, Error, Job, run as runner};
 
 /// The end of a run into a file.
@@ -39,27 +39,27 @@ impl EvaluationTask<'_> {
         output: &Path,
         fresh: bool,
         tell: &dyn Fn(&str),
-        effort: Effort<'_>,
+        execution: Execution<'_>,
     ) -> Result<RanToFile, Error> {
         let options = RunOptions {
-            threads: effort.threads()?,
+            threads: execution.threads()?,
             fresh,
             shard: None,
-            progress: effort.progress,
+            progress: execution.progress,
             environment: &|_| None,
             tell,
         };
-        let report = runner::run(&self.engine, &self.job, output, options, effort.interrupt)?;
+        let report = runner::run(&self.engine, &self.job, output, options, execution.interrupt)?;
         report.notes.iter().for_each(|note| tell(note));
-        Ok(match report.ended {
-            Ended::Already(..) | Ended::Finished(_) => {
+        Ok(match report.end {
+            RunEnd::Already(..) | RunEnd::Finished(_) => {
                 RanToFile::Complete(MemoryTable::read(output)?)
             }
-            Ended::Interrupted { kept: stored, points, .. } => {
+            RunEnd::Interrupted { kept: stored, points, .. } => {
                 RanToFile::Interrupted { stored, points }
             }
             // A run has shards only if the scheduler's variables are set.
-            Ended::Shard(..) => RanToFile::Interrupted { stored: 0, points: self.job.points },
+            RunEnd::Shard(..) => RanToFile::Interrupted { stored: 0, points: self.job.points },
         })
     }
 }

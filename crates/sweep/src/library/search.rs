@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::Effort;
+use super::Execution;
 use super::result::MemoryTable;
 use crate::model::Washer;
 use crate::plan::Plan;
@@ -12,7 +12,7 @@ use sweep_engine::commands::boundary::search as trace;
 use sweep_engine::optimise::Study;
 use sweep_engine::optimise::file::{table as study_table, trial_columns};
 use sweep_engine::optimise::search::search;
-use sweep_engine::store::{Opened, TrialColumns, Trials};
+use sweep_engine::store::{OpenOutcome, TrialColumns, Trials};
 use sweep_engine::{Error, Job, Table};
 use sweep_files::Output;
 
@@ -29,13 +29,13 @@ pub fn find_boundary(
     options: &BoundaryOptions,
     output: Option<&Path>,
     fresh: bool,
-    effort: Effort<'_>,
+    execution: Execution<'_>,
 ) -> Result<Option<MemoryTable>, Error> {
     if !(1..=1000).contains(&options.lattice) {
         return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
     }
     let task = BoundaryTask::new(plan, options)?;
-    let search = |trials| trace(&task, trials, effort);
+    let search = |trials| trace(&task, trials, execution);
     let stored = Stored { job: &task.job(), columns: task.trial_columns(), output, fresh };
     run_search(stored, search, |traced| task.table(traced))
 }
@@ -53,10 +53,10 @@ pub fn optimise_study(
     sets: &[String],
     output: Option<&Path>,
     fresh: bool,
-    effort: Effort<'_>,
+    execution: Execution<'_>,
 ) -> Result<Option<MemoryTable>, Error> {
     let study = Study::<Washer>::load(path, sets)?;
-    let search = |trials| search(&study, trials, effort);
+    let search = |trials| search(&study, trials, execution);
     let stored = Stored { job: &study.job(), columns: trial_columns(&study), output, fresh };
     run_search(stored, search, |tried| study_table(&study, tried))
 }
@@ -81,8 +81,8 @@ fn run_search<T>(
     let file = output.map(|path| Output::begin(path, kind)).transpose()?;
     let open = |path| Trials::open(path, job, columns, fresh);
     let trials = match output.map(open).transpose()? {
-        Some(Opened::Finished(())) => return output.map(MemoryTable::read).transpose(),
-        Some(Opened::Open(trials)) => Some(trials),
+        Some(OpenOutcome::Finished(())) => return output.map(MemoryTable::read).transpose(),
+        Some(OpenOutcome::Open(trials)) => Some(trials),
         None => None,
     };
     let (result, trials) = search(trials)?;

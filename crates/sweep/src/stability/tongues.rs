@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use crate::places;
-use sweep_engine::commands::cells::short;
+use sweep_engine::commands::cells::format_number;
 use sweep_engine::config::section::counted;
 use sweep_files::{FileError, ParquetFile};
 
@@ -177,7 +177,7 @@ impl StabilitySummary {
     fn tongue_line(&self, tongue: &TongueRows) -> String {
         let TongueRows { largest_growth: row, end_speeds_rpm: [first_rpm, last_rpm] } = tongue;
         let mut text = self.point_prefix(row);
-        let [speed, first, last] = [row.speed_rpm, *first_rpm, *last_rpm].map(short);
+        let [speed, first, last] = [row.speed_rpm, *first_rpm, *last_rpm].map(format_number);
         let range_end = if first == last { String::new() } else { format!(" to {last}") };
         // Writing to a String cannot fail.
         let _ = write!(

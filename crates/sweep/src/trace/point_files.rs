@@ -42,7 +42,7 @@ pub(crate) fn write_point_traces(
     let plan = engine.plan();
     files::ready(folder)?;
     remove_point_traces(folder)?;
-    let levels = read::methods(result)?;
+    let levels = read::read_methods(result)?;
     threads::pool(threads)?.install(|| {
         levels.into_par_iter().enumerate().try_for_each(|(point, level)| {
             let point = point as u64;

@@ -137,7 +137,7 @@ fn stretches(first: bool, changes: impl Iterator<Item = (f64, bool)>) -> Vec<Row
 }
 
 /// Returns the stretches of a traced row.
-fn traced_stretches(row: &TracedRow) -> Vec<RowStretch> {
+fn traced_stretches(row: &BoundaryRow) -> Vec<RowStretch> {
     let is_reliable = |distance: Option<f64>| distance.is_some_and(|distance| distance < 0.0);
     let first = match row.edges[0].bracket {
         Some(_) => is_reliable(row.edges[0].distances[0]),

@@ -13,33 +13,35 @@ use sweep_results::{Comparison, ResultTable, SharedRow};
 /// Returns the table of differences, with one row for each row that both results have.
 pub(super) fn table(
     args: &CompareArgs,
-    found: &Comparison,
+    comparison: &Comparison,
     tables: &[ResultTable; 2],
     build: Build,
 ) -> Table {
     let mut table = Table::new(build);
-    let rows = || found.shared.iter();
+    let rows = || comparison.shared.iter();
     table.counts("point", "row of A, from 0", rows().map(|row| row.rows[0]));
-    for (k, (name, unit)) in found.keys.iter().zip(&found.key_units).enumerate() {
+    for (k, (name, unit)) in comparison.keys.iter().zip(&comparison.key_units).enumerate() {
         let description =
             tables[0].column(name).map_or("", |column| column.description.as_str()).to_owned();
         let unit = if unit.is_empty() { "1" } else { unit };
         table.numbers(name, unit, &description, rows().map(|row| Some(row.key[k])));
     }
-    let said = "greatest ratio of B over that of A; null where either has none";
-    table.numbers("ratio_change", "1", said, rows().map(SharedRow::ratio_quotient));
+    let description = "greatest ratio of B over that of A; null where either has none";
+    table.numbers("ratio_change", "1", description, rows().map(SharedRow::ratio_quotient));
     table.worse(Worse::Greater);
-    let said = "least gap of the nonlinear model in B less that in A; null where either has none";
-    table.numbers("gap_change_m", "m", said, rows().map(SharedRow::gap_difference_m));
+    let description =
+        "least gap of the nonlinear model in B less that in A; null where either has none";
+    table.numbers("gap_change_m", "m", description, rows().map(SharedRow::gap_difference_m));
     table.worse(Worse::Less);
-    for (side, [suffix, which]) in [["a", "A"], ["b", "B"]].into_iter().enumerate() {
+    for (side, [suffix, file]) in [["a", "A"], ["b", "B"]].into_iter().enumerate() {
         let name = format!("ratio_max_{suffix}");
-        let said = format!("greatest ratio of {which}");
-        table.numbers(&name, "1", &said, rows().map(|row| row.ratio[side]));
+        let description = format!("greatest ratio of {file}");
+        table.numbers(&name, "1", &description, rows().map(|row| row.ratio[side]));
     }
-    let said = "none, lost (reliable in A alone), gained (reliable in B alone), defined (a verdict \
+    let description = "none, lost (reliable in A alone), gained (reliable in B alone), defined \
+                (a verdict \
                 in one file alone)";
-    table.words("flip", said, rows().map(|row| row.flip.name()));
+    table.words("flip", description, rows().map(|row| row.flip.name()));
     let sensitive = rows().map(|row| if row.sensitive { "true" } else { "false" });
     table.words("sensitive", "true where either file calls the row chaotic", sensitive);
     let status = rows().map(|row| if row.ratio_quotient().is_some() { "ok" } else { "no_ratio" });
@@ -50,12 +52,12 @@ pub(super) fn table(
     table.metadata(
         key::DIFFERENCES,
         &json!({
-            // Figures say it under their title.
+            // Figures show the name under their title.
             "name": format!("{} compared with {}", name(&args.second), name(&args.first)),
             "first": name(&args.first),
             "second": name(&args.second),
             "plan_hash": hashes,
-            "plan": found.plan,
+            "plan": comparison.plan,
         }),
     );
     table

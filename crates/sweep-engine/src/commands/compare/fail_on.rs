@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::short;
+use super::format_number;
 use sweep_files::CellKind;
 use sweep_results::{Comparison, ResultTable};
 
@@ -59,79 +59,93 @@ impl FromStr for FailOn {
 }
 
 impl FailOn {
-    /// Returns the name of the check and the files that it needs, if these files are of another
-    /// kind, so that the check could never fail.
+    /// Returns the name of the check and the kind of files that it needs, if the compared files are
+    /// of another kind. In such files the check would never fail.
     pub(super) fn unmet_need(
         &self,
-        found: &Comparison,
+        comparison: &Comparison,
         tables: &[ResultTable; 2],
     ) -> Option<[&str; 2]> {
         let (is_met, need) = match self {
             Self::Any | Self::Plan | Self::Rows => return None,
-            Self::Flips => (found.has_verdicts, ["flips", "two files with verdicts"]),
-            Self::Lost => (found.has_verdicts, ["lost", "two files with verdicts"]),
-            Self::Sensitive => (found.has_verdicts, ["sensitive", "two files with verdicts"]),
-            Self::Ratio(_) => (found.has_ratios, ["ratio", "two files with `ratio_max`"]),
-            Self::Gap(_) => (found.has_gaps, ["gap", "two files with `min_gap_nonlinear_m`"]),
+            Self::Flips => (comparison.has_verdicts, ["flips", "two files with verdicts"]),
+            Self::Lost => (comparison.has_verdicts, ["lost", "two files with verdicts"]),
+            Self::Sensitive => (comparison.has_verdicts, ["sensitive", "two files with verdicts"]),
+            Self::Ratio(_) => (comparison.has_ratios, ["ratio", "two files with `ratio_max`"]),
+            Self::Gap(_) => (comparison.has_gaps, ["gap", "two files with `min_gap_nonlinear_m`"]),
             Self::Boundary(_) => {
-                (found.boundary.is_some(), ["boundary", "two boundaries, or maps of two axes"])
+                (comparison.boundary.is_some(), ["boundary", "two boundaries, or maps of two axes"])
             }
             Self::Column(name, _) => {
                 let is_number = |table: &ResultTable| {
                     table.column(name).is_some_and(|column| column.kind == CellKind::Number)
                 };
-                let has = tables.iter().all(is_number) && !found.keys.contains(name);
-                (has, [name.as_str(), "a column of numbers in both files that is no axis"])
+                let is_compared = tables.iter().all(is_number) && !comparison.keys.contains(name);
+                (is_compared, [name.as_str(), "a column of numbers in both files that is no axis"])
             }
         };
         (!is_met).then_some(need)
     }
 
     /// Describes the forbidden differences between the files; `None` if there are none.
-    pub(super) fn violation(&self, found: &Comparison) -> Option<String> {
-        let steady = || found.shared.iter().filter(|row| !row.sensitive);
-        let counted = |what: &str, count: usize| (count > 0).then(|| format!("{what}: {count}"));
+    pub(super) fn violation(&self, comparison: &Comparison) -> Option<String> {
+        let insensitive_rows = || comparison.shared.iter().filter(|row| !row.sensitive);
+        let counted = |noun: &str, count: usize| (count > 0).then(|| format!("{noun}: {count}"));
         match self {
-            Self::Any => (!found.is_empty()).then(|| "the files differ".to_owned()),
-            Self::Plan => counted("differences of the plans", found.plan.len()),
-            Self::Rows => {
-                counted("rows of one file alone", found.unmatched_rows.iter().sum::<u64>() as usize)
-            }
-            Self::Flips => counted("verdicts that flipped", found.flips(false).count()),
+            Self::Any => (!comparison.is_empty()).then(|| "the files differ".to_owned()),
+            Self::Plan => counted("differences of the plans", comparison.plan.len()),
+            Self::Rows => counted(
+                "rows of one file alone",
+                comparison.unmatched_rows.iter().sum::<u64>() as usize,
+            ),
+            Self::Flips => counted("verdicts that flipped", comparison.flips(false).count()),
             Self::Lost => {
-                let lost = found.flips(false).filter(|row| row.is_lost).count();
-                counted("rows that are no longer reliable", lost)
+                let lost_rows = comparison.flips(false).filter(|row| row.is_lost).count();
+                counted("rows that are no longer reliable", lost_rows)
             }
             Self::Sensitive => {
-                counted("sensitive verdicts that flipped", found.flips(true).count())
+                counted("sensitive verdicts that flipped", comparison.flips(true).count())
             }
-            Self::Column(name, most) => {
-                let column = found.columns.iter().find(|column| column.name == *name)?;
-                let worst = column.worst.first().filter(|worst| worst.deviation() > *most)?;
+            Self::Column(name, max_change) => {
+                let column = comparison.columns.iter().find(|column| column.name == *name)?;
+                let worst = column.worst.first().filter(|worst| worst.deviation() > *max_change)?;
                 let unit = column.unit.as_str();
                 let change = match worst.deviation() {
-                    far if far.is_finite() => format!("changed by up to {}", short(far)),
+                    deviation if deviation.is_finite() => {
+                        format!("changed by up to {}", format_number(deviation))
+                    }
                     _ => "came or went".to_owned(),
                 };
-                Some(format!("{name} {change} {unit}, and may by {}", short(*most)))
+                Some(format!("{name} {change} {unit}, and may by {}", format_number(*max_change)))
             }
-            Self::Ratio(most) => {
-                let percent = short(100.0 * most);
-                let what = format!("ratios that changed by more than {percent} %, came or went");
-                counted(&what, steady().filter(|row| row.ratio_deviation() > *most).count())
+            Self::Ratio(max_change) => {
+                let percent = format_number(100.0 * max_change);
+                let noun = format!("ratios that changed by more than {percent} %, came or went");
+                counted(
+                    &noun,
+                    insensitive_rows().filter(|row| row.ratio_deviation() > *max_change).count(),
+                )
             }
-            Self::Gap(most) => {
-                let most_m = short(*most);
-                let what = format!("gaps that changed by more than {most_m} m, came or went");
-                counted(&what, steady().filter(|row| row.gap_deviation_m() > *most).count())
+            Self::Gap(max_change) => {
+                let max_change_m = format_number(*max_change);
+                let noun = format!("gaps that changed by more than {max_change_m} m, came or went");
+                counted(
+                    &noun,
+                    insensitive_rows().filter(|row| row.gap_deviation_m() > *max_change).count(),
+                )
             }
-            Self::Boundary(most) => {
-                let moved = found.boundary.as_ref()?;
-                let far =
-                    moved.crossings.iter().filter(|crossing| crossing.certain_shift() > *most);
-                let what =
-                    format!("crossings that moved by more than {} {}", short(*most), moved.unit);
-                counted(what.trim_end(), far.count() + moved.unmatched_lines.len())
+            Self::Boundary(max_change) => {
+                let shift = comparison.boundary.as_ref()?;
+                let shifted = shift
+                    .crossings
+                    .iter()
+                    .filter(|crossing| crossing.certain_shift() > *max_change);
+                let noun = format!(
+                    "crossings that moved by more than {} {}",
+                    format_number(*max_change),
+                    shift.unit
+                );
+                counted(noun.trim_end(), shifted.count() + shift.unmatched_lines.len())
             }
         }
     }
@@ -148,7 +162,7 @@ mod tests {
         assert_eq!("boundary=2".parse(), Ok(FailOn::Boundary(2.0)));
         let column = FailOn::Column("growth_per_s".to_owned(), 0.5);
         assert_eq!("growth_per_s = 0.5".parse(), Ok(column));
-        for (text, said) in [
+        for (text, expected_kind) in [
             ("flip", "expected any, plan"),
             ("flips=3", "expected any, plan"),
             ("ratio", "as in ratio=0.05"),
@@ -157,8 +171,8 @@ mod tests {
             ("=1", "expected any, plan"),
             ("ratio=nan", "at least 0"),
         ] {
-            let refused = text.parse::<FailOn>().unwrap_err();
-            assert!(refused.contains(said), "{text}: {refused}");
+            let message = text.parse::<FailOn>().unwrap_err();
+            assert!(message.contains(expected_kind), "{text}: {message}");
         }
     }
 }

@@ -5,7 +5,8 @@ use serde_json::Value;
 use crate::{GridInput, Model, Plan};
 use sweep_results::{Comparison, PlanChange, ResultTable, plan_changes};
 
-/// The differences of two plans that do not show, because an axis of both sets these numbers.
+/// The differences between two plans that have no effect, because an axis of both files sets these
+/// numbers.
 pub(super) struct Overridden {
     /// The name of the axis.
     pub(super) axis: String,
@@ -13,30 +14,35 @@ pub(super) struct Overridden {
     pub(super) paths: Vec<String>,
 }
 
-/// Returns the differences of the plans that an axis of both files overrides. A tolerance overrides
-/// nothing, because it lies about the plan's number.
+/// Returns the differences of the plans that an axis of both files overrides. An axis with a
+/// tolerance overrides nothing, because its values follow from the plan's number.
 pub(super) fn overridden<M: Model>(
     tables: &[ResultTable; 2],
-    found: &Comparison,
+    comparison: &Comparison,
 ) -> Vec<Overridden> {
     let plans = tables.each_ref().map(|table| table.plan.as_ref());
     let [Some(first), Some(second)] = plans else { return Vec::new() };
     let [Some(first_model), Some(second_model)] = [first, second].map(without_axes::<M>) else {
         return Vec::new();
     };
-    let before = plan_changes(&first_model.to_json(), &second_model.to_json());
+    let changes_before = plan_changes(&first_model.to_json(), &second_model.to_json());
     let second_axes = overriding_axes(second);
-    let shared = overriding_axes(first).into_iter().filter(|name| second_axes.contains(name));
-    let by_axis = shared.filter_map(|name| {
-        // The axis gives both plans the same numbers; any number serves.
+    let shared_axes = overriding_axes(first).into_iter().filter(|name| second_axes.contains(name));
+    let by_axis = shared_axes.filter_map(|name| {
+        // Both plans get the same number from the axis, so that any number serves here.
         let value = first_model.model.find(name).ok()?.value.unwrap_or(1.0);
         let [first, second] =
             [&first_model, &second_model].map(|plan| with_number(plan, name, value));
-        let after = plan_changes(&first?.to_json(), &second?.to_json());
-        let has = |changes: &[PlanChange], path: &str| changes.iter().any(|one| one.path == path);
-        let told = found.plan.iter().map(|change| &change.path);
-        let paths: Vec<String> =
-            told.filter(|path| has(&before, path) && !has(&after, path)).cloned().collect();
+        let changes_after = plan_changes(&first?.to_json(), &second?.to_json());
+        let contains_path =
+            |changes: &[PlanChange], path: &str| changes.iter().any(|change| change.path == path);
+        let changed_paths = comparison.plan.iter().map(|change| &change.path);
+        let paths: Vec<String> = changed_paths
+            .filter(|path| {
+                contains_path(&changes_before, path) && !contains_path(&changes_after, path)
+            })
+            .cloned()
+            .collect();
         (!paths.is_empty()).then(|| Overridden { axis: name.to_owned(), paths })
     });
     by_axis.collect()

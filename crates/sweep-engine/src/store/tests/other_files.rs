@@ -71,7 +71,8 @@ fn foreign_files_are_kept_under_any_name() {
                 fs::write(home.partial().join(name), text).unwrap();
             }
             let options = OpenOptions { fresh: is_fresh, ..options() };
-            let Opened::Open(run) = OpenRun::open(&home.output(), &job, options).unwrap() else {
+            let OpenOutcome::Open(run) = OpenRun::open(&home.output(), &job, options).unwrap()
+            else {
                 panic!("is not done")
             };
             write_missing(&run);
@@ -79,13 +80,13 @@ fn foreign_files_are_kept_under_any_name() {
             let note = notes.last().unwrap();
             assert!(note.contains("stays, for it holds what this run did not write"), "{note}");
             // A file is kept under its name, or renamed to `*.damaged`.
-            let left = file_names(&home);
-            assert_eq!(left.len(), SIMILAR_NAMES.len(), "{left:?}");
-            for name in left {
-                let found = fs::read_to_string(home.partial().join(&name)).unwrap();
-                assert_eq!(found, text, "{name}");
+            let remaining_names = file_names(&home);
+            assert_eq!(remaining_names.len(), SIMILAR_NAMES.len(), "{remaining_names:?}");
+            for name in remaining_names {
+                let content = fs::read_to_string(home.partial().join(&name)).unwrap();
+                assert_eq!(content, text, "{name}");
             }
-            assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
+            assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
         }
     }
 }
@@ -95,18 +96,21 @@ fn starting_over_deletes_all_files_of_an_unfinished_run() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let shard = Some(ShardRequest::Given(Shard { index: 2, count: 4 }));
-    let sharded = OpenOptions { shard, ..options() };
-    let Opened::Open(run) = OpenRun::open(&home.output(), &job, sharded).unwrap() else {
+    let shard_options = OpenOptions { shard, ..options() };
+    let OpenOutcome::Open(run) = OpenRun::open(&home.output(), &job, shard_options).unwrap() else {
         panic!("is not done")
     };
     write_missing(&run);
-    run.record(&session()).unwrap();
+    run.record_session(&session()).unwrap();
     drop(run);
-    let left = file_names(&home);
+    let remaining_names = file_names(&home);
     for name in ["plan.json", "shards.json", "shard-2.lock", "part-00000001.parquet"] {
-        assert!(left.iter().any(|known| known == name), "{name}: {left:?}");
+        assert!(
+            remaining_names.iter().any(|remaining_name| remaining_name == name),
+            "{name}: {remaining_names:?}"
+        );
     }
-    assert!(left.iter().any(|name| name.starts_with("session-")), "{left:?}");
+    assert!(remaining_names.iter().any(|name| name.starts_with("session-")), "{remaining_names:?}");
     fs::write(home.partial().join(sweep_files::atomic::temporary_name()), "half").unwrap();
     drop(OpenRun::open(&home.output(), &job, fresh()).unwrap());
     assert_eq!(file_names(&home), ["lock", "plan.json"]);
@@ -125,15 +129,15 @@ fn several_damaged_files_of_one_part_are_all_kept() {
     }
     let (_, notes) = finish(open(&home.output(), &job), &job);
     assert!(notes[0].contains("part-00000003.parquet.damaged-2"), "{notes:?}");
-    let read = |ending| {
+    let read_damaged = |ending| {
         let name = format!("{}.damaged{ending}", part_name(3));
         fs::read_to_string(home.partial().join(name)).unwrap()
     };
-    assert_eq!(["", "-2", "-3"].map(read), ["first", "second", "third"]);
+    assert_eq!(["", "-2", "-3"].map(read_damaged), ["first", "second", "third"]);
     // A run whose result exists keeps them too.
     assert!(matches!(
         OpenRun::open(&home.output(), &job, options()).unwrap(),
-        Opened::Finished(..)
+        OpenOutcome::Finished(..)
     ));
     assert_eq!(file_names(&home).len(), 3);
 }
@@ -198,7 +202,7 @@ fn a_process_killed_before_it_removes_the_folder_loses_nothing() {
     fs::write(home.partial().join(part_name(3)), part_bytes(&job, 3)).unwrap();
     assert!(matches!(
         OpenRun::open(&home.output(), &job, options()).unwrap(),
-        Opened::Finished(..)
+        OpenOutcome::Finished(..)
     ));
     assert!(!home.partial().exists());
 }

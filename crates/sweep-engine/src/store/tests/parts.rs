@@ -29,15 +29,15 @@ fn only_names_of_parts_have_an_index() {
 
 #[test]
 fn a_run_interrupted_after_any_chunk_is_resumed() {
-    let bytes = bytes_of_undisturbed_run(POINTS);
+    let bytes = uninterrupted_result(POINTS);
     let job = synthetic::job(POINTS);
-    for written in 0..=POINTS.div_ceil(8) {
+    for written_chunks in 0..=POINTS.div_ceil(8) {
         let home = Home::new();
         let run = open(&home.output(), &job);
-        (0..written).for_each(|chunk| write(&run, chunk));
+        (0..written_chunks).for_each(|chunk| write(&run, chunk));
         drop(run);
         let run = open(&home.output(), &job);
-        assert_eq!(write_missing(&run), POINTS.div_ceil(8) - written);
+        assert_eq!(write_missing(&run), POINTS.div_ceil(8) - written_chunks);
         finish(run, &job);
         assert_eq!(fs::read(home.output()).unwrap(), bytes);
     }
@@ -47,7 +47,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
     fn damaged_parts_are_renamed_noted_and_computed_again(
-        changes in prop::collection::vec((0..11_u64, any::<prop::sample::Index>(), 0..4_u8), 0..6)
+        damages in prop::collection::vec((0..11_u64, any::<prop::sample::Index>(), 0..4_u8), 0..6)
     ) {
         let home = Home::new();
         let job = synthetic::job(POINTS);
@@ -55,19 +55,19 @@ proptest! {
         write_missing(&run);
         drop(run);
         let mut damaged_chunks = std::collections::BTreeSet::new();
-        for (chunk, at, kind) in changes {
+        for (chunk, position, kind) in damages {
             let path = home.partial().join(part_name(chunk));
             let Ok(mut bytes) = fs::read(&path) else { continue };
-            let at = at.index(bytes.len().max(1));
+            let position = position.index(bytes.len().max(1));
             match kind {
-                0 => bytes.truncate(at),
-                1 if !bytes.is_empty() => bytes[at] ^= 0x40,
+                0 => bytes.truncate(position),
+                1 if !bytes.is_empty() => bytes[position] ^= 0x40,
                 2 => bytes.push(0),
                 _ => bytes.clear(),
             }
             fs::write(&path, &bytes).unwrap();
-            let intact = bytes == { part_bytes(&job, chunk) };
-            if intact { damaged_chunks.remove(&chunk); } else { damaged_chunks.insert(chunk); }
+            let is_intact = bytes == { part_bytes(&job, chunk) };
+            if is_intact { damaged_chunks.remove(&chunk); } else { damaged_chunks.insert(chunk); }
         }
         let mut run = open(&home.output(), &job);
         prop_assert_eq!(run.take_notes().len(), damaged_chunks.len());
@@ -77,7 +77,7 @@ proptest! {
         }
         prop_assert_eq!(write_missing(&run), damaged_chunks.len() as u64);
         finish(run, &job);
-        prop_assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
+        prop_assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
     }
 }
 
@@ -95,7 +95,7 @@ fn damage_after_opening_is_found_by_the_join() {
     assert_eq!(write_missing(&run), 2);
     let (_, notes) = finish(run, &job);
     assert!(notes[0].contains("part-00000004.parquet"), "{:?}", notes);
-    assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
+    assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
 }
 
 #[test]
@@ -105,8 +105,8 @@ fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
     let shard = |index| {
         let shard = Some(ShardRequest::Given(Shard { index, count: 4 }));
         match OpenRun::open(&home.output(), &job, OpenOptions { shard, ..options() }).unwrap() {
-            Opened::Open(run) => run,
-            Opened::Finished(..) => panic!("is not done"),
+            OpenOutcome::Open(run) => run,
+            OpenOutcome::Finished(..) => panic!("is not done"),
         }
     };
     assert!(matches!(
@@ -114,33 +114,34 @@ fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
         StoreError::NoRun { .. }
     ));
     // Two shards at once, one of them in two processes.
-    let first = shard(1);
-    let third = shard(3);
-    let third_again = shard(3);
-    assert_eq!(first.own_points(), (3 * 8, 0));
-    assert_eq!(third.own_points(), (8 + 8 + 1, 0), "the last chunk has one point");
-    for run in [&first, &third, &third_again] {
+    let first_shard = shard(1);
+    let third_shard = shard(3);
+    let second_third_shard = shard(3);
+    assert_eq!(first_shard.own_points(), (3 * 8, 0));
+    assert_eq!(third_shard.own_points(), (8 + 8 + 1, 0), "the last chunk has one point");
+    for run in [&first_shard, &third_shard, &second_third_shard] {
         write_missing(run);
     }
-    let busy = OpenRun::open_for_merge(&home.output(), &job).unwrap_err();
-    assert!(matches!(busy, StoreError::Busy { .. }), "{busy}");
+    let busy_error = OpenRun::open_for_merge(&home.output(), &job).unwrap_err();
+    assert!(matches!(busy_error, StoreError::Busy { .. }), "{busy_error}");
     let running = status(&home.output(), &job).unwrap().running;
     assert_eq!(running.iter().map(|holder| holder.shard).collect::<Vec<_>>(), [Some(1), Some(3)]);
-    drop((first, third, third_again));
+    drop((first_shard, third_shard, second_third_shard));
 
-    let Opened::Open(mut merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
+    let OpenOutcome::Open(mut merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap()
+    else {
         panic!("is not done")
     };
     let error = merge.join(&job, &|| false).unwrap_err();
     assert!(!error.is_refusal());
     assert!(error.to_string().contains("5 of 11 chunks are missing, of shards 2,4"), "{error}");
     drop(merge);
-    let found = status(&home.output(), &job).unwrap();
+    let folder_status = status(&home.output(), &job).unwrap();
     assert_eq!(
-        (found.state, found.missing_shards.as_str(), found.shards),
-        (State::Unfinished, "2,4", Some(4))
+        (folder_status.state, folder_status.missing_shards.as_str(), folder_status.shards),
+        (RunStage::Unfinished, "2,4", Some(4))
     );
-    assert_eq!((found.chunks_done, found.chunks_missing), (6, 5));
+    assert_eq!((folder_status.chunks_done, folder_status.chunks_missing), (6, 5));
 
     let other_count =
         OpenOptions { shard: Some(ShardRequest::Given(Shard { index: 1, count: 5 })), ..options() };
@@ -165,34 +166,38 @@ fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
     for index in [2, 4] {
         write_missing(&shard(index));
     }
-    assert_eq!(status(&home.output(), &job).unwrap().state, State::Complete);
-    let Opened::Open(merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
+    assert_eq!(status(&home.output(), &job).unwrap().state, RunStage::Complete);
+    let OpenOutcome::Open(merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
         panic!("is not done")
     };
     finish(merge, &job);
-    assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
-    let found = status(&home.output(), &job).unwrap();
-    assert_eq!((found.state, found.points_done), (State::Finished, POINTS));
-    assert!(found.points_failed > 0);
+    assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
+    let folder_status = status(&home.output(), &job).unwrap();
+    assert_eq!((folder_status.state, folder_status.points_done), (RunStage::Finished, POINTS));
+    assert!(folder_status.points_failed > 0);
 }
 
 #[test]
 fn status_counts_without_changing_files() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
-    assert_eq!(status(&home.output(), &job).unwrap().state, State::NotStarted);
+    assert_eq!(status(&home.output(), &job).unwrap().state, RunStage::NotStarted);
     assert_eq!(fs::read_dir(home.0.path()).unwrap().count(), 0);
     let run = open(&home.output(), &job);
     write(&run, 0);
     write(&run, 1);
     fs::write(home.partial().join(part_name(1)), "not a part").unwrap();
-    let found = status(&home.output(), &job).unwrap();
+    let folder_status = status(&home.output(), &job).unwrap();
     assert_eq!(
-        (found.chunks_done, found.chunks_damaged.as_slice(), found.points_done),
+        (
+            folder_status.chunks_done,
+            folder_status.chunks_damaged.as_slice(),
+            folder_status.points_done
+        ),
         (1, &[1][..], 8)
     );
-    assert_eq!(found.points_failed, 2, "points 4 and 7 of the formula fail");
-    assert_eq!(found.running[0].pid, std::process::id());
+    assert_eq!(folder_status.points_failed, 2, "points 4 and 7 of the formula fail");
+    assert_eq!(folder_status.running[0].pid, std::process::id());
     assert!(home.partial().join(part_name(1)).exists());
     let other_plan = Job { plan: json!({}), ..synthetic::job(POINTS) };
     assert!(matches!(
@@ -201,8 +206,8 @@ fn status_counts_without_changing_files() {
     ));
 }
 
-fn outcomes(points: impl Iterator<Item = u64>) -> Vec<Done> {
-    points.map(synthetic::done).collect()
+fn outcomes(points: impl Iterator<Item = u64>) -> Vec<PointRows> {
+    points.map(synthetic::point_rows).collect()
 }
 
 #[test]
@@ -215,8 +220,8 @@ fn an_incomplete_chunk_is_resumed() {
     run.write_chunk(&job, 3, outcomes([30, 25, 27].into_iter())).unwrap();
     assert_eq!(run.own_points(), (POINTS, 8 + 3));
     drop(run);
-    let seen = status(&home.output(), &job).unwrap();
-    assert_eq!((seen.points_done, seen.chunks_done), (11, 1));
+    let folder_status = status(&home.output(), &job).unwrap();
+    assert_eq!((folder_status.points_done, folder_status.chunks_done), (11, 1));
     assert!(home.partial().join("part-00000003.parquet").exists());
 
     let run = open(&home.output(), &job);
@@ -229,7 +234,7 @@ fn an_incomplete_chunk_is_resumed() {
     assert_eq!(write_missing(&run), 10);
     assert_eq!(run.own_points(), (POINTS, POINTS));
     finish(run, &job);
-    assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
+    assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
 }
 
 #[test]
@@ -244,11 +249,17 @@ fn an_unfinished_run_is_found_by_the_path_of_result_or_folder() {
     // A damaged part does not count.
     fs::write(home.partial().join(part_name(5)), part_bytes(&job, 5).split_off(1)).unwrap();
     for path in [home.output(), home.partial()] {
-        let found = unfinished(&path).unwrap().unwrap();
-        assert_eq!((found.points, found.points_done), (Some(POINTS), 8 + 3));
-        assert_eq!((&found.output, &found.folder), (&home.output(), &home.partial()));
-        assert_eq!((found.name.as_str(), found.running.len()), ("synthetic", 1));
-        assert_eq!(found.progress(), "11 of 81 points done (13.6 %)");
+        let unfinished_work = unfinished(&path).unwrap().unwrap();
+        assert_eq!((unfinished_work.points, unfinished_work.points_done), (Some(POINTS), 8 + 3));
+        assert_eq!(
+            (&unfinished_work.output, &unfinished_work.folder),
+            (&home.output(), &home.partial())
+        );
+        assert_eq!(
+            (unfinished_work.name.as_str(), unfinished_work.running.len()),
+            ("synthetic", 1)
+        );
+        assert_eq!(unfinished_work.progress(), "11 of 81 points done (13.6 %)");
     }
     let error = refuse_unfinished(&home.output()).unwrap_err();
     assert!(error.is_refusal());
@@ -271,9 +282,9 @@ fn an_unfinished_search_shows_the_number_of_trials() {
         trials.add(vec![k, 0], vec![Some(1)]).unwrap();
     }
     trials.write().unwrap();
-    let found = unfinished(&home.output()).unwrap().unwrap();
-    assert_eq!((found.points, found.points_done), (None, 5));
-    assert_eq!(found.progress(), "5 trials of a search kept");
+    let unfinished_work = unfinished(&home.output()).unwrap().unwrap();
+    assert_eq!((unfinished_work.points, unfinished_work.points_done), (None, 5));
+    assert_eq!(unfinished_work.progress(), "5 trials of a search kept");
 }
 
 #[test]
@@ -300,11 +311,11 @@ fn a_damaged_part_is_renamed_and_a_new_one_replaces_it() {
     assert!(home.partial().join("part-00000002.parquet.damaged").exists());
     write_missing(&run);
     finish(run, &job);
-    assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
+    assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
 }
 
 /// Writes bytes to the file of a part, and returns the damage that reading them finds, if any.
-fn damage(home: &Home, job: &Job<'_>, index: u64, bytes: &[u8]) -> Option<Damage> {
+fn write_and_find_damage(home: &Home, job: &Job<'_>, index: u64, bytes: &[u8]) -> Option<Damage> {
     let folder = Folder::new(&home.output(), &job.layout).unwrap();
     fs::create_dir_all(&folder.path).unwrap();
     fs::write(folder.file(part_name(index)), bytes).unwrap();
@@ -317,11 +328,11 @@ fn any_flipped_bit_in_a_part_is_found() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let bytes = part_bytes(&job, 3);
-    assert_eq!(damage(&home, &job, 3, &bytes), None);
-    for at in 0..bytes.len() {
-        let mut broken = bytes.clone();
-        broken[at] ^= 1 << (at % 8);
-        assert!(damage(&home, &job, 3, &broken).is_some(), "byte {at}");
+    assert_eq!(write_and_find_damage(&home, &job, 3, &bytes), None);
+    for position in 0..bytes.len() {
+        let mut flipped = bytes.clone();
+        flipped[position] ^= 1 << (position % 8);
+        assert!(write_and_find_damage(&home, &job, 3, &flipped).is_some(), "byte {position}");
     }
 }
 
@@ -331,10 +342,13 @@ fn any_truncation_of_a_part_is_found() {
     let job = synthetic::job(POINTS);
     let bytes = part_bytes(&job, 3);
     for length in (0..bytes.len()).step_by(3) {
-        assert!(damage(&home, &job, 3, &bytes[..length]).is_some(), "cut to {length}");
+        assert!(
+            write_and_find_damage(&home, &job, 3, &bytes[..length]).is_some(),
+            "cut to {length}"
+        );
     }
     let longer = [bytes.as_slice(), &[0]].concat();
-    assert_eq!(damage(&home, &job, 3, &longer), Some(Damage::Bytes));
+    assert_eq!(write_and_find_damage(&home, &job, 3, &longer), Some(Damage::Bytes));
 }
 
 #[test]
@@ -342,58 +356,73 @@ fn parts_of_another_plan_index_or_layout_are_foreign() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let bytes = part_bytes(&job, 3);
-    assert_eq!(damage(&home, &job, 4, &bytes), Some(Damage::Foreign), "another index");
+    assert_eq!(
+        write_and_find_damage(&home, &job, 4, &bytes),
+        Some(Damage::Foreign),
+        "another index"
+    );
     let other_build = Job { numerics: 2, ..synthetic::job(POINTS) };
-    assert_eq!(damage(&home, &other_build, 3, &bytes), Some(Damage::Foreign), "another build");
+    assert_eq!(
+        write_and_find_damage(&home, &other_build, 3, &bytes),
+        Some(Damage::Foreign),
+        "another build"
+    );
     let mut narrower = synthetic::job(POINTS);
     narrower.layout.columns.pop();
-    assert_eq!(damage(&home, &narrower, 3, &bytes), Some(Damage::Foreign), "another layout");
+    assert_eq!(
+        write_and_find_damage(&home, &narrower, 3, &bytes),
+        Some(Damage::Foreign),
+        "another layout"
+    );
     // A result has a digest too, but is not a part.
-    assert_eq!(damage(&home, &job, 3, &bytes_of_undisturbed_run(POINTS)), Some(Damage::Foreign));
+    assert_eq!(
+        write_and_find_damage(&home, &job, 3, &uninterrupted_result(POINTS)),
+        Some(Damage::Foreign)
+    );
 }
 
 #[test]
 fn rows_that_do_not_fit_their_part_are_refused() {
     let job = synthetic::job(POINTS);
     let parts = PointParts::new(&job);
-    let good = outcomes(8..16);
-    let reason = |outcomes: &[Done]| parts.encode(&job, 1, outcomes).unwrap_err().to_string();
-    for valid in [&good[..0], &good[1..2], &good] {
-        assert!(parts.encode(&job, 1, valid).is_ok());
+    let valid_rows = outcomes(8..16);
+    let reason = |outcomes: &[PointRows]| parts.encode(&job, 1, outcomes).unwrap_err().to_string();
+    for subset in [&valid_rows[..0], &valid_rows[1..2], &valid_rows] {
+        assert!(parts.encode(&job, 1, subset).is_ok());
     }
-    let swapped: Vec<Done> = good.iter().rev().cloned().collect();
+    let swapped: Vec<PointRows> = valid_rows.iter().rev().cloned().collect();
     assert!(reason(&swapped).contains("8 outcomes that are not of its points"));
     assert!(reason(&outcomes(15..17)).contains("2 outcomes that are not of its points"));
-    let mut short = good.clone();
-    short[0].rows[0].pop();
-    assert!(reason(&short).contains("does not fit"), "{}", reason(&short));
-    let mut null = good.clone();
+    let mut short_row = valid_rows.clone();
+    short_row[0].rows[0].pop();
+    assert!(reason(&short_row).contains("does not fit"), "{}", reason(&short_row));
+    let mut null_count = valid_rows.clone();
     let steps = synthetic::layout().position("steps").unwrap();
-    null[0].rows[0][steps] = None;
-    assert!(reason(&null).contains("does not fit"), "{}", reason(&null));
-    let mut none = good;
-    none[0].rows.clear();
-    assert!(reason(&none).contains("0 rows of"), "{}", reason(&none));
+    null_count[0].rows[0][steps] = None;
+    assert!(reason(&null_count).contains("does not fit"), "{}", reason(&null_count));
+    let mut without_rows = valid_rows;
+    without_rows[0].rows.clear();
+    assert!(reason(&without_rows).contains("0 rows of"), "{}", reason(&without_rows));
 }
 
 /// Returns a strategy for rows of cells that fit the columns.
 fn any_row(columns: &[DeclaredColumn]) -> impl Strategy<Value = RowCells> + use<> {
     let cell = |column: &DeclaredColumn| match &column.kind {
-        Holds::Count | Holds::Axis => any::<u64>().prop_map(Some).boxed(),
-        Holds::Flag => prop::option::of(0..2_u64).boxed(),
-        Holds::Name(names) => prop::option::of(0..names.len() as u64).boxed(),
+        CellType::Count | CellType::Axis => any::<u64>().prop_map(Some).boxed(),
+        CellType::Flag => prop::option::of(0..2_u64).boxed(),
+        CellType::Name(names) => prop::option::of(0..names.len() as u64).boxed(),
         _ => any::<Option<u64>>().boxed(),
     };
     columns.iter().map(cell).collect::<Vec<_>>()
 }
 
-/// Returns a layout with every type of column, with several tasks of each point and several rows of
+/// Returns a layout with every type of column, several tasks for each point, and several rows for
 /// each task.
 fn wide_layout() -> Layout {
     let mut layout = synthetic::layout();
-    layout.columns.insert(2, DeclaredColumn::new("kept", "", "", Holds::Kept));
-    layout.columns.push(DeclaredColumn::new("known", "1", "a count", Holds::KnownCount));
-    Layout { rows_a_point: 3, has_several: true, ..layout }
+    layout.columns.insert(2, DeclaredColumn::new("kept", "", "", CellType::Kept));
+    layout.columns.push(DeclaredColumn::new("known", "1", "a count", CellType::KnownCount));
+    Layout { tasks_per_point: 3, has_several_rows: true, ..layout }
 }
 
 proptest! {
@@ -407,22 +436,23 @@ proptest! {
     ) {
         let home = Home::new();
         let job = Job { layout: wide_layout(), ..synthetic::job(POINTS) };
-        let outcome = |(rows, point)| Done { point, rows };
-        let outcomes: Vec<Done> = points.into_iter().zip(8..).map(outcome).collect();
+        let outcome = |(rows, point)| PointRows { point, rows };
+        let outcomes: Vec<PointRows> = points.into_iter().zip(8..).map(outcome).collect();
         let run = open(&home.output(), &job);
         run.write_chunk(&job, 1, outcomes.clone()).unwrap();
-        prop_assert_eq!(run.known(8), outcomes.first().cloned());
+        prop_assert_eq!(run.stored_rows(8), outcomes.first().cloned());
         drop(run);
         let incomplete = open(&home.output(), &job).take_incomplete();
-        let found: Vec<Done> = incomplete.into_values().flatten().collect();
-        prop_assert_eq!(found, outcomes);
+        let read_back: Vec<PointRows> = incomplete.into_values().flatten().collect();
+        prop_assert_eq!(read_back, outcomes);
     }
 
     #[test]
     fn arbitrary_bytes_are_damage(
         bytes in prop::collection::vec(any::<u8>(), 0..400),
     ) {
-        prop_assert!(damage(&Home::new(), &synthetic::job(POINTS), 1, &bytes).is_some());
+        let damage = write_and_find_damage(&Home::new(), &synthetic::job(POINTS), 1, &bytes);
+        prop_assert!(damage.is_some());
     }
 }
 
@@ -434,9 +464,9 @@ fn a_part_has_the_columns_of_the_result() {
     write(&run, 2);
     let part = ParquetFile::open(&home.partial().join(part_name(2))).unwrap();
     assert_eq!(part.schema(), &job.layout.schema());
-    let found = batches(&home.partial().join(part_name(2)));
+    let part_batches = batches(&home.partial().join(part_name(2)));
     write_missing(&run);
     finish(run, &job);
     let result = &batches(&home.output())[0];
-    assert_eq!(found, [result.slice(16, 8)]);
+    assert_eq!(part_batches, [result.slice(16, 8)]);
 }

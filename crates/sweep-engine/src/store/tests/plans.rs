@@ -16,12 +16,12 @@ fn another_plan_is_refused_with_the_difference_unless_fresh() {
     let text = error.to_string();
     assert!(text.contains("/step_s: was 0.0002, is 0.0001") && text.contains("--fresh"), "{text}");
 
-    let newer = Job { version: "9.9.9", ..synthetic::job(POINTS) };
-    let text = OpenRun::open(&home.output(), &newer, options()).unwrap_err().to_string();
+    let newer_build = Job { version: "9.9.9", ..synthetic::job(POINTS) };
+    let text = OpenRun::open(&home.output(), &newer_build, options()).unwrap_err().to_string();
     assert!(text.contains(r#"/sweep_version: was "0.0.0-test", is "9.9.9""#), "{text}");
 
     let fresh = OpenOptions { fresh: true, ..options() };
-    let Opened::Open(run) = OpenRun::open(&home.output(), &other_plan, fresh).unwrap() else {
+    let OpenOutcome::Open(run) = OpenRun::open(&home.output(), &other_plan, fresh).unwrap() else {
         panic!("must run")
     };
     assert!(run.is_missing(0));
@@ -37,7 +37,7 @@ fn another_build_of_the_same_version_is_refused() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let other_build = Job { numerics: 2, ..synthetic::job(POINTS) };
-    let expect_refusal = |opened: Result<Opened<_, OpenRun>, StoreError>| {
+    let expect_refusal = |opened: Result<OpenOutcome<_, OpenRun>, StoreError>| {
         let error = opened.unwrap_err();
         assert!(error.is_refusal());
         assert!(error.to_string().contains("/numerics: was 1, is 2"), "{error}");
@@ -66,7 +66,10 @@ fn another_build_of_the_same_version_is_refused() {
     finish(run, &job);
     expect_refusal(OpenRun::open(&home.output(), &other_build, options()));
     let fresh = OpenOptions { fresh: true, ..options() };
-    assert!(matches!(OpenRun::open(&home.output(), &other_build, fresh).unwrap(), Opened::Open(_)));
+    assert!(matches!(
+        OpenRun::open(&home.output(), &other_build, fresh).unwrap(),
+        OpenOutcome::Open(_)
+    ));
 }
 
 #[test]
@@ -74,11 +77,11 @@ fn a_folder_of_an_older_format_is_refused() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     fs::create_dir(home.partial()).unwrap();
-    let old = json!({
+    let old_format = json!({
         "format": 1, "version": job.version, "plan_hash": "00", "points": POINTS, "chunk_points": 8,
         "plan": job.plan,
     });
-    fs::write(home.partial().join("plan.json"), old.to_string()).unwrap();
+    fs::write(home.partial().join("plan.json"), old_format.to_string()).unwrap();
     let error = OpenRun::open(&home.output(), &job, options()).unwrap_err();
     assert!(error.is_refusal());
     let text = error.to_string();
@@ -95,10 +98,10 @@ fn a_damaged_plan_file_is_renamed_and_the_parts_are_used() {
     write(&open(&home.output(), &job), 0);
     let plan = home.partial().join("plan.json");
     let text = fs::read_to_string(&plan).unwrap();
-    for broken in
+    for damaged_text in
         [text.replace("synthetic", "synthetik"), text[..text.len() / 2].to_owned(), String::new()]
     {
-        fs::write(&plan, broken).unwrap();
+        fs::write(&plan, damaged_text).unwrap();
         let mut run = open(&home.output(), &job);
         assert!(run.take_notes()[0].contains("the frozen plan was damaged"));
         assert!(!run.is_missing(0) && run.is_missing(1));
@@ -118,8 +121,9 @@ fn json_files_of_any_length_do_not_fill_the_memory() {
     }
     // A plan that would be too long to be read is not written.
     let numbers = vec![0.1; 2_000_000];
-    let long = Job { plan: json!({ "values": numbers }), ..synthetic::job(POINTS) };
-    let error = OpenRun::open(&home.output().with_file_name("y.parquet"), &long, options());
+    let long_plan_job = Job { plan: json!({ "values": numbers }), ..synthetic::job(POINTS) };
+    let error =
+        OpenRun::open(&home.output().with_file_name("y.parquet"), &long_plan_job, options());
     let text = error.unwrap_err().to_string();
     assert!(text.contains("more than 16 MiB") && text.contains("as a list"), "{text}");
 }

@@ -77,10 +77,10 @@ fn the_metadata_do_not_depend_on_host_or_folder() {
     let bytes = fs::read(home.output()).unwrap();
     let host = provenance::host();
     let home_text = home.0.path().to_str().unwrap();
-    for secret in [host.as_str(), home_text] {
+    for private_text in [host.as_str(), home_text] {
         assert!(
-            !bytes.windows(secret.len()).any(|window| window == secret.as_bytes()),
-            "{secret} is in the file"
+            !bytes.windows(private_text.len()).any(|window| window == private_text.as_bytes()),
+            "{private_text} is in the file"
         );
     }
 }
@@ -89,7 +89,7 @@ fn the_metadata_do_not_depend_on_host_or_folder() {
 fn the_result_does_not_depend_on_the_order_of_chunks() {
     // More rows than one batch, and a last chunk that is not full.
     let points = 5003;
-    let bytes = bytes_of_undisturbed_run(points);
+    let bytes = uninterrupted_result(points);
     let home = Home::new();
     let job = synthetic::job(points);
     let run = open(&home.output(), &job);
@@ -108,7 +108,8 @@ fn a_finished_result_is_not_computed_again() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
-    let Opened::Finished((file, tally)) = OpenRun::open(&home.output(), &job, options()).unwrap()
+    let OpenOutcome::Finished((file, tally)) =
+        OpenRun::open(&home.output(), &job, options()).unwrap()
     else {
         panic!("is done")
     };
@@ -122,26 +123,26 @@ fn a_finished_result_is_not_computed_again() {
     assert!(error.to_string().contains(r#"/name: was "synthetic", is "other_plan""#), "{error}");
 
     // A build with further columns for the same plan refuses the result.
-    let mut wider = synthetic::job(POINTS);
-    wider.layout.columns.push(DeclaredColumn::new(
+    let mut job_with_more_columns = synthetic::job(POINTS);
+    job_with_more_columns.layout.columns.push(DeclaredColumn::new(
         "further_n",
         "N",
         "a further one",
-        Holds::Measured,
+        CellType::Measured,
     ));
-    let error = OpenRun::open(&home.output(), &wider, options()).unwrap_err();
+    let error = OpenRun::open(&home.output(), &job_with_more_columns, options()).unwrap_err();
     assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.is_refusal(), "{error}");
     assert!(error.to_string().contains("further_n"), "{error}");
 
     // With `--fresh`, the old result stays until the new one replaces it.
-    let before = fs::read(home.output()).unwrap();
+    let old_bytes = fs::read(home.output()).unwrap();
     let fresh = OpenOptions { fresh: true, ..options() };
     drop(OpenRun::open(&home.output(), &other_plan, fresh).unwrap());
-    assert_eq!(fs::read(home.output()).unwrap(), before);
+    assert_eq!(fs::read(home.output()).unwrap(), old_bytes);
     let run = open(&home.output(), &other_plan);
     write_missing(&run);
     finish(run, &other_plan);
-    assert_ne!(fs::read(home.output()).unwrap(), before);
+    assert_ne!(fs::read(home.output()).unwrap(), old_bytes);
 }
 
 #[test]
@@ -151,27 +152,34 @@ fn a_result_with_a_flipped_bit_is_refused() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
-    let whole = fs::read(home.output()).unwrap();
-    let mut damaged = 0;
-    let positions = (0..whole.len()).step_by(7);
-    let tried = positions.len();
-    for at in positions {
-        let mut bytes = whole.clone();
-        bytes[at] ^= 1 << (at % 8);
+    let undamaged = fs::read(home.output()).unwrap();
+    let mut recognised_damages = 0;
+    let positions = (0..undamaged.len()).step_by(7);
+    let flipped_count = positions.len();
+    for position in positions {
+        let mut bytes = undamaged.clone();
+        bytes[position] ^= 1 << (position % 8);
         fs::write(home.output(), &bytes).unwrap();
         let error = OpenRun::open(&home.output(), &job, options()).unwrap_err();
         let text = error.to_string();
-        damaged += usize::from(matches!(error, StoreError::File(FileError::Damaged { .. })));
-        assert!(text.contains("x.parquet") && text.contains("= help: "), "byte {at}: {text}");
+        recognised_damages +=
+            usize::from(matches!(error, StoreError::File(FileError::Damaged { .. })));
+        assert!(text.contains("x.parquet") && text.contains("= help: "), "byte {position}: {text}");
         assert!(
             status(&home.output(), &job).is_err()
                 && OpenRun::open_for_merge(&home.output(), &job).is_err()
         );
-        assert!(fs::read(home.output()).unwrap() == bytes && !home.partial().exists(), "byte {at}");
+        assert!(
+            fs::read(home.output()).unwrap() == bytes && !home.partial().exists(),
+            "byte {position}"
+        );
     }
-    // In the others, the bit is in the end of the file or in a key of the metadata, so that the
+    // Elsewhere the bit is in the end of the file or in a key of the metadata, so that the
     // file is not recognised as a result.
-    assert!(damaged * 100 > tried * 95, "{damaged} of {tried} bytes");
+    assert!(
+        recognised_damages * 100 > flipped_count * 95,
+        "{recognised_damages} of {flipped_count} bytes"
+    );
 }
 
 #[test]
@@ -182,15 +190,15 @@ fn a_result_without_its_digest_is_refused() {
     write_missing(&run);
     finish(run, &job);
     let mut bytes = fs::read(home.output()).unwrap();
-    let mut refused = |word: &[u8], by: &[u8]| {
-        let at = bytes.windows(word.len()).rposition(|window| window == word).unwrap();
-        bytes[at..at + by.len()].copy_from_slice(by);
+    let mut refusal = |word: &[u8], replacement: &[u8]| {
+        let position = bytes.windows(word.len()).rposition(|window| window == word).unwrap();
+        bytes[position..position + replacement.len()].copy_from_slice(replacement);
         fs::write(home.output(), &bytes).unwrap();
         OpenRun::open(&home.output(), &job, options()).unwrap_err()
     };
-    let error = refused(b"sweep.digest", b"sweep.D");
+    let error = refusal(b"sweep.digest", b"sweep.D");
     assert!(matches!(error, StoreError::File(FileError::Damaged { .. })), "{error}");
-    let error = refused(b"sweep version", b"other");
+    let error = refusal(b"sweep version", b"other");
     assert!(matches!(error, StoreError::File(FileError::Rewritten { .. })), "{error}");
 }
 
@@ -209,23 +217,23 @@ fn results_whose_names_differ_after_a_dot_have_different_sidecars() {
         assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["file"], name);
     }
     // A result and its sidecar may be renamed together.
-    for (was, is) in [("v1.0", "w.parquet"), ("v1.0.run.json", "w.run.json")] {
-        fs::rename(home.0.path().join(was), home.0.path().join(is)).unwrap();
+    for (old_name, new_name) in [("v1.0", "w.parquet"), ("v1.0.run.json", "w.run.json")] {
+        fs::rename(home.0.path().join(old_name), home.0.path().join(new_name)).unwrap();
     }
     let renamed = OpenRun::open(&home.0.path().join("w.parquet"), &job, options()).unwrap();
-    assert!(matches!(renamed, Opened::Finished(..)));
+    assert!(matches!(renamed, OpenOutcome::Finished(..)));
     // A result whose sidecar would be that of another result, and a foreign file with the name of
     // the sidecar.
-    let refused = |output: &Path| {
+    let refusal = |output: &Path| {
         let error = OpenRun::open(output, &job, options()).unwrap_err();
         assert!(error.is_refusal());
         assert!(error.to_string().contains("is no account of the run with this --out"), "{error}");
     };
-    refused(&home.0.path().join("x"));
-    let mine = home.0.path().join("y.run.json");
-    fs::write(&mine, r#"{ "mine": true }"#).unwrap();
-    refused(&home.0.path().join("y.parquet"));
-    assert_eq!(fs::read_to_string(mine).unwrap(), r#"{ "mine": true }"#);
+    refusal(&home.0.path().join("x"));
+    let foreign_sidecar = home.0.path().join("y.run.json");
+    fs::write(&foreign_sidecar, r#"{ "mine": true }"#).unwrap();
+    refusal(&home.0.path().join("y.parquet"));
+    assert_eq!(fs::read_to_string(foreign_sidecar).unwrap(), r#"{ "mine": true }"#);
     assert!(!home.0.path().join("y.parquet.partial").exists());
 }
 
@@ -248,7 +256,7 @@ fn the_sidecar_adds_up_the_sessions() {
         version: "0.0.0-test".into(),
     };
     let mut run = open(&home.output(), &job);
-    run.record(&session(7, 40)).unwrap();
+    run.record_session(&session(7, 40)).unwrap();
     write_missing(&run);
     let tally = run.join(&job, &|| false).unwrap().unwrap();
     run.complete(&job, &tally, Some(session(9, 41))).unwrap();
@@ -280,10 +288,10 @@ fn the_counts_agree_with_the_rows() {
     let reliable = position("reliable");
     let ratio = position("ratio_max");
     let rows: Vec<_> = (0..POINTS).map(synthetic::row).collect();
-    let with = |flag| rows.iter().filter(|row| row[reliable] == flag).count() as u64;
+    let count_verdicts = |flag| rows.iter().filter(|row| row[reliable] == flag).count() as u64;
     assert_eq!(
         (tally.reliable, tally.unreliable, tally.undefined),
-        (with(Some(1)), with(Some(0)), with(None))
+        (count_verdicts(Some(1)), count_verdicts(Some(0)), count_verdicts(None))
     );
     assert_eq!(tally.reliable + tally.unreliable + tally.undefined, POINTS);
     let ratios =

@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::json;
 
 use super::super::synthetic::{job, layout};
-use super::super::{Holds, Layout};
+use super::super::{CellType, Layout};
 use super::*;
 use crate::build::Build;
 use crate::table::Table;
@@ -16,19 +16,19 @@ const BUILD: Build = Build { version: "0.0.0-test", numerics: 1 };
 fn columns() -> TrialColumns {
     let column = |name: &str, kind| DeclaredColumn::new(name, "1", format!("the {name}"), kind);
     TrialColumns {
-        keys: vec![column("candidate", Holds::Count), column("x", Holds::Axis)],
-        answers: vec![column("cost", Holds::Measured), column("excess", Holds::Measured)],
+        keys: vec![column("candidate", CellType::Count), column("x", CellType::Axis)],
+        responses: vec![column("cost", CellType::Measured), column("excess", CellType::Measured)],
     }
 }
 
 fn open(output: &Path, job: &Job<'_>) -> Trials {
     match Trials::open(output, job, columns(), false) {
-        Ok(Opened::Open(trials)) => trials,
+        Ok(OpenOutcome::Open(trials)) => trials,
         other => panic!("expected trials, got {other:?}"),
     }
 }
 
-/// Returns the key and the answer of trial `k`. The cost is null for every third trial.
+/// Returns the key and the response of trial `k`. The cost is null for every third trial.
 fn trial(k: u64) -> (TrialKey, RowCells) {
     let x = 0.1 * k as f64;
     let cost = (!k.is_multiple_of(3)).then_some(x.sin().to_bits());
@@ -37,8 +37,8 @@ fn trial(k: u64) -> (TrialKey, RowCells) {
 
 fn add(trials: &mut Trials, range: std::ops::Range<u64>) {
     for k in range {
-        let (key, answer) = trial(k);
-        trials.add(key, answer).unwrap();
+        let (key, response) = trial(k);
+        trials.add(key, response).unwrap();
     }
 }
 
@@ -70,18 +70,18 @@ fn trials_of_several_processes_are_stored_in_few_parts() {
     let trials = open(&output, &job);
     assert_eq!(trials.count() as u64, COUNT);
     for k in 0..COUNT {
-        let (key, answer) = trial(k);
-        assert_eq!(trials.recall(&key), Some(&answer), "trial {k}");
+        let (key, response) = trial(k);
+        assert_eq!(trials.find_response(&key), Some(&response), "trial {k}");
     }
-    assert_eq!(trials.recall(&[0, 1]), None);
+    assert_eq!(trials.find_response(&[0, 1]), None);
     let names = [0, 1, 2].map(|index| format!("part-{index:08}.parquet"));
     assert_eq!(parts(&output), names);
     // The columns of parts have names.
-    let first = output.with_file_name("x.parquet.partial").join(&names[0]);
-    let first = ParquetFile::open(&first).unwrap();
-    let fields = first.schema().fields().iter().map(|field| field.name().as_str());
+    let first_part = output.with_file_name("x.parquet.partial").join(&names[0]);
+    let first_part = ParquetFile::open(&first_part).unwrap();
+    let fields = first_part.schema().fields().iter().map(|field| field.name().as_str());
     assert_eq!(fields.collect::<Vec<_>>(), ["candidate", "x", "cost", "excess"]);
-    assert_eq!(first.rows(), PART_ROWS as u64);
+    assert_eq!(first_part.rows(), PART_ROWS as u64);
     assert_eq!(trials.complete(), None);
     assert_eq!(fs::read_dir(home.path()).unwrap().count(), 0);
 }
@@ -96,15 +96,15 @@ fn a_damaged_part_loses_only_the_trials_in_it() {
     trials.write().unwrap();
     drop(trials);
     let folder = output.with_file_name("x.parquet.partial");
-    let whole = fs::read(folder.join("part-00000001.parquet")).unwrap();
-    let last = fs::read(folder.join("part-00000002.parquet")).unwrap();
-    for (k, at) in (0..whole.len()).step_by(whole.len() / 40).enumerate() {
-        let mut bytes = whole.clone();
-        bytes[at] ^= 1 << (at % 8);
+    let second_part = fs::read(folder.join("part-00000001.parquet")).unwrap();
+    let third_part = fs::read(folder.join("part-00000002.parquet")).unwrap();
+    for (k, position) in (0..second_part.len()).step_by(second_part.len() / 40).enumerate() {
+        let mut bytes = second_part.clone();
+        bytes[position] ^= 1 << (position % 8);
         fs::write(folder.join("part-00000001.parquet"), &bytes).unwrap();
-        fs::write(folder.join("part-00000002.parquet"), &last).unwrap();
+        fs::write(folder.join("part-00000002.parquet"), &third_part).unwrap();
         let mut trials = open(&output, &job);
-        assert_eq!(trials.count(), 3000 - PART_ROWS, "byte {at}");
+        assert_eq!(trials.count(), 3000 - PART_ROWS, "byte {position}");
         let notes = trials.take_notes();
         assert!(notes[0].contains("part-00000001.parquet.damaged"), "{notes:?}");
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 4 + k + 1);
@@ -112,8 +112,8 @@ fn a_damaged_part_loses_only_the_trials_in_it() {
         add(&mut trials, 1024..1034);
         trials.write().unwrap();
         drop(trials);
-        let (key, answer) = trial(1030);
-        assert_eq!(open(&output, &job).recall(&key), Some(&answer));
+        let (key, response) = trial(1030);
+        assert_eq!(open(&output, &job).find_response(&key), Some(&response));
     }
     // A foreign file with the name of a part is kept.
     fs::write(folder.join("part-00000001.parquet"), "my thesis").unwrap();
@@ -127,21 +127,21 @@ fn a_damaged_part_loses_only_the_trials_in_it() {
 fn another_plan_is_refused_unless_fresh() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
-    let ours = job(8);
+    let own_job = job(8);
     let other_plan = job(9);
-    let mut trials = open(&output, &ours);
+    let mut trials = open(&output, &own_job);
     add(&mut trials, 0..5);
     trials.write().unwrap();
     drop(trials);
-    let refused = Trials::open(&output, &other_plan, columns(), false);
-    assert!(matches!(refused, Err(StoreError::PlanDiffers { .. })), "{refused:?}");
-    let Ok(Opened::Open(trials)) = Trials::open(&output, &other_plan, columns(), true) else {
+    let error = Trials::open(&output, &other_plan, columns(), false);
+    assert!(matches!(error, Err(StoreError::PlanDiffers { .. })), "{error:?}");
+    let Ok(OpenOutcome::Open(trials)) = Trials::open(&output, &other_plan, columns(), true) else {
         panic!()
     };
     assert_eq!(trials.count(), 0);
     assert!(parts(&output).is_empty());
-    let busy = Trials::open(&output, &other_plan, columns(), false);
-    assert!(matches!(busy, Err(StoreError::Busy { .. })), "{busy:?}");
+    let busy_error = Trials::open(&output, &other_plan, columns(), false);
+    assert!(matches!(busy_error, Err(StoreError::Busy { .. })), "{busy_error:?}");
 }
 
 #[test]
@@ -160,16 +160,16 @@ fn a_finished_file_of_the_same_plan_is_recognised() {
     table.counts("points", "", [1]);
     fs::write(&output, table.into_bytes(&output).unwrap()).unwrap();
     let open = |job: &Job<'_>, fresh| Trials::open(&output, job, columns(), fresh);
-    let opened = open(&ours, false);
-    assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
-    let refused = open(&other_plan, false);
-    assert!(matches!(refused, Err(StoreError::OutputDiffers { .. })), "{refused:?}");
+    let outcome = open(&ours, false);
+    assert!(matches!(outcome, Ok(OpenOutcome::Finished(()))), "{outcome:?}");
+    let refusal = open(&other_plan, false);
+    assert!(matches!(refusal, Err(StoreError::OutputDiffers { .. })), "{refusal:?}");
     assert!(!home.path().join("x.parquet.partial").exists());
     // A search that was killed after it wrote its file leaves its folder behind.
-    let Ok(Opened::Open(_)) = open(&ours, true) else { panic!() };
+    let Ok(OpenOutcome::Open(_)) = open(&ours, true) else { panic!() };
     fs::remove_file(home.path().join("x.parquet.partial/plan.json")).unwrap();
-    let opened = open(&ours, false);
-    assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
+    let outcome = open(&ours, false);
+    assert!(matches!(outcome, Ok(OpenOutcome::Finished(()))), "{outcome:?}");
     assert!(!home.path().join("x.parquet.partial").exists());
 }
 
@@ -178,8 +178,8 @@ fn a_file_of_a_model_is_never_taken_for_a_finished_search() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.toml");
     let job = job(8);
-    let own = Job { layout: Layout { kind: FileKind::Own, ..layout() }, ..job };
+    let own_file_job = Job { layout: Layout { kind: FileKind::Own, ..layout() }, ..job };
     fs::write(&output, format!("{}by a fit\n", sweep_files::OWN_FILE)).unwrap();
-    let opened = Trials::open(&output, &own, columns(), false);
-    assert!(matches!(opened, Ok(Opened::Open(_))), "{opened:?}");
+    let outcome = Trials::open(&output, &own_file_job, columns(), false);
+    assert!(matches!(outcome, Ok(OpenOutcome::Open(_))), "{outcome:?}");
 }

@@ -156,7 +156,7 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
         "tub_mass",
         "",
     ] {
-        assert!(find(name).is_err_and(|expected| expected.is_strange), "{name}");
+        assert!(find(name).is_err_and(|expected| expected.is_in_no_model), "{name}");
     }
     let table = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 100.0] };
     let find = |name: &str| MachineParameter::find(name, &machine, &table).map(|p| p.index);

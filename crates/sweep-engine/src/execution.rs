@@ -5,7 +5,7 @@ use crate::{Interrupt, ProgressMode, ThreadsError};
 
 /// The resources of a search or an evaluation.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort<'a> {
+pub struct Execution<'a> {
     /// The number of worker threads; if `None`, the cores that Slurm gave this task, else those of
     /// this machine.
     pub threads: Option<usize>,
@@ -15,7 +15,7 @@ pub struct Effort<'a> {
     pub interrupt: &'a Interrupt,
 }
 
-impl Effort<'_> {
+impl Execution<'_> {
     /// Returns the number of worker threads.
     ///
     /// # Errors
@@ -30,7 +30,7 @@ impl Effort<'_> {
 
 /// The options of a command for threads and progress.
 #[derive(Clone, Copy, Debug, clap::Args)]
-pub struct EffortArgs {
+pub struct ExecutionArgs {
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
     #[arg(long, value_name = "N", value_parser = threads::parse)]
     pub threads: Option<usize>,
@@ -45,9 +45,9 @@ pub struct EffortArgs {
     pub progress: ProgressMode,
 }
 
-impl EffortArgs {
+impl ExecutionArgs {
     /// Returns the resources with an interrupt.
-    pub fn with(self, interrupt: &Interrupt) -> Effort<'_> {
-        Effort { threads: self.threads, progress: self.progress, interrupt }
+    pub fn with(self, interrupt: &Interrupt) -> Execution<'_> {
+        Execution { threads: self.threads, progress: self.progress, interrupt }
     }
 }
