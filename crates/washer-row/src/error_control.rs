@@ -12,7 +12,7 @@
 //! its extrapolation: the difference of two levels bounds the error of the finer one where the step
 //! shrinks by enough. The second term is for two levels that agree by chance: c is the contraction
 //! of the error from level to level, 1.5 where the step shrinks ([`STEP_CONTRACTION`]), and 10 where
-//! the tolerance does or another family begins ([`TOLERANCE_RATIO`]).
+//! the tolerance does or another method begins ([`TOLERANCE_RATIO`]).
 //!
 //! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge's
 //!    mode is not capped, and limits the first step.
@@ -37,7 +37,7 @@
 use lane_ode::Tolerance;
 use washer_model::{Formula, Level, Method, ModelKind, StepSelector, capped_method};
 
-use crate::levels::{RESOLVING_LEVELS, RefinementLevel, RefinementLevels};
+use crate::levels::{FamilyStart, RESOLVING_LEVELS, RefinementLevel, RefinementLevels};
 
 /// Safety factor: the estimated error of a level, divided by its difference from the level before.
 ///
@@ -115,10 +115,16 @@ fn step_ratio(order: f64) -> f64 {
     STEP_CONTRACTION.powf(1.0 / order)
 }
 
-/// Returns the contraction of the error from one level to the next. The first level of another
-/// family contracts it as a tolerance does.
-pub(crate) fn contraction(level: Level, starts_family: bool) -> f64 {
-    if starts_family || level == Level::Additive { 1.0 / TOLERANCE_RATIO } else { STEP_CONTRACTION }
+/// Returns the contraction of the error from a level to the next `level`.
+///
+/// `start` is that of the first of the two. The difference of a level that starts to resolve modes
+/// is their ringing, and says nothing of its own error: the contraction is infinite.
+pub(crate) fn contraction(level: Level, start: FamilyStart) -> f64 {
+    match (start, level) {
+        (FamilyStart::Modes, _) => f64::INFINITY,
+        (FamilyStart::Method, _) | (FamilyStart::None, Level::Additive) => 1.0 / TOLERANCE_RATIO,
+        (FamilyStart::None, _) => STEP_CONTRACTION,
+    }
 }
 
 /// Returns the error of a level from its difference from the level before, and from that level's
@@ -256,9 +262,10 @@ mod tests {
 
     #[test]
     fn a_new_family_contracts_the_error_more_than_a_shorter_step() {
-        assert_eq!(contraction(Level::Rk4, false), 1.5);
-        assert_eq!(contraction(Level::Rk4, true), 10.0);
-        assert_eq!(contraction(Level::Additive, false), 10.0);
+        assert_eq!(contraction(Level::Dop853, FamilyStart::None), 1.5);
+        assert_eq!(contraction(Level::Dop853, FamilyStart::Method), 10.0);
+        assert_eq!(contraction(Level::Dop853, FamilyStart::Modes), f64::INFINITY);
+        assert_eq!(contraction(Level::Additive, FamilyStart::None), 10.0);
     }
 
     /// Levels whose errors decrease at least by the ratio have errors of at most the estimate.
@@ -270,7 +277,7 @@ mod tests {
                 let error = |level: i32| ratio.powf(-f64::from(level) * (order + steeper));
                 let [first, second] = [1, 2].map(|level| error(level - 1) - error(level));
                 assert!(error_of_level(first, 0.0).unwrap() >= 0.999_999 * error(1));
-                let contracted = first / contraction(Level::Capped1, false);
+                let contracted = first / contraction(Level::Capped1, FamilyStart::None);
                 assert!(error_of_level(second, contracted).unwrap() >= 0.999_999 * error(2));
             }
         }

@@ -39,6 +39,18 @@ impl RefinementLevel {
     }
 }
 
+/// The change by which a level starts a family, whose errors have other terms than those of the
+/// level before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FamilyStart {
+    /// No change: the level has shorter steps or a smaller tolerance.
+    None,
+    /// Another method of integration.
+    Method,
+    /// Modes that the level before does not resolve.
+    Modes,
+}
+
 /// The refinement levels of one model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RefinementLevels {
@@ -72,16 +84,17 @@ impl RefinementLevels {
         self.levels.iter().take_while(|level| is_capped(level)).count()
     }
 
-    /// Whether the level at this index has another method than the level before, so that its
-    /// differences measure an error of another kind. The methods are capped modes, the additive
-    /// method, and the formulas without capped modes.
-    pub fn starts_method_family(&self, level_index: usize) -> bool {
-        let family_at = |level_index: usize| {
-            let level = self.levels[level_index].level;
-            let first_of_kind = if level.is_capped() { Level::Capped0 } else { level };
-            (first_of_kind, self.unresolved_modes(level_index))
-        };
-        level_index > 0 && family_at(level_index) != family_at(level_index - 1)
+    /// Returns whether a level starts a family of levels, and by which change.
+    pub fn family_start(&self, level_index: usize) -> FamilyStart {
+        let Some(previous_index) = level_index.checked_sub(1) else { return FamilyStart::None };
+        let [previous, level] = [previous_index, level_index].map(|index| self.levels[index].level);
+        if self.unresolved_modes(previous_index) != self.unresolved_modes(level_index) {
+            FamilyStart::Modes
+        } else if previous != level && !level.is_capped() {
+            FamilyStart::Method
+        } else {
+            FamilyStart::None
+        }
     }
 
     /// Returns the index of the first level whose steps resolve the bearings' modes.

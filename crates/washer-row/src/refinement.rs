@@ -4,7 +4,7 @@
 use washer_model::{Level, ModelKind, Point, UnresolvedModes};
 
 use crate::error_control::{amplification, contraction, error_of_chaos, error_of_level};
-use crate::levels::RefinementLevels;
+use crate::levels::{FamilyStart, RefinementLevels};
 use crate::measures::TURN_FLOOR;
 use crate::metrics::Metric;
 use crate::outcome::{Outcome, Status, Trajectory};
@@ -95,18 +95,18 @@ struct ModelRefinement {
 struct LevelDifference {
     /// The relative difference; `None` if the levels cannot be compared.
     relative: Option<f64>,
-    /// Whether the level is the first of its family.
-    starts_family: bool,
+    /// The change by which the level starts a family.
+    start: FamilyStart,
 }
 
 impl LevelDifference {
     /// Returns the difference divided by the contraction of the error from this level to the next
-    /// `level`. A family that cannot be compared with the one before says nothing of its own error.
+    /// `level`. Families that cannot be compared say nothing of each other's errors.
     fn contracted_to(self, level: Level) -> f64 {
-        match self.relative {
-            Some(relative) => relative / contraction(level, self.starts_family),
-            None if self.starts_family => 0.0,
-            None => f64::INFINITY,
+        match (self.relative, self.start) {
+            (Some(relative), start) => relative / contraction(level, start),
+            (None, FamilyStart::None) => f64::INFINITY,
+            (None, _) => 0.0,
         }
     }
 }
@@ -136,8 +136,8 @@ impl ModelRefinement {
             self.run = Some(previous_run);
             return;
         }
-        let starts_family = rule.levels.starts_method_family(level);
-        self.differences.push(LevelDifference { relative: difference, starts_family });
+        let start = rule.levels.family_start(level);
+        self.differences.push(LevelDifference { relative: difference, start });
         if self.differences.len() == 1 && self.level == 0 {
             self.first_difference = difference.unwrap_or(f64::INFINITY);
         }
