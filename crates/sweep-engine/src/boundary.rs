@@ -1,8 +1,9 @@
 //! The boundary: for each value of the first axis, the places along the second where a quantity
 //! passes its limit, without filling the grid.
 //!
-//! The quantity enters as a signed distance from its limit, negative on the reliable side; nothing
-//! here knows a machine. A line is a value of the first axis, along which the second is searched.
+//! The quantity enters as a signed distance from its limit, negative on the reliable side; this
+//! module knows no machine. A line is a value of the first axis, along which the second axis is
+//! searched.
 //!
 //! 1. The lattice (`lattice`): evenly spread lines are evaluated at evenly spread columns. Every
 //!    change of side between neighbouring samples is a bracket, narrowed by the ITP method (`itp`).
@@ -92,14 +93,14 @@ pub struct Edge {
     pub kind: EdgeKind,
     /// The value of the second axis at which the quantity is at its limit; `None` unless it is a
     /// crossing.
-    pub at: Option<f64>,
+    pub position: Option<f64>,
     /// The values of the second axis between which the side changes, the lower first.
     pub bracket: Option<[f64; 2]>,
     /// Signed distances from the limit at the bracket's ends, where defined.
     pub distances: [Option<f64>; 2],
 }
 
-/// All that is known about one value of the first axis.
+/// The edges of the boundary at one value of the first axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundaryRow {
     /// The value of the first axis.

@@ -5,7 +5,7 @@ use sweep_parameter::{Channel, Limit, RatioLimits, Worse};
 
 use crate::store::{CellType, DeclaredColumn, RowCells};
 
-/// The names of the two models.
+/// The names of the two models, which begin the names of their columns.
 pub const MODELS: [&str; 2] = ["nonlinear", "linear"];
 
 /// The comparison of both models at a point. Lists are in the order of the plan's channels, arrays
@@ -66,7 +66,7 @@ impl<R> ResultColumn<R> {
         Self { declared: DeclaredColumn::new(name, unit, description, kind), cell: Box::new(cell) }
     }
 
-    /// Creates a column of measured numbers, which hardly ever repeat; null where there is none.
+    /// Creates a column of measured numbers, which rarely repeat; null where there is none.
     pub fn measured(
         name: impl Into<String>,
         unit: &str,

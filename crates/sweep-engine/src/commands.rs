@@ -25,8 +25,8 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use crate::program::call_program;
-use crate::{Error, Exit, Model, expect_random_numbers, survive_file_size_limits};
+use crate::program::set_program;
+use crate::{Error, Exit, Model, check_random_numbers, survive_file_size_limits};
 use cells::{Lines, format_cell, format_number, format_range, format_table, shorten};
 use grid::{GridArgs, ResultArgs, quoted};
 use run::install_interrupt;
@@ -48,7 +48,7 @@ pub trait Arguments {
     type Schema: clap::Args + fmt::Debug;
 }
 
-/// The arguments without added options.
+/// The arguments of a program that adds no options.
 #[derive(Debug)]
 pub enum Unextended {}
 
@@ -104,7 +104,7 @@ struct Cli {
 /// Runs the command that this process's arguments give, and returns its exit code. `name` is the
 /// name of the program.
 pub fn main<M: Model>(name: &'static str) -> ExitCode {
-    call_program(name);
+    set_program(name);
     let matches = Cli::command().name(name).bin_name(name).get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let exit = run::<M>(&cli.command).unwrap_or_else(|error| {
@@ -116,7 +116,7 @@ pub fn main<M: Model>(name: &'static str) -> ExitCode {
 
 fn run<M: Model>(command: &GeneralCommand<Unextended>) -> Result<Exit, Error> {
     survive_file_size_limits().map_err(Error::signals)?;
-    expect_random_numbers()?;
+    check_random_numbers()?;
     match command {
         GeneralCommand::Run(args) => run::run::<M>(args),
         GeneralCommand::Check(args) => check::run::<M>(args),

@@ -1,9 +1,9 @@
 //! The configuration: from a user's input to a [`Plan`], or to every mistake in it.
 //!
-//! A grid file, the file that it names for its model and the constants of the command line are read
-//! in one walk, each value with its location. Wrong values are reported and replaced by stand-ins,
-//! so that the walk goes on and one pass finds every mistake. There is a plan only if there are no
-//! mistakes.
+//! A grid file, the file that it names for its model, and the constants of the command line are
+//! read in one walk, each value with its location. Wrong values are reported and replaced by
+//! placeholders, so that the walk goes on and one pass finds every mistake. There is a plan only if
+//! there are no mistakes.
 //!
 //! Defaults: `name` is the file's name, `window_s` the whole run, `[integrator]` the defaults of
 //! [`crate::method`]'s table, `[reliability]` the ratio 2 over the model's default channels;
@@ -94,7 +94,7 @@ impl<M: Model> GridInput<M> {
     }
 
     /// Returns the grid of a result from the plan in it (`Plan::to_json`), without the points of a
-    /// design. Axes with tolerances have the values that these gave.
+    /// design. Axes with tolerances keep the values that the tolerances gave.
     pub fn from_plan(name: &str, plan: &Value) -> Self {
         let own_key = M::ABOUT.own_file.map(|file| file.key);
         let is_read = |key: &str| {
@@ -104,16 +104,16 @@ impl<M: Model> GridInput<M> {
         for axis in plan.get_mut("axis").and_then(Value::as_array_mut).into_iter().flatten() {
             axis.as_object_mut().map(|axis| axis.remove("tolerance"));
         }
-        let top = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
-        let own = own_key.and_then(|key| plan.get(key)?.as_object());
+        let grid_keys = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
+        let own_file_keys = own_key.and_then(|key| plan.get(key)?.as_object());
         Self {
-            text: Some(plan_to_toml::file(top)),
-            own_file: own.map(plan_to_toml::file),
+            text: Some(plan_to_toml::file(grid_keys)),
+            own_file: own_file_keys.map(plan_to_toml::file),
             ..Self::file(name.into(), Vec::new())
         }
     }
 
-    /// Returns the input with further constants `NAME=VALUE`, which also fix parameters that an
+    /// Returns the input with additional constants `NAME=VALUE`, which also fix parameters that an
     /// axis sweeps.
     #[must_use]
     pub fn with_fixed(self, at: &[String]) -> Self {
@@ -134,9 +134,9 @@ impl<M: Model> GridInput<M> {
         resolve(self, |_| ()).map(|(plan, ())| plan)
     }
 
-    /// Reads the grid for one point. `at` gives a value to each axis of several values (on the grid
-    /// or between its points) and to other parameters. Returns the plan, which has no axes and the
-    /// point's model, and the values of `at` by name.
+    /// Reads the grid for one point. `at` has arguments NAME=VALUE for each axis of several values
+    /// (on the grid or between its points) and for other parameters. Returns the plan, which has no
+    /// axes and the point's model, and these values by name.
     ///
     /// # Errors
     /// Every mistake found, in one pass.
@@ -153,13 +153,13 @@ fn resolve<M: Model, T>(
     finish: impl FnOnce(&mut Draft<'_, M>) -> T,
 ) -> Result<(Plan<M>, T), Diagnostics> {
     let report = Report::default();
-    let read = grid::draft(input, &report).map(|mut draft| {
-        let finished = finish(&mut draft);
+    let loaded_draft = grid::draft(input, &report).map(|mut draft| {
+        let finish_result = finish(&mut draft);
         whole::steps(&draft);
         M::check(&draft);
         let written = WrittenIn(report.written());
         let aside = ReadingNotes { notes: report.take_notes(), ..draft.plan.aside };
-        (Plan { written, aside, ..draft.plan }, finished)
+        (Plan { written, aside, ..draft.plan }, finish_result)
     });
-    report.finish(read)
+    report.finish(loaded_draft)
 }

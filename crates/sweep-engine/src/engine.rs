@@ -1,5 +1,5 @@
-//! The interface between an evaluator and the run it serves: rows come from a source, results go to
-//! a sink, and a context carries cancellation, progress and known rows.
+//! The interface between an evaluator and its run: rows come from a source, results go to a sink,
+//! and a context carries cancellation, progress and known rows.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -36,11 +36,11 @@ pub struct Engine<'a> {
     pub evaluator: Box<dyn Evaluator + 'a>,
     /// The name of the instruction set in use.
     pub simd: &'static str,
-    /// Whether consecutive rows share work. The source then keeps to the grid's order, and
-    /// otherwise takes chunks that are far apart.
+    /// Whether consecutive rows share work. If so, the source yields points in the grid's order;
+    /// otherwise it yields chunks that are far apart.
     pub is_helped_by_neighbours: bool,
-    /// A function that returns the reason why a point of the grid fails, in words; `None` if it
-    /// does not know one.
+    /// The function that returns the reason, in words, why a point of the grid fails; `None` if the
+    /// reason is not known.
     pub failure_reason: Box<dyn Fn(u64) -> Option<String> + Sync + 'a>,
 }
 
@@ -59,8 +59,8 @@ impl<'a> Engine<'a> {
 /// The state of a run that an engine shares with its caller.
 pub struct RunContext<'a> {
     interrupt: &'a Interrupt,
-    /// The flag that is set when a result could not be stored, because further ones would be lost
-    /// as well.
+    /// The flag that is set if a result cannot be stored, because later results could not be stored
+    /// either.
     is_aborted: AtomicBool,
     points_done: AtomicU64,
     is_late: Option<&'a (dyn Fn() -> bool + Sync)>,

@@ -23,7 +23,7 @@ pub struct Estimate {
     pub core_s_per_point: f64,
     /// The numbers of points that were integrated for the estimate, by status.
     pub sampled: NameCounts,
-    /// The time up to which they were integrated; at most the plan's `end_s`.
+    /// The time up to which these points were integrated; at most the plan's `end_s`.
     pub sampled_s: f64,
     /// The peak memory.
     pub memory_bytes: f64,
@@ -33,8 +33,8 @@ pub struct Estimate {
     pub result_bytes: f64,
     /// The steps of the method, in words.
     pub method: String,
-    /// The words after "below 2" in the sentence on the verdict, where ratios are not those of the
-    /// largest deviations.
+    /// The words that follow the limit in the sentence on the verdict; empty if ratios are those of
+    /// the largest deviations.
     pub criterion: &'static str,
     /// The model's notes on the plan, each with its heading.
     pub notes: Vec<(&'static str, String)>,
@@ -48,7 +48,7 @@ const SAMPLED_POINTS: u64 = 8;
 /// docs/scaling.md. Doubling it overestimates small runs.
 const PROGRAM_BYTES: f64 = 14e6;
 
-/// Memory (bytes) of a row group while it is encoded, at most. Basis: measured in docs/scaling.md.
+/// Greatest memory (bytes) of a row group while it is encoded. Basis: measured in docs/scaling.md.
 /// Doubling it overestimates large results.
 const ROW_GROUP_BYTES: f64 = 40e6;
 
@@ -67,9 +67,9 @@ impl Estimate {
         let interrupt = Interrupt::new();
         let context = RunContext::new(&interrupt);
         let pool = threads::pool(1)?;
-        let began = Instant::now();
+        let start = Instant::now();
         pool.install(|| engine.evaluator.evaluate(&source, &sink, &context));
-        let core_s_per_point = began.elapsed().as_secs_f64() / points as f64;
+        let core_s_per_point = start.elapsed().as_secs_f64() / points as f64;
         let layout = M::layout(plan);
         let status = layout.columns.iter().enumerate().find_map(|(k, column)| match &column.kind {
             CellType::Name(names) if column.name == "status" => Some((k, names)),

@@ -1,5 +1,5 @@
-//! An evaluator for searches: it answers requests from a cache, and has an engine evaluate the
-//! rest.
+//! An evaluator for searches. It responds to requests from a cache, and has an engine evaluate the
+//! points of the others.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -35,7 +35,7 @@ impl SearchStop {
     }
 }
 
-/// The numbers of the response to a request, `None` where one is null.
+/// The numbers of the response to a request; a number is `None` if it is null.
 pub type RequestValues = Vec<Option<f64>>;
 
 /// An engine with a cache of responses.
@@ -79,8 +79,8 @@ impl<'a> CachedEvaluator<'a> {
 
     /// Evaluates requests, each identified by its key and covering `rows` points.
     ///
-    /// `axis_values` returns the values of the axes at a point of a request. `find_responses`
-    /// reduces the results of a request's points, in order, to its response.
+    /// `axis_values` returns the values of the axes at a point of a request. `respond` reduces the
+    /// results of a request's points, in order, to the response.
     ///
     /// # Errors
     /// Any [`SearchStop`].
@@ -142,8 +142,8 @@ impl<'a> CachedEvaluator<'a> {
                 }
             }
         });
-        let written = self.write(|_| true);
-        if let Some(error) = failure.or(written.err()) {
+        let write_result = self.write(|_| true);
+        if let Some(error) = failure.or(write_result.err()) {
             return Err(SearchStop::Failed(error));
         }
         responses.into_iter().collect::<Option<_>>().ok_or(SearchStop::Interrupted)
@@ -173,7 +173,7 @@ impl<'a> CachedEvaluator<'a> {
     }
 
     fn count_responses(&self, count: u64) {
-        let before = self.responses.fetch_add(count, Ordering::Relaxed);
-        (self.show_responses)(before + count);
+        let earlier_count = self.responses.fetch_add(count, Ordering::Relaxed);
+        (self.show_responses)(earlier_count + count);
     }
 }

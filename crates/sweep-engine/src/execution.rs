@@ -3,7 +3,7 @@
 use crate::threads::{self};
 use crate::{Interrupt, ProgressMode, ThreadsError};
 
-/// The resources of a search or an evaluation.
+/// The threads, the display of progress and the interrupt of a search or an evaluation.
 #[derive(Clone, Copy, Debug)]
 pub struct Execution<'a> {
     /// The number of worker threads; if `None`, the cores that Slurm gave this task, else those of
@@ -46,7 +46,7 @@ pub struct ExecutionArgs {
 }
 
 impl ExecutionArgs {
-    /// Returns the resources with an interrupt.
+    /// Adds an interrupt to the options.
     pub fn with(self, interrupt: &Interrupt) -> Execution<'_> {
         Execution { threads: self.threads, progress: self.progress, interrupt }
     }

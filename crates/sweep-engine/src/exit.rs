@@ -1,4 +1,4 @@
-//! The ends of the program: exit codes, errors, and what goes to standard output and error.
+//! The exit of the program: exit codes, errors, and the text on standard output and standard error.
 
 use std::fmt::{Display, Write as _};
 use std::io::{self, Write as _};
@@ -118,8 +118,8 @@ pub enum Error {
 
 impl Error {
     /// Creates the error of an option (`"--every"`) with an invalid value.
-    pub fn option(option: &str, given: impl Display, expected: impl Display) -> Self {
-        Self::Refused(format!("`{option} {given}`: expected {expected}"))
+    pub fn option(option: &str, value: impl Display, expected: impl Display) -> Self {
+        Self::Refused(format!("`{option} {value}`: expected {expected}"))
     }
 
     /// Creates the error of signal handlers that cannot be installed.
@@ -152,9 +152,9 @@ impl Error {
         match self {
             Self::Input(diagnostics) => {
                 let text = diagnostics.styled();
-                // The escapes in this text are colours; the renderer has replaced those of quoted
-                // input.
-                let text = escaped(&text, |c| c != '\x1b' && is_unsafe(c));
+                // The escapes in this text are those of colours, because the renderer has replaced
+                // the escapes in quoted input.
+                let text = escaped(&text, |letter| letter != '\x1b' && is_unsafe(letter));
                 // Without standard error, only the exit code reports the error.
                 let _ = writeln!(anstream::stderr(), "{text}");
             }
@@ -164,9 +164,9 @@ impl Error {
 }
 
 /// Returns whether a character can control a terminal, or change the order of its text.
-fn is_unsafe(c: char) -> bool {
-    let is_control = c.is_control() && !matches!(c, '\n' | '\t');
-    is_control || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+fn is_unsafe(letter: char) -> bool {
+    let is_control = letter.is_control() && !matches!(letter, '\n' | '\t');
+    is_control || matches!(letter, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Returns a text with some characters written as `\u001b`, which is their form in JSON too.
@@ -183,7 +183,7 @@ fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> String {
     safe
 }
 
-/// Writes an answer, for people or as JSON, to standard output. Control characters that come from
+/// Writes a text, for people or as JSON, to standard output. Control characters that come from
 /// files are escaped.
 ///
 /// # Errors
@@ -192,7 +192,7 @@ pub fn show(text: &str) -> Result<Exit, Error> {
     print(&escaped(text, is_unsafe))
 }
 
-/// Writes a product of a command (a script, a file) to standard output without changes. A reader
+/// Writes the output of a command (a script, a file) to standard output without changes. A reader
 /// that closes the pipe (`| head`) is not an error.
 ///
 /// # Errors
@@ -228,8 +228,8 @@ mod tests {
         let text = escaped("a\x1b[2J\u{9b}3m\r\u{202e}é\tb\n", is_unsafe);
         assert_eq!(text, "a\\u001b[2J\\u009b3m\\u000d\\u202eé\tb\n");
         let json = serde_json::json!({ "host": "a\u{9b}\x07b" }).to_string();
-        let back: serde_json::Value = serde_json::from_str(&escaped(&json, is_unsafe)).unwrap();
-        assert_eq!(back["host"], "a\u{9b}\x07b");
+        let parsed: serde_json::Value = serde_json::from_str(&escaped(&json, is_unsafe)).unwrap();
+        assert_eq!(parsed["host"], "a\u{9b}\x07b");
         assert_eq!(escaped("plain", is_unsafe), "plain");
     }
 
@@ -237,10 +237,11 @@ mod tests {
     fn store_errors_have_exit_codes() {
         let output = PathBuf::from("x.parquet");
         let folder = PathBuf::from("x.parquet.partial");
-        let differs = StoreError::PlanDiffers { folder: folder.clone(), differences: Vec::new() };
+        let plan_differs =
+            StoreError::PlanDiffers { folder: folder.clone(), differences: Vec::new() };
         for (error, exit) in [
             (StoreError::Busy { output: output.clone(), holders: Vec::new() }, Exit::Busy),
-            (differs, Exit::BadInput),
+            (plan_differs, Exit::BadInput),
             (ThreadsError::Scheduler { given: "0".to_owned() }.into(), Exit::BadInput),
             (StoreError::NoRun { output, folder }, Exit::Failed),
         ] {

@@ -27,17 +27,17 @@ pub fn survive_file_size_limits() -> io::Result<()> {
 /// error at the start and not a panic later.
 ///
 /// # Errors
-/// A system that gives none.
-pub fn expect_random_numbers() -> Result<(), Error> {
-    let drawn = panics::caught(|| drop(RandomState::new()));
-    drawn.map_err(|panic| Error::File {
+/// A system that does not provide random numbers.
+pub fn check_random_numbers() -> Result<(), Error> {
+    let result = panics::caught(|| drop(RandomState::new()));
+    result.map_err(|panic| Error::File {
         action: "draw random numbers for",
         path: "this process".into(),
         source: io::Error::other(panic),
     })
 }
 
-/// A stop flag that signals set, shared by all threads.
+/// A flag, shared by all threads, that signals set in order to stop the work.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     stop: Arc<AtomicBool>,
@@ -58,8 +58,8 @@ impl Interrupt {
     pub fn install() -> io::Result<Self> {
         let interrupt = Self::new();
         for signal in [SIGINT, SIGTERM] {
-            // The shutdown is registered first, so that it reads the flag before this signal sets
-            // it.
+            // The shutdown is registered first, so that it reads the flag before the same signal
+            // sets the flag.
             flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.stop))?;
             flag::register_usize(signal, Arc::clone(&interrupt.signal), signal as usize)?;
             flag::register(signal, Arc::clone(&interrupt.stop))?;

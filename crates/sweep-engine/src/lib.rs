@@ -1,7 +1,7 @@
-//! Sweeps a [`Model`] over a grid: from a grid file to a result file. Nothing here knows which
-//! model it is.
+//! Sweeps a [`Model`] over a grid: from a grid file to a result file. This crate does not know any
+//! particular model.
 //!
-//! A model implements two traits: [`Model`], which stands in this file because every other one is
+//! A model implements two traits: [`Model`], which is in this file because all other items are
 //! generic over it, and [`Evaluator`].
 //!
 //! * `config` reads a grid file into a [`Plan`], or says every mistake in it. `method` declares a
@@ -43,7 +43,7 @@ pub use engine::{Engine, Evaluator, RowLookup, RowSink, RowSource, RunContext};
 pub use estimate::Estimate;
 pub use execution::{Execution, ExecutionArgs};
 pub use exit::{Error, Exit, print, show, tell};
-pub use interrupt::{Interrupt, expect_random_numbers, survive_file_size_limits};
+pub use interrupt::{Interrupt, check_random_numbers, survive_file_size_limits};
 pub use model::{About, GridTable, OwnFile};
 pub use plan::{Axis, AxisTolerance, AxisValues, Plan, Reliability, Scenario};
 pub use program::program;
@@ -72,7 +72,7 @@ pub type ModelParameter<M> = Parameter<<M as Model>::Handle>;
 /// [`write`](Model::write), [`layout`](Model::layout) and [`engine`](Model::engine), whose
 /// [`Evaluator`] has one more. The other functions have defaults.
 pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static {
-    /// The type by which the model finds a parameter again.
+    /// The type of a parameter's handle, by which the model writes the parameter's value.
     type Handle: Clone + fmt::Debug + Send + Sync + 'static;
 
     /// The facts about the model that are the same for every plan.
@@ -89,16 +89,16 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
     /// # Errors
     /// An unknown name, with the reason.
     fn find(&self, name: &str) -> Result<ModelParameter<Self>, UnknownParameter> {
-        let found = self.parameters().into_iter().find(|parameter| parameter.name == name);
-        found.ok_or_else(UnknownParameter::in_no_model)
+        let matching = self.parameters().into_iter().find(|parameter| parameter.name == name);
+        matching.ok_or_else(UnknownParameter::in_no_model)
     }
 
     /// Writes a parameter's value, which is in its range. The parameter is no edge of the window.
     fn write(&mut self, parameter: &Self::Handle, value: f64);
 
     /// Walks over the model's keys in a table of the grid file; `input` is the grid that is read.
-    /// The engine walks over `name`, `[set]`, `[time]`, `[integrator]`, `[design]`, `[[axis]]` and
-    /// its own keys of `[reliability]`.
+    /// The engine itself walks over `name`, `[set]`, `[time]`, `[integrator]`, `[design]`,
+    /// `[[axis]]` and its own keys of `[reliability]`.
     fn walk(&mut self, _table: GridTable, _: &mut Keys<'_>, _input: Option<&GridInput<Self>>) {}
 
     /// Checks the plan as a whole, after every value is set.
@@ -116,9 +116,9 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
 
     /// Creates the engine that computes the rows of a plan.
     ///
-    /// With `only` the caller reads a single column, and the others may hold anything. If the
-    /// column is a ratio, it has to be on the correct side of the plan's limit, and accurate near
-    /// the limit only.
+    /// With `only`, the caller reads a single column, and the cells of other columns are arbitrary.
+    /// If that column is a ratio, it has to be on the correct side of the plan's limit, but
+    /// accurate only near the limit.
     ///
     /// # Errors
     /// A plan that has no engine.
@@ -133,8 +133,8 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
         Estimate::from_first_rows(plan, threads)
     }
 
-    /// Returns plans of the same points whose rows have further columns: one plan for each kind of
-    /// measurement that a plan can have, and at last one with all of them.
+    /// Returns plans of the same points whose rows have more columns: one plan for each kind of
+    /// measurement that a plan can have, and then one with all kinds.
     fn variants(_: &Plan<Self>) -> Vec<Plan<Self>> {
         Vec::new()
     }

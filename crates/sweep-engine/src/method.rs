@@ -12,11 +12,11 @@ pub struct Setting {
     pub key: &'static str,
     /// The range of accepted values.
     pub range: Range,
-    /// The value where the grid file leaves it out.
+    /// The value if the grid file does not give one.
     pub default: f64,
     /// The description in one line, with the unit.
     pub description: &'static str,
-    /// The help beside a value that is refused, or nothing.
+    /// The help in the message about a refused value; empty if there is none.
     pub help: &'static str,
 }
 
@@ -77,14 +77,14 @@ pub struct IntegrationMethod {
     pub steps: StepRule,
 }
 
-/// The classical method in fixed steps, which models list under its own name.
+/// The classical method with fixed steps; models list it under a name of their own.
 pub const RK4: IntegrationMethod = IntegrationMethod {
     name: "rk4",
     description: "classical Runge-Kutta of order 4, in fixed steps",
     settings: &[STEP_S],
     steps: StepRule::Fixed,
 };
-/// The adaptive method of Dormand and Prince, which models list under its own name.
+/// The adaptive method of Dormand and Prince; models list it under a name of their own.
 pub const DOPRI5: IntegrationMethod = IntegrationMethod {
     name: "dopri5",
     description: "Dormand-Prince 5(4), adaptive",
@@ -140,7 +140,7 @@ impl Integrator {
         keys.zip(self.values.iter().copied()).collect()
     }
 
-    /// Returns the steps.
+    /// Returns how the method chooses its steps, with the step or the accuracy of its settings.
     pub fn steps(&self) -> Steps {
         let first = self.values.first().copied().unwrap_or_default();
         match self.method.steps {

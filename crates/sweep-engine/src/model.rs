@@ -17,7 +17,7 @@ pub enum GridTable {
 /// The facts about a model that are the same for every plan.
 #[derive(Clone, Copy)]
 pub struct About {
-    /// The build that results name.
+    /// The build, which is recorded in results.
     pub build: Build,
     /// The channels, in the order of columns.
     pub channels: &'static [Channel],
@@ -29,17 +29,17 @@ pub struct About {
     pub own_file: Option<OwnFile>,
     /// The advice for a user without a grid file.
     pub to_start: Option<&'static str>,
-    /// The settings that columns require which not every plan has, by the beginning of the
-    /// columns' names up to the first underscore.
+    /// The settings that optional columns require, each by the prefix of the columns' names (the
+    /// part before the first underscore).
     pub needed: &'static [(&'static str, &'static str)],
-    /// The sentence on such columns in the message about an unknown one.
+    /// The sentence about optional columns in the message about an unknown column.
     pub further: &'static str,
 }
 
 /// A file of a model's own.
 #[derive(Clone, Copy, Debug)]
 pub struct OwnFile {
-    /// The key by which a grid names it.
+    /// The key by which a grid file names the model's file.
     pub key: &'static str,
     /// The keys at the top of the file.
     pub keys: &'static [&'static str],

@@ -9,15 +9,15 @@ use sweep_parameter::{Channel, Range, RatioLimits};
 use crate::method::Integrator;
 use crate::{Design, Distribution, Model, ModelParameter};
 
-/// The greatest number of grid points that is accepted. Basis: four months at a hundred thousand
-/// points per second. Doubling it accepts runs of eight months.
+/// The greatest number of grid points that is accepted. Basis: these take four months at a hundred
+/// thousand points per second. Doubling it accepts runs of eight months.
 pub const MAX_POINTS: u64 = 1_000_000_000_000;
 
 /// The greatest `end_s` that is accepted, s. Basis: eleven days, far beyond any spin cycle.
 /// Doubling it accepts twice the longest trajectory.
 pub const MAX_END_S: f64 = 1e6;
 
-/// The range of `ratio_min`: a ratio, up to that of equal amplitudes.
+/// The range of `ratio_min`: up to 1, the ratio of equal amplitudes.
 pub const RATIO_MIN: Range = Range::Within(0.0, 1.0);
 
 /// The greatest number of steps of a trajectory by a method whose steps are bounded by stability.
@@ -59,8 +59,8 @@ pub struct Plan<M: Model> {
     pub aside: ReadingNotes,
 }
 
-/// The notes of reading a grid file. Results do not depend on them, so that plans which differ only
-/// in them are equal.
+/// The notes of reading a grid file. Results do not depend on them, and plans that differ only in
+/// them are equal.
 #[derive(Clone, Debug, Default)]
 pub struct ReadingNotes {
     /// The headers of columns in lists and measurements, with the names that they stand for.
@@ -75,26 +75,28 @@ impl PartialEq for ReadingNotes {
     }
 }
 
-/// The beginning of the source of an assumed number, which follows from others by a rule.
+/// The prefix of the source of an assumed number, whose value follows from other numbers by a rule.
 pub const ASSUMED: &str = "assumed: ";
 
 /// The source of each number, by its parameter's name: the file or option that wrote it last, or
 /// the rule of an assumed number, which begins with [`ASSUMED`]. Results do not depend on sources,
-/// so that plans which differ only in them are equal.
+/// and plans that differ only in them are equal.
 #[derive(Clone, Debug, Default)]
 pub struct WrittenIn(pub BTreeMap<String, String>);
 
 impl WrittenIn {
-    /// Returns the sources of the numbers of these names, in words; `None` where nothing wrote
-    /// them.
+    /// Returns the sources of the numbers of these names, in words; `None` if these numbers have no
+    /// source.
     pub fn source(&self, names: &[impl AsRef<str>]) -> Option<String> {
-        let mut places: Vec<&str> =
+        let mut sources: Vec<&str> =
             names.iter().filter_map(|name| Some(self.0.get(name.as_ref())?.as_str())).collect();
-        places.dedup();
-        let rules: Vec<&str> = places.extract_if(.., |place| place.starts_with(ASSUMED)).collect();
-        let given = (!places.is_empty()).then(|| format!("given: {}", places.join(", ")));
-        let all: Vec<&str> = given.as_deref().into_iter().chain(rules).collect();
-        (!all.is_empty()).then(|| all.join("; "))
+        sources.dedup();
+        let assumption_rules: Vec<&str> =
+            sources.extract_if(.., |place| place.starts_with(ASSUMED)).collect();
+        let given_sources = (!sources.is_empty()).then(|| format!("given: {}", sources.join(", ")));
+        let all_sources: Vec<&str> =
+            given_sources.as_deref().into_iter().chain(assumption_rules).collect();
+        (!all_sources.is_empty()).then(|| all_sources.join("; "))
     }
 
     /// Returns whether a number is assumed.
@@ -154,7 +156,7 @@ pub enum AxisValues {
         /// The number of values, at least 1.
         count: u64,
     },
-    /// In a design, values by a distribution between its bounds.
+    /// Values of a distribution between two bounds, in a design.
     Distributed(Distribution),
     /// Values evenly spaced in the logarithm, with both ends.
     Log {
@@ -183,7 +185,7 @@ impl AxisValues {
         self.len() == 0
     }
 
-    /// Returns value `i`, from 0, or the last value beyond it.
+    /// Returns the value at index `i`; an index beyond the last value returns the last value.
     ///
     /// Both ends are exact, and every value is the same on all machines: linear values have the
     /// bits of NumPy's `linspace`, and logarithmic ones use no platform's `pow`.
@@ -209,16 +211,16 @@ impl AxisValues {
         }
     }
 
-    /// Returns the value at a relative position `place` (0 to 1) between the first and the last
-    /// value, evenly or by the logarithm. A list returns one of its own values.
-    pub fn between(&self, place: f64) -> f64 {
+    /// Returns the value at a fraction (0 to 1) of the way from the first to the last value, on a
+    /// linear or logarithmic scale. A list returns one of its own values.
+    pub fn between(&self, fraction: f64) -> f64 {
         match *self {
             Self::List(ref values) => {
-                values[((place * values.len() as f64) as usize).min(values.len() - 1)]
+                values[((fraction * values.len() as f64) as usize).min(values.len() - 1)]
             }
-            Self::Linear { from, to, .. } => from + place * (to - from),
-            Self::Distributed(ref distribution) => distribution.quantile(place),
-            Self::Log { from, to, .. } => from * libm::exp10(place * libm::log10(to / from)),
+            Self::Linear { from, to, .. } => from + fraction * (to - from),
+            Self::Distributed(ref distribution) => distribution.quantile(fraction),
+            Self::Log { from, to, .. } => from * libm::exp10(fraction * libm::log10(to / from)),
         }
     }
 
@@ -236,12 +238,12 @@ impl AxisValues {
 }
 
 impl<M: Model> Plan<M> {
-    /// The number of axes of which [`Plan::corners`] takes both ends; further ones stay at their
-    /// least value. Basis: 2^8 corners. Each axis more doubles the corners.
+    /// The number of axes of which [`Plan::corners`] takes both ends; axes after these stay at
+    /// their least value. Basis: 2^8 corners. Each additional axis doubles the corners.
     const CORNER_AXES: usize = 8;
 
-    /// The greatest number of corners at which machines are prepared before a run. Basis: it
-    /// bounds the preparation of long lists. Doubling it doubles that time.
+    /// The greatest number of corners at which machines are prepared before a run. Basis: the
+    /// preparation of a long list takes a second. Doubling it doubles that time.
     const MAX_PREPARED: u64 = 256;
 
     /// Returns the number of points of the design or grid; 1 without axes.
@@ -255,17 +257,17 @@ impl<M: Model> Plan<M> {
     /// Returns the value of each axis at a point. The first axis of a grid varies slowest.
     pub fn axis_values(&self, point: u64) -> Vec<f64> {
         if let Some(design) = &self.design {
-            let value = |(k, axis): (usize, &Axis<M>)| match design.place(point, k) {
+            let value = |(k, axis): (usize, &Axis<M>)| match design.position(point, k) {
                 Some(place) => axis.values.between(place),
                 None => axis.values.value(point),
             };
             return self.axes.iter().enumerate().map(value).collect();
         }
         let mut values = vec![0.0; self.axes.len()];
-        let mut rest = point;
+        let mut remainder = point;
         for (value, axis) in values.iter_mut().zip(&self.axes).rev() {
-            *value = axis.values.value(rest % axis.values.len());
-            rest /= axis.values.len();
+            *value = axis.values.value(remainder % axis.values.len());
+            remainder /= axis.values.len();
         }
         values
     }
@@ -306,28 +308,28 @@ impl<M: Model> Plan<M> {
             return self.axis_values(corner);
         }
         let end = |(k, axis): (usize, &Axis<M>)| {
-            let greatest = k < Self::CORNER_AXES && corner >> k & 1 == 1;
-            axis.values.extremes()[usize::from(greatest)]
+            let takes_greatest = k < Self::CORNER_AXES && corner >> k & 1 == 1;
+            axis.values.extremes()[usize::from(takes_greatest)]
         };
         self.axes.iter().enumerate().map(end).collect()
     }
 
     /// Returns at most `MAX_PREPARED` corners, because a list may have many and a machine's modes
-    /// are expensive. Points of a longer list at which an axis has its least or greatest value come
-    /// first, and the others are spread evenly.
+    /// are expensive to compute. Of a longer list, the points at which an axis has its least or
+    /// greatest value come first, and the rest are spread evenly.
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
         let corners = self.corners();
         if corners <= Self::MAX_PREPARED {
             return (0..corners).map(|corner| self.corner(corner)).collect();
         }
-        let mut chosen = self.extreme_points();
-        let rest = Self::MAX_PREPARED.saturating_sub(chosen.len() as u64).max(1);
-        chosen.extend(
-            (0..rest)
-                .map(|k| u128::from(k) * u128::from(corners) / u128::from(rest))
+        let mut selected = self.extreme_points();
+        let remaining_count = Self::MAX_PREPARED.saturating_sub(selected.len() as u64).max(1);
+        selected.extend(
+            (0..remaining_count)
+                .map(|k| u128::from(k) * u128::from(corners) / u128::from(remaining_count))
                 .map(|corner| corner as u64),
         );
-        chosen.iter().map(|corner| self.corner(*corner)).collect()
+        selected.iter().map(|corner| self.corner(*corner)).collect()
     }
 
     /// Returns the points of a list at which an axis has its least or greatest value first.
@@ -380,7 +382,7 @@ mod tests {
         // The values of numpy.linspace(0.05, 1.0, 39), which computes i * step + start and replaces
         // the last value by the end.
         let masses = AxisValues::Linear { from: 0.05, to: 1.0, count: 39 };
-        let numpy = [
+        let expected = [
             (0, 0.05),
             (1, 0.075),
             (2, 0.1),
@@ -388,7 +390,7 @@ mod tests {
             (37, 0.975),
             (38, 1.0),
         ];
-        for (i, value) in numpy {
+        for (i, value) in expected {
             assert_eq!(masses.value(i), value, "{i}");
         }
         let dampings = AxisValues::Linear { from: 60.0, to: 300.0, count: 33 };
@@ -403,10 +405,10 @@ mod tests {
         let log = AxisValues::Log { from: 1e4, to: 1e9, count: 6 };
         let values: Vec<_> = (0..6).map(|i| log.value(i)).collect();
         assert_eq!(values, [1e4, 1e5, 1e6, 1e7, 1e8, 1e9]);
-        let odd = AxisValues::Log { from: 0.3, to: 7.7, count: 5 };
-        assert_eq!([odd.value(0), odd.value(4)], [0.3, 7.7]);
-        let ratio = odd.value(2) / odd.value(1);
-        assert!((odd.value(3) / odd.value(2) / ratio - 1.0).abs() < 1e-14);
+        let uneven = AxisValues::Log { from: 0.3, to: 7.7, count: 5 };
+        assert_eq!([uneven.value(0), uneven.value(4)], [0.3, 7.7]);
+        let ratio = uneven.value(2) / uneven.value(1);
+        assert!((uneven.value(3) / uneven.value(2) / ratio - 1.0).abs() < 1e-14);
     }
 
     #[test]

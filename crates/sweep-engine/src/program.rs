@@ -1,8 +1,8 @@
-//! The name of the program, for commands that messages advise.
+//! The name of the program, for the command lines in messages.
 
 use std::sync::OnceLock;
 
-/// The name, if [`call_program`] has set it.
+/// The name, if [`set_program`] has set it.
 static PROGRAM: OnceLock<&str> = OnceLock::new();
 
 /// Returns the program's name.
@@ -11,6 +11,6 @@ pub fn program() -> &'static str {
 }
 
 /// Sets the program's name, which is `sweep` by default; only the first call has an effect.
-pub fn call_program(name: &'static str) {
+pub fn set_program(name: &'static str) {
     let _ = PROGRAM.set(name);
 }

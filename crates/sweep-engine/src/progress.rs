@@ -1,4 +1,4 @@
-//! The display of progress: a bar on a terminal, a line from time to time elsewhere, or nothing.
+//! The display of progress: a bar on a terminal, a line at intervals elsewhere, or nothing.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
@@ -16,7 +16,7 @@ pub enum ProgressMode {
     Auto,
     /// A line every five seconds.
     Plain,
-    /// Nothing.
+    /// No display.
     None,
 }
 
@@ -26,7 +26,8 @@ pub struct Progress {
     total: u64,
     /// The plural noun for the units of the total.
     noun: &'static str,
-    /// The number of points that were stored at the start. They count as done, but not in the rate.
+    /// The number of points that were stored at the start. These points count as done, but not in
+    /// the rate.
     start: u64,
     began: Instant,
 }
@@ -46,9 +47,9 @@ impl Progress {
         progress
     }
 
-    /// Creates the display of a search, whose number of points is not known beforehand. It counts
-    /// units up to a total, or only points where the total is 0. `noun` is the plural noun for the
-    /// units, `start` the number of points that were stored at the start.
+    /// Creates the display of a search, whose number of points is not known in advance. It counts
+    /// units up to a total; if the total is 0, it counts points only. `noun` is the plural noun for
+    /// the units, `start` the number of points that were stored at the start.
     pub fn for_search(mode: ProgressMode, total: u64, noun: &'static str, start: u64) -> Self {
         let lines = |seconds| {
             let every = Duration::from_secs(seconds);
@@ -61,7 +62,11 @@ impl Progress {
                 let target = ProgressDrawTarget::stderr_with_hz(8);
                 let bar = ProgressBar::with_draw_target(Some(total), target);
                 bar.enable_steady_tick(Duration::from_millis(125));
-                Display::Bar(bar.with_style(style(if total == 0 { SPINNER } else { BAR })))
+                Display::Bar(bar.with_style(style(if total == 0 {
+                    SPINNER_TEMPLATE
+                } else {
+                    BAR_TEMPLATE
+                })))
             }
             ProgressMode::Auto => lines(60),
         };
@@ -97,7 +102,7 @@ impl Progress {
                 bar.set_message(text());
             }
             Display::Lines { every, next } if Instant::now() >= *next => {
-                // A log that cannot be written to must not end the run.
+                // A log that cannot be written must not end the run.
                 let _ = writeln!(std::io::stderr(), "{}", text());
                 *next = Instant::now() + *every;
             }
@@ -110,7 +115,7 @@ impl Progress {
         done.saturating_sub(self.start) as f64 / self.began.elapsed().as_secs_f64().max(1e-9)
     }
 
-    /// Shows that the chunks are being joined.
+    /// Shows in the bar that the chunks are being joined.
     pub fn joining(&self) {
         if let Display::Bar(bar) = &*lock(&self.display) {
             bar.set_style(style("{spinner} joining {human_len} points"));
@@ -133,16 +138,16 @@ impl Progress {
         if rate == 0.0 {
             return position;
         }
-        let left = duration(self.total.saturating_sub(done) as f64 / rate);
-        format!("{position}, {}, {left} left", per_second(rate))
+        let remaining_time = duration(self.total.saturating_sub(done) as f64 / rate);
+        format!("{position}, {}, {remaining_time} left", per_second(rate))
     }
 }
 
 /// The template of a bar with its numbers.
-const BAR: &str = "{wide_bar} {msg}";
+const BAR_TEMPLATE: &str = "{wide_bar} {msg}";
 
 /// The template of a search without a total.
-const SPINNER: &str = "{spinner} {msg}";
+const SPINNER_TEMPLATE: &str = "{spinner} {msg}";
 
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
@@ -153,13 +158,13 @@ pub fn duration(seconds: f64) -> String {
     if seconds < 10.0 {
         return format!("{seconds:.2} s");
     }
-    // Saturates beyond 1e19 s.
-    let whole = seconds.round() as u64;
-    match whole {
-        0..60 => format!("{whole} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        3600..172_800 => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
-        _ => format!("{} days", whole / 86_400),
+    // The cast saturates above 1e19 s.
+    let whole_seconds = seconds.round() as u64;
+    match whole_seconds {
+        0..60 => format!("{whole_seconds} s"),
+        60..3600 => format!("{} min {:02} s", whole_seconds / 60, whole_seconds % 60),
+        3600..172_800 => format!("{} h {:02} min", whole_seconds / 3600, whole_seconds % 3600 / 60),
+        _ => format!("{} days", whole_seconds / 86_400),
     }
 }
 

@@ -1,14 +1,10 @@
 //! The runner of a job:
 //!
-//! 1. Open or create the run's folder, and find the missing chunks.
-//! 2. Have the engine evaluate their rows on all cores.
-//! 3. Write each chunk as a part when it is complete. After a signal or an error, write the rows of
-//!    incomplete chunks too.
-//! 4. Join the parts to the result.
+//! 2. Have the engine evaluate the rows of these chunks on all cores.
 //!
-//! Memory: at most a chunk for each thread (4096 points, about 2 MB) and as many that wait for the
-//! disk, then about 40 MB for the join. Only the set of missing chunks grows with the number of
-//! points.
+//! Memory: at most one chunk for each thread (4096 points, about 2 MB) and as many chunks that wait
+//! for the disk, then about 40 MB for the join. Only the set of missing chunks grows with the
+//! number of points.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -38,9 +34,9 @@ const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
 pub struct RunOptions<'a> {
     /// The number of worker threads (`threads::count`).
     pub threads: usize,
-    /// Whether to discard what an earlier run has computed.
+    /// Whether to discard the rows of an earlier run.
     pub fresh: bool,
-    /// The shard to compute, if not everything.
+    /// The shard to compute; `None` for the whole run.
     pub shard: Option<ShardRequest>,
     /// The form in which progress is shown.
     pub progress: ProgressMode,
@@ -50,7 +46,7 @@ pub struct RunOptions<'a> {
     pub tell: &'a dyn Fn(&str),
 }
 
-/// The end of a run, other than an error.
+/// The outcome of a run without an error.
 #[derive(Debug)]
 pub enum RunEnd {
     /// The result existed already.
@@ -76,7 +72,7 @@ pub enum RunEnd {
 pub struct RunReport {
     /// The end of the run.
     pub end: RunEnd,
-    /// The work of this process, if there was any to do.
+    /// The work of this process; `None` if the result existed already.
     pub session: Option<Session>,
     /// The notes for the user.
     pub notes: Vec<String>,
@@ -112,13 +108,13 @@ pub fn run(
     if stored > 0 {
         (options.tell)(&format!("going on: {stored} of {points} points are there"));
     }
-    let began = Instant::now();
+    let start_time = Instant::now();
     let started_unix_s = provenance::now_unix_s();
     let progress = Progress::new(options.progress, points, stored);
     let work = Runner { engine, job, threads, progress: &progress, interrupt };
     let result = work.compute_and_join(&mut run);
     progress.finish();
-    let wall_s = began.elapsed().as_secs_f64();
+    let wall_s = start_time.elapsed().as_secs_f64();
     let computed = run.own_points().1.saturating_sub(stored);
     let session = Session {
         started_unix_s,
@@ -142,7 +138,8 @@ pub fn run(
         }
         Ok(None) => {
             let mut notes = run.take_notes();
-            // A failure concerns the sidecar's list of sessions only, not the rows.
+            // A failure to record the session affects only the sidecar's list of sessions, not the
+            // rows.
             notes.extend(run.record_session(&session).err().map(|error| error.to_string()));
             let (points, kept) = run.own_points();
             let end = match (interrupt.signal(), run.shard()) {
@@ -154,14 +151,14 @@ pub fn run(
             Ok(RunReport { end, session: Some(session), notes })
         }
         Err(error) => {
-            // The first error is the one to report, not one of recording the session.
+            // The error of the run is reported, not an error of recording the session.
             let _ = run.record_session(&session);
             Err(error)
         }
     }
 }
 
-/// The parts of a run that do not change while it runs.
+/// The values that stay the same during a run.
 struct Runner<'a> {
     engine: &'a Engine<'a>,
     job: &'a Job<'a>,
@@ -174,7 +171,7 @@ impl Runner<'_> {
     /// Computes the missing chunks and joins all; `None` for a shard, or after a signal.
     fn compute_and_join(&self, run: &mut OpenRun) -> Result<Option<Tally>, StoreError> {
         let stopped = || self.interrupt.stopped();
-        let mut attempts_left = 2;
+        let mut remaining_attempts = 2;
         loop {
             self.compute(run)?;
             if stopped() || run.shard().is_some() {
@@ -182,9 +179,11 @@ impl Runner<'_> {
             }
             self.progress.joining();
             match run.join(self.job, &stopped) {
-                // A chunk became unreadable after it was counted. It is computed again, twice at
-                // most.
-                Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
+                // A chunk became unreadable after it was counted. It is computed again, at most
+                // twice.
+                Err(StoreError::Incomplete { .. }) if remaining_attempts > 0 => {
+                    remaining_attempts -= 1
+                }
                 result => return result,
             }
         }
@@ -193,16 +192,16 @@ impl Runner<'_> {
     /// Computes and writes the missing chunks of this process's shard, until a signal or an error.
     fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
         let pool = threads::pool(self.threads)?;
-        let known = |point| run.stored_rows(point);
-        let context = RunContext::with_known_rows(self.interrupt, &known);
+        let stored_rows = |point| run.stored_rows(point);
+        let context = RunContext::with_known_rows(self.interrupt, &stored_rows);
         let (_, start) = run.own_points();
         // A bounded channel makes the engine wait for a slower disk instead of filling memory.
         let (sender, receiver) = sync_channel(self.threads);
         let collector = ChunkCollector::new(self, run, &context, sender);
         let collected = Mutex::new(Ok(()));
-        let written = pool.in_place_scope(|scope| {
+        let write_result = pool.in_place_scope(|scope| {
             scope.spawn(|_| *lock(&collected) = collector.run());
-            let mut written = Ok(());
+            let mut write_result = Ok(());
             loop {
                 match receiver.recv_timeout(PROGRESS_INTERVAL) {
                     Ok((chunk, rows)) => {
@@ -212,16 +211,16 @@ impl Runner<'_> {
                             if !matches!(error, StoreError::Engine { .. }) {
                                 context.abort();
                             }
-                            written = written.and(Err(error));
+                            write_result = write_result.and(Err(error));
                         }
                     }
                     Err(RecvTimeoutError::Timeout) => {}
-                    Err(RecvTimeoutError::Disconnected) => return written,
+                    Err(RecvTimeoutError::Disconnected) => return write_result,
                 }
                 self.progress.show(start + context.points_done());
             }
         });
-        written.and(unlocked(collected))
+        write_result.and(unlocked(collected))
     }
 }
 
@@ -270,9 +269,9 @@ impl<'a> ChunkCollector<'a> {
         let mut result = self.evaluate();
         let incomplete = std::mem::take(&mut *lock(&self.incomplete.0));
         for (chunk, rows) in incomplete {
-            // An error in one chunk does not keep the others from being written.
-            let written = self.run.write_chunk(self.runner.job, chunk, rows);
-            result = result.and(written);
+            // After an error in one chunk, the others are written all the same.
+            let write_result = self.run.write_chunk(self.runner.job, chunk, rows);
+            result = result.and(write_result);
         }
         result
     }
@@ -313,10 +312,12 @@ impl<'a> ChunkCollector<'a> {
     }
 }
 
-/// Returns a step through chunks that visits all of them, with consecutive ones far apart.
+/// Returns a stride with which a loop over the chunks visits each chunk once, and consecutive
+/// chunks are far apart.
 ///
-/// Expensive rows lie side by side in a grid. With this order some of them start early, beside
-/// cheap ones that keep the other threads busy, and the rows done are a sample of those left.
+/// Expensive rows are neighbours in a grid. In this order some of them start early, together with
+/// cheap rows that keep the other threads busy, and the finished rows are a sample of the remaining
+/// ones.
 fn stride(chunks: u64) -> u64 {
     // Multiples of the golden ratio spread most evenly (Knuth, TAOCP 3, section 6.4).
     const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;

@@ -66,13 +66,13 @@ pub type PointValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
 /// The facts about a plan that the store needs.
 pub struct Job<'a> {
     /// The grid with all options applied, the full machine, and the method. Two runs are the same
-    /// if this, `version` and `numerics` are the same.
+    /// if their `plan`, `version` and `numerics` are the same.
     pub plan: Value,
     /// The version of the program. Other versions may round differently, so chunks of two versions
     /// are never mixed.
     pub version: &'a str,
-    /// The version of the numerics. It tells builds of one program version apart whose numbers may
-    /// differ.
+    /// The version of the numerics. It distinguishes builds of the same program version whose
+    /// numbers may differ.
     pub numerics: u32,
     /// The number of points.
     pub points: u64,
@@ -113,18 +113,19 @@ pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<DeclaredColumn> {
     plan.axes.iter().map(column).collect()
 }
 
-/// Returns the number of points of each chunk but the last, which may have fewer. It depends on the
-/// number of all points alone.
+/// Returns the number of points of each chunk except the last, which may have fewer. It depends
+/// only on the number of all points.
 ///
-/// It is a power of two, so that chunks fill whole groups of SIMD lanes: 8 for the smallest grids,
-/// so that every core gets some; for larger grids 32 to 4096, which makes about a thousand chunks;
-/// for the largest 4096, which makes chunks of a megabyte.
+/// It is a power of two, so that chunks fill all SIMD lanes: 8 for the smallest grids, so that
+/// every core gets chunks; 32 to 4096 for larger grids, which makes about a thousand chunks; and
+/// 4096 for the largest grids, whose chunks take a megabyte.
 pub fn chunk_points(points: u64) -> u64 {
-    /// The number of points up to which a grid is small. Basis: chunks of 32 points would leave
-    /// cores without work below it. Doubling it gives grids twice as large the small chunks.
+    /// The number of points up to which a grid is small. Basis: with chunks of 32 points, smaller
+    /// grids would leave cores without work. Doubling it gives grids of twice that size the small
+    /// chunks.
     const SMALL_GRID: u64 = 128;
-    /// The desired number of chunks. Basis: an interruption loses little, and each file is worth
-    /// its overhead. Doubling it halves the chunks.
+    /// The desired number of chunks. Basis: an interruption loses a thousandth of the rows, and the
+    /// overhead of a file is small against its rows. Doubling it halves the chunks.
     const DESIRED_CHUNKS: u64 = 1024;
     if points <= SMALL_GRID {
         return 8;
@@ -192,7 +193,8 @@ impl Folder {
     }
 }
 
-/// Returns the name of the part with this index: that of a chunk, or the number of a search's part.
+/// Returns the name of the part with this index, which is the index of a chunk, or the number of a
+/// search's part.
 fn part_name(index: u64) -> String {
     format!("part-{index:08}.parquet")
 }

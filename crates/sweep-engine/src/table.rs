@@ -1,5 +1,5 @@
-//! A writer of small result files: columns with units and descriptions, and the metadata of a map's
-//! file (`store::schema`), in one row group.
+//! A writer of small result files. A file has columns with units and descriptions, the metadata of
+//! a map's file (`store::schema`), and one row group.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -67,7 +67,7 @@ impl Table {
         self.add(name, "1", description, CellType::Count, Arc::new(array));
     }
 
-    /// Adds a column of words, of which a file has few different ones.
+    /// Adds a column of words, few of which are distinct.
     pub fn words<'a>(
         &mut self,
         name: &str,

@@ -11,7 +11,7 @@ pub fn process(name: &str) -> Option<String> {
 }
 
 /// The greatest number of threads that is accepted. Basis: more than any machine has cores.
-/// Doubling it accepts as many more.
+/// Doubling it accepts twice as many threads.
 const MAX_THREADS: usize = 4096;
 
 /// The environment variable in which Slurm gives the number of a task's cores.

@@ -68,7 +68,7 @@ pub fn check(
         if result.is_complete || allow_null { result.value.clone() } else { Cell::Null }
     };
     let aggregates: Vec<Cell> = results.iter().map(value_or_null).collect();
-    let mut checked = ConditionCheck {
+    let mut condition_check = ConditionCheck {
         expression: condition.text.clone(),
         by_row: condition.by_row,
         aggregate_rows: results.iter().map(|result| result.rows).collect(),
@@ -83,7 +83,7 @@ pub fn check(
     let key_columns = table.places();
     let names = [&condition.column_names()[..], &key_columns].concat();
     for_each_row(table, &names, filter, |context| {
-        checked.rows += 1;
+        condition_check.rows += 1;
         let context = EvaluationContext { aggregates: &aggregates, ..*context };
         let truth = condition.root.truth(&context);
         if !condition.by_row {
@@ -92,8 +92,8 @@ pub fn check(
         }
         match truth {
             Some(true) => return Ok(()),
-            Some(false) => checked.failing += 1,
-            None => checked.undefined += 1,
+            Some(false) => condition_check.failing += 1,
+            None => condition_check.undefined += 1,
         }
         if allow_null && truth.is_none() {
             return Ok(());
@@ -111,14 +111,14 @@ pub fn check(
         });
         Ok(())
     })?;
-    checked.offenders = offenders.finish();
-    checked.holds = checked.rows > 0
+    condition_check.offenders = offenders.finish();
+    condition_check.holds = condition_check.rows > 0
         && if condition.by_row {
-            checked.failing == 0 && (allow_null || checked.undefined == 0)
+            condition_check.failing == 0 && (allow_null || condition_check.undefined == 0)
         } else {
             truth_of_file.unwrap_or(false)
         };
-    Ok(checked)
+    Ok(condition_check)
 }
 
 #[cfg(test)]

@@ -428,7 +428,7 @@ fn bootstrap(
             let residual = &one.residual;
             let mut resampled = Vec::with_capacity(residual.len() + BLOCK);
             while resampled.len() < residual.len() {
-                let place = draw.place(drawn, 0).unwrap_or(0.5);
+                let place = draw.position(drawn, 0).unwrap_or(0.5);
                 drawn += 1;
                 let first = (place * residual.len() as f64) as usize;
                 resampled.extend((first..first + BLOCK).map(|i| residual[i % residual.len()]));
@@ -506,7 +506,7 @@ impl MinimumSearch<'_> {
                 let is_bounded = range.iter().all(|end| end.is_finite());
                 let [from, to] =
                     if is_bounded { *range } else { [around[0].max(range[0]), around[1]] };
-                from + design.place(point, k).unwrap_or(0.5) * (to - from)
+                from + design.position(point, k).unwrap_or(0.5) * (to - from)
             };
             let sets: Vec<Vec<f64>> = (0..starts - 1)
                 .map(|point| {
@@ -556,7 +556,7 @@ fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
     let design = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed: SEED };
     let shape = DistributionShape::Normal { mean: 0.0, sd: 1.0 };
     let normal = Distribution { shape, from: -6.0, to: 6.0 };
-    move |point, k| normal.quantile(design.place(point, k).unwrap_or(0.5))
+    move |point, k| normal.quantile(design.position(point, k).unwrap_or(0.5))
 }
 
 /// Draws free numbers from the fitted distribution, evenly spread, each within its range.

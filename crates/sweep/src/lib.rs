@@ -80,7 +80,7 @@ pub use sweep_engine::store::{
     Job, OpenOptions, OpenOutcome, OpenRun, RunStage, Shard, ShardRequest, StoreError, status,
 };
 pub use sweep_engine::{
-    Error, Exit, Interrupt, expect_random_numbers, survive_file_size_limits, tell,
+    Error, Exit, Interrupt, check_random_numbers, survive_file_size_limits, tell,
 };
 pub use trace::TraceExtras;
 pub use washer_model::StartRule;

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use lane_ode::Simd;
-use sweep::{Error, Exit, WasherCli, expect_random_numbers, survive_file_size_limits};
+use sweep::{Error, Exit, WasherCli, check_random_numbers, survive_file_size_limits};
 
 fn main() -> ExitCode {
     let exit = run().unwrap_or_else(|error| {
@@ -17,6 +17,6 @@ fn run() -> Result<Exit, Error> {
     let cli = WasherCli::read();
     Simd::check().map_err(Error::model)?;
     survive_file_size_limits().map_err(Error::signals)?;
-    expect_random_numbers()?;
+    check_random_numbers()?;
     cli.command.run()
 }

@@ -122,7 +122,7 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
                 .then(|| a + (b - a) * distance_a / (distance_a - distance_b))
         });
         assert!(
-            (contour_damping.unwrap() - edge.at.unwrap()).abs() < 1.0,
+            (contour_damping.unwrap() - edge.position.unwrap()).abs() < 1.0,
             "{contour_damping:?} {edge:?}"
         );
     }
@@ -130,7 +130,7 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
 
 /// Returns the distance of an outcome's greatest ratio from the limit.
 fn distance(outcome: &Outcome, plan: &Plan) -> f64 {
-    let (quantity, _) = quantity::traced(plan, "ratio_max", None).unwrap();
+    let (quantity, _) = quantity::find_quantity(plan, "ratio_max", None).unwrap();
     let verdict = Verdict::new(outcome, plan.reliability.channels.len(), quantity.limit);
     quantity.distance(verdict.greatest.unwrap().1)
 }
@@ -170,7 +170,7 @@ fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
             "{criterion:?}: {edges:?}"
         );
         // The dampings are 0.5 N s/m apart about the last crossing.
-        let from = edges[0].at.unwrap().round() - 4.0;
+        let from = edges[0].position.unwrap().round() - 4.0;
         let count = 29;
         let fine = plan(&format!("{criterion_head}{}", axes(&masses, from, from + 14.0, count)));
         let dampings: Vec<f64> = (0..count).map(|k| from + 0.5 * f64::from(k)).collect();
@@ -183,7 +183,7 @@ fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
                 inside.then(|| y0 + (y1 - y0) * (row.first - x0) / (x1 - x0))
             });
             let contour_damping = contour_point.unwrap();
-            let crossing = edge.at.unwrap();
+            let crossing = edge.position.unwrap();
             assert!(
                 (contour_damping - crossing).abs() < 0.25,
                 "{criterion:?} at {} kg: {contour_damping} and {crossing}",
@@ -395,7 +395,7 @@ fn every_column_that_is_worse_in_one_direction_has_a_boundary() {
         assert!(!names.contains(&name), "{name}");
     }
     for name in names {
-        let (quantity, plan) = quantity::traced(&plan, name, Some(0.75)).unwrap();
+        let (quantity, plan) = quantity::find_quantity(&plan, name, Some(0.75)).unwrap();
         assert_eq!((quantity.name.as_str(), quantity.value(0.0)), (name, 0.75));
         for value in [0.5, 1.5, 3.0] {
             let distance = quantity.distance(value);
@@ -404,10 +404,11 @@ fn every_column_that_is_worse_in_one_direction_has_a_boundary() {
         }
         assert!(Washer::layout(&plan).position(name).is_some(), "{name}");
     }
-    let (_, single_channel_plan) = quantity::traced(&plan, "ratio_tub_yaw", None).unwrap();
+    let (_, single_channel_plan) = quantity::find_quantity(&plan, "ratio_tub_yaw", None).unwrap();
     assert_eq!(single_channel_plan.reliability.channels.len(), 1);
     assert_eq!(single_channel_plan.reliability.channels[0].name, "tub_yaw");
-    let refused = |name, limit| quantity::traced(&plan, name, limit).unwrap_err().to_string();
+    let refused =
+        |name, limit| quantity::find_quantity(&plan, name, limit).unwrap_err().to_string();
     assert!(refused("growth_per_s", None).contains("[stability]"));
     assert!(refused("cabinet_force", None).contains("did you mean `cabinet_force_nonlinear_n`?"));
     assert!(refused("cabinet_force_linear_n", None).contains("no limit of its own"));
@@ -425,7 +426,7 @@ fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
     let crossings = |task: &Task| {
         let rows = trace_boundary(task, 2, &Interrupt::new()).unwrap().curves.remove(0);
         let edges = rows.into_iter().flat_map(|row| row.edges);
-        let dampings: Vec<f64> = edges.filter_map(|edge| edge.at).collect();
+        let dampings: Vec<f64> = edges.filter_map(|edge| edge.position).collect();
         assert!(!dampings.is_empty());
         dampings
     };

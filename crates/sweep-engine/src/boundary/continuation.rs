@@ -1,6 +1,6 @@
 //! Continuation of crossings from line to line, and the intervals on which neighbours disagree.
 //!
-//! A line between others starts from brackets around the crossings that theirs predict, as in
+//! A line between traced lines starts from brackets around the crossings that these predict, as in
 //! predictor-corrector continuation (E. L. Allgower and K. Georg, "Numerical Continuation Methods",
 //! Springer, 1990). The predictor is the polynomial through the crossings of up to four lines by
 //! Neville's algorithm, whose last correction estimates the error (W. H. Press and others,
@@ -9,17 +9,18 @@
 use super::itp::ROOT_MARGIN;
 use super::sample::{LimitSide, SideInterval, Span, side_at};
 
-/// The part of a lattice cell by which a crossing may miss its prediction before the interval
-/// between is disputed, and the widest gap in a disputed interval, as a part of that or of a cell.
-/// Basis: two bisections. Doubling it takes 5 % fewer trials in the test `random_level_sets`, which
-/// then misses 1.8 times as many stretches that a neighbour shows.
-pub(super) const DISPUTED_PART: f64 = 0.25;
+/// A fraction with two uses. A crossing may miss its prediction by this fraction of a lattice cell
+/// before the interval between the two is disputed; and samples subdivide a disputed interval into
+/// gaps of at most this fraction of the interval or of a cell. Basis: two bisections. Doubling it
+/// takes 5 % fewer trials in the test `random_level_sets`, which then misses 1.8 times as many
+/// stretches that a neighbour shows.
+pub(super) const DISPUTED_FRACTION: f64 = 0.25;
 
-/// A traced line, seen from another.
+/// A traced line to which another line is compared.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Neighbour<'a> {
     /// The position on the first axis.
-    pub at: f64,
+    pub position: f64,
     pub intervals: &'a [SideInterval],
 }
 
@@ -34,15 +35,15 @@ impl Neighbour<'_> {
 /// A position and the side that is predicted there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PredictedSide {
-    pub at: f64,
+    pub position: f64,
     pub side: LimitSide,
 }
 
-/// Predicts the sides of a line at `at` around its crossings, from the lines to its left and to its
-/// right, the nearest first. Returns `None` if the nearest two disagree, or a position is farther
-/// than a lattice cell from their crossing.
+/// Predicts the sides of a line at a position around its crossings, from the lines to its left and
+/// to its right, the nearest first. Returns `None` if the nearest two disagree, or if a predicted
+/// position is farther than a lattice cell from their crossing.
 pub(super) fn predict(
-    at: f64,
+    position: f64,
     parents: &[Vec<Neighbour<'_>>; 2],
     cell: f64,
     span: &Span,
@@ -54,115 +55,127 @@ pub(super) fn predict(
     }
     if let [whole] = left.intervals {
         return Some(
-            [span.least, span.greatest].map(|at| PredictedSide { at, side: whole.side }).into(),
+            [span.least, span.greatest]
+                .map(|position| PredictedSide { position, side: whole.side })
+                .into(),
         );
     }
     let mut lines: Vec<&Neighbour<'_>> =
         parents.iter().flatten().filter(|line| line.agrees_with(left)).collect();
-    lines.sort_by(|a, b| (a.at - at).abs().total_cmp(&(b.at - at).abs()));
-    let mut predicted = Vec::new();
+    lines.sort_by(|a, b| (a.position - position).abs().total_cmp(&(b.position - position).abs()));
+    let mut predicted_sides = Vec::new();
     for k in 1..left.intervals.len() {
         let points: Vec<[f64; 2]> =
-            lines.iter().map(|line| [line.at, line.intervals[k].from]).collect();
-        let (root, correction) = extrapolate(&points, at);
+            lines.iter().map(|line| [line.position, line.intervals[k].from]).collect();
+        let (root, correction) = extrapolate(&points, position);
         let half_width = correction.abs().max(ROOT_MARGIN * span.tolerance);
-        for (at, side) in [
+        for (position, side) in [
             (root - half_width, left.intervals[k - 1].side),
             (root + half_width, left.intervals[k].side),
         ] {
-            if [left, right].iter().any(|line| (at - line.intervals[k].from).abs() > cell) {
+            if [left, right].iter().any(|line| (position - line.intervals[k].from).abs() > cell) {
                 return None;
             }
-            predicted.push(PredictedSide { at: at.clamp(span.least, span.greatest), side });
+            predicted_sides
+                .push(PredictedSide { position: position.clamp(span.least, span.greatest), side });
         }
     }
-    Some(predicted)
+    Some(predicted_sides)
 }
 
-/// Returns the value at `at` of the polynomial through these points, at distinct positions, and its
+/// Returns the value at a position of the polynomial through points at distinct positions, and its
 /// last correction, by Neville's algorithm.
-fn extrapolate(points: &[[f64; 2]], at: f64) -> (f64, f64) {
+fn extrapolate(points: &[[f64; 2]], position: f64) -> (f64, f64) {
     let mut values: Vec<f64> = points.iter().map(|point| point[1]).collect();
     let mut correction = 0.0;
     // After round `m`, `values[i]` is that of the polynomial through points `i` to `i + m`.
     for m in 1..points.len() {
-        let before = values[0];
+        let previous = values[0];
         for i in 0..points.len() - m {
             let from = points[i][0];
             let to = points[i + m][0];
-            values[i] = ((at - to) * values[i] + (from - at) * values[i + 1]) / (from - to);
+            values[i] =
+                ((position - to) * values[i] + (from - position) * values[i + 1]) / (from - to);
         }
-        correction = values[0] - before;
+        correction = values[0] - previous;
     }
     (values[0], correction)
 }
 
-/// A line, the neighbour that it is compared with, and the line beyond that.
+/// A line, the neighbour with which it is compared, and the line beyond the neighbour.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LinePair<'a> {
     pub own: Neighbour<'a>,
     pub neighbour: Neighbour<'a>,
-    pub beyond: Option<Neighbour<'a>>,
+    pub second_neighbour: Option<Neighbour<'a>>,
 }
 
 impl LinePair<'_> {
     /// Returns the intervals on which the line is not on the side that its neighbour predicts.
     pub(super) fn disputed(&self, cell: f64, span: &Span) -> Vec<[f64; 2]> {
         let own = self.own.intervals;
-        let predicted = self.predicted(span);
-        // Between a crossing and its prediction the sides differ, as far as predictions are off.
-        let mut misses = shared_crossings(own, &predicted);
-        misses.retain(|[is, predicted]| (is - predicted).abs() <= DISPUTED_PART * cell);
-        let mut marks: Vec<f64> = own
+        let predicted = self.move_neighbour(span);
+        // A crossing and its prediction are a pair between which the sides differ, by as much as
+        // the prediction is wrong.
+        let mut prediction_errors = shared_crossings(own, &predicted);
+        prediction_errors
+            .retain(|[is, predicted]| (is - predicted).abs() <= DISPUTED_FRACTION * cell);
+        let mut interval_ends: Vec<f64> = own
             .iter()
             .chain(&predicted)
             .flat_map(|interval| [interval.from, interval.to])
             .collect();
-        marks.sort_by(f64::total_cmp);
-        marks.dedup();
+        interval_ends.sort_by(f64::total_cmp);
+        interval_ends.dedup();
         let mut disputed = Vec::new();
-        for pair in marks.windows(2) {
+        for pair in interval_ends.windows(2) {
             let from = pair[0];
             let to = pair[1];
             let middle = 0.5 * (from + to);
-            let is_miss = misses.iter().any(|[a, b]| a.min(*b) <= from && to <= a.max(*b));
-            if !is_miss && side_at(own, middle) != side_at(&predicted, middle) {
+            let is_prediction_error =
+                prediction_errors.iter().any(|[a, b]| a.min(*b) <= from && to <= a.max(*b));
+            if !is_prediction_error && side_at(own, middle) != side_at(&predicted, middle) {
                 disputed.push([from, to]);
             }
         }
         disputed
     }
 
-    /// Returns the neighbour's intervals at the positions where this line should have them: on the
-    /// straight line from those beyond, or else moved as far as the nearest crossing that both
-    /// have.
-    fn predicted(&self, span: &Span) -> Vec<SideInterval> {
-        let beyond = self.beyond.filter(|beyond| beyond.agrees_with(&self.neighbour));
+    /// Returns the neighbour's intervals, moved to the positions that they should have on this
+    /// line: on the straight line through both neighbours' crossings, or else as far as the nearest
+    /// crossing that this line and the neighbour share.
+    fn move_neighbour(&self, span: &Span) -> Vec<SideInterval> {
+        let second_neighbour = self
+            .second_neighbour
+            .filter(|second_neighbour| second_neighbour.agrees_with(&self.neighbour));
         let shared = shared_crossings(self.own.intervals, self.neighbour.intervals);
-        let move_of = |k: usize, at: f64| match beyond {
-            Some(beyond) => {
-                let slope = (at - beyond.intervals[k].from) / (self.neighbour.at - beyond.at);
-                slope * (self.own.at - self.neighbour.at)
+        let displacement = |k: usize, position: f64| match second_neighbour {
+            Some(second_neighbour) => {
+                let slope = (position - second_neighbour.intervals[k].from)
+                    / (self.neighbour.position - second_neighbour.position);
+                slope * (self.own.position - self.neighbour.position)
             }
             None => {
-                let gap = |pair: &&[f64; 2]| (pair[1] - at).abs();
-                let nearest = shared.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)));
-                nearest.map_or(0.0, |[own, neighbours]| own - neighbours)
+                let gap = |pair: &&[f64; 2]| (pair[1] - position).abs();
+                let nearest_crossing = shared.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)));
+                nearest_crossing.map_or(0.0, |[own, neighbours]| own - neighbours)
             }
         };
-        let mut predicted = Vec::new();
+        let mut moved_intervals = Vec::new();
         let mut from = span.least;
         for (k, interval) in self.neighbour.intervals.iter().enumerate() {
             let to = match self.neighbour.intervals.get(k + 1) {
-                Some(next) => (next.from + move_of(k + 1, next.from)).clamp(from, span.greatest),
+                Some(next) => {
+                    (next.from + displacement(k + 1, next.from)).clamp(from, span.greatest)
+                }
                 None => span.greatest,
             };
             if from < to {
-                predicted.push(SideInterval { from, to, side: interval.side });
+                moved_intervals.push(SideInterval { from, to, side: interval.side });
             }
             from = to;
         }
-        predicted
+        moved_intervals
     }
 }
 
@@ -171,35 +184,41 @@ impl LinePair<'_> {
 fn shared_crossings(a: &[SideInterval], b: &[SideInterval]) -> Vec<[f64; 2]> {
     let crossings_of_a = crossings(a);
     let crossings_of_b = crossings(b);
-    let mut shared = Vec::new();
+    let mut shared_pairs = Vec::new();
     for crossing in &crossings_of_a {
-        if let Some(partner) = nearest(crossing, &crossings_of_b)
-            && nearest(&partner, &crossings_of_a) == Some(*crossing)
+        if let Some(partner) = nearest_crossing(crossing, &crossings_of_b)
+            && nearest_crossing(&partner, &crossings_of_a) == Some(*crossing)
         {
-            shared.push([crossing.at, partner.at]);
+            shared_pairs.push([crossing.position, partner.position]);
         }
     }
-    shared
+    shared_pairs
 }
 
 /// A change of side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct SideChange {
-    at: f64,
+    position: f64,
     sides: [LimitSide; 2],
 }
 
 fn crossings(intervals: &[SideInterval]) -> Vec<SideChange> {
     let change = |pair: &[SideInterval]| SideChange {
-        at: pair[1].from,
+        position: pair[1].from,
         sides: [pair[0].side, pair[1].side],
     };
     intervals.windows(2).map(change).filter(|change| change.sides[0] != change.sides[1]).collect()
 }
 
-fn nearest(to: &SideChange, among: &[SideChange]) -> Option<SideChange> {
-    let alike = among.iter().filter(|other| other.sides == to.sides);
-    alike.min_by(|a, b| (a.at - to.at).abs().total_cmp(&(b.at - to.at).abs())).copied()
+fn nearest_crossing(crossing: &SideChange, candidates: &[SideChange]) -> Option<SideChange> {
+    let same_sides = candidates.iter().filter(|other| other.sides == crossing.sides);
+    same_sides
+        .min_by(|a, b| {
+            (a.position - crossing.position)
+                .abs()
+                .total_cmp(&(b.position - crossing.position).abs())
+        })
+        .copied()
 }
 
 #[cfg(test)]
@@ -209,7 +228,7 @@ mod tests {
     const SPAN: Span = Span { least: 0.0, greatest: 100.0, tolerance: 1.0 };
     const CELL: f64 = 20.0;
 
-    /// Intervals that change sides here, the first unreliable.
+    /// Returns intervals that change sides at these positions; the first one is unreliable.
     fn intervals(crossings: &[f64]) -> Vec<SideInterval> {
         let mut side = LimitSide::Unreliable;
         let mut from = SPAN.least;
@@ -225,14 +244,16 @@ mod tests {
         intervals
     }
 
-    fn disputed(own: &[f64], neighbour: &[f64], beyond: Option<&[f64]>) -> Vec<[f64; 2]> {
+    fn disputed(own: &[f64], neighbour: &[f64], second_neighbour: Option<&[f64]>) -> Vec<[f64; 2]> {
         let own = intervals(own);
         let neighbour = intervals(neighbour);
-        let beyond = beyond.map(intervals);
+        let second_neighbour = second_neighbour.map(intervals);
         let pair = LinePair {
-            own: Neighbour { at: 3.0, intervals: &own },
-            neighbour: Neighbour { at: 2.0, intervals: &neighbour },
-            beyond: beyond.as_ref().map(|intervals| Neighbour { at: 1.0, intervals }),
+            own: Neighbour { position: 3.0, intervals: &own },
+            neighbour: Neighbour { position: 2.0, intervals: &neighbour },
+            second_neighbour: second_neighbour
+                .as_ref()
+                .map(|intervals| Neighbour { position: 1.0, intervals }),
         };
         pair.disputed(CELL, &SPAN)
     }
@@ -252,18 +273,18 @@ mod tests {
         let predict_between = |a: &[f64], b: &[f64]| {
             let left = intervals(a);
             let right = intervals(b);
-            let left = Neighbour { at: 0.0, intervals: &left };
-            let right = Neighbour { at: 2.0, intervals: &right };
+            let left = Neighbour { position: 0.0, intervals: &left };
+            let right = Neighbour { position: 2.0, intervals: &right };
             let predicted = predict(1.0, &[vec![left], vec![right]], CELL, &SPAN)?;
-            Some(predicted.iter().map(|predicted| (predicted.at, predicted.side)).collect())
+            Some(predicted.iter().map(|predicted| (predicted.position, predicted.side)).collect())
         };
         let reliable = LimitSide::Reliable;
         let unreliable = LimitSide::Unreliable;
-        let pocket: Option<Vec<_>> = predict_between(&[20.0, 60.0], &[22.0, 64.0]);
+        let two_crossings: Option<Vec<_>> = predict_between(&[20.0, 60.0], &[22.0, 64.0]);
         let expected = [(20.0, unreliable), (22.0, reliable), (60.0, reliable), (64.0, unreliable)];
-        assert_eq!(pocket, Some(expected.to_vec()));
-        let whole = predict_between(&[], &[]);
-        assert_eq!(whole, Some(vec![(0.0, unreliable), (100.0, unreliable)]));
+        assert_eq!(two_crossings, Some(expected.to_vec()));
+        let without_crossings = predict_between(&[], &[]);
+        assert_eq!(without_crossings, Some(vec![(0.0, unreliable), (100.0, unreliable)]));
         assert_eq!(predict_between(&[20.0], &[]), None);
         assert_eq!(predict_between(&[20.0], &[40.2]), None, "farther than a cell");
         assert!(predict_between(&[20.0], &[39.8]).is_some());

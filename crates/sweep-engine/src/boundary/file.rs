@@ -1,5 +1,5 @@
-//! The boundary file: one row per place where the side changes, or per row of the first axis that
-//! has none.
+//! The boundary file: one row for each edge, or one row for a value of the first axis without an
+//! edge.
 
 use serde_json::{Value, json};
 use sweep_parameter::unit_suffix;
@@ -12,7 +12,7 @@ use sweep_files::{FileKind, key};
 struct EdgeRow<'a> {
     curve: usize,
     row: &'a BoundaryRow,
-    /// The number from 1; 0 where there is none in range.
+    /// The number of the edge on its line, from 1; 0 if no edge is in range.
     number: usize,
     edge: &'a Edge,
 }
@@ -26,7 +26,7 @@ fn insert_word(name: &str, unit: &str, word: &str) -> String {
 }
 
 impl<M: Model> BoundaryTask<M> {
-    /// Returns the job of the store: the plan, with what is asked beside the grid.
+    /// Returns the job of the store, whose plan has the settings of the search too.
     pub fn job(&self) -> Job<'_> {
         let mut job = Job::new(&self.plan);
         job.layout.kind = FileKind::Boundary;
@@ -45,86 +45,95 @@ impl<M: Model> BoundaryTask<M> {
 
     /// Returns the table of the traced curves.
     pub fn table(&self, traced: &TracedBoundary) -> Table {
-        let mut about = self.settings();
-        about["worse"] = self.quantity.worse.name().into();
-        about["points"] = traced.trials.into();
-        about["rounds"] = traced.rounds.into();
+        let mut boundary_metadata = self.settings();
+        boundary_metadata["worse"] = self.quantity.worse.name().into();
+        boundary_metadata["points"] = traced.trials.into();
+        boundary_metadata["rounds"] = traced.rounds.into();
         let mut table = Table::new(M::ABOUT.build);
         self.add_columns(&mut table, traced);
         let job = self.job();
         table.metadata(key::PLAN, &job.plan);
         table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
-        table.metadata(key::BOUNDARY, &about);
+        table.metadata(key::BOUNDARY, &boundary_metadata);
         table
     }
 
     fn add_columns(&self, table: &mut Table, traced: &TracedBoundary) {
         let TracedQuantity { name: quantity, unit, .. } = &self.quantity;
-        let mut lines = Vec::new();
+        let mut edge_rows = Vec::new();
         for (curve, rows) in traced.curves.iter().enumerate() {
             for row in rows {
                 for (k, edge) in row.edges.iter().enumerate() {
                     let number = if edge.bracket.is_some() { k + 1 } else { 0 };
-                    lines.push(EdgeRow { curve, row, number, edge });
+                    edge_rows.push(EdgeRow { curve, row, number, edge });
                 }
             }
         }
-        self.add_axes(table, &lines);
+        self.add_axes(table, &edge_rows);
         table.words(
             "kind",
             "crossing, jump (the quantity leaps over its limit), undefined (it is not defined on \
              one side), or why there is none in range: reliable, unreliable or undefined wherever \
              it was evaluated",
-            lines.iter().map(|line| line.edge.kind.name()),
+            edge_rows.iter().map(|edge_row| edge_row.edge.kind.name()),
         );
         table.counts(
             "crossing",
             "number of this change of side at this value of the first axis, from 1 upwards along \
              the second; 0 where none is in range",
-            lines.iter().map(|line| line.number as u64),
+            edge_rows.iter().map(|edge_row| edge_row.number as u64),
         );
-        let changes = lines
-            .iter()
-            .map(|line| line.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64);
-        table.counts("crossings", "how many changes of side there are", changes);
-        for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
+        let edge_counts = edge_rows.iter().map(|edge_row| {
+            edge_row.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64
+        });
+        table.counts("crossings", "how many changes of side there are", edge_counts);
+        for (side_index, word, side_word) in [(0, "low", "lower"), (1, "high", "upper")] {
             let name = format!("quantity_{word}");
             let description =
-                format!("{quantity} at the bracket's {side} end; null where not defined");
-            let value = |line: &EdgeRow<'_>| Some(self.quantity.value(line.edge.distances[end]?));
-            table.numbers(&name, unit, &description, lines.iter().map(value));
+                format!("{quantity} at the bracket's {side_word} end; null where not defined");
+            let value = |edge_row: &EdgeRow<'_>| {
+                Some(self.quantity.value(edge_row.edge.distances[side_index]?))
+            };
+            table.numbers(&name, unit, &description, edge_rows.iter().map(value));
         }
-        let trials = lines.iter().map(|line| line.row.trials as u64);
-        table.counts("points", "points evaluated at this value of the first axis", trials);
+        let trial_counts = edge_rows.iter().map(|edge_row| edge_row.row.trials as u64);
+        table.counts("points", "points evaluated at this value of the first axis", trial_counts);
     }
 
     /// Adds both axes, the bracket, and the axes beyond the second.
-    fn add_axes(&self, table: &mut Table, lines: &[EdgeRow<'_>]) {
-        let [first, second, further @ ..] = self.plan.axes.as_slice() else { return };
+    fn add_axes(&self, table: &mut Table, edge_rows: &[EdgeRow<'_>]) {
+        let [first, second, other_axes @ ..] = self.plan.axes.as_slice() else { return };
         let name = &*second.parameter.name;
         let unit = second.parameter.unit;
-        table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
-        let what = second.parameter.description;
+        table
+            .parameter(&first.parameter, edge_rows.iter().map(|edge_row| Some(edge_row.row.first)));
+        let second_meaning = second.parameter.description;
         let TracedQuantity { name: quantity, limit, .. } = &self.quantity;
         let description =
-            format!("{what}, where {quantity} = {limit}; null unless it is a crossing");
-        table.numbers(name, unit, &description, lines.iter().map(|line| line.edge.at));
-        for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
+            format!("{second_meaning}, where {quantity} = {limit}; null unless it is a crossing");
+        table.numbers(
+            name,
+            unit,
+            &description,
+            edge_rows.iter().map(|edge_row| edge_row.edge.position),
+        );
+        for (side_index, word, side_word) in [(0, "low", "lower"), (1, "high", "upper")] {
             let description = format!(
-                "{side} end of the bracket in which the side changes; null where none is in range"
+                "{side_word} end of the bracket in which the side changes; null where none is in \
+                 range"
             );
-            let value = |line: &EdgeRow<'_>| Some(line.edge.bracket?[end]);
+            let value = |edge_row: &EdgeRow<'_>| Some(edge_row.edge.bracket?[side_index]);
             table.numbers(
                 &insert_word(name, unit, word),
                 unit,
                 &description,
-                lines.iter().map(value),
+                edge_rows.iter().map(value),
             );
         }
-        for (k, axis) in further.iter().enumerate() {
-            let values = lines
+        for (k, axis) in other_axes.iter().enumerate() {
+            let values = edge_rows
                 .iter()
-                .map(|line| self.plan.axis_values(line.curve as u64).get(2 + k).copied());
+                .map(|edge_row| self.plan.axis_values(edge_row.curve as u64).get(2 + k).copied());
             table.parameter(&axis.parameter, values);
         }
     }

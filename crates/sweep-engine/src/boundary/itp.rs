@@ -17,9 +17,10 @@ const N_0: i32 = 1;
 /// Doubling it makes the first steps nearly bisections.
 const KAPPA_1: f64 = 0.2;
 /// Least truncation, and least half width of a predicted bracket, in tolerances. Basis: the nearer
-/// a point is to its limit, the more accurately it has to be integrated to know its side; without
-/// it, `sweeps/fig12.toml` takes half as long again. A little less than a half, so that rounding
-/// does not make the last bracket wider than the tolerance; doubling it makes it too wide always.
+/// a point is to its limit, the more accurate an integration has to be to find its side; without
+/// this margin, `sweeps/fig12.toml` takes half as long again. It is a little less than a half, so
+/// that rounding does not make the last bracket wider than the tolerance. Doubling it makes every
+/// last bracket too wide.
 pub(super) const ROOT_MARGIN: f64 = 0.45;
 
 /// A bracket's root finder between two steps.
@@ -46,14 +47,14 @@ impl Itp {
         let widest_next = 0.5 * self.tolerance * libm::exp2(f64::from(self.steps_left));
         let r = (widest_next - 0.5 * width).max(0.0);
         self.steps_left -= 1;
-        let Some([at_low, at_high]) = distances else { return middle };
-        let x_f = low + width * (at_low / (at_low - at_high));
+        let Some([distance_low, distance_high]) = distances else { return middle };
+        let x_f = low + width * (distance_low / (distance_low - distance_high));
         let sigma = if x_f <= middle { 1.0 } else { -1.0 };
         let delta = KAPPA_1 * width * (width / self.first_width);
         let delta = delta.max(ROOT_MARGIN * self.tolerance);
         let x_t = if delta <= (middle - x_f).abs() { x_f + sigma * delta } else { middle };
         let x = if (x_t - middle).abs() <= r { x_t } else { middle - sigma * r };
-        // A root at an end, or rounding, may leave nothing between.
+        // With a root at an end, or by rounding, the position may be outside of the bracket.
         if low < x && x < high { x } else { middle }
     }
 }
@@ -67,7 +68,7 @@ mod tests {
         let [mut low, mut high] = ends;
         let mut itp = Itp::new(high - low, tolerance);
         let mut count = 0;
-        // Rounding may leave a bracket that much too wide.
+        // Rounding may leave a bracket wider than the tolerance by this factor.
         while high - low > tolerance * (1.0 + 1e-12) {
             let x = itp.step(low, high, Some([function(low), function(high)]));
             assert!(low < x && x < high, "{x} in {low}..{high}");

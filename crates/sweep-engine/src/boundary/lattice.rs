@@ -6,20 +6,20 @@
 
 use super::sample::Span;
 
-/// The most lines on each side that a line is predicted from. Basis: two on each side make a cubic;
-/// with one, `sweeps/fig12.toml` takes a third more trials. Doubling it predicts through lines that
-/// are cells away, which takes a quarter more trials there.
-const PARENTS: usize = 2;
+/// The greatest number of lines on each side from which a line is predicted. Basis: two on each
+/// side make a cubic; with one, `sweeps/fig12.toml` takes a third more trials. Doubling it predicts
+/// through lines that are cells away, which takes a quarter more trials in that study.
+const MAX_PARENTS: usize = 2;
 
 /// A line along the second axis, in the order of the first.
 #[derive(Clone, Debug)]
 pub(super) struct PlannedLine {
     /// The value of the first axis, or its logarithm.
-    pub at: f64,
+    pub position: f64,
     /// The index among the values of the first axis.
     pub index: usize,
-    /// The ranks of the lines that it is predicted from, to its left and to its right, the nearest
-    /// first; none for a lattice line.
+    /// The ranks of the lines from which this line is predicted, to its left and to its right, the
+    /// nearest first; none for a lattice line.
     pub parents: [Vec<usize>; 2],
 }
 
@@ -46,23 +46,25 @@ pub(super) fn lattice_ranks(lines: usize, cells: usize) -> Vec<usize> {
     ranks
 }
 
-/// Plans the lines at these positions of the first axis: the lattice lines first, then again and
-/// again the middle of every gap.
-pub(super) fn plan_lines(places: &[f64], cells: usize) -> Vec<PlannedLine> {
-    let mut lines = Vec::with_capacity(places.len());
-    for (index, &at) in places.iter().enumerate() {
-        lines.push(PlannedLine { at, index, parents: Default::default() });
+/// Plans the lines at these positions of the first axis: the lattice lines first, then repeatedly
+/// the middle of every gap.
+pub(super) fn plan_lines(positions: &[f64], cells: usize) -> Vec<PlannedLine> {
+    let mut lines = Vec::with_capacity(positions.len());
+    for (index, &position) in positions.iter().enumerate() {
+        lines.push(PlannedLine { position, index, parents: Default::default() });
     }
-    lines.sort_by(|a, b| a.at.total_cmp(&b.at));
-    let mut known = lattice_ranks(lines.len(), cells);
+    lines.sort_by(|a, b| a.position.total_cmp(&b.position));
+    let mut planned_ranks = lattice_ranks(lines.len(), cells);
     loop {
         let mut middles = Vec::new();
-        for right in 1..known.len() {
-            let gap = known[right] - known[right - 1];
+        for right in 1..planned_ranks.len() {
+            let gap = planned_ranks[right] - planned_ranks[right - 1];
             if gap > 1 {
-                let middle = known[right - 1] + gap / 2;
-                let left_parents = known[..right].iter().rev().take(PARENTS).copied().collect();
-                let right_parents = known[right..].iter().take(PARENTS).copied().collect();
+                let middle = planned_ranks[right - 1] + gap / 2;
+                let left_parents =
+                    planned_ranks[..right].iter().rev().take(MAX_PARENTS).copied().collect();
+                let right_parents =
+                    planned_ranks[right..].iter().take(MAX_PARENTS).copied().collect();
                 lines[middle].parents = [left_parents, right_parents];
                 middles.push(middle);
             }
@@ -70,8 +72,8 @@ pub(super) fn plan_lines(places: &[f64], cells: usize) -> Vec<PlannedLine> {
         if middles.is_empty() {
             return lines;
         }
-        known.extend(middles);
-        known.sort_unstable();
+        planned_ranks.extend(middles);
+        planned_ranks.sort_unstable();
     }
 }
 
@@ -84,8 +86,8 @@ mod tests {
         for count in 0..60 {
             for cells in 1..=12 {
                 // In falling order: ranks are not indices.
-                let places: Vec<f64> = (0..count).rev().map(f64::from).collect();
-                let lines = plan_lines(&places, cells);
+                let positions: Vec<f64> = (0..count).rev().map(f64::from).collect();
+                let lines = plan_lines(&positions, cells);
                 let mut planned = vec![false; lines.len()];
                 for rank in lattice_ranks(lines.len(), cells) {
                     assert!(lines[rank].is_lattice_line());
@@ -94,11 +96,12 @@ mod tests {
                 for _ in 0..lines.len() {
                     for rank in 0..lines.len() {
                         let parents = lines[rank].parents.concat();
-                        planned[rank] |= !parents.is_empty() && parents.iter().all(|p| planned[*p]);
+                        planned[rank] |=
+                            !parents.is_empty() && parents.iter().all(|parent| planned[*parent]);
                     }
                 }
                 assert!(planned.iter().all(|is_planned| *is_planned), "{count} {cells}");
-                assert!(lines.iter().all(|line| places[line.index] == line.at));
+                assert!(lines.iter().all(|line| positions[line.index] == line.position));
             }
         }
     }

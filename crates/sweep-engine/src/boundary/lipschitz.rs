@@ -17,37 +17,37 @@ use super::sample::LineSample;
 /// which then misses a fifth fewer stretches.
 const RELIABILITY: f64 = 1.75;
 
-/// Returns the positions to evaluate next: one in every gap wider than `finest` that may hide two
+/// Returns the positions to evaluate next: one in every gap wider than `min_gap` that may hide two
 /// roots.
-pub(super) fn candidates(samples: &[LineSample], finest: f64) -> Vec<f64> {
+pub(super) fn candidates(samples: &[LineSample], min_gap: f64) -> Vec<f64> {
     let slopes: Vec<f64> = samples.windows(2).map(|gap| slope(&gap[0], &gap[1])).collect();
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     for (k, gap) in samples.windows(2).enumerate() {
         let low = gap[0];
         let high = gap[1];
-        let width = high.at - low.at;
+        let width = high.position - low.position;
         let distances = low.finite_distance().zip(high.finite_distance());
-        let Some((at_low, at_high)) = distances else { continue };
-        if low.side() != high.side() || width <= finest {
+        let Some((distance_low, distance_high)) = distances else { continue };
+        if low.side() != high.side() || width <= min_gap {
             continue;
         }
-        let beside = &slopes[k.saturating_sub(1)..slopes.len().min(k + 2)];
-        let steepest = beside.iter().copied().fold(0.0, f64::max);
+        let adjacent_slopes = &slopes[k.saturating_sub(1)..slopes.len().min(k + 2)];
+        let steepest = adjacent_slopes.iter().copied().fold(0.0, f64::max);
         let lipschitz = RELIABILITY * steepest;
-        if lipschitz * width > at_low.abs() + at_high.abs() {
-            let middle = 0.5 * (low.at + high.at);
-            places.push(middle + (at_low.abs() - at_high.abs()) / (2.0 * lipschitz));
+        if lipschitz * width > distance_low.abs() + distance_high.abs() {
+            let middle = 0.5 * (low.position + high.position);
+            positions.push(middle + (distance_low.abs() - distance_high.abs()) / (2.0 * lipschitz));
         }
     }
-    places
+    positions
 }
 
 /// Returns the steepness between two samples of one side; 0 between others, whose bracket may
 /// contain a jump.
 fn slope(low: &LineSample, high: &LineSample) -> f64 {
     match (low.finite_distance(), high.finite_distance()) {
-        (Some(at_low), Some(at_high)) if low.side() == high.side() => {
-            ((at_high - at_low) / (high.at - low.at)).abs()
+        (Some(distance_low), Some(distance_high)) if low.side() == high.side() => {
+            ((distance_high - distance_low) / (high.position - low.position)).abs()
         }
         _ => 0.0,
     }
@@ -58,29 +58,35 @@ mod tests {
     use super::*;
 
     fn line(samples: &[(f64, f64)]) -> Vec<LineSample> {
-        samples.iter().map(|&(at, d)| LineSample { at, distance: Some(d) }).collect()
+        samples.iter().map(|&(position, d)| LineSample { position, distance: Some(d) }).collect()
     }
 
-    /// Samples until no gap may hide a pair of roots, and returns whether one was found.
-    fn finds_a_dip(function: impl Fn(f64) -> f64, finest: f64) -> bool {
-        let mut samples: Vec<(f64, f64)> = [0.0, 40.0, 80.0].map(|at| (at, function(at))).to_vec();
+    /// Adds samples until no gap may hide a pair of roots, and returns whether a dip below zero was
+    /// found.
+    fn finds_dip(function: impl Fn(f64) -> f64, min_gap: f64) -> bool {
+        let mut samples: Vec<(f64, f64)> =
+            [0.0, 40.0, 80.0].map(|position| (position, function(position))).to_vec();
         loop {
-            let places = candidates(&line(&samples), finest);
-            if places.is_empty() {
+            let positions = candidates(&line(&samples), min_gap);
+            if positions.is_empty() {
                 return samples.iter().any(|(_, distance)| *distance < 0.0);
             }
-            samples.extend(places.iter().map(|at| (*at, function(*at))));
+            samples.extend(positions.iter().map(|position| (*position, function(*position))));
             samples.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
     }
 
     #[test]
     fn a_gap_is_searched_only_if_the_slope_allows_two_roots() {
-        // The slope of 0.01 allows 0.8 over the gap, twice of which the samples are away.
+        // The slope of 0.01 allows a change of 0.8 over the gap, and the samples' distances add up
+        // to twice as much.
         assert!(candidates(&line(&[(0.0, 1.2), (40.0, 0.8)]), 5.0).is_empty());
-        let places = candidates(&line(&[(0.0, 1.2), (40.0, 0.1)]), 5.0);
-        assert_eq!(places.len(), 1);
-        assert!(20.0 < places[0] && places[0] < 40.0, "nearer to the sample at 0.1: {places:?}");
+        let positions = candidates(&line(&[(0.0, 1.2), (40.0, 0.1)]), 5.0);
+        assert_eq!(positions.len(), 1);
+        assert!(
+            20.0 < positions[0] && positions[0] < 40.0,
+            "nearer to the sample at 0.1: {positions:?}"
+        );
         assert!(candidates(&line(&[(0.0, 1.2), (40.0, 0.1)]), 40.0).is_empty(), "not wide enough");
         assert!(candidates(&line(&[(0.0, 0.4), (40.0, -0.4)]), 5.0).is_empty(), "a bracket");
     }
@@ -89,9 +95,9 @@ mod tests {
     fn a_dip_with_slopes_like_those_beside_it_is_found_wherever_it_is() {
         for k in 0..=200 {
             let bottom = 5.0 + 0.15 * f64::from(k);
-            // A dip 12 wide, on a slope that the samples at 40 and 80 show.
+            // The dip is 12 wide, and its slope is that of the samples at 40 and 80.
             let function = |x: f64| ((x - bottom).abs() * 0.05 - 0.3).min(0.025 * (x - 40.0) + 0.5);
-            assert!(finds_a_dip(function, 1.0), "{bottom}");
+            assert!(finds_dip(function, 1.0), "{bottom}");
         }
     }
 }

@@ -1,5 +1,6 @@
-//! The quantity of a boundary, its limit, and distances from that: any column of numbers that a
-//! plan's rows can have, an expression of such columns, or a condition on them.
+//! The quantity of a boundary, its limit, and its distances from the limit. A quantity is any
+//! column of numbers that a plan's rows can have, an expression of such columns, or a condition on
+//! them.
 
 use arrow_array::RecordBatch;
 use arrow_schema::ArrowError;
@@ -73,36 +74,38 @@ pub fn traceable_columns<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<
         plan.reliability.channels = vec![*channel];
         (plan, Some(channel_columns(channel.name)))
     };
-    let mut least = plan.clone();
-    least.reliability.limits.lower = Some(plan.reliability.limits.over_estimate());
-    let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
-    let plans = M::ABOUT.channels.iter().map(channel_plan).chain(further.map(|plan| (plan, None)));
-    let mut traceable_columns: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
-    for (plan, only) in plans {
+    let mut plan_with_lower_limit = plan.clone();
+    plan_with_lower_limit.reliability.limits.lower = Some(plan.reliability.limits.over_estimate());
+    let other_plans = [plan.clone(), plan_with_lower_limit].into_iter().chain(M::variants(plan));
+    let plans =
+        M::ABOUT.channels.iter().map(channel_plan).chain(other_plans.map(|plan| (plan, None)));
+    let mut columns: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
+    for (plan, channel_columns_only) in plans {
         for column in M::layout(&plan).columns {
             let is_number =
                 matches!(column.kind, CellType::Measured | CellType::Time | CellType::Count);
-            let is_asked = only.as_ref().is_none_or(|only| only.contains(&column.name));
-            let is_new = traceable_columns.iter().all(|(known, _)| known.name != column.name);
-            if is_number && column.worse.is_some() && is_asked && is_new {
-                traceable_columns.push((column, plan.clone()));
+            let is_wanted = channel_columns_only
+                .as_ref()
+                .is_none_or(|channel_columns_only| channel_columns_only.contains(&column.name));
+            let is_new = columns.iter().all(|(known, _)| known.name != column.name);
+            if is_number && column.worse.is_some() && is_wanted && is_new {
+                columns.push((column, plan.clone()));
             }
         }
     }
     // The ratios that decide on the verdict come first.
-    traceable_columns
-        .sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO].contains(&&*column.name));
-    traceable_columns
+    columns.sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO].contains(&&*column.name));
+    columns
 }
 
 /// Returns whether a text is the name of a column, not an expression.
 pub fn is_name(text: &str) -> bool {
-    text.chars().all(|one| one.is_alphanumeric() || one == '_')
+    text.chars().all(|letter| letter.is_alphanumeric() || letter == '_')
 }
 
 /// A quantity that an expression computes from the columns of a row.
 #[derive(Debug)]
-pub struct Derived<M: Model> {
+pub struct DerivedQuantity<M: Model> {
     /// The quantity.
     pub quantity: TracedQuantity,
     /// The expression.
@@ -115,24 +118,24 @@ pub struct Derived<M: Model> {
 /// and the plan that computes the columns.
 ///
 /// # Errors
-/// A mistake in the expression, columns that no plan has together, or a limit that is missing or
-/// one too many.
-pub fn derived<M: Model>(
+/// A mistake in the expression, columns that no plan has together, a missing limit, or a limit
+/// beside a condition.
+pub fn derive_quantity<M: Model>(
     plan: &Plan<M>,
     text: &str,
     limit: Option<f64>,
-) -> Result<Derived<M>, Error> {
+) -> Result<DerivedQuantity<M>, Error> {
     let plans = plans_by_columns(plan);
-    let known: Vec<Vec<KnownColumn>> =
+    let columns_by_plan: Vec<Vec<KnownColumn>> =
         plans.iter().map(|plan| columns(&M::layout(plan).schema())).collect();
-    let mut all: Vec<KnownColumn> = Vec::new();
-    for column in known.iter().flatten() {
-        if all.iter().all(|one| one.name != column.name) {
-            all.push(column.clone());
+    let mut all_columns: Vec<KnownColumn> = Vec::new();
+    for column in columns_by_plan.iter().flatten() {
+        if all_columns.iter().all(|other| other.name != column.name) {
+            all_columns.push(column.clone());
         }
     }
-    let condition = Goal::constraint(text, &all);
-    let goal = match (condition, Goal::objective(text, &all), limit) {
+    let condition = Goal::constraint(text, &all_columns);
+    let goal = match (condition, Goal::objective(text, &all_columns), limit) {
         (Ok(_), _, Some(limit)) => {
             let expected = "none with a condition, which has limits of its own";
             return Err(Error::option("--limit", limit, expected));
@@ -145,8 +148,8 @@ pub fn derived<M: Model>(
         (Err(mistake), Err(number_mistake), limit) => {
             let report = Report::default();
             let mistake = if limit.is_some() { number_mistake } else { mistake };
-            let at = Location::new(report.add("--quantity", text), mistake.span.clone());
-            let mistake = Diagnostic::from_expression(mistake, &at);
+            let location = Location::new(report.add("--quantity", text), mistake.span.clone());
+            let mistake = Diagnostic::from_expression(mistake, &location);
             report.push(mistake.help("`--quantity` without a name lists the columns"));
             report.finish(None::<()>)?;
             return Err(Error::option("--quantity", text, "an expression of columns"));
@@ -156,10 +159,11 @@ pub fn derived<M: Model>(
         let expected = "an expression of a row's columns, without min(), max() and the like";
         return Err(Error::option("--quantity", text, expected));
     }
-    let has_all = |columns: &&Vec<KnownColumn>| {
+    let has_all_columns = |columns: &&Vec<KnownColumn>| {
         goal.columns().all(|name| columns.iter().any(|column| column.name == name))
     };
-    let Some(at) = known.iter().position(|columns| has_all(&columns)) else {
+    let Some(plan_index) = columns_by_plan.iter().position(|columns| has_all_columns(&columns))
+    else {
         let names: Vec<&str> = goal.columns().collect();
         let names = names.join(", ");
         let expected = format!("columns that one grid file has; ask in it for all of {names}");
@@ -181,8 +185,8 @@ pub fn derived<M: Model>(
             scale: Scale::Over(if limit == 0.0 { 1.0 } else { limit.abs() }),
         },
     };
-    let plan = plans.into_iter().nth(at).unwrap_or_else(|| plan.clone());
-    Ok(Derived { quantity, goal, plan })
+    let plan = plans.into_iter().nth(plan_index).unwrap_or_else(|| plan.clone());
+    Ok(DerivedQuantity { quantity, goal, plan })
 }
 
 /// Returns plans of the same points with more and more columns: the plan itself, each with a
@@ -197,10 +201,10 @@ fn plans_by_columns<M: Model>(plan: &Plan<M>) -> Vec<Plan<M>> {
     plans
 }
 
-/// Computes the value of an expression in a row. For a condition this is its margin: the distance
-/// of its operands as a share of the greater one, negative where the condition does not hold. Of
-/// several comparisons the one that decides counts; a condition that compares no numbers has 1 or
-/// -1.
+/// Returns the value of an expression in a row. For a condition this is its margin: the distance of
+/// its operands as a share of the greater one, negative if the condition does not hold. If the
+/// condition has several comparisons, the margin of the decisive one counts; a condition that
+/// compares no numbers has a margin of 1 or -1.
 ///
 /// # Errors
 /// A batch without the columns of the expression.
@@ -226,43 +230,46 @@ fn channel_columns(name: &str) -> [String; 3] {
 /// column's own if none is given.
 ///
 /// # Errors
-/// A column that the plan's rows cannot have, or that has no limit of its own where none is given.
-pub fn traced<M: Model>(
+/// A column that the plan's rows cannot have, or a column without a limit of its own if no limit is
+/// given.
+pub fn find_quantity<M: Model>(
     plan: &Plan<M>,
     name: &str,
     limit: Option<f64>,
 ) -> Result<(TracedQuantity, Plan<M>), Error> {
-    let mut traceable_columns = traceable_columns(plan);
-    let Some(at) = traceable_columns.iter().position(|(column, _)| column.name == name) else {
-        let names = || traceable_columns.iter().map(|(column, _)| column.name.as_str());
+    let mut candidates = traceable_columns(plan);
+    let Some(index) = candidates.iter().position(|(column, _)| column.name == name) else {
+        let names = || candidates.iter().map(|(column, _)| column.name.as_str());
         let kind = |name: &str| name.split('_').next().map(str::to_owned);
         let is_of_kind = |known: &str| kind(known) == kind(name);
-        let needed =
+        let required_setting =
             M::ABOUT.needed.iter().find(|(prefix, _)| kind(name).as_deref() == Some(prefix));
-        if let Some((_, needed)) = needed.filter(|_| !names().any(is_of_kind)) {
-            return Err(Error::option("--quantity", name, needed));
+        if let Some((_, required_setting)) = required_setting.filter(|_| !names().any(is_of_kind)) {
+            return Err(Error::option("--quantity", name, required_setting));
         }
-        let meant = nearest(name, names());
-        let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
+        let suggestion = nearest(name, names());
+        let suggestion =
+            suggestion.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
         let known_columns: Vec<String> =
             M::ABOUT.channels.iter().flat_map(|channel| channel_columns(channel.name)).collect();
         let is_of_channel = |name: &&str| known_columns.iter().any(|known| known == name);
         let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
         let names = names.join(", ");
         let [ratio, nonlinear, linear] = channel_columns("CHANNEL");
-        let further = M::ABOUT.further;
-        let expected = format!("one of {names}, {ratio}, {nonlinear}, {linear}{further}{meant}");
+        let optional_columns = M::ABOUT.further;
+        let expected =
+            format!("one of {names}, {ratio}, {nonlinear}, {linear}{optional_columns}{suggestion}");
         return Err(Error::option("--quantity", name, expected));
     };
-    let (column, mut plan) = traceable_columns.swap_remove(at);
-    let own = column.limit;
-    let Some(value) = limit.or(own.map(|limit| limit.value)) else {
+    let (column, mut plan) = candidates.swap_remove(index);
+    let own_limit = column.limit;
+    let Some(value) = limit.or(own_limit.map(|limit| limit.value)) else {
         let unit = &column.unit;
         let expected = format!("--limit with it, in {unit}: it has no limit of its own");
         return Err(Error::option("--quantity", name, expected));
     };
     let is_ratio = name.starts_with(RATIO);
-    let scale = own.map_or(value.abs(), |limit| limit.scale);
+    let scale = own_limit.map_or(value.abs(), |limit| limit.scale);
     if !value.is_finite() || (is_ratio && value <= 0.0) || scale == 0.0 {
         let expected = format!("a number greater than 0, as {name} is never below");
         return Err(Error::option("--limit", value, expected));

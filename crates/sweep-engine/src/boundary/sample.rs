@@ -1,12 +1,12 @@
 //! The samples of a line and the sides of the limit that they are on.
 //!
-//! Positions are coordinates of the second axis: its values, or their logarithms. Distances are
-//! signed distances from the limit, of order one (a logarithm of a ratio).
+//! Positions are coordinates of the second axis, which are its values or their logarithms.
+//! Distances are signed distances from the limit, of order one (a logarithm of a ratio).
 
 use super::SearchRange;
 
 /// Returns the coordinate of an axis's value.
-pub(super) fn position(value: f64, is_log: bool) -> f64 {
+pub(super) fn coordinate(value: f64, is_log: bool) -> f64 {
     if is_log { libm::log(value) } else { value }
 }
 
@@ -14,24 +14,24 @@ impl SearchRange {
     /// Returns the range that is searched, in coordinates.
     pub(super) fn span(&self) -> Span {
         Span {
-            least: position(self.least, self.second_log),
-            greatest: position(self.greatest, self.second_log),
+            least: coordinate(self.least, self.second_log),
+            greatest: coordinate(self.greatest, self.second_log),
             tolerance: self.tolerance,
         }
     }
 
     /// Returns the value of the second axis at a position.
-    pub(super) fn value(&self, at: f64) -> f64 {
+    pub(super) fn value(&self, position: f64) -> f64 {
         let span = self.span();
-        // The ends are exact whatever the logarithm rounds to.
-        if at <= span.least {
+        // The ends of the range are returned exactly, without the rounding of the logarithm.
+        if position <= span.least {
             self.least
-        } else if at >= span.greatest {
+        } else if position >= span.greatest {
             self.greatest
         } else if self.second_log {
-            libm::exp(at)
+            libm::exp(position)
         } else {
-            at
+            position
         }
     }
 }
@@ -47,7 +47,7 @@ pub(super) enum LimitSide {
 /// An evaluated position on a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LineSample {
-    pub at: f64,
+    pub position: f64,
     pub distance: Option<f64>,
 }
 
@@ -74,8 +74,8 @@ pub(super) struct Span {
     pub tolerance: f64,
 }
 
-/// An interval of a line on one side, as far as its samples show. It ends where the side changes,
-/// or at the range's end.
+/// An interval of a line on which all samples are on one side. It ends where the side changes, or
+/// at the range's end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SideInterval {
     pub from: f64,
@@ -84,7 +84,8 @@ pub(super) struct SideInterval {
 }
 
 /// Returns the side of a line at a position; `None` before its first samples.
-pub(super) fn side_at(intervals: &[SideInterval], at: f64) -> Option<LimitSide> {
-    let found = intervals.iter().find(|interval| interval.from <= at && at <= interval.to);
-    found.map(|interval| interval.side)
+pub(super) fn side_at(intervals: &[SideInterval], position: f64) -> Option<LimitSide> {
+    let interval_at =
+        intervals.iter().find(|interval| interval.from <= position && position <= interval.to);
+    interval_at.map(|interval| interval.side)
 }

@@ -1,7 +1,7 @@
 //! The task of a plan, and a model's distances at trial points.
 
 use super::lattice::{columns, lattice_ranks};
-use super::quantity::{Derived, derived, is_name, margin, traced};
+use super::quantity::{DerivedQuantity, derive_quantity, find_quantity, is_name, margin};
 use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::written::finite;
 use crate::evaluator::{CachedEvaluator, RequestValues, SearchStop};
@@ -12,17 +12,17 @@ use crate::store::{
 use crate::{AxisValues, Error, Model, Plan, StoreError};
 use sweep_results::Goal;
 
-/// The most lines of all curves together. Basis: the traced rows of so many stay below a gigabyte
-/// of memory. Doubling it doubles that.
+/// The greatest number of lines of all curves together. Basis: their traced rows take less than a
+/// gigabyte of memory. Doubling it doubles that memory.
 const MAX_LINES: u64 = 1_000_000;
 
-/// The least tolerance, as a part of the range. Basis: a bracket as narrow still holds thousands of
-/// numbers. Doubling it refuses tolerances that work.
-const LEAST_TOLERANCE: f64 = 1e-9;
+/// The least tolerance, as a fraction of the range. Basis: the narrowest bracket still contains
+/// thousands of floating-point numbers. Doubling it refuses tolerances that work.
+const MIN_TOLERANCE_FRACTION: f64 = 1e-9;
 
-/// Parts of the range in the default tolerance. Basis: 0.5 N s/m in `sweeps/fig12.toml`. Doubling
-/// it takes about one more trial per crossing.
-const DEFAULT_PARTS: f64 = 480.0;
+/// The range divided by the default tolerance. Basis: 0.5 N s/m in `sweeps/fig12.toml`. Doubling it
+/// takes about one more trial per crossing.
+const DEFAULT_TOLERANCES_PER_RANGE: f64 = 480.0;
 
 /// The options of a boundary.
 #[derive(Clone, Debug, clap::Args)]
@@ -68,26 +68,27 @@ impl<M: Model> BoundaryTask<M> {
     /// Returns the task of a plan.
     ///
     /// # Errors
-    /// The errors of [`traced`] and [`derived`], and [`Error::Refused`] for a plan without a
-    /// boundary or a tolerance that cannot be met or means nothing.
+    /// The errors of [`find_quantity`] and [`derive_quantity`], and [`Error::Refused`] for a plan
+    /// without a boundary or a tolerance that cannot be met or means nothing.
     pub fn new(plan: &Plan<M>, options: &BoundaryOptions) -> Result<Self, Error> {
         let (quantity, expression, plan) = if is_name(&options.quantity) {
-            let (quantity, plan) = traced(plan, &options.quantity, options.limit)?;
+            let (quantity, plan) = find_quantity(plan, &options.quantity, options.limit)?;
             (quantity, None, plan)
         } else {
-            let Derived { quantity, goal, plan } = derived(plan, &options.quantity, options.limit)?;
+            let DerivedQuantity { quantity, goal, plan } =
+                derive_quantity(plan, &options.quantity, options.limit)?;
             (quantity, Some(goal), plan)
         };
-        let refused = |why: String| Err(Error::Refused(why));
+        let refuse = |reason: String| Err(Error::Refused(reason));
         if plan.design.is_some() {
-            return refused(
+            return refuse(
                 "a boundary runs over the axes of a grid, and this file has a [design]: remove \
                  it, and give [[axis]] twice"
                     .to_owned(),
             );
         }
-        let [first, second, further @ ..] = plan.axes.as_slice() else {
-            return refused(format!(
+        let [first, second, other_axes @ ..] = plan.axes.as_slice() else {
+            return refuse(format!(
                 "a boundary runs over two axes, and this grid has {}: give [[axis]] twice, first \
                  the one along which the curve is wanted, then the one that is searched; one that \
                  --at gives a value is no axis, one with `values` of one number is",
@@ -96,29 +97,31 @@ impl<M: Model> BoundaryTask<M> {
         };
         let [least, greatest] = second.values.extremes();
         if least >= greatest {
-            return refused(format!(
+            return refuse(format!(
                 "the second axis, `{}`, has one value: give it the range to search, as range = {{ \
                  from, to, count }} or as `values` whose least and greatest are its ends",
                 second.parameter.name
             ));
         }
         // Plans hold at most 1e12 points, so the products fit.
-        let curves: u64 = further.iter().map(|axis| axis.values.len()).product();
+        let curves: u64 = other_axes.iter().map(|axis| axis.values.len()).product();
         let rows = first.values.len() * curves;
         if rows > MAX_LINES {
-            return refused(format!(
+            return refuse(format!(
                 "{rows} rows (values of the first axis, times the combinations of the axes beyond \
                  the second) are more than {MAX_LINES}: trace parts of them"
             ));
         }
         let second_log = matches!(second.values, AxisValues::Log { .. });
         let extent = if second_log { libm::log(greatest / least) } else { greatest - least };
-        let given = options.tolerance.unwrap_or(extent / DEFAULT_PARTS);
-        if !(extent * LEAST_TOLERANCE..=extent).contains(&given) {
-            return refused(format!(
-                "--tolerance {given} is out of range: expected from {:e} to {extent} for the \
+        let requested_tolerance =
+            options.tolerance.unwrap_or(extent / DEFAULT_TOLERANCES_PER_RANGE);
+        if !(extent * MIN_TOLERANCE_FRACTION..=extent).contains(&requested_tolerance) {
+            return refuse(format!(
+                "--tolerance {requested_tolerance} is out of range: expected from {:e} to {extent} \
+                 for the \
                  second axis",
-                extent * LEAST_TOLERANCE
+                extent * MIN_TOLERANCE_FRACTION
             ));
         }
         let search = SearchRange {
@@ -126,7 +129,7 @@ impl<M: Model> BoundaryTask<M> {
             greatest,
             first_log: matches!(first.values, AxisValues::Log { .. }),
             second_log,
-            tolerance: given,
+            tolerance: requested_tolerance,
             lattice: options.lattice.into(),
         };
         let firsts = (0..first.values.len()).map(|k| first.values.value(k)).collect();
@@ -144,10 +147,10 @@ impl<M: Model> BoundaryTask<M> {
             .collect();
         let columns: Vec<f64> = columns(&self.search.span(), self.search.lattice)
             .into_iter()
-            .map(|at| self.search.value(at))
+            .map(|position| self.search.value(position))
             .collect();
         [lines, columns]
-            .map(|marks| marks.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max))
+            .map(|positions| positions.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max))
     }
 
     /// Returns the name of the column that is at its limit, if it is one.
@@ -160,16 +163,16 @@ impl<M: Model> BoundaryTask<M> {
         &self,
         layout: &Layout,
         axis_values: Vec<f64>,
-        done: PointRows,
+        point_rows: PointRows,
     ) -> Result<Option<f64>, StoreError> {
         let Some(expression) = &self.expression else {
-            let place = layout.columns.iter().position(|one| one.name == self.quantity.name);
-            let cell = place.and_then(|place| Some((place, done.rows.first()?[place])));
-            return Ok(cell.and_then(|(place, cell)| layout.columns[place].number(cell)));
+            let index = layout.columns.iter().position(|column| column.name == self.quantity.name);
+            let cell = index.and_then(|index| Some((index, point_rows.rows.first()?[index])));
+            return Ok(cell.and_then(|(index, cell)| layout.columns[index].number(cell)));
         };
         let mut rows = ResultRows::new(layout);
-        let point = done.point;
-        for row in done.rows.into_iter().take(1) {
+        let point = point_rows.point;
+        for row in point_rows.rows.into_iter().take(1) {
             rows.push(point, axis_values.clone(), row);
         }
         let value = rows.take().and_then(|batch| margin(expression, &batch));
@@ -188,14 +191,14 @@ impl<M: Model> BoundaryTask<M> {
             let key = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
             let keys: Vec<TrialKey> = values.iter().map(key).collect();
             let values = |k: usize, _: u64| values[k].clone();
-            let answer = |k: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
-                let distance = |done: PointRows| -> Result<Option<f64>, StoreError> {
-                    let value = self.value(&layout, values(k, 0), done)?;
+            let respond = |k: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
+                let distance = |point_rows: PointRows| -> Result<Option<f64>, StoreError> {
+                    let value = self.value(&layout, values(k, 0), point_rows)?;
                     Ok(value.map(|value| self.quantity.distance(value)))
                 };
                 points.into_iter().map(distance).collect()
             };
-            Ok(evaluator.evaluate(&keys, 1, &values, &answer)?.concat())
+            Ok(evaluator.evaluate(&keys, 1, &values, &respond)?.concat())
         }
     }
 
@@ -210,11 +213,11 @@ impl<M: Model> BoundaryTask<M> {
     /// Returns the columns of trials: the axes, and the distance from the limit.
     pub fn trial_columns(&self) -> TrialColumns {
         let TracedQuantity { name, limit, .. } = &self.quantity;
-        let about = format!(
+        let description = format!(
             "signed distance of {name} from {limit}, negative on the good side; null where {name} \
              is not defined"
         );
-        let distance = DeclaredColumn::new("distance", "1", about, CellType::Measured);
+        let distance = DeclaredColumn::new("distance", "1", description, CellType::Measured);
         TrialColumns { keys: axis_columns(&self.plan), responses: vec![distance] }
     }
 }

@@ -32,14 +32,14 @@ pub(crate) fn traced(
         batches.borrow_mut().push(trials.len());
         Ok(trials.iter().map(|trial| distance(trial.first, trial.second)).collect())
     };
-    let mut tell = |rows| assert!(rows < firsts.len(), "{rows}");
-    let Ok::<_, Infallible>(traced) = trace(&evaluate, firsts, 1, search, &mut tell);
+    let mut check_lines = |rows| assert!(rows < firsts.len(), "{rows}");
+    let Ok::<_, Infallible>(traced) = trace(&evaluate, firsts, 1, search, &mut check_lines);
     let evaluated = evaluated.borrow();
     let batches = batches.borrow();
     assert!(batches.iter().all(|&trials| trials > 0), "{batches:?}");
     assert_eq!((traced.trials, traced.rounds), (evaluated.len(), batches.len()));
     let mut keys: Vec<[u64; 2]> =
-        evaluated.iter().map(|t| [t.first.to_bits(), t.second.to_bits()]).collect();
+        evaluated.iter().map(|trial| [trial.first.to_bits(), trial.second.to_bits()]).collect();
     keys.sort_unstable();
     keys.dedup();
     assert_eq!(keys.len(), evaluated.len(), "nothing is evaluated twice");
@@ -47,9 +47,9 @@ pub(crate) fn traced(
     traced
 }
 
-/// Returns a distance like that of the paper's Fig. 12: saturated on both sides of a slightly bent
-/// line.
-fn like_fig12(mass: f64, damping: f64) -> Option<f64> {
+/// Returns a distance similar to that of the paper's Fig. 12: saturated on both sides of a slightly
+/// bent line.
+fn fig12_distance(mass: f64, damping: f64) -> Option<f64> {
     let x = (line(mass) - damping) / 40.0;
     let distance =
         if x > 0.0 { 2.5 * (1.0 - (-1.4 * x).exp()) } else { 0.65 * ((1.6 * x).exp() - 1.0) };
@@ -73,7 +73,10 @@ pub(crate) fn check_edges(
             let [a, b] = [distance(row.first, low), distance(row.first, high)];
             assert_eq!(edge.distances, [a, b], "{row:?}");
             assert_ne!(a.map(|a| a < 0.0), b.map(|b| b < 0.0), "{row:?}");
-            assert!(edge.at.is_none_or(|at| (low..=high).contains(&at)), "{row:?}");
+            assert!(
+                edge.position.is_none_or(|position| (low..=high).contains(&position)),
+                "{row:?}"
+            );
         }
     }
 }
@@ -81,8 +84,8 @@ pub(crate) fn check_edges(
 #[test]
 fn a_smooth_boundary_takes_a_fifth_of_the_grids_points() {
     let firsts = masses(39);
-    let traced = traced(like_fig12, &firsts, &SEARCH);
-    check_edges(&traced, like_fig12, 0.5);
+    let traced = traced(fig12_distance, &firsts, &SEARCH);
+    check_edges(&traced, fig12_distance, 0.5);
     assert!(traced.trials <= 39 * 33 / 5, "{}", traced.trials);
     for (row, &mass) in traced.curves[0].iter().zip(&firsts) {
         assert_eq!((row.first, row.edges.len()), (mass, 1));
@@ -91,25 +94,25 @@ fn a_smooth_boundary_takes_a_fifth_of_the_grids_points() {
             assert_eq!(edge.kind, EdgeKind::NoneReliable, "{mass}");
         } else {
             assert_eq!(edge.kind, EdgeKind::Crossing, "{mass}");
-            // The function has a kink there, so that linear interpolation in the bracket is not
-            // exact.
-            assert!((edge.at.unwrap() - line(mass)).abs() < 0.2, "{mass}: {edge:?}");
+            // The function has a kink at its limit, so that linear interpolation in the bracket is
+            // not exact.
+            assert!((edge.position.unwrap() - line(mass)).abs() < 0.2, "{mass}: {edge:?}");
         }
     }
 }
 
 #[test]
 fn the_cost_of_a_trace_is_pinned() {
-    let fold = |mass, damping| folded(mass, damping);
+    let fold = |mass, damping| distance_with_dip(mass, damping);
     let wave = |mass: f64, damping: f64| Some(0.8 * ((damping - 20.0 * mass) / 25.0).sin());
     let cost = |distance: &dyn Fn(f64, f64) -> Option<f64>, rows| {
         let traced = traced(distance, &masses(rows), &SEARCH);
         (traced.trials, traced.rounds)
     };
     let costs = [
-        cost(&like_fig12, 5),
-        cost(&like_fig12, 39),
-        cost(&like_fig12, 400),
+        cost(&fig12_distance, 5),
+        cost(&fig12_distance, 39),
+        cost(&fig12_distance, 400),
         cost(&fold, 39),
         cost(&wave, 39),
     ];
@@ -118,17 +121,17 @@ fn the_cost_of_a_trace_is_pinned() {
 
 #[test]
 fn jumps_are_distinguished_from_steep_crossings() {
-    let leap = |_: f64, damping: f64| Some(if damping < 137.3 { 1.0 } else { -0.6 });
-    for row in &traced(leap, &masses(12), &SEARCH).curves[0] {
+    let step_function = |_: f64, damping: f64| Some(if damping < 137.3 { 1.0 } else { -0.6 });
+    for row in &traced(step_function, &masses(12), &SEARCH).curves[0] {
         let edge = row.edges[0];
-        assert_eq!((edge.kind, edge.at), (EdgeKind::Jump, None));
+        assert_eq!((edge.kind, edge.position), (EdgeKind::Jump, None));
         let [low, high] = edge.bracket.unwrap();
         assert!(low < 137.3 && 137.3 <= high && high - low <= 0.5 / 16.0);
     }
     let steep = |_: f64, damping: f64| Some(((137.3 - damping) * 5.0).clamp(-0.6, 1.0));
     for row in &traced(steep, &masses(12), &SEARCH).curves[0] {
         assert_eq!(row.edges[0].kind, EdgeKind::Crossing);
-        assert!((row.edges[0].at.unwrap() - 137.3).abs() < 0.03, "{row:?}");
+        assert!((row.edges[0].position.unwrap() - 137.3).abs() < 0.03, "{row:?}");
     }
 }
 
@@ -142,18 +145,19 @@ fn several_crossings_are_several_edges() {
             .map(|k| 20.0 * row.first + 25.0 * std::f64::consts::PI * f64::from(k))
             .filter(|root| (60.0..300.0).contains(root))
             .collect();
-        let found: Vec<f64> = row.edges.iter().map(|edge| edge.at.unwrap()).collect();
-        assert_eq!(found.len(), roots.len(), "{}", row.first);
+        let positions: Vec<f64> = row.edges.iter().map(|edge| edge.position.unwrap()).collect();
+        assert_eq!(positions.len(), roots.len(), "{}", row.first);
         assert!(
-            found.iter().zip(&roots).all(|(found, root)| (found - root).abs() < 0.1),
-            "{found:?} {roots:?}"
+            positions.iter().zip(&roots).all(|(position, root)| (position - root).abs() < 0.1),
+            "{positions:?} {roots:?}"
         );
     }
 }
 
 #[test]
 fn an_island_as_wide_as_two_cells_is_found_in_every_row_it_spans() {
-    // A reliable disc in an unreliable plane, and the other way round.
+    // The first case is a reliable disc in an unreliable plane, the second an unreliable disc in a
+    // reliable plane.
     for sign in [1.0, -1.0] {
         let disc = |mass: f64, damping: f64| {
             let x = (mass - 0.5) / 0.3;
@@ -167,17 +171,18 @@ fn an_island_as_wide_as_two_cells_is_found_in_every_row_it_spans() {
             if x.abs() < 0.97 {
                 assert_eq!(row.edges.len(), 2, "{row:?}");
             } else if x.abs() > 1.0 {
-                let none =
+                let has_no_edge =
                     if sign > 0.0 { EdgeKind::NoneUnreliable } else { EdgeKind::NoneReliable };
-                assert_eq!(row.edges[0].kind, none, "{row:?}");
+                assert_eq!(row.edges[0].kind, has_no_edge, "{row:?}");
             }
         }
     }
 }
 
-/// A function like Fig. 12 beyond 0.94 kg: a cliff ends in a dip of one to three N s/m below the
-/// limit before the ratio rises once more; at smaller masses the dip stays above it.
-fn folded(mass: f64, damping: f64) -> Option<f64> {
+/// Returns a distance similar to that of Fig. 12 beyond 0.94 kg: a cliff ends in a dip of one to
+/// three N s/m below the limit before the ratio rises once more. At smaller masses the dip stays
+/// above the limit.
+fn distance_with_dip(mass: f64, damping: f64) -> Option<f64> {
     let x = damping - 230.0 * (mass - 1.0);
     let cliff = 0.25 * (246.5 - x);
     let tail = 0.036 * (248.1 - x);
@@ -188,8 +193,8 @@ fn folded(mass: f64, damping: f64) -> Option<f64> {
 
 #[test]
 fn a_narrow_dip_beside_the_crossing_is_found_and_followed() {
-    let traced = traced(folded, &masses(39), &SEARCH);
-    check_edges(&traced, folded, 0.5);
+    let traced = traced(distance_with_dip, &masses(39), &SEARCH);
+    check_edges(&traced, distance_with_dip, 0.5);
     let edges: Vec<usize> =
         traced.curves[0].iter().rev().take(5).map(|row| row.edges.len()).collect();
     assert_eq!(edges, [3, 3, 3, 1, 1]);
@@ -213,10 +218,10 @@ fn a_pocket_that_ends_between_rows_is_found_up_to_its_last_row() {
     for (row, height) in rows.iter().zip(&heights).skip(1) {
         let mut expected = vec![bottom(*height)];
         expected.extend((*height < 0.12).then_some(180.0));
-        let found: Vec<f64> = row.edges.iter().filter_map(|edge| edge.at).collect();
+        let positions: Vec<f64> = row.edges.iter().filter_map(|edge| edge.position).collect();
         let is_near = |(a, b): (&f64, &f64)| (a - b).abs() < 0.1;
         assert!(
-            found.len() == expected.len() && found.iter().zip(&expected).all(is_near),
+            positions.len() == expected.len() && positions.iter().zip(&expected).all(is_near),
             "{row:?}"
         );
     }
@@ -233,8 +238,8 @@ fn a_pocket_found_late_is_followed_through_every_row() {
     let traced = traced(tongue, &masses(39), &SEARCH);
     check_edges(&traced, tongue, 0.5);
     for row in &traced.curves[0] {
-        let has_it = ((row.first - 0.55) / 0.3).abs() < 0.9;
-        assert!(row.edges.len() == 2 || !has_it, "{row:?}");
+        let crosses_tongue = ((row.first - 0.55) / 0.3).abs() < 0.9;
+        assert!(row.edges.len() == 2 || !crosses_tongue, "{row:?}");
     }
 }
 
@@ -247,7 +252,7 @@ fn pockets_are_found_once_a_cell_fits_into_them() {
         Some(if inside { 0.5 } else { -0.5 })
     };
     let search = SearchRange { least: 4.0, greatest: 30.0, tolerance: 0.02, ..SEARCH };
-    // Cells of 0.299 s.
+    // These cells are 0.299 s wide.
     let traced = traced(distance, &masses(3), &SearchRange { lattice: 87, ..search });
     check_edges(&traced, distance, 0.02);
     assert!(traced.curves[0].iter().all(|row| row.edges.len() == 6), "{traced:?}");
@@ -255,20 +260,21 @@ fn pockets_are_found_once_a_cell_fits_into_them() {
 
 #[test]
 fn undefined_quantities_are_reported() {
-    let broken =
-        |mass: f64, damping: f64| if damping < 100.0 { None } else { like_fig12(mass, damping) };
+    let partly_undefined = |mass: f64, damping: f64| {
+        if damping < 100.0 { None } else { fig12_distance(mass, damping) }
+    };
     let rows_of = |distance: &dyn Fn(f64, f64) -> Option<f64>, firsts: &[f64]| {
         traced(distance, firsts, &SEARCH).curves.remove(0)
     };
-    let rows = rows_of(&broken, &[0.2, 0.6]);
+    let rows = rows_of(&partly_undefined, &[0.2, 0.6]);
     let kinds: Vec<Vec<EdgeKind>> =
         rows.iter().map(|row| row.edges.iter().map(|edge| edge.kind).collect()).collect();
     assert_eq!(kinds, [vec![EdgeKind::Undefined], vec![EdgeKind::Undefined, EdgeKind::Crossing]]);
-    assert_eq!(rows[0].edges[0].at, None);
-    let nothing = rows_of(&|_, _| None, &masses(5));
-    assert!(nothing.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
-    let nan = rows_of(&|_, _| Some(f64::NAN), &masses(5));
-    assert!(nan.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
+    assert_eq!(rows[0].edges[0].position, None);
+    let undefined_rows = rows_of(&|_, _| None, &masses(5));
+    assert!(undefined_rows.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
+    let nan_rows = rows_of(&|_, _| Some(f64::NAN), &masses(5));
+    assert!(nan_rows.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
 }
 
 #[test]
@@ -276,7 +282,7 @@ fn a_row_without_an_edge_has_no_number() {
     for (distance, kind) in [(-1.0, EdgeKind::NoneReliable), (1.0, EdgeKind::NoneUnreliable)] {
         let traced = traced(|_, _| Some(distance), &masses(39), &SEARCH);
         for row in &traced.curves[0] {
-            let edge = Edge { kind, at: None, bracket: None, distances: [None; 2] };
+            let edge = Edge { kind, position: None, bracket: None, distances: [None; 2] };
             assert_eq!(row.edges, [edge]);
         }
     }
@@ -320,24 +326,33 @@ fn logarithmic_axes_are_searched_in_their_logarithms() {
         let edge = row.edges[0];
         let [low, high] = edge.bracket.unwrap();
         assert!((high / low).ln() <= 0.0101, "{edge:?}");
-        assert!((edge.at.unwrap() / line(row.first)).ln().abs() < 0.005);
+        assert!((edge.position.unwrap() / line(row.first)).ln().abs() < 0.005);
     }
 }
 
 #[test]
 fn curves_share_batches() {
-    let shifted = |trials: &[BoundaryTrial]| -> Result<_, Infallible> {
-        let distance = |t: &BoundaryTrial| like_fig12(t.first, t.second - 9.0 * t.curve as f64);
+    let evaluate_shifted = |trials: &[BoundaryTrial]| -> Result<_, Infallible> {
+        let distance = |t: &BoundaryTrial| fig12_distance(t.first, t.second - 9.0 * t.curve as f64);
         Ok(trials.iter().map(distance).collect())
     };
     let firsts = masses(39);
-    let [Ok(one), Ok(three)] = [1, 3].map(|n| trace(&shifted, &firsts, n, &SEARCH, &mut |_| {}));
-    assert!(three.rounds <= one.rounds + 4, "{} for {}", three.rounds, one.rounds);
-    for (k, rows) in three.curves.iter().enumerate() {
+    let [Ok(one_curve), Ok(three_curves)] =
+        [1, 3].map(|n| trace(&evaluate_shifted, &firsts, n, &SEARCH, &mut |_| {}));
+    assert!(
+        three_curves.rounds <= one_curve.rounds + 4,
+        "{} for {}",
+        three_curves.rounds,
+        one_curve.rounds
+    );
+    for (k, rows) in three_curves.curves.iter().enumerate() {
         for row in rows {
             let line = line(row.first) + 9.0 * k as f64;
-            let found = row.edges[0].at;
-            assert!(found.map_or(line <= 60.0, |at| (at - line).abs() < 0.2), "{k}: {row:?}");
+            let position = row.edges[0].position;
+            assert!(
+                position.map_or(line <= 60.0, |position| (position - line).abs() < 0.2),
+                "{k}: {row:?}"
+            );
         }
     }
 }
@@ -348,21 +363,21 @@ fn rows_in_any_order_give_the_same_edges() {
     let mut shuffled = firsts.clone();
     shuffled.swap(0, 7);
     shuffled.reverse();
-    let mut rows = traced(like_fig12, &shuffled, &SEARCH).curves.remove(0);
+    let mut rows = traced(fig12_distance, &shuffled, &SEARCH).curves.remove(0);
     rows.sort_by(|a, b| a.first.total_cmp(&b.first));
-    assert_eq!(rows, traced(like_fig12, &firsts, &SEARCH).curves[0]);
+    assert_eq!(rows, traced(fig12_distance, &firsts, &SEARCH).curves[0]);
 }
 
 #[test]
 fn an_evaluator_that_stops_ends_the_search() {
     let batches = Cell::new(0);
-    let third = |trials: &[BoundaryTrial]| {
+    let stop_at_third = |trials: &[BoundaryTrial]| {
         batches.set(batches.get() + 1);
         if batches.get() == 3 {
             return Err("enough");
         }
-        Ok(trials.iter().map(|t| like_fig12(t.first, t.second)).collect())
+        Ok(trials.iter().map(|t| fig12_distance(t.first, t.second)).collect())
     };
-    let ended = trace(&third, &masses(9), 1, &SEARCH, &mut |_| {});
-    assert_eq!(ended, Err("enough"));
+    let result = trace(&stop_at_third, &masses(9), 1, &SEARCH, &mut |_| {});
+    assert_eq!(result, Err("enough"));
 }

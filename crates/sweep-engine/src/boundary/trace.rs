@@ -1,9 +1,9 @@
-//! The trace of all lines: the lattice first, then the lines between, each as soon as the lines
-//! that it is predicted from are traced, and again where neighbours disagree.
+//! The trace of all lines: the lattice lines first, then each line between them as soon as the
+//! lines from which it is predicted are traced. A line continues if neighbours disagree with it.
 //!
-//! Every line that passes a rectangle shows its side there, if the rectangle is as large as a cell
-//! of the lattice, along both axes, and all on one side. The proof is by induction over the order
-//! in which lines begin:
+//! Claim: if a rectangle is at least as large as a lattice cell along both axes, and all of it is
+//! on one side, then every line through the rectangle has an interval of that side in it. The proof
+//! is by induction over the order in which lines begin:
 //!
 //! - A line that is evaluated at the lattice's columns has a sample in the rectangle. Lattice lines
 //!   are, and at least one of them passes the rectangle.
@@ -15,61 +15,62 @@
 //!   two the outer is on another side, so it is outside of the rectangle, and the crossing between
 //!   the two is as well. So the interval between these crossings spans the rectangle.
 
-use super::continuation::{DISPUTED_PART, LinePair, Neighbour, PredictedSide, predict};
+use super::continuation::{DISPUTED_FRACTION, LinePair, Neighbour, PredictedSide, predict};
 use super::lattice::{PlannedLine, columns, plan_lines};
 use super::line::LineSearch;
 use super::lipschitz;
-use super::sample::{LineSample, SideInterval, Span, position};
+use super::sample::{LineSample, SideInterval, Span, coordinate};
 use super::{BoundaryRow, BoundaryTrial, SearchRange, TracedBoundary};
 
-/// Lines that are traced at once, in whole curves. Basis: some ten megabytes, and plenty to fill
-/// lanes. Doubling it doubles the memory.
-const LINES_AT_ONCE: usize = 1 << 14;
-/// The most samples that a line takes because its neighbours disagree with it. Basis: the trace of
-/// any function ends (test `the_search_of_noise_ends`). Doubling it doubles the trials of noise.
-const DISPUTED_MAX: usize = 64;
-/// The narrowest gap on a lattice line that is searched for pairs of roots, as a part of a lattice
-/// cell. Basis: three bisections. Doubling it loses the folds of `sweeps/fig12.toml`.
-const FINEST_PART: f64 = 0.125;
+/// The greatest number of lines that are traced at once, in whole curves. Basis: they take some ten
+/// megabytes, and give trials enough to fill lanes. Doubling it doubles the memory.
+const MAX_BLOCK_LINES: usize = 1 << 14;
+/// The greatest number of samples that a line takes because its neighbours disagree with it. Basis:
+/// it makes the trace of any function end (test `the_search_of_noise_ends`). Doubling it doubles
+/// the trials of noise.
+const MAX_DISPUTED_SAMPLES: usize = 64;
+/// The narrowest gap on a lattice line that is searched for pairs of roots, as a fraction of a
+/// lattice cell. Basis: three bisections. Doubling it loses the folds of `sweeps/fig12.toml`.
+const MIN_GAP_FRACTION: f64 = 0.125;
 
 /// Traces `curves` curves over these values of the first axis. `evaluate` returns one signed
-/// distance from the limit per trial, in the same order: negative on the reliable side, `None`
-/// where the quantity is not defined. Before every batch `tell` hears how many lines are traced,
-/// unless a neighbour will disagree.
+/// distance from the limit for each trial, in the same order: negative on the reliable side, `None`
+/// where the quantity is not defined. Before every batch, `report_lines` receives the number of
+/// lines that are traced; a later disagreement of neighbours can reduce that number.
 ///
 /// # Errors
-/// Whatever stopped the evaluation.
+/// The error with which `evaluate` stopped.
 pub fn trace<E>(
     evaluate: &dyn Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, E>,
     firsts: &[f64],
     curves: usize,
     search: &SearchRange,
-    tell: &mut dyn FnMut(usize),
+    report_lines: &mut dyn FnMut(usize),
 ) -> Result<TracedBoundary, E> {
-    let mut traced =
+    let mut boundary =
         TracedBoundary { curves: Vec::with_capacity(curves), ..TracedBoundary::default() };
-    let at_once = (LINES_AT_ONCE / firsts.len().max(1)).max(1);
-    while traced.curves.len() < curves {
-        let begun = traced.curves.len();
-        let end = (begun + at_once).min(curves);
-        let mut block = Block::new(begun..end, firsts, search);
+    let curves_at_once = (MAX_BLOCK_LINES / firsts.len().max(1)).max(1);
+    while boundary.curves.len() < curves {
+        let first_curve = boundary.curves.len();
+        let end = (first_curve + curves_at_once).min(curves);
+        let mut block = Block::new(first_curve..end, firsts, search);
         loop {
             let batch = block.next_batch();
             if batch.is_empty() {
                 break;
             }
-            tell(begun * firsts.len() + block.lines_traced());
+            report_lines(first_curve * firsts.len() + block.lines_traced());
             let trials: Vec<BoundaryTrial> = batch.iter().map(|request| request.trial).collect();
             let distances = evaluate(&trials)?;
             for (request, distance) in batch.iter().zip(distances) {
                 block.insert(request, distance);
             }
-            traced.trials += trials.len();
-            traced.rounds += 1;
+            boundary.trials += trials.len();
+            boundary.rounds += 1;
         }
-        traced.curves.extend(block.finish());
+        boundary.curves.extend(block.finish());
     }
-    Ok(traced)
+    Ok(boundary)
 }
 
 /// A trial, with the line that needs it: its curve within the block, its rank along the first axis,
@@ -78,7 +79,7 @@ struct TrialRequest {
     trial: BoundaryTrial,
     curve: usize,
     rank: usize,
-    at: f64,
+    position: f64,
 }
 
 /// Curves that are traced together.
@@ -100,11 +101,12 @@ struct Block<'a> {
 struct LineState {
     /// The search, once it has begun.
     search: Option<LineSearch>,
-    /// The sides of its first samples by its parents, until they are compared.
+    /// The sides that the parents predict for the first samples, until they are compared with these
+    /// samples.
     predicted: Vec<PredictedSide>,
     /// The intervals of one side, while all brackets are narrow.
     intervals: Option<Vec<SideInterval>>,
-    /// Whether it needs nothing more, unless a neighbour disagrees.
+    /// Whether the line needs no further samples, unless a neighbour disagrees.
     is_traced: bool,
     /// The number of samples taken because neighbours disagree.
     disputed: usize,
@@ -115,7 +117,7 @@ impl<'a> Block<'a> {
         let span = search.span();
         let cells = search.lattice.max(1);
         let places: Vec<f64> =
-            firsts.iter().map(|first| position(*first, search.first_log)).collect();
+            firsts.iter().map(|first| coordinate(*first, search.first_log)).collect();
         Self {
             first_curve: curves.start,
             firsts,
@@ -156,10 +158,10 @@ impl<'a> Block<'a> {
     /// Adds the trials that a line needs next to the batch.
     fn advance(&mut self, curve: usize, rank: usize, batch: &mut Vec<TrialRequest>) {
         let first = self.firsts[self.lines[rank].index];
-        for at in self.next_places(curve, rank) {
-            let second = self.search.value(at);
+        for position in self.next_places(curve, rank) {
+            let second = self.search.value(position);
             let trial = BoundaryTrial { curve: self.first_curve + curve, first, second };
-            batch.push(TrialRequest { trial, curve, rank, at });
+            batch.push(TrialRequest { trial, curve, rank, position });
         }
     }
 
@@ -177,23 +179,23 @@ impl<'a> Block<'a> {
                 search.request(self.columns.iter().copied(), &span);
             }
         }
-        let places = search.take_places(&span);
-        if !places.is_empty() {
+        let positions = search.take_places(&span);
+        if !positions.is_empty() {
             state.intervals = None;
-            return places;
+            return positions;
         }
         // Other lines begin from these intervals while the search for pairs of roots goes on.
         state.intervals = Some(search.intervals(&span));
         if self.lines[rank].is_lattice_line() {
-            let finest = (FINEST_PART * self.cell).max(span.tolerance);
-            search.request(lipschitz::candidates(search.samples(), finest), &span);
+            let min_gap = (MIN_GAP_FRACTION * self.cell).max(span.tolerance);
+            search.request(lipschitz::candidates(search.samples(), min_gap), &span);
         }
-        let places = search.take_places(&span);
-        state.is_traced = places.is_empty();
-        places
+        let positions = search.take_places(&span);
+        state.is_traced = positions.is_empty();
+        positions
     }
 
-    /// Whether all brackets are narrow on the lines that a line is predicted from.
+    /// Whether all brackets are narrow on the parents of a line.
     fn may_begin(&self, curve: usize, rank: usize) -> bool {
         let mut parents = self.lines[rank].parents.iter().flatten();
         parents.all(|parent| self.neighbour(curve, *parent).is_some())
@@ -203,14 +205,16 @@ impl<'a> Block<'a> {
     /// lattice.
     fn begin(&mut self, curve: usize, rank: usize) {
         let line = &self.lines[rank];
-        let traced = |ranks: &Vec<usize>| {
+        let find_parents = |ranks: &Vec<usize>| {
             ranks.iter().filter_map(|rank| self.neighbour(curve, *rank)).collect()
         };
-        let parents = line.parents.each_ref().map(traced);
+        let parents = line.parents.each_ref().map(find_parents);
         let mut search = LineSearch::default();
-        let predicted = predict(line.at, &parents, self.cell, &self.span);
+        let predicted = predict(line.position, &parents, self.cell, &self.span);
         match &predicted {
-            Some(sides) => search.request(sides.iter().map(|predicted| predicted.at), &self.span),
+            Some(sides) => {
+                search.request(sides.iter().map(|predicted| predicted.position), &self.span)
+            }
             None => search.request(self.columns.iter().copied(), &self.span),
         }
         let state = &mut self.curves[curve][rank];
@@ -218,35 +222,36 @@ impl<'a> Block<'a> {
         state.predicted = predicted.unwrap_or_default();
     }
 
-    /// Returns a line as others see it, if all its brackets are narrow.
+    /// Returns a line for comparison with others, if all its brackets are narrow.
     fn neighbour(&self, curve: usize, rank: usize) -> Option<Neighbour<'_>> {
         let intervals = self.curves[curve].get(rank)?.intervals.as_ref()?;
-        Some(Neighbour { at: self.lines[rank].at, intervals })
+        Some(Neighbour { position: self.lines[rank].position, intervals })
     }
 
-    /// Returns the positions that subdivide the intervals that neighbours dispute, by rank.
+    /// Returns, by rank, the positions that subdivide the intervals about which neighbours
+    /// disagree.
     fn disputes(&self, curve: usize) -> Vec<(usize, Vec<f64>)> {
         let mut disputes = Vec::new();
         for (rank, state) in self.curves[curve].iter().enumerate() {
-            if !state.is_traced || state.disputed >= DISPUTED_MAX {
+            if !state.is_traced || state.disputed >= MAX_DISPUTED_SAMPLES {
                 continue;
             }
             let Some(search) = &state.search else { continue };
             let Some(own) = self.neighbour(curve, rank) else { continue };
-            let mut places = Vec::new();
+            let mut positions = Vec::new();
             for step in [-1, 1] {
-                let at_offset = |offset| self.neighbour(curve, rank.checked_add_signed(offset)?);
-                let Some(neighbour) = at_offset(step) else { continue };
-                let pair = LinePair { own, neighbour, beyond: at_offset(2 * step) };
+                let neighbour_at = |offset| self.neighbour(curve, rank.checked_add_signed(offset)?);
+                let Some(neighbour) = neighbour_at(step) else { continue };
+                let pair = LinePair { own, neighbour, second_neighbour: neighbour_at(2 * step) };
                 for interval in pair.disputed(self.cell, &self.span) {
                     let width = interval[1] - interval[0];
-                    let widest = DISPUTED_PART * self.cell.min(width);
-                    let widest = widest.max(0.5 * self.span.tolerance);
-                    places.extend(search.subdivide(interval, widest, &self.span));
+                    let max_gap = DISPUTED_FRACTION * self.cell.min(width);
+                    let max_gap = max_gap.max(0.5 * self.span.tolerance);
+                    positions.extend(search.subdivide(interval, max_gap, &self.span));
                 }
             }
-            if !places.is_empty() {
-                disputes.push((rank, places));
+            if !positions.is_empty() {
+                disputes.push((rank, positions));
             }
         }
         disputes
@@ -255,7 +260,7 @@ impl<'a> Block<'a> {
     fn insert(&mut self, request: &TrialRequest, distance: Option<f64>) {
         let distance = distance.filter(|distance| !distance.is_nan());
         if let Some(search) = &mut self.curves[request.curve][request.rank].search {
-            search.insert(LineSample { at: request.at, distance });
+            search.insert(LineSample { position: request.position, distance });
         }
     }
 
@@ -265,7 +270,7 @@ impl<'a> Block<'a> {
 
     /// Returns the traced rows of every curve, in the order of the first axis's values.
     fn finish(self) -> Vec<Vec<BoundaryRow>> {
-        let value = |at: f64| self.search.value(at);
+        let value = |position: f64| self.search.value(position);
         let mut ranks: Vec<usize> = (0..self.lines.len()).collect();
         ranks.sort_by_key(|rank| self.lines[*rank].index);
         let mut curves = Vec::with_capacity(self.curves.len());

@@ -76,12 +76,12 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
     if stored_points > 0 {
         tell(&format!("going on: {} there", counted(stored_points as usize, "point")));
     }
-    let began = Instant::now();
+    let start = Instant::now();
     let execution = args.execution.with(&interrupt);
     let (traced, trials) = search(&task, Some(trials), execution)?;
     let Some(traced) = traced else {
         let stored_points = counted(trials.map_or(0, |trials| trials.count()), "point");
-        let wall = duration(began.elapsed().as_secs_f64());
+        let wall = duration(start.elapsed().as_secs_f64());
         let mut text =
             format!("{}: interrupted with {stored_points} kept, after {wall}\n", plan.name);
         text.line("go on", resume_command());
@@ -92,7 +92,7 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let text = summary(&task, &traced, began.elapsed().as_secs_f64());
+    let text = summary(&task, &traced, start.elapsed().as_secs_f64());
     Ok(print_summary(text, &output))
 }
 

@@ -58,7 +58,8 @@ pub fn format_cell(cell: &Cell) -> String {
 
 /// Shortens a text to fit a line, because a file of another program may have very long texts.
 pub fn shorten(text: &str) -> String {
-    /// The maximum number of characters. Basis: the width of a terminal.
+    /// The maximum number of characters. Basis: the width of a terminal. Doubling it fills two
+    /// lines.
     const MAX_CHARACTERS: usize = 80;
     match text.char_indices().nth(MAX_CHARACTERS) {
         Some((end, _)) => format!("{}... ({} characters)", &text[..end], text.chars().count()),

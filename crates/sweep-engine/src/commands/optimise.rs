@@ -86,10 +86,10 @@ pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
-    let began = Instant::now();
+    let start = Instant::now();
     let execution = args.execution.with(&interrupt);
     let (candidates, trials) = search(&study, Some(trials), execution)?;
-    let wall_s = began.elapsed().as_secs_f64();
+    let wall_s = start.elapsed().as_secs_f64();
     let Some(candidates) = candidates else {
         let wall = duration(wall_s);
         let mut text = format!("{}: interrupted after {wall}\n", study.name);
@@ -314,15 +314,17 @@ fn summarise<M: Model>(
     let listing_interval = front.len().div_ceil(MAX_LISTED).max(1);
     let is_best = |cells: &[Cell]| cells[0].number() == optimum["best"].as_f64();
     // The best candidate is always listed, and the nearest one if none is feasible.
-    let listed = front.iter().enumerate();
-    let listed = listed.filter(|(k, cells)| k % listing_interval == 0 || is_best(cells));
-    let listed = listed.map(|(_, cells)| cells).chain(&nearest_cells);
+    let listed_candidates = front.iter().enumerate();
+    let listed_candidates =
+        listed_candidates.filter(|(k, cells)| k % listing_interval == 0 || is_best(cells));
+    let listed_candidates = listed_candidates.map(|(_, cells)| cells).chain(&nearest_cells);
     let row_texts =
         |cells: &[Cell]| cells.iter().take(1).chain(&cells[3..]).map(format_cell).collect();
     let headings: Vec<String> =
         names.iter().take(1).chain(&names[3..]).map(|&name| name.to_owned()).collect();
-    let listed: Vec<Vec<String>> = listed.map(|cells| row_texts(cells)).collect();
-    text.push_str(&format_table(&headings, &listed, "  "));
+    let listed_candidates: Vec<Vec<String>> =
+        listed_candidates.map(|cells| row_texts(cells)).collect();
+    text.push_str(&format_table(&headings, &listed_candidates, "  "));
     if let Some((path, file)) = own_file_output {
         let own_text = values.as_deref().and_then(|values| own_file(study, values));
         match chosen_candidate.zip(own_text) {

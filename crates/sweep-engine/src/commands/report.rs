@@ -95,20 +95,20 @@ pub fn run<M: Model>(
     let mut all_hold = true;
     let mut requirement_rows = Vec::new();
     for condition in &requirements {
-        let checked = check(&file, condition, None, false, 1)?;
-        all_hold &= checked.holds;
+        let condition_check = check(&file, condition, None, false, 1)?;
+        all_hold &= condition_check.holds;
         let aggregate_values: Vec<String> =
-            checked.aggregate_values.iter().map(format_cell).collect();
-        let violating_rows = checked.failing + checked.undefined;
-        let outcome = match checked.by_row {
-            true => format!("{violating_rows} of {} rows break it", checked.rows),
+            condition_check.aggregate_values.iter().map(format_cell).collect();
+        let violating_rows = condition_check.failing + condition_check.undefined;
+        let outcome = match condition_check.by_row {
+            true => format!("{violating_rows} of {} rows break it", condition_check.rows),
             false => aggregate_values.join(", "),
         };
-        let verdict = if checked.holds { "holds" } else { "FAILS" };
-        if !checked.holds {
-            tell(&format!("FAILS  {}: {outcome}", checked.expression));
+        let verdict = if condition_check.holds { "holds" } else { "FAILS" };
+        if !condition_check.holds {
+            tell(&format!("FAILS  {}: {outcome}", condition_check.expression));
         }
-        requirement_rows.push(vec![checked.expression, outcome, verdict.to_owned()]);
+        requirement_rows.push(vec![condition_check.expression, outcome, verdict.to_owned()]);
     }
     body += &html_table("What is required", &["", "found", ""], &requirement_rows);
     body += &format!("<figure>{picture}</figure>\n");

@@ -263,15 +263,15 @@ fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Val
     });
     if let Some(result) = &file.result {
         let tally = tally(opened)?;
-        let places = extreme_locations(opened, result, &tally)?;
-        let places = places
+        let locations = extreme_locations(opened, result, &tally)?;
+        let locations = locations
             .into_iter()
             .map(|(point, values)| (point.to_string(), values.into_iter().collect::<Value>()));
         json["version"] = json!(result.version);
         json["numerics"] = json!(result.numerics);
         json["plan_hash"] = json!(result.plan_hash);
         json["summary"] = json!(tally);
-        json["points"] = places.collect();
+        json["points"] = locations.collect();
     }
     Ok(json)
 }
@@ -356,14 +356,14 @@ fn axes(plan: &Value) -> &[Value] {
 /// number of others.
 fn add_columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> bool) {
     text.line("rows", file.rows);
-    let shown: Vec<&ColumnRange> =
+    let shown_columns: Vec<&ColumnRange> =
         file.columns.iter().filter(|column| all || is_shown(&column.name)).collect();
-    let width = shown.iter().map(|column| column.name.len()).max().unwrap_or(0);
-    for column in &shown {
+    let width = shown_columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
+    for column in &shown_columns {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "    {:width$}  {}", column.name, describe_range(column));
     }
-    let others = file.columns.len() - shown.len();
+    let others = file.columns.len() - shown_columns.len();
     if others > 0 {
         text.line("columns", format!("{others} more, shown by --all"));
     }

@@ -71,12 +71,12 @@ fn summary(
     if folder_status.state == RunStage::Finished || folder_status.state == RunStage::NotStarted {
         return text;
     }
-    let damaged = match folder_status.chunks_damaged.len() {
+    let damaged_note = match folder_status.chunks_damaged.len() {
         0 => String::new(),
         count => format!(" ({count} of them damaged)"),
     };
     let chunks = format!(
-        "{} of {} done, {} missing{damaged}",
+        "{} of {} done, {} missing{damaged_note}",
         folder_status.chunks_done, folder_status.chunks, folder_status.chunks_missing
     );
     text.line("chunks", &chunks);

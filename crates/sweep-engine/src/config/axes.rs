@@ -10,64 +10,64 @@ use super::report::{Diagnostic, Report};
 use super::section::check_number;
 use super::{Draft, Field, Located, Location, Section, quoted, refused_number, short};
 use crate::Model;
-use crate::design::{DesignRule, DistributionShape, MOST_AXES, TAIL_DEVIATIONS};
+use crate::design::{DesignRule, DistributionShape, MAX_AXES, TAIL_DEVIATIONS};
 use crate::plan::MAX_POINTS;
 use crate::{Axis, AxisTolerance, AxisValues, Design, Distribution, ModelParameter};
 
 /// Claims the numbers that an axis writes. Returns false, after a report, if another axis writes
-/// them. `is_about` says that the axis is a tolerance about the model's own number.
+/// one of them. `has_tolerance` is true for an axis with a tolerance about the model's own number.
 fn claim<M: Model>(
     name: &Located<&str>,
     parameter: &ModelParameter<M>,
-    swept: &mut ClaimedNumbers,
-    is_about: bool,
+    claimed: &mut ClaimedNumbers,
+    has_tolerance: bool,
     draft: &Draft<'_, M>,
 ) -> bool {
     let report = draft.report;
     let parts = &parameter.parts;
-    if !swept.claim(name, parts.clone(), report) {
+    if !claimed.claim(name, parts.clone(), report) {
         return false;
     }
-    // A tolerance lies about the constant, so that the constant has an effect.
-    for constant in draft.constants.iter().filter(|_| !is_about) {
+    // The constant has an effect on a tolerance, as its nominal value.
+    for constant in draft.constants.iter().filter(|_| !has_tolerance) {
         if constant.parameter.parts.iter().all(|part| parts.contains(part)) {
             let title = format!(
                 "`{}` is swept by an axis: this constant has no effect",
                 constant.name.value
             );
             let diagnostic = Diagnostic::new(title)
-                .at(&constant.name.at, "expected a parameter that no axis sweeps");
-            report.push(diagnostic.at(&name.at, "swept here"));
+                .at(&constant.name.location, "expected a parameter that no axis sweeps");
+            report.push(diagnostic.at(&name.location, "swept here"));
         }
     }
     true
 }
 
-/// Returns whether options fix all numbers of an axis, which then sweeps nothing.
-fn is_fixed<M: Model>(parameter: &ModelParameter<M>, draft: &Draft<'_, M>) -> bool {
-    let parts = &parameter.parts;
-    let mut options = draft.constants.iter().filter(|constant| constant.is_over_file);
+/// Returns whether options fix all numbers of an axis, so that it sweeps nothing.
+fn is_fixed<M: Model>(swept_parameter: &ModelParameter<M>, draft: &Draft<'_, M>) -> bool {
+    let parts = &swept_parameter.parts;
+    let mut options = draft.constants.iter().filter(|constant| constant.overrides_file);
     options.any(|constant| parts.iter().all(|part| constant.parameter.parts.contains(part)))
 }
 
 /// Reads every `[[axis]]`: the values of a grid, or the ranges of a design.
 pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
     let report = root.report;
-    let mut swept = ClaimedNumbers::default();
+    let mut claimed = ClaimedNumbers::default();
     let sections = root.tables("axis");
-    if let (Some(design), Some(at)) = (&design, report.place("design")) {
-        let most = if matches!(design, Design::Spread { rule: DesignRule::Sobol, .. }) {
-            MOST_AXES
+    if let (Some(design), Some(location)) = (&design, report.place("design")) {
+        let max_count = if matches!(design, Design::Spread { rule: DesignRule::Sobol, .. }) {
+            MAX_AXES
         } else {
             usize::MAX
         };
-        if sections.is_empty() || sections.len() > most {
+        if sections.is_empty() || sections.len() > max_count {
             let title = format!("a design by \"{}\" over {} axes", design.method(), sections.len());
-            let expected = match most {
+            let expected = match max_count {
                 usize::MAX => "expected at least one [[axis]] with a range".to_owned(),
-                most => format!("expected from 1 to {most} [[axis]], each with a range"),
+                max_count => format!("expected from 1 to {max_count} [[axis]], each with a range"),
             };
-            report.refuse::<()>(&at, title, expected);
+            report.refuse::<()>(&location, title, expected);
         }
     }
     let mut points: Option<u64> = Some(1);
@@ -75,13 +75,13 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
         let field = section.text("parameter");
         let name = section.require(field, "parameter", "the name of a parameter");
         let parameter = name.as_ref().and_then(|name| find(name, draft));
-        let own = parameter.as_ref().map(|parameter| SweptFacts::new(parameter, draft));
-        let own = own.unwrap_or(SweptFacts { name: "", range: Range::Any, value: None });
+        let swept = parameter.as_ref().map(|parameter| SweptParameter::new(parameter, draft));
+        let swept = swept.unwrap_or(SweptParameter { name: "", range: Range::Any, value: None });
         let values = match &design {
-            Some(design) => extent(&section, &own, design.points()),
-            None => values(&section, &own),
+            Some(design) => read_design_values(&section, &swept, design.points()),
+            None => values(&section, &swept),
         };
-        let is_about = section.key_at("tolerance").is_some()
+        let has_tolerance = section.key_at("tolerance").is_some()
             || section.key_inside("distribution", "tolerance");
         section.finish();
         if parameter.as_ref().is_some_and(|parameter| is_fixed(parameter, draft)) {
@@ -95,16 +95,16 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
                 let title =
                     format!("too many grid points: {points} before this axis, times {count}");
                 let expected = format!("expected at most {MAX_POINTS} in all");
-                report.refuse::<()>(&values.at, title, expected);
+                report.refuse::<()>(&values.location, title, expected);
             }
             points = product;
         }
         if let (Some(name), Some(parameter)) = (name, parameter)
-            && claim(&name, &parameter, &mut swept, is_about, draft)
-            && let (Some(Located { value, at }), Some(_)) = (values, points)
+            && claim(&name, &parameter, &mut claimed, has_tolerance, draft)
+            && let (Some(Located { value, location }), Some(_)) = (values, points)
         {
             let SpreadValues { values, tolerance } = value;
-            add(Axis { parameter, values, tolerance }, at, draft);
+            add(Axis { parameter, values, tolerance }, location, draft);
         }
     }
     // A plan whose axes are all fixed is a single point.
@@ -113,8 +113,8 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
 }
 
 /// Adds an axis to the plan.
-pub fn add<M: Model>(axis: Axis<M>, at: Location, draft: &mut Draft<'_, M>) {
-    draft.report.put(format!("axis[{}]", draft.plan.axes.len()), at);
+pub fn add<M: Model>(axis: Axis<M>, location: Location, draft: &mut Draft<'_, M>) {
+    draft.report.put(format!("axis[{}]", draft.plan.axes.len()), location);
     draft.plan.axes.push(axis);
 }
 
@@ -125,51 +125,62 @@ pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Dra
         let expected = "the columns of the list are the axes; remove this";
         report.refuse::<()>(section.at(), "an [[axis]] beside a list of points", expected);
     }
-    let mut swept = ClaimedNumbers::default();
+    let mut claimed = ClaimedNumbers::default();
     list.table.notes().into_iter().for_each(|note| report.note(format!("the list: {note}")));
     for column in std::mem::take(&mut list.table.columns) {
-        let name = Located { value: column.name.value.as_str(), at: column.name.at.clone() };
-        if name.value == list::ID || !column.is_known && is_foreign(&name, draft) {
+        let name =
+            Located { value: column.name.value.as_str(), location: column.name.location.clone() };
+        if name.value == list::ID_COLUMN || !column.is_known && is_unlike_parameters(&name, draft) {
             continue;
         }
         let Some(parameter) = find(&name, draft) else { continue };
         let range = parameter.range;
-        let mut sound = true;
+        let mut is_valid = true;
         for (row, &value) in
             column.values.iter().enumerate().filter(|(_, value)| !range.contains(**value))
         {
-            sound = false;
+            is_valid = false;
             if list.table.is_refused(value) {
                 continue;
             }
             report.push_with(|sources| {
-                let what = format!("value {} of {}", row + 1, quoted(name.value));
-                refused_number(&what, value, &list.table.place(sources, column.place, row), range)
+                let description = format!("value {} of {}", row + 1, quoted(name.value));
+                refused_number(
+                    &description,
+                    value,
+                    &list.table.place(sources, column.place, row),
+                    range,
+                )
             });
         }
-        if claim(&name, &parameter, &mut swept, false, draft) && sound {
+        if claim(&name, &parameter, &mut claimed, false, draft) && is_valid {
             let values = AxisValues::List(column.values);
             let axis = Axis { parameter, values, tolerance: None };
-            add(axis, name.at.clone(), draft);
+            add(axis, name.location.clone(), draft);
         }
     }
     if draft.plan.axes.is_empty() && report.is_clean() {
         let refusal = Diagnostic::new("the list of points has no column of a parameter")
             .help("`[columns]` in the grid file may name what its columns hold");
         let expected = "expected a file whose header names parameters";
-        let at = report.place("design.file");
-        report.push(at.into_iter().fold(refusal, |refusal, at| refusal.at(&at, expected)));
+        let location = report.place("design.file");
+        report.push(
+            location.into_iter().fold(refusal, |refusal, location| refusal.at(&location, expected)),
+        );
     }
     draft.plan.design = Some(list.design);
 }
 
 /// Returns whether a name is so different from all parameters that its column holds something else.
-fn is_foreign<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) -> bool {
+fn is_unlike_parameters<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) -> bool {
     let model = &draft.plan.model;
     let Err(error) = model.find(name.value) else { return false };
-    let all = model.parameters();
-    let near = nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| &*one.name));
-    error.is_in_no_model && near.is_none()
+    let parameters = model.parameters();
+    let nearest_name = nearest(
+        name.value,
+        parameters.iter().take(MAX_COMPARED_NAMES).map(|parameter| &*parameter.name),
+    );
+    error.is_in_no_model && nearest_name.is_none()
 }
 
 /// The kinds of distributions by name, with their numbers; "uniform" is another name of a range.
@@ -179,8 +190,8 @@ pub const DISTRIBUTIONS: [(&str, &[(&str, Range)]); 3] = [
     ("uniform", &[]),
 ];
 
-/// The model's facts about a swept parameter.
-struct SweptFacts<'p> {
+/// A swept parameter, as the model describes it.
+struct SweptParameter<'p> {
     /// The name of the parameter; empty if it is unknown, which has been reported.
     name: &'p str,
     /// The range of valid values.
@@ -189,7 +200,7 @@ struct SweptFacts<'p> {
     value: Option<f64>,
 }
 
-impl<'p> SweptFacts<'p> {
+impl<'p> SweptParameter<'p> {
     fn new<M: Model>(parameter: &'p ModelParameter<M>, draft: &Draft<'_, M>) -> Self {
         let plan = &draft.plan;
         let value = match parameter.window_edge {
@@ -199,12 +210,12 @@ impl<'p> SweptFacts<'p> {
         Self { name: &parameter.name, range: parameter.range, value }
     }
 
-    /// Reads `tolerance`: a range about the model's own number, by a distance in its unit or in
-    /// percent of it.
+    /// Reads `tolerance`: a range about the model's own number, as a distance in the parameter's
+    /// unit or in percent of the number.
     fn tolerance(&self, section: &Section<'_>) -> Field<ToleranceRange> {
         section.text_or_number("tolerance").then(|found| {
             let report = section.report;
-            let at = found.at;
+            let location = found.location;
             let text = found.value.trim();
             let percent = text.strip_suffix('%').map(str::trim_end);
             let number = percent.unwrap_or(text).parse().ok();
@@ -212,36 +223,40 @@ impl<'p> SweptFacts<'p> {
                 let title = format!("`tolerance` = \"{}\" is no tolerance", short(text));
                 let expected = "expected a positive number in the parameter's unit, or percent of \
                     its value as in \"5 %\"";
-                return report.refuse(&at, title, expected);
+                return report.refuse(&location, title, expected);
             };
             if self.name.is_empty() {
                 return None;
             }
-            let Some(middle) = self.value else {
+            let Some(nominal) = self.value else {
                 let title =
                     format!("`{}` has no single number as the middle of a tolerance", self.name);
                 let expected =
                     "expected a range: it sets numbers that differ, or that the model lacks";
-                return report.refuse(&at, title, expected);
+                return report.refuse(&location, title, expected);
             };
-            // This order of operations is exact: 120 less 5 % is 114.
+            // This order of operations is exact for round numbers: 120 less 5 % is 114.
             let [from, to] = match percent {
-                Some(_) => [100.0 - number, 100.0 + number].map(|part| middle * part / 100.0),
-                None => [middle - number, middle + number],
+                Some(_) => [100.0 - number, 100.0 + number].map(|part| nominal * part / 100.0),
+                None => [nominal - number, nominal + number],
             };
             let [from, to] = [from.min(to), from.max(to)];
             for end in [from, to] {
-                check_number(&quoted(self.name), end, at.clone(), self.range, report)?;
+                check_number(&quoted(self.name), end, location.clone(), self.range, report)?;
             }
             if from == to {
                 let title = format!("`{}` is 0, and so is every percentage of it", self.name);
-                return report.refuse(&at, title, "expected a tolerance in the parameter's unit");
+                return report.refuse(
+                    &location,
+                    title,
+                    "expected a tolerance in the parameter's unit",
+                );
             }
             let tolerance = match percent {
                 Some(_) => AxisTolerance::Percent(number),
                 None => AxisTolerance::Distance(number),
             };
-            Some(Located { value: ToleranceRange { tolerance, from, middle, to }, at })
+            Some(Located { value: ToleranceRange { tolerance, from, nominal, to }, location })
         })
     }
 }
@@ -254,21 +269,22 @@ struct SpreadValues {
 
 fn without_tolerance(found: Located<AxisValues>) -> Located<SpreadValues> {
     let value = SpreadValues { values: found.value, tolerance: None };
-    Located { value, at: found.at }
+    Located { value, location: found.location }
 }
 
-/// A range about the model's own number.
+/// A range about the model's own number, the nominal value.
 #[derive(Clone, Copy)]
 struct ToleranceRange {
     tolerance: AxisTolerance,
     from: f64,
-    middle: f64,
+    nominal: f64,
     to: f64,
 }
 
-/// Standard deviations between the middle of a tolerance and its ends. Basis: a process that just
-/// meets it (capability 1) has 99.7 % within. Doubling it halves the spread of parts.
-const DEVIATIONS: f64 = 3.0;
+/// Standard deviations between the nominal value and either end of a tolerance. Basis: a process
+/// that just meets its tolerance (capability 1) has 99.7 % of its parts within. Doubling it halves
+/// the spread of parts.
+const TOLERANCE_DEVIATIONS: f64 = 3.0;
 
 impl ToleranceRange {
     /// Returns evenly spaced values with both ends.
@@ -282,12 +298,12 @@ impl ToleranceRange {
     fn shape(self, kind: usize) -> Option<DistributionShape> {
         match kind {
             0 => Some(DistributionShape::Normal {
-                mean: self.middle,
-                sd: (self.to - self.from) / 2.0 / DEVIATIONS,
+                mean: self.nominal,
+                sd: (self.to - self.from) / 2.0 / TOLERANCE_DEVIATIONS,
             }),
             1 => Some(DistributionShape::Lognormal {
-                median: self.middle,
-                sigma: libm::log(self.to / self.middle) / DEVIATIONS,
+                median: self.nominal,
+                sigma: libm::log(self.to / self.nominal) / TOLERANCE_DEVIATIONS,
             }),
             _ => None,
         }
@@ -295,26 +311,27 @@ impl ToleranceRange {
 }
 
 /// Reads a distribution truncated at `from` and `to`.
-fn distribution(
+fn read_distribution(
     section: Section<'_>,
-    own: &SweptFacts<'_>,
+    swept: &SweptParameter<'_>,
     points: u64,
 ) -> Option<Located<SpreadValues>> {
-    let at = section.at().clone();
+    let location = section.at().clone();
     let report = section.report;
-    let range = own.range;
+    let range = swept.range;
     let field = section.choice("kind", &DISTRIBUTIONS.map(|(kind, _)| kind));
     let kind = section.require(field, "kind", "`normal`, `lognormal` or `uniform`");
     let kind = kind.map(|kind| kind.value);
-    let number = |key, range, needed: bool| {
+    let number = |key, range, is_required: bool| {
         let field = section.number(key, range);
-        let field = section.expect(field, key, needed.then_some("a number"));
+        let field = section.expect(field, key, is_required.then_some("a number"));
         field.given().map(|number| number.value)
     };
-    let field = own.tolerance(&section);
+    let field = swept.tolerance(&section);
     let mut tolerance = None;
     let (shape, bounds) = if let Field::Absent = field {
-        // An unknown kind has no list of keys, but each key has a range.
+        // The keys of an unknown kind are unknown, so that the keys of all kinds are read with
+        // their ranges.
         let keys = kind.map_or(&DISTRIBUTIONS[..], |kind| &DISTRIBUTIONS[kind..=kind]);
         let keys = keys.iter().flat_map(|(_, numbers)| *numbers);
         let numbers: Vec<_> =
@@ -330,8 +347,8 @@ fn distribution(
         section.finish();
         let bounds = match shape {
             Some(shape) => [
-                from.unwrap_or(shape.at(-TAIL_DEVIATIONS)),
-                to.unwrap_or(shape.at(TAIL_DEVIATIONS)),
+                from.unwrap_or(shape.value(-TAIL_DEVIATIONS)),
+                to.unwrap_or(shape.value(TAIL_DEVIATIONS)),
             ],
             None => [from?, to?],
         };
@@ -343,110 +360,126 @@ fn distribution(
         let range = field.given()?.value;
         if kind? == 1 && range.from <= 0.0 {
             let title = format!("a tolerance down to {} has no logarithm", decimal(range.from));
-            return report.refuse(&at, title, "expected a positive range, or kind = \"normal\"");
+            return report.refuse(
+                &location,
+                title,
+                "expected a positive range, or kind = \"normal\"",
+            );
         }
         tolerance = Some(range.tolerance);
         (range.shape(kind?), [range.from, range.to])
     };
     let [from, to] = bounds;
-    let [from_said, to_said] = bounds.map(decimal);
+    let [from_text, to_text] = bounds.map(decimal);
     if from.partial_cmp(&to) != Some(std::cmp::Ordering::Less) {
-        let title = format!("a distribution from {from_said} to {to_said}");
-        return report.refuse(&at, title, "expected `from` below `to`");
+        let title = format!("a distribution from {from_text} to {to_text}");
+        return report.refuse(&location, title, "expected `from` below `to`");
     }
-    if let Some(&beyond) = bounds.iter().find(|&&bound| !range.contains(bound)) {
-        let title = format!("the distribution reaches to {}", decimal(beyond));
-        return report.refuse(&at, title, format!("expected {range}: cut it by `from` and `to`"));
+    if let Some(&bound_out_of_range) = bounds.iter().find(|&&bound| !range.contains(bound)) {
+        let title = format!("the distribution reaches to {}", decimal(bound_out_of_range));
+        return report.refuse(
+            &location,
+            title,
+            format!("expected {range}: cut it by `from` and `to`"),
+        );
     }
-    // Most of a distribution lies within one deviation of its middle.
-    let [low, high] = shape.map_or(bounds, |shape| [shape.at(-1.0), shape.at(1.0)]);
+    // Two thirds of a distribution lie within one deviation of its middle.
+    let [low, high] = shape.map_or(bounds, |shape| [shape.value(-1.0), shape.value(1.0)]);
     let [low, high] = [low.max(from), high.min(to)];
-    if low < high && most_distinct(low, high).is_some_and(|most| most < points) {
+    if low < high && max_distinct_values(low, high).is_some_and(|max_count| max_count < points) {
         let title = format!(
-            "a distribution from {from_said} to {to_said} has no {points} different values"
+            "a distribution from {from_text} to {to_text} has no {points} different values"
         );
         let expected = "expected a wider one, or fewer `points` in [design]";
-        return report.refuse(&at, title, expected);
+        return report.refuse(&location, title, expected);
     }
     let values = match shape {
         None => AxisValues::Linear { from, to, count: 2 },
         Some(shape) => {
-            let [low, high] = [shape.at(-TAIL_DEVIATIONS), shape.at(TAIL_DEVIATIONS)];
+            let [low, high] = [shape.value(-TAIL_DEVIATIONS), shape.value(TAIL_DEVIATIONS)];
             if to <= low || high <= from {
                 let title =
-                    format!("no part of the distribution lies between {from_said} and {to_said}");
+                    format!("no part of the distribution lies between {from_text} and {to_text}");
                 let [low, high] = [low, high].map(decimal);
                 let expected = format!("expected bounds within {low} and {high}");
-                return report.refuse(&at, title, expected);
+                return report.refuse(&location, title, expected);
             }
             AxisValues::Distributed(Distribution { shape, from, to })
         }
     };
-    Some(Located { value: SpreadValues { values, tolerance }, at })
+    Some(Located { value: SpreadValues { values, tolerance }, location })
 }
 
 /// Reads the range or distribution over which a design spreads `points` points.
-fn extent(
+fn read_design_values(
     section: &Section<'_>,
-    own: &SweptFacts<'_>,
+    swept: &SweptParameter<'_>,
     points: u64,
 ) -> Option<Located<SpreadValues>> {
     let reason = "a design spreads its points over `range = { from = ..., to = ... }`";
     section.misplace(&["values"], reason);
-    let tolerance = own.tolerance(section);
+    let tolerance = swept.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
-        section.misplace(&["range", "distribution"], BESIDE_TOLERANCE);
+        section.misplace(&["range", "distribution"], TOLERANCE_EXCLUDES);
         section.misplace(&["count"], "the number of points belongs in [design], as `points`");
-        let Located { value: range, at } = tolerance.given()?;
-        return Some(Located { value: range.values(2), at });
+        let Located { value: range, location } = tolerance.given()?;
+        return Some(Located { value: range.values(2), location });
     }
     match section.table("distribution", "distribution = { kind, ... }").given() {
         Some(distributed) => {
             section.misplace(&["range"], "the distribution has its own `from` and `to`");
-            distribution(distributed.value, own, points)
+            read_distribution(distributed.value, swept, points)
         }
         None => {
             let field = section.table("range", "range = { from, to }");
-            let spaced = section.require(field, "range", "`range = { from = ..., to = ... }`")?;
-            spacing(spaced.value, own.range, Some(points)).map(without_tolerance)
+            let range_section =
+                section.require(field, "range", "`range = { from = ..., to = ... }`")?;
+            spacing(range_section.value, swept.range, Some(points)).map(without_tolerance)
         }
     }
 }
 
 /// The reason for rejecting other keys beside a tolerance.
-const BESIDE_TOLERANCE: &str = "`tolerance` gives the ends, about the machine's own number";
+const TOLERANCE_EXCLUDES: &str = "`tolerance` gives the ends, about the machine's own number";
 
 /// Minimum distance between neighbouring values, as a share of the greater end. Basis: closer
-/// values could round to the same number.
+/// values could round to the same number. Doubling it halves the greatest number of values in a
+/// narrow range.
 const MIN_SEPARATION: f64 = 8.0 * f64::EPSILON;
 
 /// Returns the maximum number of distinct values in a range; `None` if it exceeds every limit.
-fn most_distinct(from: f64, to: f64) -> Option<u64> {
+fn max_distinct_values(from: f64, to: f64) -> Option<u64> {
     let steps = ((to - from).abs() / (MIN_SEPARATION * from.abs().max(to.abs()))).floor();
     // Both ends are exact, however close they are.
     (steps < MAX_POINTS as f64).then_some((steps as u64 + 1).max(2))
 }
 
 /// Reads the values of an axis: listed, or as a range.
-fn values(section: &Section<'_>, own: &SweptFacts<'_>) -> Option<Located<SpreadValues>> {
-    let range = own.range;
-    let tolerance = own.tolerance(section);
+fn values(section: &Section<'_>, swept: &SweptParameter<'_>) -> Option<Located<SpreadValues>> {
+    let range = swept.range;
+    let tolerance = swept.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
-        section.misplace(&["values", "range"], BESIDE_TOLERANCE);
+        section.misplace(&["values", "range"], TOLERANCE_EXCLUDES);
         let expected = "the number of values, both ends included";
         let count = section.whole("count", &(2..=MAX_POINTS));
         let count = section.require(count, "count", expected);
-        let Located { value: range, at } = tolerance.given()?;
+        let Located { value: range, location } = tolerance.given()?;
         let count = count?.value;
-        if let Some(most) = most_distinct(range.from, range.to).filter(|&most| most < count) {
+        if let Some(max_count) =
+            max_distinct_values(range.from, range.to).filter(|&max_count| max_count < count)
+        {
             let title = format!("a tolerance has no {count} different values");
-            return section.report.refuse(&at, title, format!("expected at most {most}"));
+            return section.report.refuse(
+                &location,
+                title,
+                format!("expected at most {max_count}"),
+            );
         }
-        return Some(Located { value: range.values(count), at });
+        return Some(Located { value: range.values(count), location });
     }
-    let listed = section.right_numbers("values", range);
-    let spaced = section.table("range", "range = { from, to, count }");
-    match (listed, spaced) {
+    let value_list = section.right_numbers("values", range);
+    let range_section = section.table("range", "range = { from, to, count }");
+    match (value_list, range_section) {
         (Field::Absent, Field::Absent) => {
             section.missing(
                 "values",
@@ -454,16 +487,18 @@ fn values(section: &Section<'_>, own: &SweptFacts<'_>) -> Option<Located<SpreadV
             );
             None
         }
-        (Field::Given(listed), Field::Absent) => {
-            list(listed, section.report).map(without_tolerance)
+        (Field::Given(value_list), Field::Absent) => {
+            list(value_list, section.report).map(without_tolerance)
         }
-        (Field::Absent, Field::Given(spaced)) => {
-            spacing(spaced.value, range, None).map(without_tolerance)
+        (Field::Absent, Field::Given(range_section)) => {
+            spacing(range_section.value, range, None).map(without_tolerance)
         }
-        (Field::Given(listed), Field::Given(spaced)) => {
+        (Field::Given(value_list), Field::Given(range_section)) => {
             let diagnostic = Diagnostic::new("an axis has both `values` and `range`");
             section.report.push(
-                diagnostic.at(&spaced.at, "expected only one of them").at(&listed.at, "given here"),
+                diagnostic
+                    .at(&range_section.location, "expected only one of them")
+                    .at(&value_list.location, "given here"),
             );
             None
         }
@@ -472,25 +507,32 @@ fn values(section: &Section<'_>, own: &SweptFacts<'_>) -> Option<Located<SpreadV
 }
 
 fn list(
-    listed: Located<(Vec<Located<f64>>, bool)>,
+    value_list: Located<(Vec<Located<f64>>, bool)>,
     report: &Report,
 ) -> Option<Located<AxisValues>> {
-    let (values, mut sound) = listed.value;
-    if values.is_empty() && sound {
-        return report.refuse(&listed.at, "`values` is empty", "expected at least one number");
+    let (values, mut is_valid) = value_list.value;
+    if values.is_empty() && is_valid {
+        return report.refuse(
+            &value_list.location,
+            "`values` is empty",
+            "expected at least one number",
+        );
     }
-    let mut order: Vec<&Located<f64>> = values.iter().collect();
-    order.sort_by(|a, b| a.value.total_cmp(&b.value).then(a.at.span.start.cmp(&b.at.span.start)));
-    for pair in order.windows(2) {
+    let mut sorted_values: Vec<&Located<f64>> = values.iter().collect();
+    sorted_values.sort_by(|a, b| {
+        a.value.total_cmp(&b.value).then(a.location.span.start.cmp(&b.location.span.start))
+    });
+    for pair in sorted_values.windows(2) {
         if pair[0].value == pair[1].value {
             let title = format!("the value {} is twice on this axis", decimal(pair[1].value));
-            let diagnostic = Diagnostic::new(title).at(&pair[1].at, "expected each value once");
-            report.push(diagnostic.at(&pair[0].at, "first given here"));
-            sound = false;
+            let diagnostic =
+                Diagnostic::new(title).at(&pair[1].location, "expected each value once");
+            report.push(diagnostic.at(&pair[0].location, "first given here"));
+            is_valid = false;
         }
     }
     let values = AxisValues::List(values.iter().map(|value| value.value).collect());
-    sound.then_some(Located { value: values, at: listed.at })
+    is_valid.then_some(Located { value: values, location: value_list.location })
 }
 
 /// Reads a range with a count, or one for the `points` points of a design.
@@ -499,7 +541,7 @@ pub fn spacing(
     range: Range,
     points: Option<u64>,
 ) -> Option<Located<AxisValues>> {
-    let at = section.at().clone();
+    let location = section.at().clone();
     let report = section.report;
     let [from, to] =
         ["from", "to"].map(|key| section.require(section.number(key, range), key, "a number"));
@@ -511,7 +553,7 @@ pub fn spacing(
         Some(value) => {
             let reason = "the number of points belongs in [design], as `points`";
             section.misplace(&["count"], reason);
-            Some(Located { value, at: at.clone() })
+            Some(Located { value, location: location.clone() })
         }
     };
     let logarithmic = section.choice("spacing", &["linear", "log"]).or(0);
@@ -525,32 +567,34 @@ pub fn spacing(
     let [low, high] = [from.value, to.value].map(decimal);
     if is_point && is_design {
         let title = format!("a design cannot spread points from {low} to {high}");
-        return report.refuse(&to.at, title, "expected another number");
+        return report.refuse(&to.location, title, "expected another number");
     }
     if is_point && count.value > 1 {
         let title = format!("a range from {low} to {high} has one value, not {}", count.value);
-        return report.refuse(&to.at, title, "expected another number, or count = 1");
+        return report.refuse(&to.location, title, "expected another number, or count = 1");
     }
     if !is_point && !is_design && count.value == 1 {
         let title = "one value cannot be both ends of a range";
-        return report.refuse(&count.at, title, "expected at least 2");
+        return report.refuse(&count.location, title, "expected at least 2");
     }
     if logarithmic && !(from.value > 0.0 && to.value > 0.0) {
         let end = if from.value > 0.0 { &to } else { &from };
         let title = format!("{} has no logarithm", decimal(end.value));
         let expected = "expected a number greater than 0, or spacing = \"linear\"";
-        return report.refuse(&end.at, title, expected);
+        return report.refuse(&end.location, title, expected);
     }
-    if let Some(most) = most_distinct(from.value, to.value).filter(|&most| most < count.value) {
+    if let Some(max_count) =
+        max_distinct_values(from.value, to.value).filter(|&max_count| max_count < count.value)
+    {
         let title = format!("a range from {low} to {high} has no {} different values", count.value);
         if is_design {
             let expected = "expected ends farther apart, or fewer `points` in [design]";
-            return report.refuse(&to.at, title, expected);
+            return report.refuse(&to.location, title, expected);
         }
-        let expected = format!("expected at most {most}, or ends farther apart");
-        return report.refuse(&count.at, title, expected);
+        let expected = format!("expected at most {max_count}, or ends farther apart");
+        return report.refuse(&count.location, title, expected);
     }
-    // A design's range has its two ends as values; the design chooses the points between.
+    // A range in a design has its two ends as values; the design chooses the points between them.
     let from = from.value;
     let to = to.value;
     let count = if is_design { 2 } else { count.value };
@@ -559,5 +603,5 @@ pub fn spacing(
     } else {
         AxisValues::Linear { from, to, count }
     };
-    Some(Located { value, at })
+    Some(Located { value, location })
 }

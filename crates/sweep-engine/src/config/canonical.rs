@@ -28,7 +28,7 @@ impl<M: Model> Plan<M> {
             reliability: self.reliability.clone(),
             ..Self::blank()
         };
-        let axes = self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref()));
+        let axes = self.axes.iter().map(|axis| self::axis_to_json(axis, self.design.as_ref()));
         let description = Keys::described(false, |keys| {
             sections::walk(&mut plan, keys);
             keys.write("axis", axes.collect());
@@ -40,7 +40,7 @@ impl<M: Model> Plan<M> {
     }
 }
 
-fn axis<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> Value {
+fn axis_to_json<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> Value {
     let parameter = &axis.parameter.name;
     if let Some(Design::List { .. }) = design {
         // The values are columns of the result, and the design's hash covers them.

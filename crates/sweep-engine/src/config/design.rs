@@ -8,7 +8,8 @@ use crate::plan::MAX_POINTS;
 
 /// The seed of a design whose file gives none.
 pub const DEFAULT_SEED: u64 = 0;
-/// Maximum seed. Basis: every JSON and TOML reader has it exactly.
+/// Maximum seed. Basis: every JSON and TOML reader represents it exactly. Doubling it loses the
+/// last bit in readers with floating-point numbers.
 pub const MAX_SEED: u64 = (1 << 53) - 1;
 /// The number of points of a Sobol sequence with 32 bits.
 const MAX_SOBOL_POINTS: u64 = 1 << 32;
@@ -18,17 +19,18 @@ pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
     keys.table(Key::new("design", ""), |keys| {
         let rules = DesignRule::ALL.map(|(_, name, about)| (name, about));
         let all = [&rules[..], &[("list", "points as listed")]].concat();
-        let now = design.as_ref().map(Design::method);
-        let now = all.iter().position(|(name, _)| Some(*name) == now);
+        let current_rule = design.as_ref().map(Design::method);
+        let current_rule = all.iter().position(|(name, _)| Some(*name) == current_rule);
         let key =
             Key::new("method", "").needed("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
         let variants = Variants { all, default: None, set: 0 };
-        let chosen = keys.variants(key, &variants, now, |keys, k| match DesignRule::ALL.get(k) {
-            Some((rule, ..)) => spread(*rule, design, keys),
-            None => listed(design, keys),
-        });
-        // A stand-in for a rejected design lets the axes be read.
-        if chosen.is_none() && keys.section().is_some() && design.is_none() {
+        let selected_rule =
+            keys.variants(key, &variants, current_rule, |keys, k| match DesignRule::ALL.get(k) {
+                Some((rule, ..)) => walk_spread(*rule, design, keys),
+                None => walk_list(design, keys),
+            });
+        // A placeholder for a rejected design lets the axes be read.
+        if selected_rule.is_none() && keys.section().is_some() && design.is_none() {
             *design = Some(Design::Spread {
                 rule: DesignRule::MonteCarlo,
                 points: 1,
@@ -36,12 +38,12 @@ pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
             });
         }
         if matches!(keys.walk, KeyWalk::Set(_)) && !matches!(design, Some(Design::Spread { .. })) {
-            spread(DesignRule::LatinHypercube, &mut None, keys);
+            walk_spread(DesignRule::LatinHypercube, &mut None, keys);
         }
     })
 }
 
-fn listed(design: &mut Option<Design>, keys: &mut Keys<'_>) {
+fn walk_list(design: &mut Option<Design>, keys: &mut Keys<'_>) {
     keys.misplace(&["points", "seed"], "a list has the points that it lists");
     let key = Key::new(
         "file",
@@ -52,28 +54,28 @@ fn listed(design: &mut Option<Design>, keys: &mut Keys<'_>) {
         _ => Default::default(),
     };
     let key = key.needed("a CSV or Parquet file, relative to this file");
-    let found = keys.key(key, &Form::Text, &mut file);
+    let field = keys.key(key, &Form::Text, &mut file);
     keys.write("points", points.into());
     keys.write("hash", hash.as_str().into());
-    if found.given().is_some() || keys.section().is_none() {
+    if field.given().is_some() || keys.section().is_none() {
         *design = Some(Design::List { file, points, hash });
     }
 }
 
-fn spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
+fn walk_spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
     keys.misplace(&["file"], "only the method \"list\" has it");
     let numbers = match design {
         Some(Design::Spread { points, seed, .. }) => Some((*points, *seed)),
         Some(Design::List { .. }) | None => None,
     };
-    // Stand-ins for rejected numbers let the axes be read.
+    // Placeholders for rejected numbers let the axes be read.
     let (mut points, mut seed) = numbers.unwrap_or((1, DEFAULT_SEED));
-    let most = if rule == DesignRule::Sobol { MAX_SOBOL_POINTS } else { MAX_POINTS };
+    let max_points = if rule == DesignRule::Sobol { MAX_SOBOL_POINTS } else { MAX_POINTS };
     let key = Key::new("points", "the number of points").needed("the number of points").set();
-    let points_found = keys.key(key, &Form::Whole(1..=most), &mut points);
+    let points_field = keys.key(key, &Form::Whole(1..=max_points), &mut points);
     let key = Key::new("seed", "the seed of the random positions").set();
-    let seed_found = keys.key(key, &Form::Whole(0..=MAX_SEED), &mut seed);
-    for (name, field) in [("points", points_found), ("seed", seed_found)] {
+    let seed_field = keys.key(key, &Form::Whole(0..=MAX_SEED), &mut seed);
+    for (name, field) in [("points", points_field), ("seed", seed_field)] {
         if let (None, Field::Given(_)) = (numbers, field) {
             let title =
                 format!("`{name}` belongs to a design, and this grid has none that takes it");

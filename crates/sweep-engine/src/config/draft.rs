@@ -10,7 +10,7 @@ use crate::{Model, ModelParameter, Plan};
 pub struct Draft<'a, M: Model> {
     /// The plan so far.
     pub plan: Plan<M>,
-    /// The locations of its numbers, and the mistakes.
+    /// The locations of the plan's numbers, and the mistakes.
     pub report: &'a Report,
     /// The constants that `[set]`, `--set` and `--at` have written.
     pub constants: Vec<SetConstant<M>>,
@@ -25,8 +25,8 @@ pub struct SetConstant<M: Model> {
     pub parameter: ModelParameter<M>,
     /// The value with its location.
     pub value: Located<f64>,
-    /// Whether it overrides the file, and so fixes a swept parameter.
-    pub is_over_file: bool,
+    /// Whether the constant overrides the file, and so fixes a swept parameter.
+    pub overrides_file: bool,
 }
 
 /// The single numbers that are written, each with the name that writes it.
@@ -46,7 +46,8 @@ impl ClaimedNumbers {
             report.push(written_twice(name, first));
             return false;
         }
-        let name = Located { value: name.value.as_ref().to_owned(), at: name.at.clone() };
+        let name =
+            Located { value: name.value.as_ref().to_owned(), location: name.location.clone() };
         self.0.extend(parts.into_iter().map(|part| (part, name.clone())));
         true
     }

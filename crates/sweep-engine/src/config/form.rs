@@ -38,22 +38,28 @@ pub struct Numbers {
     pub count: RangeInclusive<usize>,
     /// The keys of the entries' locations, if they are not the array's key with an index.
     pub places: Vec<String>,
-    /// The text of the message about a wrong number of entries.
+    /// The expectation in the message about a wrong number of entries.
     pub expected: String,
     /// The help of that message.
     pub help: Option<&'static str>,
 }
 
 impl Form<'_> {
-    /// Reads the value from a file. Locations of several numbers are kept under `place`.
-    pub fn read(&self, section: &Section<'_>, key: &'static str, place: &str) -> Field<Value> {
+    /// Reads the value from a file. The locations of several numbers are recorded under
+    /// `location_key`.
+    pub fn read(
+        &self,
+        section: &Section<'_>,
+        key: &'static str,
+        location_key: &str,
+    ) -> Field<Value> {
         match self {
             Self::Number(range) => section.number(key, *range).map(|found| found.value.into()),
             Self::Whole(bounds) => section.whole(key, bounds).map(|found| found.value.into()),
             Self::Text => section.text(key).map(|found| found.value.into()),
             Self::Word(all) => section.choice(key, all).map(|found| all[found.value].into()),
             Self::Words(what, all) => names(section, key, what, all),
-            Self::Numbers(numbers) => numbers.read(section, key, place),
+            Self::Numbers(numbers) => numbers.read(section, key, location_key),
             Self::Own(read, _) => read(section, key),
         }
     }
@@ -105,21 +111,24 @@ impl Numbers {
         }
     }
 
-    fn read(&self, section: &Section<'_>, key: &'static str, place: &str) -> Field<Value> {
+    fn read(&self, section: &Section<'_>, key: &'static str, location_key: &str) -> Field<Value> {
         section.numbers(key, self.read).then(|found| {
             if !self.count.contains(&found.value.len()) {
                 let title = format!("`{key}` has {} numbers", found.value.len());
-                let refusal = Diagnostic::new(title).at(&found.at, self.expected.as_str());
+                let refusal = Diagnostic::new(title).at(&found.location, self.expected.as_str());
                 section.report.push(self.help.into_iter().fold(refusal, Diagnostic::help));
                 return None;
             }
             let put = |(k, number): (usize, Located<f64>)| {
-                let own = self.places.get(k).cloned();
-                section.report.put(own.unwrap_or_else(|| format!("{place}[{k}]")), number.at);
+                let own_key = self.places.get(k).cloned();
+                section.report.put(
+                    own_key.unwrap_or_else(|| format!("{location_key}[{k}]")),
+                    number.location,
+                );
                 number.value
             };
             let value = found.value.into_iter().enumerate().map(put).collect();
-            Some(Located { value, at: found.at })
+            Some(Located { value, location: found.location })
         })
     }
 }

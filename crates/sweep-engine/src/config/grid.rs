@@ -17,15 +17,15 @@ use toml::de::DeTable;
 /// Reads the grid file and applies the constants. Returns `None` if the file has no text.
 pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
     let GridInput { path, text, sets, at, .. } = input;
-    let shown = path.display();
+    let path_text = path.display();
     let (text, source) = match text {
-        Some(text) => (text.clone(), report.add(shown.to_string(), text.as_str())),
+        Some(text) => (text.clone(), report.add(path_text.to_string(), text.as_str())),
         None => syntax::text(path, "grid", M::ABOUT.to_start, report)?,
     };
     if is_blank(&text) {
-        let at = Location::new(source, 0..0);
-        let refusal =
-            Diagnostic::new(format!("the grid file {shown} is empty")).at(&at, "expected a grid");
+        let location = Location::new(source, 0..0);
+        let refusal = Diagnostic::new(format!("the grid file {path_text} is empty"))
+            .at(&location, "expected a grid");
         report.push(M::ABOUT.to_start.into_iter().fold(refusal, Diagnostic::help));
         return None;
     }
@@ -43,9 +43,9 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
         sets.iter().partition(|set| set.contains('=') && names.contains(&name_of(set)));
     parameters::constants(keys.section()?, sets, at, &mut draft);
     draft.plan.aside.columns = columns(keys.section()?);
-    let written = design::walk(&mut draft.plan.design, &mut keys);
+    let design_field = design::walk(&mut draft.plan.design, &mut keys);
     let root = keys.section()?;
-    match (written, draft.plan.design.take()) {
+    match (design_field, draft.plan.design.take()) {
         (_, Some(Design::List { file, .. })) => {
             let model = draft.plan.model.clone();
             let known = |name: &str| {
@@ -58,7 +58,7 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
                 None => drop(root.tables("axis")),
             }
         }
-        // A [design] that is no table leaves it unknown which axes are right.
+        // If [design] is no table, it is unknown whether the axes are those of a grid or a design.
         (Field::Bad, None) => drop(root.tables("axis")),
         (_, design) => axes::axes(root, design, &mut draft),
     }
@@ -73,19 +73,19 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
 fn columns(root: &Section<'_>) -> Vec<(String, String)> {
     let Some(section) = root.table("columns", "[columns]").given() else { return Vec::new() };
     let section = section.value;
-    let named = |header: Located<&str>| {
+    let named_header = |header: Located<&str>| {
         let name = section.text_named(header.value)?;
         Some((header.value.to_owned(), name.value.to_owned()))
     };
-    section.names().into_iter().filter_map(named).collect()
+    section.names().into_iter().filter_map(named_header).collect()
 }
 
 /// The keys of study files.
-pub const STUDY: [&str; 8] =
+pub const STUDY_KEYS: [&str; 8] =
     ["name", "grid", "parameter", "population", "candidates", "seed", "objective", "conditions"];
 
-/// Rejects a file of another kind: most of its keys belong to that kind, and none to this kind
-/// alone. Returns whether it was rejected.
+/// Rejects a file of another kind: most of its keys are those of the other kind, and no key is only
+/// of the expected kind. Returns whether the file was rejected.
 pub fn is_another<M: Model>(
     own: &str,
     table: &DeTable<'_>,
@@ -93,21 +93,24 @@ pub fn is_another<M: Model>(
     report: &Report,
 ) -> bool {
     let grid = described::<M>().finish();
-    let has = |kind: &str, key: &str| match kind {
+    let has_key = |kind: &str, key: &str| match kind {
         "grid" => {
             ["set", "axis", "columns"].contains(&key) || grid["properties"].get(key).is_some()
         }
-        "study" => STUDY.contains(&key),
+        "study" => STUDY_KEYS.contains(&key),
         _ => M::ABOUT.own_file.is_some_and(|file| file.keys.contains(&key)),
     };
     let keys: Vec<&str> = table.keys().map(|key| &**key.get_ref()).collect();
-    let is = |kind: &&str| {
-        let theirs = keys.iter().filter(|key| has(kind, key)).count();
-        2 * theirs > keys.len() && keys.iter().all(|key| has(kind, key) || !has(own, key))
+    let is_kind = |kind: &&str| {
+        let keys_of_kind = keys.iter().filter(|key| has_key(kind, key)).count();
+        2 * keys_of_kind > keys.len()
+            && keys.iter().all(|key| has_key(kind, key) || !has_key(own, key))
     };
     let own_key = M::ABOUT.own_file.map_or("", |file| file.key);
     let kinds = [own, "grid", "study", own_key];
-    let Some(kind) = kinds.into_iter().find(is).filter(|kind| *kind != own) else { return false };
+    let Some(kind) = kinds.into_iter().find(is_kind).filter(|kind| *kind != own) else {
+        return false;
+    };
     report.push_with(|sources| {
         let program = program();
         let name = sources.name(source);

@@ -18,7 +18,7 @@ pub struct Key<'k> {
     description: &'k str,
     /// The expected value, if the key is required.
     needed: Option<&'k str>,
-    /// Whether `--set` takes the key.
+    /// Whether `--set` can change the key.
     is_set: bool,
 }
 
@@ -34,7 +34,7 @@ impl<'k> Key<'k> {
         Self { needed: Some(expected), ..self }
     }
 
-    /// Returns the key as one that `--set` takes.
+    /// Returns the key as one that `--set` can change.
     #[must_use]
     pub const fn set(self) -> Self {
         Self { is_set: true, ..self }
@@ -65,7 +65,7 @@ impl<'a> Options<'a> {
         let mut written: Vec<NamedArgument<'_>> = Vec::new();
         for argument in arguments {
             let Some(next) = NamedArgument::read("--set", argument, report) else { continue };
-            match written.iter().find(|known| known.name.value == next.name.value) {
+            match written.iter().find(|earlier| earlier.name.value == next.name.value) {
                 Some(first) => report.push(written_twice(&next.name, &first.name)),
                 None => written.push(next),
             }
@@ -73,18 +73,19 @@ impl<'a> Options<'a> {
         Self { written, changed: RefCell::default(), report }
     }
 
-    /// Returns the value under a name, and notes it if it differs from `was`.
-    fn value(&self, name: &str, kind: &Form<'_>, was: &Value) -> Field<Value> {
+    /// Returns the value of an option, and records the change if the value differs from
+    /// `old_value`.
+    fn value(&self, name: &str, kind: &Form<'_>, old_value: &Value) -> Field<Value> {
         let Some(written) = self.written.iter().find(|written| written.name.value == name) else {
             return Field::Absent;
         };
         let Some(value) = kind.read_option(written) else { return Field::Bad };
-        if value != *was {
-            // A list of words is noted as it was written.
-            let noted = if value.is_array() { written.value.value.into() } else { value.clone() };
-            self.changed.borrow_mut().push((name.to_owned(), noted));
+        if value != *old_value {
+            // The change to a list of words has the text of the argument.
+            let change = if value.is_array() { written.value.value.into() } else { value.clone() };
+            self.changed.borrow_mut().push((name.to_owned(), change));
         }
-        Field::Given(Located { value, at: written.value.at.clone() })
+        Field::Given(Located { value, location: written.value.location.clone() })
     }
 }
 
@@ -95,7 +96,7 @@ pub struct Description {
     entries: Map<String, Value>,
     required: Vec<&'static str>,
     variants: Vec<Value>,
-    /// The keys of this table and its inner tables that `--set` takes.
+    /// The keys of this table and its inner tables that `--set` can change.
     pub set: Vec<&'static str>,
 }
 
@@ -121,10 +122,15 @@ impl Description {
 
     /// Returns the first of these tables that has a key.
     pub fn table_of<'t>(&self, key: &str, tables: &[&'t str]) -> Option<&'t str> {
-        let has = |schema: &Value| schema["properties"].get(key).is_some();
-        let any =
-            |schema: &Value| schema["oneOf"].as_array().is_some_and(|all| all.iter().any(has));
-        let entry = |table: &str| self.entries.get(table).is_some_and(|it| has(it) || any(it));
+        let has_property = |schema: &Value| schema["properties"].get(key).is_some();
+        let variant_has_property = |schema: &Value| {
+            schema["oneOf"].as_array().is_some_and(|all| all.iter().any(has_property))
+        };
+        let entry = |table: &str| {
+            self.entries
+                .get(table)
+                .is_some_and(|schema| has_property(schema) || variant_has_property(schema))
+        };
         tables.iter().copied().find(|table| entry(table))
     }
 
@@ -142,16 +148,16 @@ impl Description {
 pub struct Keys<'a> {
     /// The purpose of the walk.
     pub walk: KeyWalk<'a>,
-    /// The prefix of the keys under which locations are kept.
+    /// The prefix of the keys under which locations are recorded.
     pub places: String,
-    /// Whether the table's variant is unknown, so that only keys that are present are checked.
-    is_loose: bool,
+    /// Whether the table's variant is unknown. Then only the keys that are present are checked.
+    is_lenient: bool,
 }
 
 impl<'a> Keys<'a> {
     /// Returns the keys of the top table.
     pub fn new(walk: KeyWalk<'a>) -> Self {
-        Self { walk, places: String::new(), is_loose: false }
+        Self { walk, places: String::new(), is_lenient: false }
     }
 
     /// Returns the description of a walk: a schema, or values.
@@ -179,7 +185,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// Adds a value that no file has, if the walk describes values.
+    /// Adds a value that is not in files, if the walk describes values.
     pub fn write(&mut self, name: &'static str, value: Value) {
         if !self.is_schema() {
             self.describe(Key::new(name, ""), |_| value);
@@ -209,65 +215,67 @@ impl<'a> Keys<'a> {
     pub fn refuse(&self, name: &str, title: &str, expected: &str) {
         let KeyWalk::Set(options) = &self.walk else { return };
         for written in options.written.iter().filter(|written| written.name.value == name) {
-            options.report.refuse::<()>(&written.name.at, title, expected);
+            options.report.refuse::<()>(&written.name.location, title, expected);
         }
     }
 
-    /// Walks over a key with its value. A wrong or missing value is reported and leaves the old
-    /// one.
+    /// Walks over a key with its value. A wrong or missing value is reported, and the old value
+    /// stays.
     pub fn key<T: Serialize + DeserializeOwned>(
         &mut self,
         key: Key<'_>,
         kind: &Form<'_>,
         value: &mut T,
     ) -> Field<()> {
-        let place = format!("{}{}", self.places, key.name);
-        let was = json!(value);
-        // An empty value is neither written nor a default.
-        let is_there = ![json!(null), json!([]), json!("")].contains(&was);
+        let location_key = format!("{}{}", self.places, key.name);
+        let old_value = json!(value);
+        // An empty value is neither described nor a default.
+        let is_present = ![json!(null), json!([]), json!("")].contains(&old_value);
         let found = match &mut self.walk {
-            KeyWalk::Read(section) if self.is_loose && section.is_known(key.name) => Field::Absent,
-            KeyWalk::Read(section) => {
-                let field = kind.read(section, key.name, &place);
-                section.expect(field, key.name, key.needed.filter(|_| !self.is_loose))
+            KeyWalk::Read(section) if self.is_lenient && section.is_known(key.name) => {
+                Field::Absent
             }
-            KeyWalk::Set(options) if key.is_set => options.value(key.name, kind, &was),
+            KeyWalk::Read(section) => {
+                let field = kind.read(section, key.name, &location_key);
+                section.expect(field, key.name, key.needed.filter(|_| !self.is_lenient))
+            }
+            KeyWalk::Set(options) if key.is_set => options.value(key.name, kind, &old_value),
             KeyWalk::Describe(description) if description.is_schema => {
                 let mut schema = kind.schema();
-                if is_there && key.needed.is_none() {
-                    schema["default"] = was;
+                if is_present && key.needed.is_none() {
+                    schema["default"] = old_value;
                 }
                 description.add(key, schema);
                 Field::Absent
             }
-            KeyWalk::Describe(description) if is_there => {
-                description.add(key, was);
+            KeyWalk::Describe(description) if is_present => {
+                description.add(key, old_value);
                 Field::Absent
             }
             KeyWalk::Set(_) | KeyWalk::Describe(_) => Field::Absent,
         };
-        found.then(|Located { value: found, at }| {
+        found.then(|Located { value: found, location }| {
             *value = serde_json::from_value(found).ok()?;
-            self.report()?.put(place, at.clone());
-            Some(Located { value: (), at })
+            self.report()?.put(location_key, location.clone());
+            Some(Located { value: (), location })
         })
     }
 
-    /// Walks over a key with some of `all`, by their names; `what` names them in messages.
+    /// Walks over a key with some of `all`, by their names; `noun` names them in messages.
     pub fn words<T: Copy>(
         &mut self,
         key: Key<'_>,
-        what: &'static str,
+        noun: &'static str,
         all: &[T],
         name: fn(T) -> &'static str,
         value: &mut Vec<T>,
     ) -> Field<()> {
         let names: Vec<&str> = all.iter().copied().map(name).collect();
         let mut words: Vec<String> = value.iter().map(|one| name(*one).to_owned()).collect();
-        let found = self.key(key, &Form::Words(what, &names), &mut words);
+        let field = self.key(key, &Form::Words(noun, &names), &mut words);
         let find = |word: &String| all.iter().copied().find(|one| name(*one) == word);
         *value = words.iter().filter_map(find).collect();
-        found
+        field
     }
 
     /// Walks over a table under a key.
@@ -278,7 +286,7 @@ impl<'a> Keys<'a> {
             KeyWalk::Read(root) => root
                 .expect(root.table(name, &format!("[{name}]")), name, key.needed)
                 .map(|section| {
-                    root.report.put(name, section.at);
+                    root.report.put(name, section.location);
                     let mut keys = keys(KeyWalk::Read(section.value));
                     walk(&mut keys);
                     keys.finish();
@@ -297,8 +305,8 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// Walks over an array of tables under a key: those in `read`, or `count` of them. `walk` takes
-    /// the index of a table.
+    /// Walks over an array of tables under a key: the tables in `read`, or `count` described ones.
+    /// `walk` takes the index of a table.
     pub fn tables(
         &mut self,
         key: Key<'_>,
@@ -325,20 +333,21 @@ impl<'a> Keys<'a> {
         description.add(key, value);
     }
 
-    /// Ends the walk: keys of the file that it did not name are rejected.
+    /// Ends the walk, and rejects the keys of the file that the walk did not name.
     pub fn finish(self) {
         if let KeyWalk::Read(section) = self.walk {
             section.finish();
         }
     }
 
-    /// Walks over a key whose word decides on further keys. `walk` takes the index of a word and
-    /// walks over its keys; `now` is the current word. Returns the word that is chosen.
+    /// Walks over a key whose word decides which other keys the table has. `walk` takes the index
+    /// of a word and walks over its keys; `current` is the current word. Returns the index of the
+    /// selected word.
     pub fn variants(
         &mut self,
         key: Key<'_>,
         variants: &Variants,
-        now: Option<usize>,
+        current: Option<usize>,
         mut walk: impl FnMut(&mut Self, usize),
     ) -> Option<usize> {
         if let KeyWalk::Describe(table) = &mut self.walk
@@ -358,29 +367,29 @@ impl<'a> Keys<'a> {
         let expected = list_choices(&names);
         let needed = key.needed.or(variants.default.is_none().then_some(&expected));
         let can_be = if let KeyWalk::Set(_) = self.walk { variants.set } else { names.len() };
-        let mut word = now.map(|now| names[now].to_owned());
-        let found = self.key(Key { needed, ..key }, &Form::Word(&names[..can_be]), &mut word);
-        if let (KeyWalk::Set(options), Field::Given(found)) = (&self.walk, &found) {
+        let mut word = current.map(|current| names[current].to_owned());
+        let field = self.key(Key { needed, ..key }, &Form::Word(&names[..can_be]), &mut word);
+        if let (KeyWalk::Set(options), Field::Given(field)) = (&self.walk, &field) {
             // The word decides on the whole table, so that its location is that of the table.
-            options.report.put(self.places.trim_end_matches('.'), found.at.clone());
+            options.report.put(self.places.trim_end_matches('.'), field.location.clone());
         }
         let word = names.iter().position(|name| word.as_deref() == Some(name));
-        let chosen = match (&self.walk, found) {
+        let selected = match (&self.walk, field) {
             (KeyWalk::Read(_), Field::Absent) => variants.default,
             (KeyWalk::Read(_), Field::Bad) => None,
             _ => word,
         };
-        self.is_loose = chosen.is_none() && self.section().is_some();
-        match chosen {
-            Some(chosen) => walk(self, chosen),
-            None if self.is_loose => (0..names.len()).for_each(|k| walk(self, k)),
+        self.is_lenient = selected.is_none() && self.section().is_some();
+        match selected {
+            Some(selected) => walk(self, selected),
+            None if self.is_lenient => (0..names.len()).for_each(|k| walk(self, k)),
             None => {}
         }
-        chosen
+        selected
     }
 }
 
-/// The words of a key that decides on further keys.
+/// The words of a key that decides which other keys a table has.
 pub struct Variants {
     /// The words with their descriptions.
     pub all: Vec<(&'static str, &'static str)>,

@@ -27,27 +27,30 @@ pub use names::{ANY_UNIT, Names};
 /// Maximum size of a list, bytes. Basis: it holds the maximum number of values. Doubling it doubles
 /// the memory of a list.
 const MAX_LIST_BYTES: u64 = 256 << 20;
-/// Maximum number of values of a list. Basis: 160 MB of memory. Doubling it doubles that.
+/// Maximum number of values of a list. Basis: they take 160 MB of memory. Doubling it doubles that
+/// memory.
 const MAX_NUMBERS: u64 = 20_000_000;
-/// Maximum number of columns of a list. Basis: far more than a machine has parameters.
+/// Maximum number of columns of a list. Basis: far more than a machine has parameters. Doubling it
+/// accepts wider files.
 const MAX_COLUMNS: usize = 1000;
-/// Maximum length of a path in a message, characters.
+/// Maximum length of a path in a message, characters. Basis: no sensible path is longer. Doubling
+/// it shows longer paths.
 const MAX_PATH_CHARACTERS: usize = 1000;
 
 /// The name of a column that identifies rows for people and is no parameter.
-pub(super) const ID: &str = "id";
+pub(super) const ID_COLUMN: &str = "id";
 
 /// The names of columns in which programs number rows, beside empty names.
-const INDEX: [&str; 3] = ["__index_level_0__", "Unnamed: 0", "index"];
+const INDEX_COLUMNS: [&str; 3] = ["__index_level_0__", "Unnamed: 0", "index"];
 
 /// Returns whether a column of this name only numbers rows.
 pub fn is_index(name: &str) -> bool {
-    name.is_empty() || INDEX.contains(&name)
+    name.is_empty() || INDEX_COLUMNS.contains(&name)
 }
 
 /// A table of numbers in a file; NaN for a missing value.
 pub struct NumberTable {
-    /// The columns: known ones, all of one length, and ignored ones.
+    /// The columns: known columns of equal length, and ignored columns.
     pub columns: Vec<ListColumn>,
     rows: RowLocations,
     /// The number of lines before the line of names.
@@ -57,12 +60,12 @@ pub struct NumberTable {
 impl NumberTable {
     /// Reads a CSV or Parquet file of numbers; `None` after mistakes, which are reported.
     pub fn read(path: &Path, names: &Names<'_>, report: &Report) -> Option<Self> {
-        let shown = shown(path);
-        let file = Location::new(report.add(shown.as_str(), String::new()), 0..0);
+        let path_text = show_path(path);
+        let file = Location::new(report.add(path_text.as_str(), String::new()), 0..0);
         match table(path, &file, true, names, report) {
             Ok((table, _)) => report.is_clean().then_some(table),
             Err(reason) => {
-                let title = format!("cannot read {shown}: {reason}");
+                let title = format!("cannot read {path_text}: {reason}");
                 let help = "expected a CSV or Parquet file of numbers under a line of names";
                 report.push(Diagnostic::new(title).help(help));
                 None
@@ -80,20 +83,20 @@ impl NumberTable {
         let headers: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         let (source, places) = report.header(name, &headers);
         let mut table = Vec::new();
-        for (place, ((header, values), at)) in columns.into_iter().zip(places).enumerate() {
-            let found = names.find(&header, None).unwrap_or_else(|[title, expected]| {
-                report.refuse::<()>(&at, title, expected);
+        for (place, ((header, values), location)) in columns.into_iter().zip(places).enumerate() {
+            let known_name = names.find(&header, None).unwrap_or_else(|[title, expected]| {
+                report.refuse::<()>(&location, title, expected);
                 None
             });
-            let is_known = found.is_some();
-            let (value, values) = match found {
-                Some(found) => {
-                    let values = values.into_iter().map(|value| found.scale.apply(value));
-                    (found.name, values.collect())
+            let is_known = known_name.is_some();
+            let (value, values) = match known_name {
+                Some(known_name) => {
+                    let values = values.into_iter().map(|value| known_name.scale.apply(value));
+                    (known_name.name, values.collect())
                 }
                 None => (header.clone(), Vec::new()),
             };
-            let name = Located { value, at };
+            let name = Located { value, location };
             table.push(ListColumn { name, header, place, is_known, values });
         }
         Self {
@@ -108,21 +111,21 @@ impl NumberTable {
         matches!(self.rows, RowLocations::Lines { .. }) && value.is_nan()
     }
 
-    /// Returns the location of a value: `column` is the column's index in the file, `row` is from
-    /// 0.
+    /// Returns the location of a value. `column` is the index of the column in the file, and `row`
+    /// the index of the row, both from 0.
     pub fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
         match &self.rows {
-            RowLocations::Binary(at) => at.clone(),
+            RowLocations::Binary(location) => location.clone(),
             RowLocations::Lines { source, starts, separator } => {
                 let start = starts.get(row).map_or(0, |&start| start as usize);
                 let line = TextLine::at(sources.text(*source), start);
-                let span = line.cells(*separator).nth(column).map(|(_, at)| at);
+                let span = line.cells(*separator).nth(column).map(|(_, location)| location);
                 Location::new(*source, span.unwrap_or(start..start))
             }
         }
     }
 
-    /// Returns a value as it stands in a file of text; indices as those of [`Self::place`].
+    /// Returns the text of a value in a file of text; the indices are those of [`Self::place`].
     pub fn cell(&self, report: &Report, column: usize, row: usize) -> Option<String> {
         let RowLocations::Lines { source, .. } = &self.rows else { return None };
         let sources = report.sources();
@@ -136,25 +139,28 @@ impl NumberTable {
         if self.preamble > 0 {
             notes.push(format!("{} before the names left out", counted(self.preamble, "line")));
         }
-        let left_out: Vec<String> =
+        let ignored: Vec<String> =
             self.columns.iter().filter(|it| !it.is_known).map(|it| quoted(&it.header)).collect();
-        if !left_out.is_empty() {
-            let (few, more) = left_out.split_at(left_out.len().min(MAX_NAMED_COLUMNS));
-            let more = if more.is_empty() { "" } else { ", ..." };
-            let columns = if left_out.len() == 1 { "the column" } else { "the columns" };
-            notes.push(format!("left out {columns} {}{more}", few.join(", ")));
+        if !ignored.is_empty() {
+            let (named, ellipsis) = ignored.split_at(ignored.len().min(MAX_NAMED_COLUMNS));
+            let ellipsis = if ellipsis.is_empty() { "" } else { ", ..." };
+            let columns = if ignored.len() == 1 { "the column" } else { "the columns" };
+            notes.push(format!("left out {columns} {}{ellipsis}", named.join(", ")));
         }
-        let renamed = self.columns.iter().filter(|it| it.is_known && it.header != it.name.value);
-        let renamed = renamed.map(|it| format!("{} is {}", quoted(&it.header), it.name.value));
-        let renamed: Vec<String> = renamed.collect();
-        if !renamed.is_empty() {
-            notes.push(renamed.join(", "));
+        let renamed_columns =
+            self.columns.iter().filter(|it| it.is_known && it.header != it.name.value);
+        let renamed_columns =
+            renamed_columns.map(|it| format!("{} is {}", quoted(&it.header), it.name.value));
+        let renamed_columns: Vec<String> = renamed_columns.collect();
+        if !renamed_columns.is_empty() {
+            notes.push(renamed_columns.join(", "));
         }
         notes
     }
 }
 
-/// Maximum number of columns that a note names. Basis: a note of one line.
+/// Maximum number of columns that a note names. Basis: a note of one line. Doubling it names twice
+/// as many.
 const MAX_NAMED_COLUMNS: usize = 8;
 
 /// A list of points.
@@ -173,7 +179,7 @@ pub struct ListColumn {
     pub header: String,
     /// The index in the file, from 0.
     pub place: usize,
-    /// Whether the reader knows the name; otherwise there are no values.
+    /// Whether the reader knows the name. An unknown column has no values.
     pub is_known: bool,
     /// The value of each row.
     pub values: Vec<f64>,
@@ -191,16 +197,16 @@ enum RowLocations {
 type ListError = String;
 
 /// Returns a path as messages show it.
-fn shown(path: &Path) -> String {
+fn show_path(path: &Path) -> String {
     cut(&path.display().to_string(), MAX_PATH_CHARACTERS)
 }
 
-/// Reads the table of a file and the hash of its bytes; mistakes are reported. Messages point at
-/// `file`. If `gaps` is true, a missing value is NaN; otherwise NaN marks a rejected value.
+/// Reads the table of a file and the hash of its bytes; mistakes are reported at `file`. With
+/// `allows_missing`, a missing value is NaN; otherwise NaN marks a rejected value.
 fn table(
     path: &Path,
     file: &Location,
-    gaps: bool,
+    allows_missing: bool,
     names: &Names<'_>,
     report: &Report,
 ) -> Result<(NumberTable, String), ListError> {
@@ -208,9 +214,11 @@ fn table(
     let hash = blake3::hash(&bytes).to_hex().to_string();
     if bytes.starts_with(b"PAR1") {
         let mut columns = Vec::new();
-        for (place, read) in parquet::columns(bytes, gaps, names)?.into_iter().enumerate() {
-            let parquet::ParquetColumn { name, header, values } = read;
-            let name = Located { value: name, at: file.clone() };
+        for (place, parquet_column) in
+            parquet::columns(bytes, allows_missing, names)?.into_iter().enumerate()
+        {
+            let parquet::ParquetColumn { name, header, values } = parquet_column;
+            let name = Located { value: name, location: file.clone() };
             let is_known = values.is_some();
             let values = values.unwrap_or_default();
             columns.push(ListColumn { name, header, place, is_known, values });
@@ -221,11 +229,11 @@ fn table(
         ));
     }
     let text = text::text(bytes)?;
-    // Messages quote the text when all is read; until then this function owns it.
-    let source = report.add(shown(path), String::new());
-    let read = csv::read(&text, source, gaps, names, report);
+    // The report gets the text after it is read, because this function borrows it until then.
+    let source = report.add(show_path(path), String::new());
+    let text_table = csv::read(&text, source, allows_missing, names, report);
     report.fill(source, text);
-    let csv::TextTable { columns, starts, separator, preamble } = read?;
+    let csv::TextTable { columns, starts, separator, preamble } = text_table?;
     Ok((
         NumberTable { columns, rows: RowLocations::Lines { source, starts, separator }, preamble },
         hash,
@@ -235,33 +243,33 @@ fn table(
 /// Reads a list of points.
 pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) -> Option<List> {
     let path = beside(grid, file);
-    let at = report.place("design.file")?;
-    let shown = shown(&path);
-    let (table, hash) = match table(&path, &at, false, names, report) {
+    let location = report.place("design.file")?;
+    let path_text = show_path(&path);
+    let (table, hash) = match table(&path, &location, false, names, report) {
         Ok(read) => read,
         Err(reason) => {
-            let title = format!("cannot read the list of points {shown}: {reason}");
+            let title = format!("cannot read the list of points {path_text}: {reason}");
             let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
                 relative to this file";
-            return report.refuse(&at, title, expected);
+            return report.refuse(&location, title, expected);
         }
     };
     let points = table.columns.iter().map(|column| column.values.len()).max().unwrap_or_default();
     if points == 0 && !report.is_clean() {
         return None;
     }
-    let is_parameter = |column: &ListColumn| column.is_known && column.name.value != ID;
+    let is_parameter = |column: &ListColumn| column.is_known && column.name.value != ID_COLUMN;
     let has_parameter = table.columns.iter().any(is_parameter);
     let has_unknown = table.columns.iter().any(|column| !column.is_known);
     if points == 0 && (has_parameter || !has_unknown) {
-        let title = format!("the list of points {shown} is empty");
+        let title = format!("the list of points {path_text} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";
-        return report.refuse(&at, title, expected);
+        return report.refuse(&location, title, expected);
     }
     // Unknown names are reported when they are looked up.
     if !has_parameter && !has_unknown {
-        let title = format!("the list of points {shown} has no column but `{ID}`");
-        return report.refuse(&at, title, "expected a column of a parameter");
+        let title = format!("the list of points {path_text} has no column but `{ID_COLUMN}`");
+        return report.refuse(&location, title, "expected a column of a parameter");
     }
     let design = Design::List { file: file.to_owned(), points: points as u64, hash };
     Some(List { design, table })
@@ -269,10 +277,10 @@ pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) 
 
 fn bytes(path: &Path) -> Result<Vec<u8>, ListError> {
     let mut bytes = Vec::new();
-    let read = regular::open(path)
+    let byte_count = regular::open(path)
         .and_then(|file| file.take(MAX_LIST_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|error| error.to_string())?;
-    match read as u64 > MAX_LIST_BYTES {
+    match byte_count as u64 > MAX_LIST_BYTES {
         true => Err(format!("it is longer than {} MiB", MAX_LIST_BYTES >> 20)),
         false => Ok(bytes),
     }

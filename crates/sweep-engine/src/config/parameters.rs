@@ -11,7 +11,7 @@ use crate::Model;
 use crate::{ModelParameter, Plan, program};
 
 /// Number of names that are compared for a suggestion. Basis: a machine of thousands of springs has
-/// more, and the comparison of all would take long.
+/// more, and the comparison of all would take long. Doubling it doubles that time.
 pub(super) const MAX_COMPARED_NAMES: usize = 400;
 
 /// Reads `[set]`, then `--set` and `--at`, which override it, and writes them into the plan.
@@ -32,28 +32,28 @@ pub fn constants<M: Model>(
     }
     let mut constants = arguments("--set", sets, draft);
     constants.extend(arguments("--at", at, draft));
-    let before = draft.plan.clone();
+    let plan_before = draft.plan.clone();
     apply(&constants, draft);
     // A constant that equals the file's value does not change the plan.
-    let changes = |constant: &&SetConstant<M>| {
-        let mut after = before.clone();
-        write(&constant.parameter, &mut after, constant.value.value);
-        after != before
+    let changes_plan = |constant: &&SetConstant<M>| {
+        let mut plan_after = plan_before.clone();
+        write(&constant.parameter, &mut plan_after, constant.value.value);
+        plan_after != plan_before
     };
     draft.plan.set = constants
         .iter()
-        .filter(changes)
+        .filter(changes_plan)
         .map(|constant| (constant.name.value.clone(), constant.value.value.into()))
         .collect();
 }
 
-/// Replaces the axes by one point: `at` has a value for each axis of several values, and may have
-/// values of other parameters.
+/// Replaces the axes by one point. `at` has an argument NAME=VALUE for each axis of several values,
+/// and may have arguments for other parameters.
 pub fn point<M: Model>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
     let constants = arguments("--at", at, draft);
-    let named = |name: &str| at.iter().any(|argument| name_of(argument) == name);
+    let is_given = |name: &str| at.iter().any(|argument| name_of(argument) == name);
     for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
-        if named(&axis.parameter.name) {
+        if is_given(&axis.parameter.name) {
             continue;
         }
         if axis.values.len() == 1 {
@@ -76,24 +76,24 @@ fn arguments<'a, M: Model>(
     arguments: impl IntoIterator<Item = &'a String>,
     draft: &Draft<'a, M>,
 ) -> Vec<SetConstant<M>> {
-    let written =
+    let named_arguments =
         arguments.into_iter().filter_map(|one| NamedArgument::read(option, one, draft.report));
     let constant =
         |one: NamedArgument<'a>| constant(one.name.clone(), |range| one.number(range), true, draft);
-    written.filter_map(constant).collect()
+    named_arguments.filter_map(constant).collect()
 }
 
 /// Returns a constant if its name is a parameter and `number` gives a value in its range.
 fn constant<M: Model>(
     name: Located<&str>,
     number: impl FnOnce(Range) -> Option<Located<f64>>,
-    is_over_file: bool,
+    overrides_file: bool,
     draft: &Draft<'_, M>,
 ) -> Option<SetConstant<M>> {
     let parameter = find(&name, draft)?;
     let value = number(parameter.range)?;
-    let name = Located { value: name.value.to_owned(), at: name.at };
-    Some(SetConstant { name, parameter, value, is_over_file })
+    let name = Located { value: name.value.to_owned(), location: name.location };
+    Some(SetConstant { name, parameter, value, overrides_file })
 }
 
 /// Finds the parameter of this name; an unknown name is reported.
@@ -109,7 +109,7 @@ pub fn unknown<M: Model>(
     model: &M,
 ) -> Diagnostic {
     let title = format!("unknown parameter {}", quoted(name.value));
-    let diagnostic = Diagnostic::new(title).at(&name.at, reason.as_str());
+    let diagnostic = Diagnostic::new(title).at(&name.location, reason.as_str());
     let tables = ["time", "integrator", "reliability"];
     let table = is_in_no_model.then(|| described::<M>().table_of(name.value, &tables)).flatten();
     match (is_in_no_model, table) {
@@ -121,10 +121,12 @@ pub fn unknown<M: Model>(
             })
         }
         (true, None) => {
-            let all = model.parameters();
-            let near = diagnostic
-                .nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| &*one.name));
-            near.help(format!("`{} parameters` lists every name", program()))
+            let parameters = model.parameters();
+            let with_suggestion = diagnostic.nearest(
+                name.value,
+                parameters.iter().take(MAX_COMPARED_NAMES).map(|one| &*one.name),
+            );
+            with_suggestion.help(format!("`{} parameters` lists every name", program()))
         }
         (false, _) => diagnostic,
     }
@@ -137,7 +139,7 @@ fn apply<M: Model>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
         if claimed.claim(&constant.name, constant.parameter.parts.clone(), draft.report) {
             write(&constant.parameter, &mut draft.plan, constant.value.value);
             for part in &constant.parameter.parts {
-                draft.report.put(part.clone(), constant.value.at.clone());
+                draft.report.put(part.clone(), constant.value.location.clone());
             }
             draft.constants.push(constant.clone());
         }

@@ -5,13 +5,14 @@ use super::{Diagnostic, Diagnostics, Located, Location, Report, quoted, refused_
 use crate::Model;
 use crate::{Axis, Plan};
 
-/// Finds the column of each axis of a plan: its index in `names`, or `None` for an axis of one
-/// value that the table leaves out. Every value must lie between the ends of its axis, because the
-/// method's steps are chosen for that range; so a row depends on the plan and its own values alone.
-/// `values` yields those of a column in order, `None` for a missing one.
+/// Finds the column of each axis of a plan: its index in `names`, or `None` if the table leaves out
+/// an axis of one value. Every value must lie between the ends of its axis, because the steps of
+/// the method are chosen for that range. A row then depends only on the plan and its own values.
+/// `values` yields the values of a column in order, `None` for a missing one.
 ///
 /// # Errors
-/// Every mistake: columns that are unknown, no axis, repeated or missing, and values out of range.
+/// Every mistake: columns that are unknown, not an axis, repeated or missing, and values out of
+/// range.
 pub fn check_columns<M: Model, V>(
     plan: &Plan<M>,
     names: &[&str],
@@ -23,37 +24,38 @@ where
     let report = Report::default();
     let (source, places) = report.header("table", names);
     let mut axis_columns: Vec<Option<usize>> = vec![None; plan.axes.len()];
-    for (k, (&value, at)) in names.iter().zip(&places).enumerate() {
-        let name = Located { value, at: at.clone() };
-        let place = plan.axes.iter().position(|axis| axis.parameter.name == name.value);
-        let Some(place) = place else {
-            report.push_with(|_| no_axis(&name, plan));
+    for (k, (&value, location)) in names.iter().zip(&places).enumerate() {
+        let name = Located { value, location: location.clone() };
+        let axis_index = plan.axes.iter().position(|axis| axis.parameter.name == name.value);
+        let Some(axis_index) = axis_index else {
+            report.push_with(|_| column_without_axis(&name, plan));
             continue;
         };
-        if let Some(first) = axis_columns[place] {
+        if let Some(first) = axis_columns[axis_index] {
             let title = format!("the column {} is given twice", quoted(name.value));
-            let diagnostic = Diagnostic::new(title).at(&name.at, "expected each axis once");
+            let diagnostic = Diagnostic::new(title).at(&name.location, "expected each axis once");
             report.push(diagnostic.at(&places[first], "first given here"));
             continue;
         }
-        axis_columns[place] = Some(k);
-        let axis = &plan.axes[place];
-        let ends = axis.values.extremes();
-        let [least, greatest] = ends;
+        axis_columns[axis_index] = Some(k);
+        let axis = &plan.axes[axis_index];
+        let axis_bounds = axis.values.extremes();
+        let [least, greatest] = axis_bounds;
         let is_on_axis = |value: &f64| (least..=greatest).contains(value);
         for (row, value) in
             values(k).enumerate().filter(|(_, value)| !value.is_some_and(|v| is_on_axis(&v)))
         {
-            report.push_with(|_| off_axis(value, row, axis, ends, &name));
+            report.push_with(|_| value_off_axis(value, row, axis, axis_bounds, &name));
         }
     }
     for (axis, column) in plan.axes.iter().zip(&axis_columns) {
         if column.is_none() && axis.values.len() > 1 {
             let name = &axis.parameter.name;
             let title = format!("the table has no column {}", quoted(name));
-            let whole = Location::new(source, 0..places.last().map_or(0, |last| last.span.end));
+            let whole_header =
+                Location::new(source, 0..places.last().map_or(0, |last| last.span.end));
             let expected = "expected a column for every axis of the plan";
-            report.push(Diagnostic::new(title).at(&whole, expected));
+            report.push(Diagnostic::new(title).at(&whole_header, expected));
         }
     }
     report.finish(Some(axis_columns))
@@ -65,7 +67,7 @@ pub fn not_numbers(names: &[String], column: usize, found: &str) -> Diagnostics 
     column_mistake(names, column, what, format!("expected numbers, found {found}"))
 }
 
-/// Returns the mistake of a column whose length differs from the first.
+/// Returns the mistake of a column whose length differs from that of the first column.
 pub fn other_length(names: &[String], column: usize, length: usize, first: usize) -> Diagnostics {
     let what = format!("the column {} has {length} values", quoted(&names[column]));
     column_mistake(names, column, what, format!("expected {first}, as the first column has"))
@@ -80,32 +82,34 @@ fn column_mistake(names: &[String], column: usize, title: String, expected: Stri
 }
 
 /// Returns the mistake of a value that is not on its axis.
-fn off_axis<M: Model>(
+fn value_off_axis<M: Model>(
     value: Option<f64>,
     row: usize,
     axis: &Axis<M>,
     [least, greatest]: [f64; 2],
     name: &Located<&str>,
 ) -> Diagnostic {
-    let what = format!("row {} of {}", row + 1, quoted(name.value));
+    let description = format!("row {} of {}", row + 1, quoted(name.value));
     let range = axis.parameter.range;
     match value {
-        None => Diagnostic::new(format!("{what} has no value"))
-            .at(&name.at, format!("expected {range}")),
-        Some(value) if !range.contains(value) => refused_number(&what, value, &name.at, range),
+        None => Diagnostic::new(format!("{description} has no value"))
+            .at(&name.location, format!("expected {range}")),
+        Some(value) if !range.contains(value) => {
+            refused_number(&description, value, &name.location, range)
+        }
         Some(value) => {
-            let title = format!("{what} = {value} is off the plan's axis");
+            let title = format!("{description} = {value} is off the plan's axis");
             let expected = format!("expected a number from {least} to {greatest}");
             let axis = &axis.parameter.name;
             Diagnostic::new(title)
-                .at(&name.at, expected)
+                .at(&name.location, expected)
                 .help(format!("give `{axis}` a wider range in the plan's [[axis]]"))
         }
     }
 }
 
 /// Returns the mistake of a column that is no axis: a fixed parameter, or an unknown name.
-fn no_axis<M: Model>(name: &Located<&str>, plan: &Plan<M>) -> Diagnostic {
+fn column_without_axis<M: Model>(name: &Located<&str>, plan: &Plan<M>) -> Diagnostic {
     if let Err(error) = plan.model.find(name.value) {
         return unknown(name, &error, &plan.model);
     }
@@ -115,7 +119,7 @@ fn no_axis<M: Model>(name: &Located<&str>, plan: &Plan<M>) -> Diagnostic {
         axes => format!("expected the plan's axes: {}", axes.join(", ")),
     };
     let title = format!("{} is no axis of this plan", quoted(name.value));
-    Diagnostic::new(title).at(&name.at, expected).help(format!(
+    Diagnostic::new(title).at(&name.location, expected).help(format!(
         "add [[axis]] with parameter = \"{}\" and the range that the table may cover",
         name.value
     ))

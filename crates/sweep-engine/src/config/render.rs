@@ -9,61 +9,63 @@ use super::report::{Diagnostic, Diagnostics};
 use super::section::counted;
 use super::source::{Location, SourceLine, Sources, floor_char_boundary};
 
-/// Maximum length of a line that is shown whole, bytes. Basis: a few screens of a terminal. Longer
-/// lines are shown around the mistake.
-const LONGEST_LINE_BYTES: usize = 4000;
-/// Length of the part of a long line that is shown, bytes. Basis: a line of a terminal.
-const SHOWN_BYTES: usize = 130;
-/// Length of that part before the mistake, bytes.
-const BEFORE_BYTES: usize = 40;
+/// Maximum length of a line that is shown whole, bytes; of a longer line, the part around the
+/// mistake is shown. Basis: a few screens of a terminal. Doubling it shows longer lines whole.
+const MAX_WHOLE_LINE_BYTES: usize = 4000;
+/// Length of the part of a long line that is shown, bytes. Basis: a line of a terminal. Doubling it
+/// shows twice as much.
+const WINDOW_BYTES: usize = 130;
+/// Length of the shown part of a long line before the mistake, bytes. Basis: a third of
+/// [`WINDOW_BYTES`]. Doubling it leaves less room for the text after the mistake.
+const WINDOW_LEAD_BYTES: usize = 40;
 
 fn renderer(colour: bool) -> Renderer {
     if colour { Renderer::styled() } else { Renderer::plain() }
 }
 
 /// Renders one mistake, without a newline at its end.
-fn diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -> String {
+fn render_diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -> String {
     let mut group = Group::with_title(Level::ERROR.primary_title(diagnostic.title.as_str()));
     // Locations on one line share its snippet.
     let mut shown: Vec<(usize, &Location)> = Vec::new();
-    for (k, (at, _)) in diagnostic.places.iter().enumerate() {
-        let number = sources.line(at).number;
-        if shown.iter().any(|&(line, other)| line == number && other.source == at.source) {
+    for (k, (location, _)) in diagnostic.places.iter().enumerate() {
+        let number = sources.line(location).number;
+        if shown.iter().any(|&(line, other)| line == number && other.source == location.source) {
             continue;
         }
-        shown.push((number, at));
-        group = picture(group, diagnostic, sources, k);
+        shown.push((number, location));
+        group = add_snippet(group, diagnostic, sources, k);
     }
     let help = diagnostic.help.iter().map(|help| Level::HELP.message(help.as_str()));
     renderer(colour).render(&[group.elements(help)])
 }
 
 /// Adds the snippet of location `k`: its line, with every location on it marked.
-fn picture<'a>(
+fn add_snippet<'a>(
     group: Group<'a>,
     diagnostic: &'a Diagnostic,
     sources: &'a Sources,
     k: usize,
 ) -> Group<'a> {
-    let at = &diagnostic.places[k].0;
-    let line = sources.line(at);
+    let location = &diagnostic.places[k].0;
+    let line = sources.line(location);
     let window = window(&line);
     let column = line.text[..line.span.start].chars().count() + 1;
     let mut snippet = Snippet::source(&line.text[window.clone()]).line_start(line.number);
     for (j, (other, label)) in diagnostic.places.iter().enumerate() {
         let marked = sources.line(other);
-        let inside = other.source == at.source
+        let is_in_window = other.source == location.source
             && marked.number == line.number
             && window.start <= marked.span.start
             && marked.span.start <= window.end;
-        if inside {
+        if is_in_window {
             let kind = if j == 0 { AnnotationKind::Primary } else { AnnotationKind::Context };
             let span =
                 marked.span.start - window.start..marked.span.end.min(window.end) - window.start;
             snippet = snippet.annotation(kind.span(span).label(label.as_str()));
         }
     }
-    let name = sources.name(at.source);
+    let name = sources.name(location.source);
     if window == (0..line.text.len()) {
         group.element(snippet.path(name))
     } else {
@@ -73,18 +75,19 @@ fn picture<'a>(
 
 /// Returns the part of a line that is shown, in its bytes.
 fn window(line: &SourceLine<'_>) -> Range<usize> {
-    if line.text.len() <= LONGEST_LINE_BYTES {
+    if line.text.len() <= MAX_WHOLE_LINE_BYTES {
         return 0..line.text.len();
     }
-    let start = floor_char_boundary(line.text, line.span.start.saturating_sub(BEFORE_BYTES));
-    start..floor_char_boundary(line.text, start + SHOWN_BYTES)
+    let start = floor_char_boundary(line.text, line.span.start.saturating_sub(WINDOW_LEAD_BYTES));
+    start..floor_char_boundary(line.text, start + WINDOW_BYTES)
 }
 
 /// Returns the last line, which counts the mistakes.
-fn summary(count: usize, beyond: usize, colour: bool) -> String {
+fn render_summary(count: usize, beyond: usize, colour: bool) -> String {
     let mistakes = counted(count, "mistake");
-    let shown = if beyond == 0 { String::new() } else { format!(" ({} shown)", count - beyond) };
-    let title = format!("{mistakes}{shown}, nothing was done");
+    let shown_note =
+        if beyond == 0 { String::new() } else { format!(" ({} shown)", count - beyond) };
+    let title = format!("{mistakes}{shown_note}, nothing was done");
     renderer(colour).render(&[Group::with_title(Level::ERROR.primary_title(title))])
 }
 
@@ -97,10 +100,10 @@ impl Diagnostics {
     fn text(&self, colour: bool) -> String {
         let mut text = String::new();
         for found in &self.found {
-            text.push_str(&diagnostic(found, &self.sources, colour));
+            text.push_str(&render_diagnostic(found, &self.sources, colour));
             text.push_str("\n\n");
         }
-        text.push_str(&summary(self.count(), self.beyond, colour));
+        text.push_str(&render_summary(self.count(), self.beyond, colour));
         text
     }
 }

@@ -7,17 +7,17 @@ use super::source::{Location, SourceId, Sources};
 use crate::plan::ASSUMED;
 use sweep_results::nearest;
 
-/// Maximum number of mistakes that are kept; further ones are counted. Basis: a wrong file must not
-/// fill a terminal or the memory.
-const MAX_KEPT: usize = 100;
+/// Maximum number of mistakes that are kept; later ones are only counted. Basis: a wrong file must
+/// not fill a terminal or the memory. Doubling it shows twice as many.
+const MAX_MISTAKES: usize = 100;
 
 /// A mistake.
 #[derive(Debug)]
 pub struct Diagnostic {
     /// The mistake in one line.
     pub title: String,
-    /// The locations with the expectation at each; the first is that of the mistake, the others
-    /// explain.
+    /// The locations, each with the text that is expected at it. The first is the location of the
+    /// mistake; the others explain the mistake.
     pub places: Vec<(Location, String)>,
     /// The advice.
     pub help: Vec<String>,
@@ -30,15 +30,15 @@ impl Diagnostic {
     }
 
     /// Returns the mistake of an expression at this location.
-    pub fn from_expression(mistake: sweep_results::ExpressionError, at: &Location) -> Self {
+    pub fn from_expression(mistake: sweep_results::ExpressionError, location: &Location) -> Self {
         let (typed, names) = mistake.candidates.unwrap_or_default();
         let names = names.iter().map(String::as_str);
-        Self::new(mistake.title).at(at, mistake.expected).nearest(&typed, names)
+        Self::new(mistake.title).at(location, mistake.expected).nearest(&typed, names)
     }
 
-    /// Adds a location with the expectation there.
-    pub fn at(mut self, at: &Location, expected: impl Into<String>) -> Self {
-        self.places.push((at.clone(), expected.into()));
+    /// Adds a location, with the text that is expected at it.
+    pub fn at(mut self, location: &Location, expected: impl Into<String>) -> Self {
+        self.places.push((location.clone(), expected.into()));
         self
     }
 
@@ -61,30 +61,31 @@ impl Diagnostic {
 #[derive(Debug, Default)]
 pub struct Report {
     sources: RefCell<Sources>,
-    found: RefCell<FoundMistakes>,
+    found: RefCell<Mistakes>,
     /// The locations of numbers, for checks that are made later.
     places: RefCell<BTreeMap<String, Location>>,
-    /// The numbers that were rejected or missing, in whose place stand-ins are.
+    /// The numbers that were rejected or missing, and are replaced by placeholders.
     doubtful: RefCell<BTreeSet<String>>,
-    /// The rules of numbers that a file leaves out, by parameter.
+    /// The rules of the numbers that a file leaves out, by parameter.
     assumed: RefCell<BTreeMap<String, String>>,
     /// The notes for the user on how input was read.
     notes: RefCell<Vec<String>>,
 }
 
 #[derive(Debug, Default)]
-struct FoundMistakes {
+struct Mistakes {
     found: Vec<Diagnostic>,
     beyond: usize,
-    /// The lines that are not TOML; mistakes on them may come from the parser's recovery.
+    /// The lines that are not TOML. Other mistakes on them may come from the parser's recovery, so
+    /// they are dropped.
     broken: BTreeMap<SourceId, BTreeSet<usize>>,
-    /// The start of an array that is never closed, in each text.
+    /// The start of an array that is never closed, for each text.
     swallowed: BTreeMap<SourceId, usize>,
 }
 
-impl FoundMistakes {
+impl Mistakes {
     fn keep(&mut self, diagnostic: Diagnostic) {
-        if self.found.len() >= MAX_KEPT {
+        if self.found.len() >= MAX_MISTAKES {
             self.beyond += 1;
         } else {
             self.found.push(diagnostic);
@@ -103,12 +104,12 @@ impl Report {
     pub fn header(&self, name: &str, columns: &[&str]) -> (SourceId, Vec<Location>) {
         let source = self.add(name, columns.join(","));
         let mut next = 0;
-        let place = |column: &&str| {
+        let column_location = |column: &&str| {
             let start = next;
             next += column.len() + 1;
             Location::new(source, start..start + column.len())
         };
-        (source, columns.iter().map(place).collect())
+        (source, columns.iter().map(column_location).collect())
     }
 
     /// Sets the text of a source that was added without one.
@@ -121,11 +122,11 @@ impl Report {
         self.sources.borrow()
     }
 
-    /// Keeps the location of a number by its key: a parameter's name, `time.end_s` and the like for
-    /// other keys of the grid file, `spin.time_s[3]` for an entry of an array, `axis[0]` for an
+    /// Records the location of a number by its key: a parameter's name, `time.end_s` and the like
+    /// for other keys of the grid file, `spin.time_s[3]` for an entry of an array, `axis[0]` for an
     /// axis.
-    pub fn put(&self, key: impl Into<String>, at: Location) {
-        self.places.borrow_mut().insert(key.into(), at);
+    pub fn put(&self, key: impl Into<String>, location: Location) {
+        self.places.borrow_mut().insert(key.into(), location);
     }
 
     /// Marks a number as rejected or missing, so that checks that depend on it are skipped.
@@ -133,7 +134,7 @@ impl Report {
         self.doubtful.borrow_mut().insert(key.into());
     }
 
-    /// Keeps the rule that gives a parameter its value if a file leaves it out.
+    /// Records the rule that gives a parameter its value if a file leaves it out.
     pub fn assume(&self, name: &str, rule: &str) {
         self.assumed.borrow_mut().insert(name.to_owned(), format!("{ASSUMED}{rule}"));
     }
@@ -153,14 +154,15 @@ impl Report {
         self.places.borrow().get(key).cloned()
     }
 
-    /// Returns the source of each parameter: the text that wrote it last, or the rule of one that
-    /// was left out.
+    /// Returns the source of each parameter: the text that wrote it last, or the rule that gives it
+    /// if no text writes it.
     pub fn written(&self) -> BTreeMap<String, String> {
         let places = self.places.borrow();
         let sources = self.sources.borrow();
         let parameters = places.iter().filter(|(key, _)| !key.contains(['.', '[']));
-        let written = parameters.map(|(key, at)| (key.clone(), sources.name(at.source).to_owned()));
-        self.assumed.borrow().clone().into_iter().chain(written).collect()
+        let written_sources = parameters
+            .map(|(key, location)| (key.clone(), sources.name(location.source).to_owned()));
+        self.assumed.borrow().clone().into_iter().chain(written_sources).collect()
     }
 
     /// Returns whether a number was rejected or missing.
@@ -183,16 +185,16 @@ impl Report {
     /// Adds a mistake at one location, and returns `None` in place of the value.
     pub fn refuse<T>(
         &self,
-        at: &Location,
+        location: &Location,
         title: impl Into<String>,
         expected: impl Into<String>,
     ) -> Option<T> {
-        self.push(Diagnostic::new(title).at(at, expected));
+        self.push(Diagnostic::new(title).at(location, expected));
         None
     }
 
-    /// Adds a mistake that is made only if it is kept: finding its line or the nearest name a
-    /// million times would take minutes.
+    /// Adds a mistake, which is created only if it is kept: finding the line or the nearest name of
+    /// a million mistakes would take minutes.
     pub fn push_with(&self, diagnose: impl FnOnce(&Sources) -> Diagnostic) {
         if self.is_full() {
             self.found.borrow_mut().beyond += 1;
@@ -201,10 +203,13 @@ impl Report {
         let sources = self.sources.borrow();
         let diagnostic = diagnose(&sources);
         let mut found = self.found.borrow_mut();
-        let broken = diagnostic.places.first().is_some_and(|(at, _)| {
-            let swallowed = found.swallowed.get(&at.source).is_some_and(|&f| at.span.start >= f);
-            let broken = found.broken.get(&at.source);
-            swallowed || broken.is_some_and(|lines| lines.contains(&sources.line(at).number))
+        let broken = diagnostic.places.first().is_some_and(|(location, _)| {
+            let swallowed = found
+                .swallowed
+                .get(&location.source)
+                .is_some_and(|&start| location.span.start >= start);
+            let broken = found.broken.get(&location.source);
+            swallowed || broken.is_some_and(|lines| lines.contains(&sources.line(location).number))
         });
         if !broken {
             found.keep(diagnostic);
@@ -214,12 +219,12 @@ impl Report {
     /// Adds a mistake of syntax, the first of each line.
     pub fn push_syntax(&self, diagnostic: Diagnostic) {
         let mut found = self.found.borrow_mut();
-        let first = found.found.len() >= MAX_KEPT
-            || diagnostic.places.first().is_none_or(|(at, _)| {
-                let number = self.sources.borrow().line(at).number;
-                found.broken.entry(at.source).or_default().insert(number)
+        let is_kept = found.found.len() >= MAX_MISTAKES
+            || diagnostic.places.first().is_none_or(|(location, _)| {
+                let number = self.sources.borrow().line(location).number;
+                found.broken.entry(location.source).or_default().insert(number)
             });
-        if first {
+        if is_kept {
             found.keep(diagnostic);
         }
     }
@@ -232,14 +237,18 @@ impl Report {
     /// Adds the mistake of a missing key, unless wrong syntax may hide it.
     pub fn push_missing(&self, diagnostic: Diagnostic) {
         let mut found = self.found.borrow_mut();
-        if !diagnostic.places.iter().any(|(at, _)| found.broken.contains_key(&at.source)) {
+        if !diagnostic
+            .places
+            .iter()
+            .any(|(location, _)| found.broken.contains_key(&location.source))
+        {
             found.keep(diagnostic);
         }
     }
 
     /// Returns whether further mistakes are only counted.
     pub fn is_full(&self) -> bool {
-        self.found.borrow().found.len() >= MAX_KEPT
+        self.found.borrow().found.len() >= MAX_MISTAKES
     }
 
     /// Returns whether there are no mistakes so far.
@@ -254,8 +263,10 @@ impl Report {
 
     /// Returns all mistakes.
     pub fn into_diagnostics(self) -> Diagnostics {
-        let FoundMistakes { mut found, beyond, .. } = self.found.into_inner();
-        found.sort_by_key(|d| d.places.first().map(|(at, _)| (at.source, at.span.start)));
+        let Mistakes { mut found, beyond, .. } = self.found.into_inner();
+        found.sort_by_key(|d| {
+            d.places.first().map(|(location, _)| (location.source, location.span.start))
+        });
         Diagnostics { sources: self.sources.into_inner(), found, beyond }
     }
 }
@@ -280,14 +291,15 @@ impl Diagnostics {
     /// Returns the mistakes that are kept, in the order of the text.
     pub fn mistakes(&self) -> Vec<Mistake> {
         let mistake = |Diagnostic { title, places, help }: &Diagnostic| {
-            let place = places.first();
-            let line = place.map(|(at, _)| self.sources.line(at));
+            let main_location = places.first();
+            let line = main_location.map(|(location, _)| self.sources.line(location));
             Mistake {
-                file: place.map(|(at, _)| self.sources.name(at.source).to_owned()),
+                file: main_location
+                    .map(|(location, _)| self.sources.name(location.source).to_owned()),
                 line: line.as_ref().map(|line| line.number),
                 column: line.map(|line| line.text[..line.span.start].chars().count() + 1),
                 message: title.clone(),
-                expected: place.map(|(_, expected)| expected.clone()),
+                expected: main_location.map(|(_, expected)| expected.clone()),
                 hints: help.clone(),
             }
         };
@@ -323,7 +335,7 @@ mod tests {
             report.push(Diagnostic::new("wrong"));
         }
         let diagnostics = report.into_diagnostics();
-        assert_eq!((diagnostics.count(), diagnostics.found.len()), (1000, MAX_KEPT));
+        assert_eq!((diagnostics.count(), diagnostics.found.len()), (1000, MAX_MISTAKES));
         assert!(diagnostics.to_string().contains("1000 mistakes"));
     }
 }

@@ -20,22 +20,24 @@ pub fn grid<M: Model>() -> Value {
     let mut described = described::<M>();
     let key = Key::new("set", "constants, by the names of `sweep parameters`");
     described.add(key, M::schema_of_set());
-    let about = "headers of lists and measurements with the names of what they hold";
+    let axis_description = "headers of lists and measurements with the names of what they hold";
     let names = json!({ "type": "object", "additionalProperties": { "type": "string" } });
-    described.add(Key::new("columns", about), names);
+    described.add(Key::new("columns", axis_description), names);
     let axes = json!({ "type": "array", "items": axis() });
-    let about = "swept parameters; the first varies slowest. With [design] each has a range \
+    let axis_description = "swept parameters; the first varies slowest. With [design] each has \
+                 a range \
                  without a count";
-    described.add(Key::new("axis", about), axes);
+    described.add(Key::new("axis", axis_description), axes);
     let mut schema = described.finish();
-    // Only a design takes distributions; its ranges have no count.
+    // Only a design has distributions, and its ranges have no count.
     schema["if"] = json!({ "required": ["design"] });
-    let counted = json!({ "range": { "required": ["count"] } });
+    let range_with_count = json!({ "range": { "required": ["count"] } });
     let every_axis = |items: Value| json!({ "properties": { "axis": { "items": items } } });
-    let not_counted = json!({ "required": ["range"], "properties": counted });
-    schema["then"] = every_axis(json!({ "not": not_counted }));
-    let not_spread = json!({ "required": ["distribution"] });
-    schema["else"] = every_axis(json!({ "properties": counted, "not": not_spread }));
+    let without_count = json!({ "required": ["range"], "properties": range_with_count });
+    schema["then"] = every_axis(json!({ "not": without_count }));
+    let without_distribution = json!({ "required": ["distribution"] });
+    schema["else"] =
+        every_axis(json!({ "properties": range_with_count, "not": without_distribution }));
     document("Grid file of sweep", schema)
 }
 
@@ -68,8 +70,8 @@ pub fn set(parameters: &[Parameter<impl Sized>], patterns: Map<String, Value>) -
 }
 
 fn distribution() -> Value {
-    let one = |&(kind, numbers): &(&'static str, &[(&'static str, Range)])| {
-        let own = numbers.iter().map(|(key, range)| (*key, number(*range)));
+    let distribution_schema = |&(kind, numbers): &(&'static str, &[(&'static str, Range)])| {
+        let shape_numbers = numbers.iter().map(|(key, range)| (*key, number(*range)));
         let ends = ["from", "to"].map(|key| (key, number(Range::Any)));
         let mut required = vec!["kind"];
         match numbers {
@@ -77,14 +79,14 @@ fn distribution() -> Value {
             numbers => required.extend(numbers.iter().map(|(key, _)| *key)),
         }
         let kind = || ("kind", json!({ "const": kind }));
-        let given = table([kind()].into_iter().chain(own).chain(ends), &required);
-        let about = table([kind(), ("tolerance", tolerance())], &["kind", "tolerance"]);
-        [given, about]
+        let with_numbers = table([kind()].into_iter().chain(shape_numbers).chain(ends), &required);
+        let with_tolerance = table([kind(), ("tolerance", tolerance())], &["kind", "tolerance"]);
+        [with_numbers, with_tolerance]
     };
     json!({
         "description": "of a design, cut at `from` and `to`; left out, they lie six standard \
                         deviations from the middle. A tolerance is three",
-        "oneOf": DISTRIBUTIONS.iter().flat_map(one).collect::<Value>(),
+        "oneOf": DISTRIBUTIONS.iter().flat_map(distribution_schema).collect::<Value>(),
     })
 }
 
@@ -104,9 +106,9 @@ fn axis() -> Value {
     count["description"] = "the number of values, both ends included".into();
     let spacing = json!({ "enum": ["linear", "log"], "default": "linear" });
     let ends = ["from", "to"].map(|key| (key, number(Range::Any)));
-    let further = [("count", count.clone()), ("spacing", spacing)];
-    let range = table(ends.into_iter().chain(further), &["from", "to"]);
-    let about = json!({
+    let count_and_spacing = [("count", count.clone()), ("spacing", spacing)];
+    let range = table(ends.into_iter().chain(count_and_spacing), &["from", "to"]);
+    let tolerance_schema = json!({
         "type": "object",
         "properties": { "parameter": parameter, "tolerance": tolerance(), "count": count },
         "required": ["parameter", "tolerance"],
@@ -114,9 +116,10 @@ fn axis() -> Value {
     });
     let values =
         json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
-    let given =
+    let with_parameter =
         |(key, value)| table([("parameter", parameter.clone()), (key, value)], &["parameter", key]);
-    let ways = [("values", values), ("range", range), ("distribution", distribution())];
-    let ways: Vec<Value> = ways.map(given).into_iter().chain([about]).collect();
-    json!({ "oneOf": ways })
+    let axis_forms = [("values", values), ("range", range), ("distribution", distribution())];
+    let axis_forms: Vec<Value> =
+        axis_forms.map(with_parameter).into_iter().chain([tolerance_schema]).collect();
+    json!({ "oneOf": axis_forms })
 }

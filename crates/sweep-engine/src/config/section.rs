@@ -1,6 +1,6 @@
-//! A walk over a TOML table key by key. Values are taken by name and kind; a wrong one is reported
-//! and the walk goes on, so that one pass finds every mistake. Keys that were not taken are
-//! reported at the end.
+//! A walk over a TOML table key by key. Values are read by name and kind. A wrong value is reported
+//! and the walk goes on, so that one pass finds every mistake. Keys that were not read are reported
+//! at the end.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -41,19 +41,19 @@ impl<T> Field<T> {
     }
 
     /// Maps the value at the same location.
-    pub fn map<U>(self, next: impl FnOnce(Located<T>) -> U) -> Field<U> {
+    pub fn map<U>(self, map_value: impl FnOnce(Located<T>) -> U) -> Field<U> {
         self.then(|found| {
-            let at = found.at.clone();
-            Some(Located { value: next(found), at })
+            let location = found.location.clone();
+            Some(Located { value: map_value(found), location })
         })
     }
 
-    /// Maps the value at the same location, or rejects it, which the function has reported.
-    pub fn then<U>(self, next: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
+    /// Maps the value at the same location, or rejects it after the function has reported it.
+    pub fn then<U>(self, map_value: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
         match self {
             Self::Absent => Field::Absent,
             Self::Bad => Field::Bad,
-            Self::Given(found) => next(found).map_or(Field::Bad, Field::Given),
+            Self::Given(found) => map_value(found).map_or(Field::Bad, Field::Given),
         }
     }
 }
@@ -64,12 +64,12 @@ type Value<'a> = Spanned<DeValue<'a>>;
 pub struct Section<'a> {
     /// The name in messages: `[spin]`, `the grid file`.
     title: String,
-    at: Location,
+    location: Location,
     table: &'a DeTable<'a>,
     /// The report of mistakes.
     pub report: &'a Report,
     known: RefCell<Vec<&'static str>>,
-    /// Keys that are valid elsewhere, with the reason.
+    /// The keys that are valid in another place or variant, with the reason why they are rejected.
     misplaced: RefCell<BTreeMap<&'static str, String>>,
 }
 
@@ -77,32 +77,32 @@ impl<'a> Section<'a> {
     /// Returns the walk over a table.
     pub fn new(
         title: impl Into<String>,
-        at: Location,
+        location: Location,
         table: &'a DeTable<'a>,
         report: &'a Report,
     ) -> Self {
         let (known, misplaced) = Default::default();
-        Self { title: title.into(), at, table, report, known, misplaced }
+        Self { title: title.into(), location, table, report, known, misplaced }
     }
 
     /// Returns the location of the table.
     pub fn at(&self) -> &Location {
-        &self.at
+        &self.location
     }
 
     fn place(&self, span: std::ops::Range<usize>) -> Location {
-        Location::new(self.at.source, span)
+        Location::new(self.location.source, span)
     }
 
     fn get(&self, key: &'static str) -> Option<&'a Value<'a>> {
-        // A key that may be a number or a word is taken twice.
+        // A key that may be a number or a word is read twice.
         if !self.is_known(key) {
             self.known.borrow_mut().push(key);
         }
         self.table.get(key)
     }
 
-    /// Returns whether a key was taken.
+    /// Returns whether a key was read.
     pub fn is_known(&self, key: &str) -> bool {
         self.known.borrow().contains(&key)
     }
@@ -112,15 +112,15 @@ impl<'a> Section<'a> {
         self.table.get_key_value(key).map(|(key, _)| self.place(key.span()))
     }
 
-    /// Returns whether a table under a key has another key.
+    /// Returns whether the table under a key has an inner key.
     pub fn key_inside(&self, table: &str, key: &str) -> bool {
         let table = self.table.get(table).map(Spanned::get_ref);
         matches!(table, Some(DeValue::Table(table)) if table.contains_key(key))
     }
 
-    /// Rejects these keys with a reason of their own instead of "unknown key".
+    /// Rejects these keys with this reason instead of "unknown key".
     pub fn misplace(&self, keys: &[&'static str], reason: &str) {
-        // The first reason is kept, which is the caller's own.
+        // The first reason of a key is kept, because it is the more specific one.
         let mut misplaced = self.misplaced.borrow_mut();
         for key in keys {
             misplaced.entry(key).or_insert_with(|| reason.to_owned());
@@ -143,8 +143,9 @@ impl<'a> Section<'a> {
     /// Reports a required key that is missing.
     pub fn missing(&self, key: &str, expected: &str) {
         let title = format!("`{key}` is missing in {}", self.title);
-        self.report
-            .push_missing(Diagnostic::new(title).at(&self.at, format!("expected {expected}")));
+        self.report.push_missing(
+            Diagnostic::new(title).at(&self.location, format!("expected {expected}")),
+        );
     }
 
     /// Reads the value under a key by a function, which reports a value that it rejects.
@@ -154,14 +155,14 @@ impl<'a> Section<'a> {
         read: impl FnOnce(&'a Value<'a>, &Location) -> Option<T>,
     ) -> Field<T> {
         let Some(value) = self.get(key) else { return Field::Absent };
-        let at = self.place(value.span());
-        let found = read(value, &at);
-        found.map_or(Field::Bad, |value| Field::Given(Located { value, at }))
+        let location = self.place(value.span());
+        let found = read(value, &location);
+        found.map_or(Field::Bad, |value| Field::Given(Located { value, location }))
     }
 
     /// Reports a value of the wrong type.
-    fn wrong<T>(&self, what: &str, value: &Value<'_>, expected: &str) -> Option<T> {
-        let found = match value.get_ref() {
+    fn wrong<T>(&self, description: &str, value: &Value<'_>, expected: &str) -> Option<T> {
+        let type_name = match value.get_ref() {
             DeValue::String(_) => "a string",
             DeValue::Integer(_) => "a whole number",
             DeValue::Float(_) => "a decimal number",
@@ -173,20 +174,20 @@ impl<'a> Section<'a> {
         let text = value.get_ref().as_str().filter(|_| expected.contains("number"));
         let is_number = text.is_some_and(|text| text.parse::<f64>().is_ok());
         let help = is_number.then_some("write the number without quotes");
-        let refusal = Diagnostic::new(format!("{what} has the wrong type"))
-            .at(&self.place(value.span()), format!("expected {expected}, found {found}"));
+        let refusal = Diagnostic::new(format!("{description} has the wrong type"))
+            .at(&self.place(value.span()), format!("expected {expected}, found {type_name}"));
         self.report.push(help.into_iter().fold(refusal, Diagnostic::help));
         None
     }
 
-    /// Takes a finite number in a range.
+    /// Reads a finite number in a range.
     pub fn number(&self, key: &'static str, range: Range) -> Field<f64> {
         self.read(key, |value, _| Some(self.number_of(&quoted(key), value, range)?.value))
     }
 
-    /// Takes a whole number within bounds.
+    /// Reads a whole number within bounds.
     pub fn whole(&self, key: &'static str, bounds: &RangeInclusive<u64>) -> Field<u64> {
-        self.read(key, |value, at| {
+        self.read(key, |value, location| {
             let DeValue::Integer(integer) = value.get_ref() else {
                 return self.wrong(&quoted(key), value, "a whole number");
             };
@@ -194,19 +195,19 @@ impl<'a> Section<'a> {
             count.filter(|count| bounds.contains(count)).or_else(|| {
                 let title = format!("`{key}` = {integer} is out of range");
                 let least = bounds.start();
-                let most = bounds.end();
-                let expected = format!("expected a whole number from {least} to {most}");
-                self.report.refuse(at, title, expected)
+                let max = bounds.end();
+                let expected = format!("expected a whole number from {least} to {max}");
+                self.report.refuse(location, title, expected)
             })
         })
     }
 
-    /// Takes a string.
+    /// Reads a string.
     pub fn text(&self, key: &'static str) -> Field<&'a str> {
         self.read(key, |value, _| Some(self.text_of(&quoted(key), value)?.value))
     }
 
-    /// Takes a string, or a number as it is written.
+    /// Reads a string, or the text of a number.
     pub fn text_or_number(&self, key: &'static str) -> Field<&'a str> {
         self.read(key, |value, _| match value.get_ref() {
             DeValue::Integer(integer) if integer.radix() == 10 => Some(integer.as_str()),
@@ -220,26 +221,26 @@ impl<'a> Section<'a> {
         self.get(key).is_some_and(|value| value.get_ref().is_str())
     }
 
-    /// Takes a word, as its index in `choices`.
+    /// Reads a word, as its index in `choices`.
     pub fn choice(&self, key: &'static str, choices: &[&str]) -> Field<usize> {
         self.text(key).then(|found| {
             let position = choices.iter().position(|&choice| choice == found.value);
             if position.is_none() {
                 self.report.push_with(|_| unknown_word(key, &found, choices));
             }
-            position.map(|value| Located { value, at: found.at })
+            position.map(|value| Located { value, location: found.location })
         })
     }
 
-    /// Takes an array of finite numbers in a range; one wrong number rejects all.
+    /// Reads an array of finite numbers in a range; one wrong number rejects all.
     pub fn numbers(&self, key: &'static str, range: Range) -> Field<Vec<Located<f64>>> {
         self.right_numbers(key, range).then(|found| {
             let (numbers, all) = found.value;
-            all.then_some(Located { value: numbers, at: found.at })
+            all.then_some(Located { value: numbers, location: found.location })
         })
     }
 
-    /// Takes the valid numbers of an array, and whether all are valid.
+    /// Reads the valid numbers of an array, and whether all are valid.
     pub fn right_numbers(
         &self,
         key: &'static str,
@@ -248,12 +249,12 @@ impl<'a> Section<'a> {
         self.items(key, "an array of numbers").map(|items| {
             let number = |item| self.number_of(&entry(key), item, range);
             let numbers: Vec<_> = items.value.iter().filter_map(number).collect();
-            let all = numbers.len() == items.value.len();
-            (numbers, all)
+            let are_all_valid = numbers.len() == items.value.len();
+            (numbers, are_all_valid)
         })
     }
 
-    /// Takes the valid strings of an array; others are reported.
+    /// Reads the valid strings of an array; others are reported.
     pub fn texts(&self, key: &'static str) -> Field<Vec<Located<&'a str>>> {
         self.items(key, "an array of strings").map(|items| {
             items.value.iter().filter_map(|item| self.text_of(&entry(key), item)).collect()
@@ -267,15 +268,17 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// Takes the table under a key.
+    /// Reads the table under a key.
     pub fn table(&self, key: &'static str, title: &str) -> Field<Section<'a>> {
-        self.read(key, |value, at| match value.get_ref() {
-            DeValue::Table(table) => Some(Section::new(title, at.clone(), table, self.report)),
+        self.read(key, |value, location| match value.get_ref() {
+            DeValue::Table(table) => {
+                Some(Section::new(title, location.clone(), table, self.report))
+            }
             _ => self.wrong(&quoted(key), value, &format!("a table, {title}")),
         })
     }
 
-    /// Takes an array of tables, `[[key]]`; empty if it is absent.
+    /// Reads an array of tables, `[[key]]`; it is empty if the key is absent.
     pub fn tables(&self, key: &'static str) -> Vec<Section<'a>> {
         let kind = format!("tables, each under [[{key}]]");
         let items = self.items(key, &kind).given().map_or(&[][..], |items| items.value);
@@ -292,40 +295,48 @@ impl<'a> Section<'a> {
     /// Returns every key as written, for tables whose keys are names of parameters.
     pub fn names(&self) -> Vec<Located<&'a str>> {
         let keys = self.table.keys();
-        keys.map(|key| Located { value: &**key.get_ref(), at: self.place(key.span()) }).collect()
+        keys.map(|key| Located { value: &**key.get_ref(), location: self.place(key.span()) })
+            .collect()
     }
 
-    /// Takes the number under a name from [`Section::names`].
+    /// Reads the number under a name from [`Section::names`].
     pub fn number_named(&self, name: &str, range: Range) -> Option<Located<f64>> {
         self.number_of(&quoted(name), self.table.get(name)?, range)
     }
 
-    /// Takes the string under a name from [`Section::names`].
+    /// Reads the string under a name from [`Section::names`].
     pub fn text_named(&self, name: &str) -> Option<Located<&'a str>> {
         self.text_of(&quoted(name), self.table.get(name)?)
     }
 
-    fn text_of(&self, what: &str, value: &'a Value<'a>) -> Option<Located<&'a str>> {
+    fn text_of(&self, description: &str, value: &'a Value<'a>) -> Option<Located<&'a str>> {
         match value.get_ref() {
-            DeValue::String(text) => Some(Located { value: text, at: self.place(value.span()) }),
-            _ => self.wrong(what, value, "a string"),
+            DeValue::String(text) => {
+                Some(Located { value: text, location: self.place(value.span()) })
+            }
+            _ => self.wrong(description, value, "a string"),
         }
     }
 
-    fn number_of(&self, what: &str, value: &Value<'_>, range: Range) -> Option<Located<f64>> {
+    fn number_of(
+        &self,
+        description: &str,
+        value: &Value<'_>,
+        range: Range,
+    ) -> Option<Located<f64>> {
         let number = match value.get_ref() {
             DeValue::Float(float) => float.as_str().parse().ok(),
             DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
             DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix())
                 .ok()
                 .map(|value| value as f64),
-            _ => return self.wrong(what, value, "a number"),
+            _ => return self.wrong(description, value, "a number"),
         };
         let number = number.unwrap_or(f64::INFINITY);
-        check_number(what, number, self.place(value.span()), range, self.report)
+        check_number(description, number, self.place(value.span()), range, self.report)
     }
 
-    /// Reports every key that was not taken.
+    /// Reports every key that was not read.
     pub fn finish(self) {
         let known = self.known.into_inner();
         let misplaced = self.misplaced.into_inner();
@@ -335,15 +346,15 @@ impl<'a> Section<'a> {
                 continue;
             }
             self.report.push_with(|_| {
-                let at = Location::new(self.at.source, key.span());
+                let location = Location::new(self.location.source, key.span());
                 match misplaced.get(name) {
                     Some(reason) => {
                         Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
-                            .at(&at, reason.as_str())
+                            .at(&location, reason.as_str())
                     }
                     None => {
                         Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
-                            .at(&at, format!("expected {}", list_choices(&known)))
+                            .at(&location, format!("expected {}", list_choices(&known)))
                             .nearest(name, known.iter().copied())
                     }
                 }
@@ -362,8 +373,8 @@ pub fn written_twice(
         (name, other) => format!("`{other}` and `{name}` write the same number"),
     };
     Diagnostic::new(title)
-        .at(&second.at, "expected each number once")
-        .at(&first.at, "first written here")
+        .at(&second.location, "expected each number once")
+        .at(&first.location, "first written here")
 }
 
 /// A word of earlier versions that was removed.
@@ -371,7 +382,7 @@ struct RemovedWord {
     /// The key of the word.
     key: &'static str,
     word: &'static str,
-    /// The word that replaces it, for models that have that.
+    /// The word that replaces the removed one, in models that have it.
     successor: &'static str,
     reason: &'static str,
 }
@@ -385,13 +396,15 @@ const REMOVED_WORDS: [RemovedWord; 1] = [RemovedWord {
 }];
 
 /// Returns the mistake of a word that is not among the choices.
-pub fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
-    let removed = REMOVED_WORDS.iter().find(|removed| {
-        removed.key == what && removed.word == found.value && choices.contains(&removed.successor)
+pub fn unknown_word(description: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
+    let removed_word = REMOVED_WORDS.iter().find(|removed_word| {
+        removed_word.key == description
+            && removed_word.word == found.value
+            && choices.contains(&removed_word.successor)
     });
-    let refusal = Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))
-        .at(&found.at, format!("expected {}", list_choices(choices)));
-    match removed {
+    let refusal = Diagnostic::new(format!("unknown {description} \"{}\"", short(found.value)))
+        .at(&found.location, format!("expected {}", list_choices(choices)));
+    match removed_word {
         Some(RemovedWord { key, word, successor, reason }) => refusal.help(format!(
             "\"{word}\" was removed: write {key} = \"{successor}\" in its place; {reason}"
         )),
@@ -410,8 +423,8 @@ pub fn list_choices(choices: &[&str]) -> String {
 }
 
 /// Returns a count with its noun, whose plural ends in s.
-pub fn counted(count: usize, what: &str) -> String {
-    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
+pub fn counted(count: usize, description: &str) -> String {
+    if count == 1 { format!("1 {description}") } else { format!("{count} {description}s") }
 }
 
 /// Returns a key as messages show it.
@@ -429,37 +442,42 @@ pub fn short(typed: &str) -> String {
     cut(typed, 60)
 }
 
-/// Returns at most `most` characters of a text.
-pub fn cut(text: &str, most: usize) -> String {
-    match text.char_indices().nth(most) {
+/// Returns at most `max` characters of a text, with an ellipsis if it is shortened.
+pub fn cut(text: &str, max: usize) -> String {
+    match text.char_indices().nth(max) {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text.to_owned(),
     }
 }
 
-/// Returns the number if it is finite and in range; otherwise it is reported.
+/// Returns the number if it is finite and in range. Other numbers are reported.
 pub fn check_number(
-    what: &str,
+    description: &str,
     value: f64,
-    at: Location,
+    location: Location,
     range: Range,
     report: &Report,
 ) -> Option<Located<f64>> {
     if range.contains(value) {
-        return Some(Located { value, at });
+        return Some(Located { value, location });
     }
-    report.push(refused_number(what, value, &at, range));
+    report.push(refused_number(description, value, &location, range));
     None
 }
 
 /// Returns the mistake of a number that is not finite or not in range.
-pub fn refused_number(what: &str, value: f64, at: &Location, range: Range) -> Diagnostic {
+pub fn refused_number(
+    description: &str,
+    value: f64,
+    location: &Location,
+    range: Range,
+) -> Diagnostic {
     let title = if value.is_nan() {
-        format!("{what} is not a number")
+        format!("{description} is not a number")
     } else if value.is_infinite() {
-        format!("{what} is not finite")
+        format!("{description} is not finite")
     } else {
-        format!("{what} = {} is out of range", decimal(value))
+        format!("{description} = {} is out of range", decimal(value))
     };
-    Diagnostic::new(title).at(at, format!("expected {}", range.describe_for(value)))
+    Diagnostic::new(title).at(location, format!("expected {}", range.describe_for(value)))
 }

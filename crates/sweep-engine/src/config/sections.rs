@@ -57,15 +57,17 @@ pub(super) fn sections<M: Model>(
     input: Option<&GridInput<M>>,
 ) {
     let Plan { name, model, end_s, window_s, integrator, reliability, .. } = plan;
-    let about = "name of the run and of its result file; the grid file's own name if left out";
+    let description =
+        "name of the run and of its result file; the grid file's own name if left out";
     let schema = json!({ "type": "string", "pattern": "^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$" });
-    let read = |root: &Section<'_>, _| {
+    let read_name = |root: &Section<'_>, _| {
         let path = input.map_or(Path::new(""), |input| &input.path);
-        let over = input.and_then(|input| input.name.as_deref());
-        let name = self::name(root, path, over, "add `name = \"...\"`, or pass `--name`");
-        Field::Given(Located { value: name.into(), at: root.at().clone() })
+        let overriding_name = input.and_then(|input| input.name.as_deref());
+        let name =
+            self::name(root, path, overriding_name, "add `name = \"...\"`, or pass `--name`");
+        Field::Given(Located { value: name.into(), location: root.at().clone() })
     };
-    keys.key(Key::new("name", about), &Form::Own(&read, schema), name);
+    keys.key(Key::new("name", description), &Form::Own(&read_name, schema), name);
     model.walk(GridTable::Top, keys, input);
     keys.table(Key::new("time", "").needed("a section [time]"), |keys| time(end_s, window_s, keys));
     keys.table(Key::new("integrator", ""), |keys| method(M::ABOUT.methods, integrator, keys));
@@ -74,18 +76,23 @@ pub(super) fn sections<M: Model>(
         let Reliability { limits, channels } = reliability;
         let key = Key::new("ratio_limit", "a point is reliable where every ratio is below this");
         keys.key(key.set(), &Form::Number(Range::Positive), &mut limits.upper);
-        let about = "if given, a point is reliable where every ratio is above this too";
-        keys.key(Key::new("ratio_min", about).set(), &Form::Number(RATIO_MIN), &mut limits.lower);
+        let description = "if given, a point is reliable where every ratio is above this too";
+        keys.key(
+            Key::new("ratio_min", description).set(),
+            &Form::Number(RATIO_MIN),
+            &mut limits.lower,
+        );
         let key = Key::new("channels", "channels that are compared").set();
         keys.words(key, "channel", M::ABOUT.channels, |channel| channel.name, channels);
     });
 }
 
 /// The form of names, which become file names.
-const PLAIN_NAME: &str = "letters a to z and A to Z, digits, `-`, `_` and `.`, beginning with a \
+const FILE_NAME_RULE: &str = "letters a to z and A to Z, digits, `-`, `_` and `.`, beginning \
+                          with a \
                           letter or digit, at most 100 characters";
 
-fn is_plain(name: &str) -> bool {
+fn is_file_name(name: &str) -> bool {
     let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
     first
         && name.len() <= 100
@@ -94,28 +101,29 @@ fn is_plain(name: &str) -> bool {
 
 /// Parses a run's name from the command line.
 pub fn plain_name(text: &str) -> Result<String, String> {
-    if is_plain(text) { Ok(text.to_owned()) } else { Err(format!("expected {PLAIN_NAME}")) }
+    if is_file_name(text) { Ok(text.to_owned()) } else { Err(format!("expected {FILE_NAME_RULE}")) }
 }
 
-/// Returns the run's name: `over`, the name in the file, or the file's own name, in this order.
-/// `help` is the advice for a file without any of them.
-pub fn name(root: &Section<'_>, path: &Path, over: Option<&str>, help: &str) -> String {
+/// Returns the run's name: `overriding_name`, the name in the file, or the file's own name, in this
+/// order. `help` is the advice for a file without any of them.
+pub fn name(root: &Section<'_>, path: &Path, overriding_name: Option<&str>, help: &str) -> String {
     match root.text("name") {
-        Field::Given(found) if is_plain(found.value) => {
-            return over.unwrap_or(found.value).to_owned();
+        Field::Given(found) if is_file_name(found.value) => {
+            return overriding_name.unwrap_or(found.value).to_owned();
         }
         Field::Given(found) => {
             let title = "`name` is not a plain file name";
-            root.report.refuse::<()>(&found.at, title, format!("expected {PLAIN_NAME}"));
+            root.report.refuse::<()>(&found.location, title, format!("expected {FILE_NAME_RULE}"));
         }
         Field::Bad => {}
         Field::Absent => {
             let stem = || path.file_stem().and_then(|stem| stem.to_str());
-            if let Some(name) = over.or_else(stem).filter(|name| is_plain(name)) {
+            if let Some(name) = overriding_name.or_else(stem).filter(|name| is_file_name(name)) {
                 return name.to_owned();
             }
             let title = "`name` is missing, and the file's own name cannot replace it";
-            let refusal = Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}"));
+            let refusal =
+                Diagnostic::new(title).at(root.at(), format!("expected {FILE_NAME_RULE}"));
             root.report.push_missing(refusal.help(help));
         }
     }
@@ -124,8 +132,8 @@ pub fn name(root: &Section<'_>, path: &Path, over: Option<&str>, help: &str) -> 
 
 /// Walks over the end and the window.
 fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
-    let about = Key::new("end_s", "end of the integration, s").set();
-    let key = about.needed("the end of the integration in s");
+    let description = Key::new("end_s", "end of the integration, s").set();
+    let key = description.needed("the end of the integration in s");
     let described = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": MAX_END_S });
     let (kind, expected) = match &keys.walk {
         KeyWalk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
@@ -133,32 +141,37 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
         _ => (Form::Own(&|_, _| Field::Absent, described), ""),
     };
     let mut value = *end_s;
-    let end = keys.key(key, &kind, &mut value).given().and_then(|Located { at, .. }| {
+    let end = keys.key(key, &kind, &mut value).given().and_then(|Located { location, .. }| {
         if 0.0 < value && value <= MAX_END_S {
-            return Some(Located { value, at });
+            return Some(Located { value, location });
         }
         let title = format!("`end_s` = {} is out of range", decimal(value));
-        keys.report()?.refuse(&at, title, format!("expected {expected}at most {MAX_END_S:e} s"))
+        keys.report()?.refuse(
+            &location,
+            title,
+            format!("expected {expected}at most {MAX_END_S:e} s"),
+        )
     });
-    let is_window_written = |report: &Report| report.place(WINDOW[1]).is_some();
+    let is_window_written = |report: &Report| report.place(WINDOW_PARAMETERS[1]).is_some();
     if let Some(end) = &end {
         *end_s = end.value;
-        // A default window ends with the run.
+        // The default window ends at the end of the run.
         if !keys.report().is_some_and(is_window_written) {
             window_s[1] = end.value;
         }
     }
-    let about = "amplitudes are taken from the first to the second time, s; the whole run if left \
+    let description = "amplitudes are taken from the first to the second time, s; the whole run \
+                 if left \
                  out";
     let expected = "expected two, [from, to], in s";
     let kind = Form::Numbers(Numbers {
-        places: WINDOW.map(str::to_owned).to_vec(),
+        places: WINDOW_PARAMETERS.map(str::to_owned).to_vec(),
         ..Numbers::new(Range::NonNegative, 2..=2, expected)
     });
     let mut edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
-    let found = keys.key(Key::new("window_s", about), &kind, &mut edges);
-    if let (Field::Given(found), Some(report)) = (found, keys.report())
-        && let Some(window) = window(&found.at, &edges, end.as_ref(), report)
+    let window_field = keys.key(Key::new("window_s", description), &kind, &mut edges);
+    if let (Field::Given(window_field), Some(report)) = (window_field, keys.report())
+        && let Some(window) = window(&window_field.location, &edges, end.as_ref(), report)
         && end.is_some()
     {
         *window_s = window;
@@ -166,27 +179,29 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
 }
 
 /// The names of the window's edges as parameters.
-const WINDOW: [&str; 2] = ["window_from_s", "window_to_s"];
+const WINDOW_PARAMETERS: [&str; 2] = ["window_from_s", "window_to_s"];
 
 /// Returns the window that was read, if it is valid.
 fn window(
-    at: &Location,
+    location: &Location,
     edges: &[f64],
     end: Option<&Located<f64>>,
     report: &Report,
 ) -> Option<[f64; 2]> {
     let &[from, to] = edges else { return None };
-    let [from_said, to_said] = [from, to].map(decimal);
+    let [from_text, to_text] = [from, to].map(decimal);
     if from >= to {
-        let what = if from > to { "reversed" } else { "empty" };
-        let title = format!("the window is {what}: it goes from {from_said} s to {to_said} s");
-        return report.refuse(at, title, "expected [from, to] with from < to");
+        let adjective = if from > to { "reversed" } else { "empty" };
+        let title = format!("the window is {adjective}: it goes from {from_text} s to {to_text} s");
+        return report.refuse(location, title, "expected [from, to] with from < to");
     }
     if let Some(end) = end.filter(|end| to > end.value) {
-        let title = format!("the window ends at {to_said} s, after the integration");
-        let refusal = Diagnostic::new(title)
-            .at(&report.place(WINDOW[1])?, format!("expected at most {}", decimal(end.value)));
-        report.push(refusal.at(&end.at, "the integration ends here"));
+        let title = format!("the window ends at {to_text} s, after the integration");
+        let refusal = Diagnostic::new(title).at(
+            &report.place(WINDOW_PARAMETERS[1])?,
+            format!("expected at most {}", decimal(end.value)),
+        );
+        report.push(refusal.at(&end.location, "the integration ends here"));
         return None;
     }
     Some([from, to])
@@ -199,36 +214,43 @@ fn method(all: &'static [IntegrationMethod], integrator: &mut Integrator, keys: 
         default: Some(all.len() - 1),
         set: all.len(),
     };
-    let now = all.iter().position(|entry| entry.name == integrator.name());
-    keys.variants(Key::new("method", "").set(), &variants, now, |keys, method| {
+    let current_method = all.iter().position(|entry| entry.name == integrator.name());
+    keys.variants(Key::new("method", "").set(), &variants, current_method, |keys, method| {
         let entry = &all[method];
         let name = entry.name;
         let others = all.iter().flat_map(|other| other.settings).map(|setting| setting.key);
         for key in others.filter(|key| !entry.has(key)).collect::<BTreeSet<_>>() {
-            let owners = all.iter().filter(|other| other.has(key)).map(|other| other.name);
-            let owners: Vec<&str> = owners.collect();
+            let methods_with_key =
+                all.iter().filter(|other| other.has(key)).map(|other| other.name);
+            let methods_with_key: Vec<&str> = methods_with_key.collect();
             let (noun, verb) =
-                if owners.len() == 1 { ("method", "has") } else { ("methods", "have") };
-            let owners_list = owners.join("\" and \"");
+                if methods_with_key.len() == 1 { ("method", "has") } else { ("methods", "have") };
+            let owners_list = methods_with_key.join("\" and \"");
             keys.misplace(
                 &[key],
                 &format!("only the {noun} \"{owners_list}\" {verb} it, not \"{name}\""),
             );
             let title = format!("the method \"{name}\" has no `{key}`");
-            keys.refuse(key, &title, &format!("`{key}` belongs to \"{}\"", owners.join("\", \"")));
+            keys.refuse(
+                key,
+                &title,
+                &format!("`{key}` belongs to \"{}\"", methods_with_key.join("\", \"")),
+            );
         }
         // Settings that the old and the new method share keep their values.
-        let was = integrator.settings();
+        let old_settings = integrator.settings();
         *integrator = entry.with(|&Setting { key, range, default, description, help }| {
-            let was = was.iter().find(|(known, _)| *known == key);
-            let mut number = was.map_or(default, |(_, number)| *number);
+            let old_settings = old_settings.iter().find(|(known, _)| *known == key);
+            let mut number = old_settings.map_or(default, |(_, number)| *number);
             let setting = Key::new(key, description).set();
             let field = keys.key(setting, &Form::Number(range), &mut number);
             if let (Field::Bad, false, Some(report)) = (field, help.is_empty(), keys.report()) {
                 report.add_help(help);
             }
-            if let Some((section, at)) = keys.section().and_then(|s| Some((s, s.key_at(key)?))) {
-                section.report.put(format!("integrator.{key}"), at);
+            if let Some((section, location)) =
+                keys.section().and_then(|s| Some((s, s.key_at(key)?)))
+            {
+                section.report.put(format!("integrator.{key}"), location);
             }
             number
         });

@@ -6,14 +6,14 @@ use std::path::Path;
 
 use sweep_files::regular;
 
-/// Maximum size of a file of text, bytes. Basis: the longest spin table fits, a result file given
-/// by mistake does not. Doubling it doubles the peak memory: two bytes may become a table of 1 kB,
-/// so that a grid and its machine take up to 1 GB.
+/// Maximum size of a file of text, bytes. Basis: the longest spin table fits, and a result file
+/// that is passed by mistake does not. Doubling it doubles the peak memory: two bytes may become a
+/// table of 1 kB, so that a grid and its machine take up to 1 GB.
 pub const MAX_TEXT_BYTES: u64 = 896 << 10;
 
 /// Resolves a path in a file, relative to the file's folder.
-pub fn beside(file: &Path, named: &str) -> std::path::PathBuf {
-    file.parent().unwrap_or(Path::new("")).join(named)
+pub fn beside(file: &Path, relative_path: &str) -> std::path::PathBuf {
+    file.parent().unwrap_or(Path::new("")).join(relative_path)
 }
 
 /// Returns whether a text has nothing but white space and a byte order mark.
@@ -40,7 +40,7 @@ pub struct Located<T> {
     /// The value.
     pub value: T,
     /// The location at which it was written.
-    pub at: Location,
+    pub location: Location,
 }
 
 /// The texts that were read, in order.
@@ -59,12 +59,12 @@ struct SourceText {
 /// The system's error, or the reason why the file is no text.
 pub fn read(path: &Path) -> io::Result<String> {
     let bytes = regular::read_text(path, MAX_TEXT_BYTES + 1)?;
-    let refused = |why: String| Err(io::Error::other(why));
+    let refuse = |reason: String| Err(io::Error::other(reason));
     if bytes.starts_with(b"PAR1") {
-        return refused("it is a Parquet file, not text: `sweep show` reads it".to_owned());
+        return refuse("it is a Parquet file, not text: `sweep show` reads it".to_owned());
     }
     if bytes.len() as u64 > MAX_TEXT_BYTES {
-        return refused(format!(
+        return refuse(format!(
             "it is longer than {} KiB: give values as a range, or points as a list in a file of \
              their own",
             MAX_TEXT_BYTES >> 10
@@ -72,11 +72,11 @@ pub fn read(path: &Path) -> io::Result<String> {
     }
     String::from_utf8(bytes).or_else(|error| match error.as_bytes() {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => {
-            refused("it is UTF-16, not UTF-8: save it as UTF-8".to_owned())
+            refuse("it is UTF-16, not UTF-8: save it as UTF-8".to_owned())
         }
         _ => {
             let byte = error.utf8_error().valid_up_to() + 1;
-            refused(format!("it is not UTF-8 text: the first bad byte is number {byte}"))
+            refuse(format!("it is not UTF-8 text: the first bad byte is number {byte}"))
         }
     })
 }
@@ -104,16 +104,17 @@ impl Sources {
     }
 
     /// Returns the line in which a location begins, and the part of the location on that line.
-    pub fn line(&self, at: &Location) -> SourceLine<'_> {
-        let text = self.text(at.source);
-        let start = floor_char_boundary(text, at.span.start);
+    pub fn line(&self, location: &Location) -> SourceLine<'_> {
+        let text = self.text(location.source);
+        let start = floor_char_boundary(text, location.span.start);
         let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
         let line_end = text[start..].find('\n').map_or(text.len(), |newline| start + newline);
         let line = text[line_start..line_end].trim_end_matches('\r');
-        let end = floor_char_boundary(text, at.span.end).min(line_start + line.len());
+        let end = floor_char_boundary(text, location.span.end).min(line_start + line.len());
         let start = (start - line_start).min(line.len());
         let end = (end.max(line_start) - line_start).max(start);
-        // Bytes are counted, because the lines of a long list are counted for each mistake.
+        // Newline bytes are counted instead of characters, because each mistake in a long list
+        // counts the lines before it.
         let number =
             text.as_bytes()[..line_start].iter().filter(|&&byte| byte == b'\n').count() + 1;
         SourceLine { text: line, number, span: start..end }
@@ -150,7 +151,7 @@ impl Location {
 mod tests {
     use super::*;
 
-    fn line_of(text: &str, span: Range<usize>) -> (String, usize, Range<usize>) {
+    fn find_line(text: &str, span: Range<usize>) -> (String, usize, Range<usize>) {
         let mut sources = Sources::default();
         let id = sources.add("x", text);
         let line = sources.line(&Location::new(id, span));
@@ -159,13 +160,13 @@ mod tests {
 
     #[test]
     fn a_location_is_cut_to_its_first_line() {
-        assert_eq!(line_of("a = 1\nbc = [\n 2]\n", 11..16), ("bc = [".to_owned(), 2, 5..6));
-        assert_eq!(line_of("a = 1\r\nb = 2\r\n", 0..5), ("a = 1".to_owned(), 1, 0..5));
-        assert_eq!(line_of("a", 7..9), ("a".to_owned(), 1, 1..1));
-        assert_eq!(line_of("", 0..0), (String::new(), 1, 0..0));
-        assert_eq!(line_of("a\n", 2..2), (String::new(), 2, 0..0));
+        assert_eq!(find_line("a = 1\nbc = [\n 2]\n", 11..16), ("bc = [".to_owned(), 2, 5..6));
+        assert_eq!(find_line("a = 1\r\nb = 2\r\n", 0..5), ("a = 1".to_owned(), 1, 0..5));
+        assert_eq!(find_line("a", 7..9), ("a".to_owned(), 1, 1..1));
+        assert_eq!(find_line("", 0..0), (String::new(), 1, 0..0));
+        assert_eq!(find_line("a\n", 2..2), (String::new(), 2, 0..0));
         // The middle of a character is moved back to its beginning.
-        assert_eq!(line_of("é = 1", 1..3), ("é = 1".to_owned(), 1, 0..3));
+        assert_eq!(find_line("é = 1", 1..3), ("é = 1".to_owned(), 1, 0..3));
     }
 
     #[test]
@@ -181,9 +182,11 @@ mod tests {
         assert!(refusal(b"ab\xffc").ends_with("the first bad byte is number 3"));
         assert!(refusal(b"\xff\xfen\0").starts_with("it is UTF-16"));
         assert!(refusal(b"PAR1\xff").starts_with("it is a Parquet file"));
-        let longest = vec![b' '; MAX_TEXT_BYTES as usize];
-        assert!(refusal(&[&longest[..], b" "].concat()).starts_with("it is longer than 896 KiB"));
-        assert!(file(&longest).is_ok());
+        let largest_text = vec![b' '; MAX_TEXT_BYTES as usize];
+        assert!(
+            refusal(&[&largest_text[..], b" "].concat()).starts_with("it is longer than 896 KiB")
+        );
+        assert!(file(&largest_text).is_ok());
         assert!(read(folder.path()).is_err());
     }
 }

@@ -9,24 +9,24 @@ use toml::de::{DeTable, Error};
 use super::source::read;
 use super::{Diagnostic, Location, Report, SourceId, quoted};
 
-/// Reads the text of a file and adds it to the report. A file that cannot be read is reported;
-/// `to_start` is the advice if it does not exist, `what` its kind in words.
+/// Reads the text of a file and adds it to the report. A file that cannot be read is reported:
+/// `kind` is its kind in words, and `to_start` the advice if it does not exist.
 pub fn text(
     path: &Path,
     what: &str,
     to_start: Option<&str>,
     report: &Report,
 ) -> Option<(String, SourceId)> {
-    let shown = path.display();
+    let path_text = path.display();
     let error = match read(path) {
         Ok(text) => {
-            let source = report.add(shown.to_string(), text.as_str());
+            let source = report.add(path_text.to_string(), text.as_str());
             return Some((text, source));
         }
         Err(error) => error,
     };
     let is_missing = error.kind() == ErrorKind::NotFound;
-    let refusal = Diagnostic::new(format!("cannot read the {what} file {shown}: {error}"));
+    let refusal = Diagnostic::new(format!("cannot read the {what} file {path_text}: {error}"));
     report.push(to_start.filter(|_| is_missing).into_iter().fold(refusal, Diagnostic::help));
     None
 }
@@ -35,21 +35,22 @@ pub fn text(
 pub fn parse<'a>(text: &'a str, source: SourceId, report: &Report) -> Spanned<DeTable<'a>> {
     let (table, mut errors) = DeTable::parse_recoverable(text);
     errors.sort_by_key(start);
-    // The rest of the text after an array that is never closed gives many mistakes, of which the
-    // first one is meaningful.
+    // The text after an array that is never closed gives many mistakes, of which only the first is
+    // meaningful.
     let unclosed = errors.iter().any(|error| error.message().starts_with("unclosed array"));
-    let swallowed =
+    let unclosed_index =
         errors.iter().position(|error| error.message().contains("array")).filter(|_| unclosed);
-    if let Some(first) = swallowed {
-        let at = Location::new(source, errors[first].span().unwrap_or(0..0));
+    if let Some(first) = unclosed_index {
+        let location = Location::new(source, errors[first].span().unwrap_or(0..0));
         report.push_syntax(
-            Diagnostic::new("an array is not closed").at(&at, "expected `,` or `]` before this"),
+            Diagnostic::new("an array is not closed")
+                .at(&location, "expected `,` or `]` before this"),
         );
-        report.swallow(&at);
+        report.swallow(&location);
         errors.truncate(first);
     }
     for error in errors {
-        report.push_syntax(describe(&error, text, source));
+        report.push_syntax(describe_error(&error, text, source));
     }
     table
 }
@@ -58,23 +59,26 @@ fn start(error: &Error) -> usize {
     error.span().map_or(0, |span| span.start)
 }
 
-fn describe(error: &Error, text: &str, source: SourceId) -> Diagnostic {
+fn describe_error(error: &Error, text: &str, source: SourceId) -> Diagnostic {
     let span = error.span().unwrap_or(0..0);
-    let typed = text.get(span.clone()).unwrap_or_default();
-    let at = Location::new(source, span);
-    // The message has the expectation after its first comma, if at all.
+    let wrong_text = text.get(span.clone()).unwrap_or_default();
+    let location = Location::new(source, span);
+    // If the parser states an expectation, it follows the first comma of the message.
     let (what, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
     match what {
-        "duplicate key" => Diagnostic::new(format!("the key {} is given twice", quoted(typed)))
-            .at(&at, "expected each key once"),
+        "duplicate key" => {
+            Diagnostic::new(format!("the key {} is given twice", quoted(wrong_text)))
+                .at(&location, "expected each key once")
+        }
         "string values must be quoted" => {
-            let title = if typed.is_empty() {
+            let title = if wrong_text.is_empty() {
                 "a value is missing".to_owned()
             } else {
-                format!("{} is no value", quoted(typed))
+                format!("{} is no value", quoted(wrong_text))
             };
-            Diagnostic::new(title).at(&at, "expected a number, a string in quotes, or an array")
+            Diagnostic::new(title)
+                .at(&location, "expected a number, a string in quotes, or an array")
         }
-        what => Diagnostic::new(what).at(&at, expected),
+        what => Diagnostic::new(what).at(&location, expected),
     }
 }

@@ -33,49 +33,56 @@ pub fn window<M: Model>(
     if from_s < to_s && to_s <= end_s {
         return;
     }
-    let concerns = ["window_from_s", "window_to_s", "time.end_s"].map(str::to_owned).to_vec();
-    if !reported.insert(concerns.clone()) {
+    let keys = ["window_from_s", "window_to_s", "time.end_s"].map(str::to_owned).to_vec();
+    if !reported.insert(keys.clone()) {
         return;
     }
     let [from_s, to_s, end_s] = [from_s, to_s, end_s].map(decimal);
     let title =
         format!("the window from {from_s} s to {to_s} s does not fit into a run to {end_s} s");
-    refuse(draft, title, &concerns, "expected window_from_s < window_to_s <= end_s");
+    refuse(draft, title, &keys, "expected window_from_s < window_to_s <= end_s");
 }
 
 /// Reports a combination of numbers at each location where one of them was written.
-pub fn refuse<M: Model>(draft: &Draft<'_, M>, title: String, concerns: &[String], expected: &str) {
+pub fn refuse<M: Model>(draft: &Draft<'_, M>, title: String, keys: &[String], expected: &str) {
     draft.report.push_with(|sources| {
         let labels = once(expected).chain(repeat("and this"));
-        let places = places(draft, concerns, sources);
-        places.iter().zip(labels).fold(Diagnostic::new(title), |all, (at, label)| all.at(at, label))
+        let locations = find_locations(draft, keys, sources);
+        locations
+            .iter()
+            .zip(labels)
+            .fold(Diagnostic::new(title), |all, (location, label)| all.at(location, label))
     });
 }
 
 /// Returns the locations of the concerned numbers: the axes that sweep them first, then files and
 /// arguments.
-fn places<M: Model>(draft: &Draft<'_, M>, concerns: &[String], sources: &Sources) -> Vec<Location> {
-    let sweeps = |parameter: &ModelParameter<M>| {
-        parameter.parts.iter().any(|part| concerns.iter().any(|key| key == part))
+fn find_locations<M: Model>(
+    draft: &Draft<'_, M>,
+    keys: &[String],
+    sources: &Sources,
+) -> Vec<Location> {
+    let writes_key = |parameter: &ModelParameter<M>| {
+        parameter.parts.iter().any(|part| keys.iter().any(|key| key == part))
     };
-    let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| sweeps(&axis.parameter));
+    let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| writes_key(&axis.parameter));
     let axes = axes.filter_map(|(k, _)| draft.report.place(&format!("axis[{k}]")));
-    let mut places: Vec<Location> = Vec::new();
-    for place in axes.chain(concerns.iter().filter_map(|key| draft.report.place(key))) {
+    let mut locations: Vec<Location> = Vec::new();
+    for place in axes.chain(keys.iter().filter_map(|key| draft.report.place(key))) {
         // Numbers on one line, such as a vector's, share a location.
         let line = sources.line(&place).number;
-        let same = places
+        let same_line = locations
             .iter_mut()
             .find(|other| other.source == place.source && sources.line(other).number == line);
-        match same {
+        match same_line {
             Some(other) => {
                 other.span =
                     other.span.start.min(place.span.start)..other.span.end.max(place.span.end);
             }
-            None => places.push(place.clone()),
+            None => locations.push(place.clone()),
         }
     }
-    places
+    locations
 }
 
 /// Reports a fixed step that is longer than the run, or needs too many steps.
@@ -97,8 +104,10 @@ pub fn steps<M: Model>(draft: &Draft<'_, M>) {
     draft.report.push(end.fold(refusal, |all, end| all.at(&end, "and this")));
 }
 
-/// Returns the mistake of a step, at its location or that of the section that leaves it out.
+/// Returns the mistake of a step. It is at the step's location, or at the section if the file gives
+/// no step.
 pub fn refuse_step<M: Model>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
     let step = draft.report.place("integrator.step_s").or_else(|| draft.report.place("integrator"));
-    step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(&at, expected))
+    step.into_iter()
+        .fold(Diagnostic::new(title), |diagnostic, location| diagnostic.at(&location, expected))
 }

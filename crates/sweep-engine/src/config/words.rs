@@ -5,43 +5,43 @@ use serde_json::Value;
 use super::{Diagnostic, Field, Located, Report, Section, unknown_word};
 
 /// Reads a list of words of `all`, each once; an empty list is a mistake.
-pub fn names(section: &Section<'_>, key: &'static str, what: &str, all: &[&str]) -> Field<Value> {
+pub fn names(section: &Section<'_>, key: &'static str, noun: &str, all: &[&str]) -> Field<Value> {
     section.texts(key).map(|list| {
         if list.value.is_empty() {
             let expected = format!("expected at least one of `{}`", all.join("`, `"));
-            section.report.refuse::<()>(&list.at, format!("`{key}` is empty"), expected);
+            section.report.refuse::<()>(&list.location, format!("`{key}` is empty"), expected);
         }
-        known_words(list.value, what, all, section.report).0.into()
+        known_words(list.value, noun, all, section.report).0.into()
     })
 }
 
 /// Returns the words that are in `all`, each once, and whether all words were valid.
 pub fn known_words<'t>(
     found: impl IntoIterator<Item = Located<&'t str>>,
-    what: &str,
+    noun: &str,
     all: &[&str],
     report: &Report,
 ) -> (Vec<&'t str>, bool) {
-    let mut chosen: Vec<Located<&str>> = Vec::new();
-    let mut is_sound = true;
+    let mut valid_words: Vec<Located<&str>> = Vec::new();
+    let mut are_all_valid = true;
     for found in found {
         let is_known = all.contains(&found.value);
-        let first = chosen.iter().find(|other| other.value == found.value);
-        is_sound &= is_known && first.is_none();
+        let first = valid_words.iter().find(|other| other.value == found.value);
+        are_all_valid &= is_known && first.is_none();
         match first {
-            _ if !is_known => report.push_with(|_| unknown_word(what, &found, all)),
+            _ if !is_known => report.push_with(|_| unknown_word(noun, &found, all)),
             Some(first) => {
-                let title = format!("the {what} \"{}\" is given twice", found.value);
-                let refusal =
-                    Diagnostic::new(title).at(&found.at, format!("expected each {what} once"));
+                let title = format!("the {noun} \"{}\" is given twice", found.value);
+                let refusal = Diagnostic::new(title)
+                    .at(&found.location, format!("expected each {noun} once"));
                 // Names of one argument share a location.
-                report.push(match first.at == found.at {
+                report.push(match first.location == found.location {
                     true => refusal,
-                    false => refusal.at(&first.at, "first given here"),
+                    false => refusal.at(&first.location, "first given here"),
                 });
             }
-            None => chosen.push(found),
+            None => valid_words.push(found),
         }
     }
-    (chosen.into_iter().map(|one| one.value).collect(), is_sound)
+    (valid_words.into_iter().map(|word| word.value).collect(), are_all_valid)
 }

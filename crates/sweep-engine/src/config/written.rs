@@ -22,8 +22,10 @@ impl<'a> NamedArgument<'a> {
     /// Splits an option's argument.
     pub fn read(option: &str, argument: &'a str, report: &'a Report) -> Option<Self> {
         let source = report.add(option, argument);
-        let located =
-            |value: &'a str, span| Located { value: value.trim(), at: Location::new(source, span) };
+        let located = |value: &'a str, span| Located {
+            value: value.trim(),
+            location: Location::new(source, span),
+        };
         match argument.split_once('=') {
             Some((name, value)) => {
                 let equals = name.len();
@@ -32,20 +34,22 @@ impl<'a> NamedArgument<'a> {
             }
             None => {
                 let title = format!("`{}` is not a constant", short(argument));
-                let whole = Location::new(source, 0..argument.len());
-                report.refuse(&whole, title, "expected NAME=VALUE")
+                let whole_argument = Location::new(source, 0..argument.len());
+                report.refuse(&whole_argument, title, "expected NAME=VALUE")
             }
         }
     }
 
     /// Parses the number, in a range.
     pub fn number(&self, range: Range) -> Option<Located<f64>> {
-        let at = self.value.at.clone();
+        let location = self.value.location.clone();
         match self.value.value.parse() {
-            Ok(number) => check_number(&quoted(self.name.value), number, at, range, self.report),
+            Ok(number) => {
+                check_number(&quoted(self.name.value), number, location, range, self.report)
+            }
             Err(_) => {
                 let title = format!("`{}` is not a number", short(self.value.value));
-                self.report.refuse(&at, title, format!("expected {range}"))
+                self.report.refuse(&location, title, format!("expected {range}"))
             }
         }
     }
@@ -56,27 +60,28 @@ impl<'a> NamedArgument<'a> {
         number.filter(|number| bounds.contains(number)).or_else(|| {
             let title = format!("`{}` is not a valid number", short(self.value.value));
             let least = bounds.start();
-            let most = bounds.end();
-            let expected = format!("expected a whole number from {least} to {most}");
-            self.report.refuse(&self.value.at, title, expected)
+            let greatest = bounds.end();
+            let expected = format!("expected a whole number from {least} to {greatest}");
+            self.report.refuse(&self.value.location, title, expected)
         })
     }
 
     /// Parses a word, as its index in `choices`.
     pub fn choice(&self, choices: &[&str]) -> Option<usize> {
-        let place = choices.iter().position(|choice| *choice == self.value.value);
-        if place.is_none() {
+        let index = choices.iter().position(|choice| *choice == self.value.value);
+        if index.is_none() {
             self.report.push_with(|_| unknown_word(self.name.value, &self.value, choices));
         }
-        place
+        index
     }
 
     /// Parses words separated by commas, each once and at least one.
-    pub fn list(&self, what: &str, all: &[&str]) -> Option<Vec<&'a str>> {
-        let Located { value, at } = &self.value;
-        let parts = value.split(',').map(|part| Located { value: part.trim(), at: at.clone() });
-        let (chosen, is_sound) = known_words(parts, what, all, self.report);
-        is_sound.then_some(chosen)
+    pub fn list(&self, noun: &str, all: &[&str]) -> Option<Vec<&'a str>> {
+        let Located { value, location } = &self.value;
+        let parts =
+            value.split(',').map(|part| Located { value: part.trim(), location: location.clone() });
+        let (valid_words, are_all_valid) = known_words(parts, noun, all, self.report);
+        are_all_valid.then_some(valid_words)
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::f64::consts::SQRT_2;
 
-/// Range of a distribution without bounds on either side of its middle, standard deviations. Basis:
-/// a share of 2e-9 lies beyond. Doubling it makes axes twice as long, whose ends have no points.
+/// Range on either side of the middle of a distribution without bounds, in standard deviations.
+/// Basis: a share of 2e-9 lies beyond. Doubling it makes axes twice as long, whose ends have no
+/// points.
 pub const TAIL_DEVIATIONS: f64 = 6.0;
 
 /// The shape of a distribution.
@@ -54,7 +55,7 @@ impl DistributionShape {
     }
 
     /// Returns the value at this number of standard deviations from the middle.
-    pub fn at(self, deviations: f64) -> f64 {
+    pub fn value(self, deviations: f64) -> f64 {
         match self {
             Self::Normal { mean, sd } => mean + sd * deviations,
             Self::Lognormal { median, sigma } => median * libm::exp(sigma * deviations),
@@ -71,25 +72,26 @@ impl DistributionShape {
 }
 
 impl Distribution {
-    /// Returns the quantile at `place` (0 to 1). It has the same bits on every machine, because no
-    /// platform's functions are called.
-    pub fn quantile(&self, place: f64) -> f64 {
+    /// Returns the quantile of a probability (0 to 1). It has the same bits on every machine,
+    /// because no functions of the platform are called.
+    pub fn quantile(&self, probability: f64) -> f64 {
         let [low, high] = [self.from, self.to].map(|bound| self.shape.deviations(bound));
-        // Above the middle the distribution is mirrored: the share beyond is small there and keeps
-        // its digits.
+        // Above the middle the distribution is mirrored, because the share beyond the value is
+        // small there and keeps its digits.
         let deviations = if low > 0.0 {
-            -truncated_quantile(-high, -low, 1.0 - place)
+            -truncated_quantile(-high, -low, 1.0 - probability)
         } else {
-            truncated_quantile(low, high, place)
+            truncated_quantile(low, high, probability)
         };
-        self.shape.at(deviations).clamp(self.from, self.to)
+        self.shape.value(deviations).clamp(self.from, self.to)
     }
 }
 
 /// Returns the quantile of the standard normal distribution truncated at two bounds.
-fn truncated_quantile(low: f64, high: f64, place: f64) -> f64 {
-    let [below, above] = [low, high].map(cumulative_normal);
-    standard_quantile(below + place * (above - below)).clamp(low, high)
+fn truncated_quantile(low: f64, high: f64, probability: f64) -> f64 {
+    let [lower_probability, upper_probability] = [low, high].map(cumulative_normal);
+    standard_quantile(lower_probability + probability * (upper_probability - lower_probability))
+        .clamp(low, high)
 }
 
 /// Returns the cumulative standard normal distribution.
@@ -156,8 +158,8 @@ fn standard_quantile(p: f64) -> f64 {
         return if q < 0.0 { f64::NEG_INFINITY } else { f64::INFINITY };
     }
     let r = (-libm::log(tail)).sqrt();
-    let (above, below, r) = if r <= 5.0 { (C, D, r - 1.6) } else { (E, F, r - 5.0) };
-    let value = polynomial(&above, r) / polynomial(&below, r);
+    let (numerator, denominator, r) = if r <= 5.0 { (C, D, r - 1.6) } else { (E, F, r - 5.0) };
+    let value = polynomial(&numerator, r) / polynomial(&denominator, r);
     if q < 0.0 { -value } else { value }
 }
 
@@ -175,8 +177,8 @@ mod tests {
             (0.001_349_898_031_630_094_6, -3.0),
             (1e-9, -5.997_807_015_007_687),
         ] {
-            let found = standard_quantile(p);
-            assert!((found - x).abs() < 1e-12 * x.abs().max(1.0), "{p}: {found}, {x}");
+            let quantile = standard_quantile(p);
+            assert!((quantile - x).abs() < 1e-12 * x.abs().max(1.0), "{p}: {quantile}, {x}");
         }
     }
 
@@ -198,10 +200,14 @@ mod tests {
             (normal, 20.0, 60.0),
             (lognormal, 80.0, 110.0),
         ] {
-            let cut = Distribution { shape, from, to };
-            let values: Vec<f64> = (0..=100).map(|k| cut.quantile(f64::from(k) / 100.0)).collect();
+            let truncated = Distribution { shape, from, to };
+            let values: Vec<f64> =
+                (0..=100).map(|k| truncated.quantile(f64::from(k) / 100.0)).collect();
             assert!(values.windows(2).all(|pair| pair[0] < pair[1]), "{values:?}");
-            assert!((values[0] - from).abs() < 1e-6 && (values[100] - to).abs() < 1e-6, "{cut:?}");
+            assert!(
+                (values[0] - from).abs() < 1e-6 && (values[100] - to).abs() < 1e-6,
+                "{truncated:?}"
+            );
         }
         let symmetric = Distribution { shape: normal, from: 40.0, to: 160.0 };
         assert!((symmetric.quantile(0.5) - 100.0).abs() < 1e-12);

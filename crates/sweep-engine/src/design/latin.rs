@@ -1,22 +1,23 @@
 //! Latin hypercubes. A keyed permutation assigns the strata, so that no table of them is needed.
 
-use super::{axis_key, mixed};
+use super::{axis_key, mix};
 
 /// Returns the position of a point along an axis: a random position within its stratum.
-pub(super) fn place(point: u64, points: u64, axis: usize, seed: u64) -> f64 {
+pub(super) fn position(point: u64, points: u64, axis: usize, seed: u64) -> f64 {
     let key = axis_key(seed, axis);
-    let stratum = permuted(point, points, key);
-    // The offset of half a unit in 52 bits makes it neither 0 nor 1.
-    let within = ((mixed(key ^ mixed(point)) >> 12) as f64 + 0.5) * 2.0_f64.powi(-52);
-    let place = (stratum as f64 + within) / points as f64;
-    place.min(1.0 - f64::EPSILON / 2.0)
+    let stratum = permute(point, points, key);
+    // Adding half of the last of 52 bits keeps the offset from being 0 or 1.
+    let offset = ((mix(key ^ mix(point)) >> 12) as f64 + 0.5) * 2.0_f64.powi(-52);
+    let position = (stratum as f64 + offset) / points as f64;
+    position.min(1.0 - f64::EPSILON / 2.0)
 }
 
 /// Returns the image of `index` under a permutation of `0..length`: a Feistel network over the next
 /// even number of bits, iterated until the value is in range (J. Black, P. Rogaway, Ciphers with
 /// arbitrary finite domains, CT-RSA 2002, method 2). It takes at most four iterations on average.
-fn permuted(index: u64, length: u64, key: u64) -> u64 {
-    /// Rounds of the network. Basis: four make a pseudorandom permutation; two more mix better.
+fn permute(index: u64, length: u64, key: u64) -> u64 {
+    /// Rounds of the network. Basis: four make a pseudorandom permutation; six mix better. Doubling
+    /// it doubles the time of a point.
     const ROUNDS: u64 = 6;
     let bits = u64::BITS - length.saturating_sub(1).leading_zeros();
     let half = bits.div_ceil(2).max(1);
@@ -26,7 +27,7 @@ fn permuted(index: u64, length: u64, key: u64) -> u64 {
         let mut left = value >> half;
         let mut right = value & mask;
         for round in 0..ROUNDS {
-            let next = left ^ (mixed(key ^ (right << 8) ^ round) & mask);
+            let next = left ^ (mix(key ^ (right << 8) ^ round) & mask);
             left = right;
             right = next;
         }
@@ -44,9 +45,9 @@ mod tests {
     #[test]
     fn every_length_has_a_permutation() {
         for length in (1..70).chain([100, 255, 256, 257, 1000]) {
-            let mut seen: Vec<u64> = (0..length).map(|i| permuted(i, length, 7)).collect();
-            seen.sort_unstable();
-            assert_eq!(seen, (0..length).collect::<Vec<_>>(), "{length}");
+            let mut images: Vec<u64> = (0..length).map(|i| permute(i, length, 7)).collect();
+            images.sort_unstable();
+            assert_eq!(images, (0..length).collect::<Vec<_>>(), "{length}");
         }
     }
 
@@ -55,7 +56,7 @@ mod tests {
         for points in [1, 2, 37, 512] {
             for axis in 0..5 {
                 let mut strata: Vec<u64> = (0..points)
-                    .map(|i| (place(i, points, axis, 3) * points as f64) as u64)
+                    .map(|i| (position(i, points, axis, 3) * points as f64) as u64)
                     .collect();
                 strata.sort_unstable();
                 assert_eq!(strata, (0..points).collect::<Vec<_>>());
@@ -66,22 +67,25 @@ mod tests {
     #[test]
     fn axes_and_seeds_are_uncorrelated() {
         let column =
-            |axis, seed| (0..1000).map(|i| place(i, 1000, axis, seed)).collect::<Vec<f64>>();
+            |axis, seed| (0..1000).map(|i| position(i, 1000, axis, seed)).collect::<Vec<f64>>();
         let correlation = |a: &[f64], b: &[f64]| {
             let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - 0.5) * (b - 0.5)).sum();
             sum / 1000.0 * 12.0
         };
         // The bound for independent columns is four standard deviations, 4 / sqrt(1000).
         for (a, b) in [((0, 1), (1, 1)), ((0, 1), (0, 2)), ((2, 5), (3, 5))] {
-            let found = correlation(&column(a.0, a.1), &column(b.0, b.1));
-            assert!(found.abs() < 0.13, "{a:?} {b:?}: {found}");
+            let coefficient = correlation(&column(a.0, a.1), &column(b.0, b.1));
+            assert!(coefficient.abs() < 0.13, "{a:?} {b:?}: {coefficient}");
         }
     }
 
     #[test]
     fn a_hypercube_of_1e12_points_takes_no_memory() {
         let points = 1_000_000_000_000;
-        let places = [0, 1, points / 2, points - 1].map(|i| place(i, points, 3, 11));
-        assert!(places.iter().all(|place| 0.0 < *place && *place < 1.0), "{places:?}");
+        let positions = [0, 1, points / 2, points - 1].map(|i| position(i, points, 3, 11));
+        assert!(
+            positions.iter().all(|position| 0.0 < *position && *position < 1.0),
+            "{positions:?}"
+        );
     }
 }

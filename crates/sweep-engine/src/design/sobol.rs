@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 
 use super::axis_key;
 
-/// Maximum number of axes: those with direction numbers in the table below.
-pub const MOST_AXES: usize = 32;
+/// Maximum number of axes: the number of dimensions with direction numbers in this file.
+pub const MAX_AXES: usize = 32;
 
 /// Bits of a coordinate and of an index: the sequence has 2^32 points.
 const BITS: usize = 32;
@@ -16,7 +16,7 @@ const BITS: usize = 32;
 /// Constructing Sobol sequences with better two-dimensional projections, SIAM J. Sci. Comput. 30
 /// (2008), 2635-2654.
 #[rustfmt::skip]
-const JOE_KUO: [(u32, &[u32]); MOST_AXES - 1] = [
+const JOE_KUO: [(u32, &[u32]); MAX_AXES - 1] = [
     (0, &[1]),
     (1, &[1, 3]),
     (1, &[1, 3, 1]),
@@ -51,7 +51,7 @@ const JOE_KUO: [(u32, &[u32]); MOST_AXES - 1] = [
 ];
 
 /// The direction numbers of every dimension, the first bit of a coordinate first.
-static DIRECTIONS: LazyLock<[[u32; BITS]; MOST_AXES]> = LazyLock::new(|| from_fn(directions));
+static DIRECTIONS: LazyLock<[[u32; BITS]; MAX_AXES]> = LazyLock::new(|| from_fn(directions));
 
 fn directions(axis: usize) -> [u32; BITS] {
     let Some((a, m)) = axis.checked_sub(1).map(|index| JOE_KUO[index]) else {
@@ -62,9 +62,9 @@ fn directions(axis: usize) -> [u32; BITS] {
     for i in 0..BITS {
         v[i] = match i.checked_sub(s) {
             None => m[i] << (BITS - 1 - i),
-            Some(before) => (1..s)
+            Some(previous) => (1..s)
                 .filter(|k| a >> (s - 1 - k) & 1 == 1)
-                .fold(v[before] ^ (v[before] >> s), |next, k| next ^ v[i - k]),
+                .fold(v[previous] ^ (v[previous] >> s), |next, k| next ^ v[i - k]),
         };
     }
     v
@@ -73,16 +73,17 @@ fn directions(axis: usize) -> [u32; BITS] {
 /// Returns coordinate `axis` of point `point` as a fraction of 2^32. Beyond 2^32 points or the last
 /// axis the sequence repeats.
 fn coordinate(point: u64, axis: usize) -> u32 {
-    let directions = &DIRECTIONS[axis % MOST_AXES];
+    let directions = &DIRECTIONS[axis % MAX_AXES];
     (0..BITS).filter(|bit| point >> bit & 1 == 1).fold(0, |x, bit| x ^ directions[bit])
 }
 
-/// Scrambles a coordinate by Owen's method: each bit is flipped or not by a hash of the bits before
-/// it. A hash whose carries go upwards does so to reversed bits.
+/// Scrambles a coordinate by Owen's method, in which a hash of the higher bits decides whether a
+/// bit is flipped. In a product the carries go from lower to higher bits, so the hash is applied to
+/// reversed bits.
 ///
 /// B. Burley, Practical hash-based Owen scrambling, J. Computer Graphics Techniques 9 (2020), 1-20;
 /// after S. Laine and T. Karras (2011), with the constants that N. Vegdahl found to mix better.
-const fn scrambled(x: u32, seed: u32) -> u32 {
+const fn scramble(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits();
     x ^= x.wrapping_mul(0x3D20_ADEA);
     x = x.wrapping_add(seed);
@@ -93,10 +94,10 @@ const fn scrambled(x: u32, seed: u32) -> u32 {
 }
 
 /// Returns the position of a point along an axis: the middle of its interval of length 2^-32.
-pub(super) fn place(point: u64, axis: usize, seed: u64) -> f64 {
+pub(super) fn position(point: u64, axis: usize, seed: u64) -> f64 {
     // The upper half of the key is mixed as well as the lower half.
     let key = (axis_key(seed, axis) >> 32) as u32;
-    (f64::from(scrambled(coordinate(point, axis), key)) + 0.5) * 2.0_f64.powi(-32)
+    (f64::from(scramble(coordinate(point, axis), key)) + 0.5) * 2.0_f64.powi(-32)
 }
 
 #[cfg(test)]
@@ -127,11 +128,11 @@ mod tests {
 
     #[test]
     fn every_axis_is_stratified_at_powers_of_two() {
-        for axis in 0..MOST_AXES {
+        for axis in 0..MAX_AXES {
             for power in [1, 4, 10] {
                 let points = 1_u64 << power;
                 let mut cells: Vec<u64> =
-                    (0..points).map(|i| (place(i, axis, 5) * points as f64) as u64).collect();
+                    (0..points).map(|i| (position(i, axis, 5) * points as f64) as u64).collect();
                 cells.sort_unstable();
                 assert_eq!(cells, (0..points).collect::<Vec<_>>(), "axis {axis}, {points} points");
             }
@@ -142,12 +143,12 @@ mod tests {
     fn the_first_two_axes_fill_every_elementary_rectangle() {
         // A (0, m, 2)-net in base 2 remains one under nested scrambling.
         for columns in 0..=8_u32 {
-            let across = f64::from(1_u32 << columns);
-            let up = f64::from(1_u32 << (8 - columns));
+            let column_count = f64::from(1_u32 << columns);
+            let row_count = f64::from(1_u32 << (8 - columns));
             let mut cells: Vec<u32> = (0..256)
                 .map(|i| {
-                    ((place(i, 0, 9) * across) as u32) << (8 - columns)
-                        | (place(i, 1, 9) * up) as u32
+                    ((position(i, 0, 9) * column_count) as u32) << (8 - columns)
+                        | (position(i, 1, 9) * row_count) as u32
                 })
                 .collect();
             cells.sort_unstable();
@@ -169,7 +170,7 @@ mod tests {
     fn the_mean_of_a_smooth_function_converges_faster_than_random() {
         let error = |points: u64| {
             let sum: f64 = (0..points)
-                .map(|i| (0..4).map(|axis| 1.0 + (place(i, axis, 1) - 0.5)).product::<f64>())
+                .map(|i| (0..4).map(|axis| 1.0 + (position(i, axis, 1) - 0.5)).product::<f64>())
                 .sum();
             (sum / points as f64 - 1.0).abs()
         };
@@ -179,7 +180,7 @@ mod tests {
 
     #[test]
     fn seeds_scramble_differently() {
-        let column = |seed| (0..64).map(|i| place(i, 0, seed).to_bits()).collect::<Vec<_>>();
+        let column = |seed| (0..64).map(|i| position(i, 0, seed).to_bits()).collect::<Vec<_>>();
         assert_ne!(column(1), column(2));
         assert_eq!(column(1), column(1));
     }

@@ -20,10 +20,12 @@ use std::cmp::Ordering;
 use crate::design::{Design, DesignRule};
 
 /// Share of a trial's coordinates that come from the mutant. Basis: the papers' usual value.
+/// Doubling it is not possible; halving it moves along fewer axes at once.
 const CROSSOVER: f64 = 0.9;
-/// Range of the multiple of the difference, uniformly distributed (S. Das, A. Konar, U. K.
-/// Chakraborty, Two improved differential evolution schemes for faster global search, GECCO 2005).
-const FACTOR: [f64; 2] = [0.3, 0.9];
+/// Range of the factor of the difference, which is uniformly distributed. Basis: S. Das, A. Konar,
+/// U. K. Chakraborty, Two improved differential evolution schemes for faster global search, GECCO
+/// 2005. Doubling it makes trials leave the box.
+const FACTOR_RANGE: [f64; 2] = [0.3, 0.9];
 
 /// The settings of a search.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +54,8 @@ pub struct Candidate {
 }
 
 impl Evolution {
-    /// Returns the index of the first trial of the last third, if it comes after the first
-    /// generation. With one objective, trials from there on start from the best candidate.
+    /// Returns the index of the first trial of the last third, if that third begins after the first
+    /// generation. With one objective, these trials start from the best candidate.
     pub fn first_late(&self) -> u64 {
         let Self { candidates, population, .. } = *self;
         (candidates - candidates / 3).max(population.min(candidates))
@@ -61,7 +63,7 @@ impl Evolution {
 }
 
 impl Candidate {
-    /// Returns whether the candidate has every number and violates no constraint.
+    /// Returns whether the candidate has all responses and violates no constraint.
     pub fn is_feasible(&self, objectives: usize) -> bool {
         self.responses.as_ref().is_some_and(|all| all[objectives..].iter().all(|&one| one <= 0.0))
     }
@@ -77,38 +79,46 @@ pub fn evolve<E>(
     evaluate: &mut dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>, E>,
 ) -> Result<Vec<Candidate>, E> {
     let Evolution { parameters, objectives, population, candidates, seed } = *evolution;
-    let mut tried: Vec<Candidate> = Vec::new();
+    let mut evaluated: Vec<Candidate> = Vec::new();
     let mut members: Vec<usize> = Vec::new();
     for generation in 0.. {
-        let count = population.min(candidates - tried.len() as u64);
+        let count = population.min(candidates - evaluated.len() as u64);
         if count == 0 {
             break;
         }
-        let first = tried.len();
-        let ranks = Ranks::new(&tried, objectives);
+        let first = evaluated.len();
+        let ranks = Ranks::new(&evaluated, objectives);
         let better = |a, b| if ranks.compare(b, a) == Some(Ordering::Less) { b } else { a };
         let best = members.iter().copied().reduce(better);
-        let start = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed };
+        let initial_design =
+            Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed };
         let place = |k: u64| -> Vec<f64> {
             if generation == 0 {
-                return (0..parameters).filter_map(|axis| start.place(k, axis)).collect();
+                return (0..parameters)
+                    .filter_map(|axis| initial_design.position(k, axis))
+                    .collect();
             }
             let number = first as u64 + k;
-            let near = best.filter(|_| objectives == 1 && number >= evolution.first_late());
-            mutant(&tried, &members, (k as usize, near), number, evolution)
+            let start_candidate =
+                best.filter(|_| objectives == 1 && number >= evolution.first_late());
+            create_trial(&evaluated, &members, (k as usize, start_candidate), number, evolution)
         };
-        let places: Vec<Vec<f64>> = (0..count).map(place).collect();
-        let responses = evaluate(&places)?;
-        let trials = places.into_iter().zip(responses);
-        tried.extend(trials.map(|(place, responses)| Candidate { place, responses, generation }));
+        let positions: Vec<Vec<f64>> = (0..count).map(place).collect();
+        let responses = evaluate(&positions)?;
+        let trials = positions.into_iter().zip(responses);
+        evaluated.extend(trials.map(|(place, responses)| Candidate {
+            place,
+            responses,
+            generation,
+        }));
         if generation == 0 {
-            members = (0..tried.len()).collect();
+            members = (0..evaluated.len()).collect();
             continue;
         }
-        let ranks = Ranks::new(&tried, objectives);
+        let ranks = Ranks::new(&evaluated, objectives);
         let mut next = Vec::with_capacity(2 * members.len());
         for (k, &member) in members.iter().enumerate() {
-            let trial = Some(first + k).filter(|&trial| trial < tried.len());
+            let trial = Some(first + k).filter(|&trial| trial < evaluated.len());
             match trial.map(|trial| (trial, ranks.compare(trial, member))) {
                 Some((trial, Some(Ordering::Less | Ordering::Equal))) => next.push(trial),
                 Some((trial, None)) => next.extend([member, trial]),
@@ -117,15 +127,15 @@ pub fn evolve<E>(
         }
         members = ranks.best(next, population as usize);
     }
-    Ok(tried)
+    Ok(evaluated)
 }
 
-/// Returns the trial that challenges a member. `number` selects its random numbers; `near` is the
-/// best candidate, if the trial starts from it.
-fn mutant(
+/// Returns the position of the trial that challenges a member. `number` selects its random numbers;
+/// `start_candidate` is the best candidate, if the trial starts from it.
+fn create_trial(
     tried: &[Candidate],
     members: &[usize],
-    (member, near): (usize, Option<usize>),
+    (member, start_candidate): (usize, Option<usize>),
     number: u64,
     evolution: &Evolution,
 ) -> Vec<f64> {
@@ -137,7 +147,7 @@ fn mutant(
     let mut axis = 0;
     let mut draw = || {
         axis += 1;
-        draws.place(number, axis).unwrap_or(0.5)
+        draws.position(number, axis).unwrap_or(0.5)
     };
     let mut others = [member; 4];
     for k in 1..4 {
@@ -146,9 +156,9 @@ fn mutant(
         }
     }
     let [own, base, plus, minus] = others.map(|other| tried[members[other]].place.as_slice());
-    let factor = FACTOR[0] + (FACTOR[1] - FACTOR[0]) * draw();
+    let factor = FACTOR_RANGE[0] + (FACTOR_RANGE[1] - FACTOR_RANGE[0]) * draw();
     let (base, factor) =
-        near.map_or((base, factor), |best| (tried[best].place.as_slice(), 0.5 * factor));
+        start_candidate.map_or((base, factor), |best| (tried[best].place.as_slice(), 0.5 * factor));
     let from_mutant = (draw() * own.len() as f64) as usize;
     let coordinate = |k: usize| {
         let mutated = (base[k] + factor * (plus[k] - minus[k])).clamp(0.0, 1.0);
@@ -184,9 +194,11 @@ impl<'a> Ranks<'a> {
             .map(|k| excesses().map(|all| all[k]).fold(f64::MIN_POSITIVE, f64::max))
             .collect();
         let violation = |one: &Candidate| match &one.responses {
-            Some(all) => {
-                all[objectives..].iter().zip(&greatest).map(|(own, most)| own / most).sum()
-            }
+            Some(all) => all[objectives..]
+                .iter()
+                .zip(&greatest)
+                .map(|(own, max_count)| own / max_count)
+                .sum(),
             None => f64::INFINITY,
         };
         Self { tried, objectives, violations: tried.iter().map(violation).collect() }
@@ -211,26 +223,26 @@ impl<'a> Ranks<'a> {
         }
     }
 
-    /// Returns at most `most` of these, front by front; the most crowded of the last front are
-    /// removed.
-    fn best(&self, mut left: Vec<usize>, most: usize) -> Vec<usize> {
-        let mut chosen = Vec::with_capacity(most);
-        while left.len() + chosen.len() > most && chosen.len() < most {
+    /// Returns at most `max_count` of these candidates, front by front; the most crowded of the
+    /// last front are removed.
+    fn best(&self, mut remaining: Vec<usize>, max_count: usize) -> Vec<usize> {
+        let mut selected = Vec::with_capacity(max_count);
+        while remaining.len() + selected.len() > max_count && selected.len() < max_count {
             let dominated = |k: &usize| {
-                left.iter().any(|&other| self.compare(other, *k) == Some(Ordering::Less))
+                remaining.iter().any(|&other| self.compare(other, *k) == Some(Ordering::Less))
             };
-            let (rest, mut front): (Vec<usize>, Vec<usize>) =
-                left.iter().partition(|k| dominated(k));
-            while front.len() + chosen.len() > most {
+            let (dominated_rest, mut front): (Vec<usize>, Vec<usize>) =
+                remaining.iter().partition(|k| dominated(k));
+            while front.len() + selected.len() > max_count {
                 front.remove(self.most_crowded(&front));
             }
-            chosen.extend(front);
-            left = rest;
+            selected.extend(front);
+            remaining = dominated_rest;
         }
-        if chosen.len() < most {
-            chosen.extend(left);
+        if selected.len() < max_count {
+            selected.extend(remaining);
         }
-        chosen
+        selected
     }
 
     /// Returns the index of the member of a front with the least crowding distance.
@@ -259,9 +271,9 @@ mod tests {
 
     use super::*;
 
-    fn tried(evolution: Evolution, answer: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Candidate> {
-        let mut evaluate = |places: &[Vec<f64>]| {
-            Ok::<_, Infallible>(places.iter().map(|place| answer(place)).collect())
+    fn tried(evolution: Evolution, respond: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Candidate> {
+        let mut evaluate = |positions: &[Vec<f64>]| {
+            Ok::<_, Infallible>(positions.iter().map(|place| respond(place)).collect())
         };
         let Ok(tried) = evolve(&evolution, &mut evaluate);
         assert_eq!(tried.len() as u64, evolution.candidates);
@@ -276,38 +288,39 @@ mod tests {
     fn rosenbrocks_function_is_minimised() {
         // The function is Rosenbrock's in [-2, 2], with its minimum at (1, 1): (0.75, 0.75) of the
         // box.
-        let found = tried(SEARCH, |at| {
+        let candidates = tried(SEARCH, |at| {
             let [x, y] = [4.0 * at[0] - 2.0, 4.0 * at[1] - 2.0];
             Some(vec![(1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2)])
         });
-        let best = &found[front(&found, 1)[0]];
+        let best = &candidates[front(&candidates, 1)[0]];
         assert!(best.place.iter().all(|x| (x - 0.75).abs() < 2e-3), "{best:?}");
     }
 
     #[test]
     fn the_minimum_is_feasible_and_has_objectives() {
-        // The minimum of x + y with x y >= 0.25 is at (0.5, 0.5); there are no numbers for x > 0.9.
-        let found = tried(SEARCH, |at| {
+        // The minimum of x + y with x y >= 0.25 is at (0.5, 0.5); there are no responses for x >
+        // 0.9.
+        let candidates = tried(SEARCH, |at| {
             let number = vec![at[0] + at[1], (0.25 - at[0] * at[1]).max(0.0)];
             (at[0] <= 0.9).then_some(number)
         });
-        let best = &found[front(&found, 1)[0]];
+        let best = &candidates[front(&candidates, 1)[0]];
         let sum = best.responses.as_ref().unwrap()[0];
         assert!(best.is_feasible(1) && (1.0..1.0005).contains(&sum), "{best:?}");
-        assert_eq!(front(&found[..0], 1), [0; 0]);
+        assert_eq!(front(&candidates[..0], 1), [0; 0]);
     }
 
     #[test]
     fn a_pareto_front_is_covered_from_end_to_end() {
         // The problem is Schaffer's, with the front from x = 0 to 2, where sqrt(f) + sqrt(g) = 2.
         let two_objectives = Evolution { parameters: 1, objectives: 2, ..SEARCH };
-        let found = tried(two_objectives, |at| {
+        let candidates = tried(two_objectives, |at| {
             let x = 20.0 * at[0] - 10.0;
             Some(vec![x * x, (x - 2.0) * (x - 2.0)])
         });
-        let mut roots: Vec<f64> = front(&found, 2)
+        let mut roots: Vec<f64> = front(&candidates, 2)
             .iter()
-            .map(|&k| found[k].responses.as_ref().unwrap()[0].sqrt())
+            .map(|&k| candidates[k].responses.as_ref().unwrap()[0].sqrt())
             .collect();
         roots.sort_by(f64::total_cmp);
         assert!(roots.len() > 100 && roots[0] < 0.02 && roots[roots.len() - 1] > 1.98, "{roots:?}");
@@ -316,16 +329,16 @@ mod tests {
 
     #[test]
     fn a_short_search_ends_close_to_the_minimum() {
-        // Without trials from the best candidate the median of these exceeds 1e-4.
+        // Without trials from the best candidate, the median of the minima exceeds 1e-4.
         let bowl = |at: &[f64]| (at[0] - 0.3).powi(2) + 3.0 * (at[1] - 0.6).powi(2);
         let least = |seed| {
             let short = Evolution { candidates: 256, seed, ..SEARCH };
-            let found = tried(short, |at| Some(vec![bowl(at)]));
-            bowl(&found[front(&found, 1)[0]].place)
+            let candidates = tried(short, |at| Some(vec![bowl(at)]));
+            bowl(&candidates[front(&candidates, 1)[0]].place)
         };
-        let mut found: Vec<f64> = (0..21).map(least).collect();
-        found.sort_by(f64::total_cmp);
-        assert!(found[10] < 5e-5, "{found:?}");
+        let mut minima: Vec<f64> = (0..21).map(least).collect();
+        minima.sort_by(f64::total_cmp);
+        assert!(minima[10] < 5e-5, "{minima:?}");
     }
 
     #[test]

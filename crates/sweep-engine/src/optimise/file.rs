@@ -20,30 +20,30 @@ pub fn table<M: Model>(study: &Study<M>, tried: &[Candidate]) -> Table {
         let column = values.iter().map(|values| Some(values[k]));
         table.parameter(parameter, column);
     }
-    let answer = |k: usize, sign: f64| {
+    let signed_response = |k: usize, sign: f64| {
         tried.iter().map(move |one| one.responses.as_ref().map(|responses| sign * responses[k]))
     };
     for (k, one) in study.objectives.iter().enumerate() {
         let unit = objective_unit(&one.goal);
         let verb = if one.sign > 0.0 { "minimised" } else { "maximised" };
         let description = format!("{}, {verb}; null where a row has no value", one.goal.text());
-        table.numbers(&one.name, unit, &description, answer(k, one.sign));
+        table.numbers(&one.name, unit, &description, signed_response(k, one.sign));
     }
     for (k, goal) in study.conditions.iter().enumerate() {
         let description =
             format!("how far the rows are from keeping {}; 0 where they do", goal.text());
-        table.numbers(&excess_name(k), "1", &description, answer(objectives + k, 1.0));
+        table.numbers(&excess_name(k), "1", &description, signed_response(objectives + k, 1.0));
     }
     let feasible = tried.iter().map(|one| one.is_feasible(objectives));
     table.flags("feasible", "whether every condition holds", feasible);
     let on_front = (0..tried.len()).map(|k| front.contains(&k));
     table.flags("on_front", "whether no feasible candidate beats it in every objective", on_front);
-    let mut about = study.settings();
-    about["best"] = best(tried, &front, objectives).into();
+    let mut optimum = study.settings();
+    optimum["best"] = find_best(tried, &front, objectives).into();
     let job = study.job();
     table.metadata(key::PLAN, &job.plan);
     table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
-    table.metadata(key::OPTIMISE, &about);
+    table.metadata(key::OPTIMISE, &optimum);
     table
 }
 
@@ -88,7 +88,7 @@ pub fn parameters<M: Model>(study: &Study<M>) -> &[Axis<M>] {
 
 /// Returns the candidate of the front that is closest to the minimum of every objective, each as a
 /// share of its range over the front.
-fn best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize> {
+fn find_best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize> {
     let value = |candidate: usize, k: usize| {
         tried[candidate].responses.as_ref().map_or(f64::INFINITY, |responses| responses[k])
     };
@@ -99,10 +99,10 @@ fn best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize
         })
         .collect();
     let distance = |candidate: usize| -> f64 {
-        let parts = extents.iter().enumerate().map(|(k, [low, high])| {
+        let scaled_distances = extents.iter().enumerate().map(|(k, [low, high])| {
             (value(candidate, k) - low) / (high - low).max(f64::MIN_POSITIVE)
         });
-        parts.map(|part| part * part).sum()
+        scaled_distances.map(|scaled_distance| scaled_distance * scaled_distance).sum()
     };
     front.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
 }

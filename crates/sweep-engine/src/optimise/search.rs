@@ -22,33 +22,35 @@ pub fn search<M: Model>(
     trials: Option<Trials>,
     execution: Execution<'_>,
 ) -> Result<(Option<Vec<Candidate>>, Option<Trials>), Error> {
-    let there = trials.as_ref().map_or(0, Trials::count) as u64;
-    let progress = Progress::new(execution.progress, study.evolution.candidates, there);
-    let shown = |candidates| progress.show(candidates);
+    let stored_candidates = trials.as_ref().map_or(0, Trials::count) as u64;
+    let progress = Progress::new(execution.progress, study.evolution.candidates, stored_candidates);
+    let show_candidates = |candidates| progress.show(candidates);
     let threads = execution.threads()?;
     let engine = M::engine(&study.plan, None)?;
-    let evaluator = CachedEvaluator::new(engine, threads, execution.interrupt, trials, &shown)?;
+    let evaluator =
+        CachedEvaluator::new(engine, threads, execution.interrupt, trials, &show_candidates)?;
     let layout = M::layout(&study.plan);
     let mut count = 0;
-    let found = evolve(&study.evolution, &mut |places| {
-        let candidates: Vec<Vec<f64>> = places.iter().map(|place| study.values(place)).collect();
+    let result = evolve(&study.evolution, &mut |positions| {
+        let candidates: Vec<Vec<f64>> =
+            positions.iter().map(|position| study.values(position)).collect();
         let keys: Vec<TrialKey> =
             (count..).zip(&candidates).map(|(number, values)| key(number, values)).collect();
-        count += places.len() as u64;
+        count += positions.len() as u64;
         let values = |k: usize, row| study.axis_values(&candidates[k], row);
-        let answer = |k: usize, points| answer(study, &layout, &candidates[k], points);
-        let found = evaluator.evaluate(&keys, study.rows(), &values, &answer)?;
-        let signs = study.objectives.iter().map(|one| one.sign);
+        let respond = |k: usize, points| respond(study, &layout, &candidates[k], points);
+        let result = evaluator.evaluate(&keys, study.rows(), &values, &respond)?;
+        let signs = study.objectives.iter().map(|objective| objective.sign);
         let signs: Vec<f64> = signs.chain(study.conditions.iter().map(|_| 1.0)).collect();
-        let minimised = |numbers: RequestValues| {
+        let apply_signs = |numbers: RequestValues| {
             let signed = numbers.into_iter().zip(&signs);
-            // Without one number there are none.
+            // If one number is missing, the candidate has none.
             signed.map(|(number, sign)| number.map(|number| sign * number)).collect()
         };
-        Ok(found.into_iter().map(minimised).collect())
+        Ok(result.into_iter().map(apply_signs).collect())
     });
     progress.finish();
-    Ok((SearchStop::interrupted_to_none(found)?, evaluator.into_cache()))
+    Ok((SearchStop::interrupted_to_none(result)?, evaluator.into_cache()))
 }
 
 /// Computes the slack of each condition for the rows of a candidate; `None` after an interrupt.
@@ -62,20 +64,21 @@ pub fn slacks<M: Model>(
 ) -> Result<Option<Vec<Option<Slack>>>, Error> {
     let threads = execution.threads()?;
     let engine = M::engine(&study.plan, None)?;
-    let silent = |_: u64| {};
-    let evaluator = CachedEvaluator::new(engine, threads, execution.interrupt, None, &silent)?;
+    let ignore_count = |_: u64| {};
+    let evaluator =
+        CachedEvaluator::new(engine, threads, execution.interrupt, None, &ignore_count)?;
     let layout = M::layout(&study.plan);
-    let found = Mutex::new(Vec::new());
-    let answer = |_: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
+    let slacks_found = Mutex::new(Vec::new());
+    let respond = |_: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
         let batch = batch(study, &layout, values, points)?;
         let slacks = study.conditions.iter().map(|goal| goal.slack(&batch));
-        *lock(&found) = slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(defect)?;
+        *lock(&slacks_found) = slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(defect)?;
         Ok(RequestValues::new())
     };
     let keys = [key(0, values)];
-    let evaluated =
-        evaluator.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &answer);
-    Ok(SearchStop::interrupted_to_none(evaluated)?.map(|_| unlocked(found)))
+    let result =
+        evaluator.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &respond);
+    Ok(SearchStop::interrupted_to_none(result)?.map(|_| unlocked(slacks_found)))
 }
 
 /// Returns the error of rows that do not fit their own columns, which is a defect of the program.
@@ -84,19 +87,19 @@ pub(crate) fn defect(error: ArrowError) -> StoreError {
 }
 
 /// Returns the objectives of a candidate, then its constraint violations.
-fn answer<M: Model>(
+fn respond<M: Model>(
     study: &Study<M>,
     layout: &Layout,
     values: &[f64],
     points: Vec<PointRows>,
 ) -> Result<RequestValues, StoreError> {
     let batch = batch(study, layout, values, points)?;
-    let objectives = study.objectives.iter().map(|one| &one.goal);
+    let objectives = study.objectives.iter().map(|objective| &objective.goal);
     let goals = objectives.chain(&study.conditions);
     let numbers = goals.map(|goal: &Goal| goal.evaluate(&batch)).collect::<Result<Vec<_>, _>>();
-    // An infinite number is as good as none.
-    let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
-    Ok(numbers.map_err(defect)?.into_iter().map(finite).collect())
+    // An infinite number counts as missing.
+    let finite_or_none = |number: Option<f64>| number.filter(|number| number.is_finite());
+    Ok(numbers.map_err(defect)?.into_iter().map(finite_or_none).collect())
 }
 
 /// Returns the rows of a candidate's points as a batch.
@@ -107,9 +110,9 @@ fn batch<M: Model>(
     points: Vec<PointRows>,
 ) -> Result<RecordBatch, StoreError> {
     let mut rows = ResultRows::new(layout);
-    let keyed_rows = |done: PointRows| {
-        let row = done.point % study.rows();
-        done.rows.into_iter().map(move |cells: RowCells| (row, cells))
+    let keyed_rows = |point_rows: PointRows| {
+        let row = point_rows.point % study.rows();
+        point_rows.rows.into_iter().map(move |cells: RowCells| (row, cells))
     };
     for (row, cells) in points.into_iter().flat_map(keyed_rows) {
         rows.push(row, study.axis_values(values, row), cells);

@@ -10,7 +10,7 @@ use sweep_results::{Column, ExpressionError, Goal, columns};
 use super::Evolution;
 use crate::config::axes::{add, spacing};
 use crate::config::design::{DEFAULT_SEED, MAX_SEED};
-use crate::config::grid::{STUDY, draft, is_another};
+use crate::config::grid::{STUDY_KEYS, draft, is_another};
 use crate::config::parameters::find;
 use crate::config::section::list_choices;
 use crate::config::sections::name;
@@ -19,19 +19,21 @@ use crate::config::syntax::{self, parse};
 use crate::config::{
     Diagnostic, Draft, Field, Located, Location, Report, Section, whole, written_twice,
 };
-use crate::design::{DesignRule, MOST_AXES};
+use crate::design::{DesignRule, MAX_AXES};
 use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, ModelParameter, Plan};
 
 /// Maximum number of candidates. Basis: a file of some 100 MB. Doubling it doubles that.
 const MAX_CANDIDATES: u64 = 1_000_000;
 /// Maximum number of rows at which a candidate is evaluated. Basis: a generation must fit memory.
+/// Doubling it doubles that memory.
 const MAX_ROWS: u64 = 100_000;
-/// Maximum number of parameters. Basis: differential evolution converges slowly with more.
+/// Maximum number of parameters. Basis: differential evolution converges slowly with more. Doubling
+/// it accepts studies that hardly converge.
 const MAX_PARAMETERS: u64 = 20;
 
 /// Generations in the default number of candidates. Basis: a study of a few parameters has
 /// converged by then. Doubling it doubles the time of a study.
-const GENERATIONS: u64 = 24;
+const DEFAULT_GENERATIONS: u64 = 24;
 
 /// A search for the minimum of some objectives over some parameters.
 #[derive(Clone, Debug)]
@@ -57,8 +59,8 @@ pub struct Study<M: Model> {
 pub struct SearchedParameter {
     /// The bounds, linear or logarithmic.
     pub bounds: AxisValues,
-    /// The greatest deviation of products from the candidate's value, as a share of it; the grid's
-    /// design spreads the deviations.
+    /// The greatest relative deviation of a product from the candidate's value. The grid's design
+    /// spreads the deviations.
     pub tolerance: f64,
 }
 
@@ -94,7 +96,7 @@ impl<M: Model> Study<M> {
         let root =
             Section::new("the study file", Location::new(source, 0..0), table.get_ref(), report);
         let name = name(&root, path, None, "add `name = \"...\"`, or rename the file");
-        let [_, grid, parameter, population, candidates, seed, objective, conditions] = STUDY;
+        let [_, grid, parameter, population, candidates, seed, objective, conditions] = STUDY_KEYS;
         let grid = root.require(root.text(grid), grid, "a grid file, relative to this file");
         let input = grid.map(|grid| GridInput::file(beside(path, grid.value), sets.to_vec()));
         let mut draft = input.and_then(|input| draft::<M>(&input, report));
@@ -108,9 +110,10 @@ impl<M: Model> Study<M> {
         let candidates = root.whole(candidates, &(1..=MAX_CANDIDATES)).or(0);
         let seed = root.whole(seed, &(0..=MAX_SEED)).or(DEFAULT_SEED);
         // Populations of multiples of 8 fill the lanes of candidates with a single row.
-        let usual = (10 * parameters.len() as u64).next_multiple_of(8).max(32);
-        let population = population.filter(|&one| one > 0).unwrap_or(usual);
-        let candidates = candidates.filter(|&one| one > 0).unwrap_or(GENERATIONS * population);
+        let default_population = (10 * parameters.len() as u64).next_multiple_of(8).max(32);
+        let population = population.filter(|&count| count > 0).unwrap_or(default_population);
+        let candidates =
+            candidates.filter(|&count| count > 0).unwrap_or(DEFAULT_GENERATIONS * population);
         if let Some(draft) = &draft {
             whole::steps(draft);
             M::check(draft);
@@ -145,7 +148,7 @@ impl<M: Model> Study<M> {
         Some(Self { name, plan, grid, parameters, objectives, conditions, evolution })
     }
 
-    /// Returns the number of numbers of a candidate: objectives and constraint violations.
+    /// Returns the number of responses of a candidate: objectives and constraint violations.
     pub fn responses(&self) -> usize {
         self.objectives.len() + self.conditions.len()
     }
@@ -163,19 +166,20 @@ impl<M: Model> Study<M> {
 
     /// Returns the values of the plan's axes in a row of a candidate.
     pub fn axis_values(&self, values: &[f64], row: u64) -> Vec<f64> {
-        let mut at = self.grid.axis_values(row);
-        let own = at.len();
-        let spread = |k: usize| {
-            let place = self.grid.design.as_ref().and_then(|design| design.place(row, own + k));
-            2.0 * place.unwrap_or(0.5) - 1.0
+        let mut location = self.grid.axis_values(row);
+        let axis_count = location.len();
+        let relative_deviation = |k: usize| {
+            let position =
+                self.grid.design.as_ref().and_then(|design| design.position(row, axis_count + k));
+            2.0 * position.unwrap_or(0.5) - 1.0
         };
         let parameters = self.parameters.iter().zip(values).enumerate();
         let actual = parameters.map(|(k, (parameter, &value))| match parameter.tolerance {
             0.0 => value,
-            tolerance => value * (1.0 + tolerance * spread(k)),
+            tolerance => value * (1.0 + tolerance * relative_deviation(k)),
         });
-        at.extend(actual);
-        at
+        location.extend(actual);
+        location
     }
 
     /// Returns the job of the store.
@@ -188,10 +192,10 @@ impl<M: Model> Study<M> {
 
     /// Returns the study's settings beside the plan, as JSON.
     pub fn settings(&self) -> Value {
-        let verb = |one: &Objective| if one.sign > 0.0 { "minimise" } else { "maximise" };
+        let objective_verb = |one: &Objective| if one.sign > 0.0 { "minimise" } else { "maximise" };
         let objectives = self.objectives.iter();
         let objectives =
-            objectives.map(|one| json!({ "name": one.name, verb(one): one.goal.text() }));
+            objectives.map(|one| json!({ "name": one.name, objective_verb(one): one.goal.text() }));
         json!({
             "grid": self.grid.to_json(),
             "objective": objectives.collect::<Value>(),
@@ -204,7 +208,8 @@ impl<M: Model> Study<M> {
     }
 }
 
-/// Makes every axis a range and drops the design, because rows of candidates lie anywhere between.
+/// Makes every axis a range and drops the design, because rows of candidates lie anywhere in the
+/// ranges.
 fn flatten<M: Model>(plan: &mut Plan<M>) {
     for axis in &mut plan.axes {
         if let AxisValues::List(_) = axis.values {
@@ -231,45 +236,51 @@ fn parameters<M: Model>(
     }
     let mut searched = Vec::new();
     for section in sections {
-        let at = section.at().clone();
+        let location = section.at().clone();
         let name = section.require(section.text("name"), "name", "the name of a parameter");
         let tolerance = section.number("tolerance", Range::NonNegative);
-        let found = name.as_ref().zip(draft.as_ref()).and_then(|(name, draft)| find(name, draft));
-        let range = found.as_ref().map_or(Range::Any, |parameter| parameter.range);
+        let expression =
+            name.as_ref().zip(draft.as_ref()).and_then(|(name, draft)| find(name, draft));
+        let range = expression.as_ref().map_or(Range::Any, |parameter| parameter.range);
         section.misplace(&["count"], "the study has `candidates`, and finds the values itself");
         let bounds = spacing(section, range, Some(2));
-        let spread = match tolerance {
+        let spread_tolerance = match tolerance {
             Field::Given(part) if part.value >= 1.0 => {
                 let title = "a tolerance of the whole value or more";
-                report.refuse(&part.at, title, "expected a part of the value, as 0.05")
+                report.refuse(&part.location, title, "expected a part of the value, as 0.05")
             }
-            Field::Given(part) if draft.is_some() && !spreads(design, draft) => {
+            Field::Given(part) if draft.is_some() && !has_free_dimension(design, draft) => {
                 let title = "a tolerance without a design that spreads it";
                 let expected = format!(
-                    "expected a [design] in the grid file, by \"sobol\" over at most {MOST_AXES} \
+                    "expected a [design] in the grid file, by \"sobol\" over at most {MAX_AXES} \
                      axes and parameters, \"latin_hypercube\" or \"monte_carlo\""
                 );
-                report.refuse(&part.at, title, expected)
+                report.refuse(&part.location, title, expected)
             }
             Field::Given(part) => Some(part.value),
             _ => Some(0.0),
         };
         let (Some(name), Some(parameter), Some(bounds), Some(tolerance), Some(draft)) =
-            (name, found, bounds, spread, draft.as_mut())
+            (name, expression, bounds, spread_tolerance, draft.as_mut())
         else {
             continue;
         };
-        let shares = |theirs: &ModelParameter<M>| {
-            theirs.parts.iter().any(|part| parameter.parts.contains(part))
+        let shares_number = |other_parameter: &ModelParameter<M>| {
+            other_parameter.parts.iter().any(|part| parameter.parts.contains(part))
         };
-        let set = draft.constants.iter().find(|one| one.is_over_file && shares(&one.parameter));
-        let swept = || {
+        let overriding_constant = draft
+            .constants
+            .iter()
+            .find(|constant| constant.overrides_file && shares_number(&constant.parameter));
+        let sweeping_axis = || {
             let mut axes = draft.plan.axes.iter().enumerate();
-            let (k, axis) = axes.find(|(_, axis)| shares(&axis.parameter))?;
-            let at = report.place(&format!("axis[{k}]"))?;
-            Some(Located { value: axis.parameter.name.to_string(), at })
+            let (k, axis) = axes.find(|(_, axis)| shares_number(&axis.parameter))?;
+            let location = report.place(&format!("axis[{k}]"))?;
+            Some(Located { value: axis.parameter.name.to_string(), location })
         };
-        if let Some(first) = set.map(|constant| constant.name.clone()).or_else(swept) {
+        if let Some(first) =
+            overriding_constant.map(|constant| constant.name.clone()).or_else(sweeping_axis)
+        {
             report.push(written_twice(&name, &first));
             continue;
         }
@@ -282,18 +293,18 @@ fn parameters<M: Model>(
             *low -= tolerance * low.abs();
             *high += tolerance * high.abs();
         }
-        add(axis, at, draft);
+        add(axis, location, draft);
         searched.push(SearchedParameter { bounds: bounds.value, tolerance });
     }
     searched
 }
 
 /// Returns whether a design has room for another axis.
-fn spreads<M: Model>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bool {
+fn has_free_dimension<M: Model>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bool {
     let axes = draft.as_ref().map_or(0, |draft| draft.plan.axes.len());
     match design {
         None | Some(Design::List { .. }) => false,
-        Some(Design::Spread { rule: DesignRule::Sobol, .. }) => axes < MOST_AXES,
+        Some(Design::Spread { rule: DesignRule::Sobol, .. }) => axes < MAX_AXES,
         Some(_) => true,
     }
 }
@@ -311,7 +322,7 @@ fn objectives(
         root.missing("objective", "[[objective]] with `minimise` or `maximise`");
     }
     for section in sections {
-        let at = section.at().clone();
+        let location = section.at().clone();
         let texts = VERBS.map(|(verb, sign)| (section.text(verb).given(), sign));
         section.finish();
         let [text] = &texts
@@ -322,7 +333,7 @@ fn objectives(
             let expected =
                 format!("expected {}, and an expression", list_choices(&VERBS.map(|(v, _)| v)));
             root.report.refuse::<()>(
-                &at,
+                &location,
                 "an objective without an expression, or with two",
                 expected,
             );
@@ -330,14 +341,14 @@ fn objectives(
         };
         let (text, sign) = text;
         let Some(goal) = goals.read(text, Goal::objective) else { continue };
-        let is_same = |one: &Objective| spaceless(one.goal.text()) == spaceless(text.value);
+        let is_same = |one: &Objective| remove_spaces(one.goal.text()) == remove_spaces(text.value);
         if goal.is_by_row() && goals.rows > 1 {
             let title =
                 format!("a number for each row, and every candidate has {} rows", goals.rows);
             let expected = "expected max(), min(), mean() or quantile() of it";
-            root.report.refuse::<()>(&text.at, title, expected);
+            root.report.refuse::<()>(&text.location, title, expected);
         } else if objectives.iter().any(is_same) {
-            root.report.refuse::<()>(&text.at, "an objective twice", "expected each once");
+            root.report.refuse::<()>(&text.location, "an objective twice", "expected each once");
         } else {
             let name = unique_name(&column_name(text.value), &objectives, parameters);
             objectives.push(Objective { name, goal, sign: *sign });
@@ -347,7 +358,7 @@ fn objectives(
 }
 
 /// Returns an expression without its spaces.
-fn spaceless(text: &str) -> String {
+fn remove_spaces(text: &str) -> String {
     text.split_whitespace().collect()
 }
 
@@ -355,11 +366,11 @@ fn spaceless(text: &str) -> String {
 fn column_name(text: &str) -> String {
     const OPERATORS: [(&str, &str); 6] =
         [("+", "plus"), ("-", "minus"), ("*", "times"), ("/", "over"), ("<", "lt"), (">", "gt")];
-    let mut spelled = text.to_owned();
+    let mut spelled_out = text.to_owned();
     for (operator, word) in OPERATORS {
-        spelled = spelled.replace(operator, &format!(" {word} "));
+        spelled_out = spelled_out.replace(operator, &format!(" {word} "));
     }
-    let words = spelled.split(|c: char| !c.is_alphanumeric() && c != '_');
+    let words = spelled_out.split(|c: char| !c.is_alphanumeric() && c != '_');
     words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
 }
 
@@ -372,9 +383,9 @@ fn unique_name(name: &str, objectives: &[Objective], parameters: &[String]) -> S
             || parameters.iter().any(|parameter| parameter == name)
             || objectives.iter().any(|objective| objective.name == name)
     };
-    let numbered = (2..).map(|number| format!("objective_{name}_{number}"));
-    let plain = [name.to_owned(), format!("objective_{name}")];
-    plain.into_iter().chain(numbered).find(|name| !is_taken(name)).unwrap_or_default()
+    let numbered_names = (2..).map(|number| format!("objective_{name}_{number}"));
+    let unnumbered = [name.to_owned(), format!("objective_{name}")];
+    unnumbered.into_iter().chain(numbered_names).find(|name| !is_taken(name)).unwrap_or_default()
 }
 
 /// The context in which expressions are read.
@@ -390,21 +401,24 @@ struct GoalReader<'a> {
 impl GoalReader<'_> {
     fn read(
         &self,
-        found: &Located<&str>,
+        expression: &Located<&str>,
         read: fn(&str, &[Column]) -> Result<Goal, ExpressionError>,
     ) -> Option<Goal> {
-        let mistake = match read(found.value, &self.known) {
+        let mistake = match read(expression.value, &self.known) {
             Ok(goal) => return Some(goal),
             Err(mistake) if mistake.candidates.is_some() && !self.is_sound => return None,
             Err(mistake) => mistake,
         };
-        // The position in the text follows the opening quote, unless escapes have moved it.
-        let start = found.at.span.start + 1;
-        let is_plain = self.text.get(start..).is_some_and(|rest| rest.starts_with(found.value));
+        // The location begins after the opening quote, unless escapes have moved the text.
+        let start = expression.location.span.start + 1;
+        let is_plain =
+            self.text.get(start..).is_some_and(|rest| rest.starts_with(expression.value));
         let span = start + mistake.span.start..start + mistake.span.end;
-        let at =
-            Location::new(found.at.source, if is_plain { span } else { found.at.span.clone() });
-        self.report.push(Diagnostic::from_expression(mistake, &at));
+        let location = Location::new(
+            expression.location.source,
+            if is_plain { span } else { expression.location.span.clone() },
+        );
+        self.report.push(Diagnostic::from_expression(mistake, &location));
         None
     }
 }

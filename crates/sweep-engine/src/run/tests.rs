@@ -64,7 +64,7 @@ fn output(home: &tempfile::TempDir) -> PathBuf {
     home.path().join("x.parquet")
 }
 
-/// Runs the whole_run job with a number of threads, and returns the bytes of the result.
+/// Runs a job without interruption on a number of threads, and returns the bytes of the result.
 fn whole_run(points: u64, threads: usize) -> Vec<u8> {
     let home = tempfile::tempdir().unwrap();
     let report = run(
@@ -134,27 +134,28 @@ fn results_do_not_depend_on_the_number_of_shards() {
 fn a_run_interrupted_at_any_point_is_resumed_to_the_same_bytes() {
     let bytes = whole_run(POINTS, 1);
     let job = synthetic::job(POINTS);
-    // Chunks have eight points, so that the run is interrupted at edges and in the middle of
-    // chunks.
-    for at in (0..POINTS).step_by(4) {
+    // Chunks have eight points, so that some runs are interrupted at the edge of a chunk and others
+    // within one.
+    for interrupted_point in (0..POINTS).step_by(4) {
         let home = tempfile::tempdir().unwrap();
         let interrupt = Interrupt::new();
-        let stopping = FormulaEngine::new(|point| {
-            if point == at {
+        let interrupting_engine = FormulaEngine::new(|point| {
+            if point == interrupted_point {
                 interrupt.raise(15);
             }
         });
-        let report = run(&stopping, &job, &output(&home), options(1), &interrupt).unwrap();
+        let report =
+            run(&interrupting_engine, &job, &output(&home), options(1), &interrupt).unwrap();
         let RunEnd::Interrupted { signal: 15, kept, points: POINTS } = report.end else {
             panic!("{report:?}")
         };
-        let evaluated = stopping.evaluated.into_inner();
+        let evaluated = interrupting_engine.evaluated.into_inner();
         assert_eq!(kept, evaluated, "rows of incomplete chunks are kept too");
         assert!(!output(&home).exists());
-        let resumed = FormulaEngine::new(|_| {});
-        run(&resumed, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-        assert_eq!(resumed.evaluated.into_inner(), POINTS - kept);
-        assert!(fs::read(output(&home)).unwrap() == bytes, "interrupted at {at}");
+        let resumed_engine = FormulaEngine::new(|_| {});
+        run(&resumed_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+        assert_eq!(resumed_engine.evaluated.into_inner(), POINTS - kept);
+        assert!(fs::read(output(&home)).unwrap() == bytes, "interrupted at {interrupted_point}");
     }
 }
 
@@ -163,10 +164,10 @@ fn a_finished_run_is_not_repeated() {
     let home = tempfile::tempdir().unwrap();
     let job = synthetic::job(POINTS);
     run(&FormulaEngine::new(|_| {}), &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    let again = FormulaEngine::new(|_| {});
-    let report = run(&again, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+    let second_engine = FormulaEngine::new(|_| {});
+    let report = run(&second_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
     assert!(matches!(report.end, RunEnd::Already(..)), "{report:?}");
-    assert_eq!(again.evaluated.into_inner(), 0);
+    assert_eq!(second_engine.evaluated.into_inner(), 0);
 }
 
 #[test]
@@ -180,10 +181,10 @@ fn a_panic_of_the_engine_loses_only_unfinished_rows() {
     assert!(!error.is_refusal());
     let text = error.to_string();
     assert!(text.contains("points 16 to 23") && text.contains("twenty is too much"), "{text}");
-    let resumed = FormulaEngine::new(|_| {});
-    run(&resumed, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+    let resumed_engine = FormulaEngine::new(|_| {});
+    run(&resumed_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
     assert_eq!(
-        resumed.evaluated.into_inner(),
+        resumed_engine.evaluated.into_inner(),
         POINTS - stored,
         "the rows before the panic are kept"
     );
@@ -195,22 +196,22 @@ fn a_folder_that_vanishes_ends_the_run_with_an_error() {
     let home = tempfile::tempdir().unwrap();
     let job = synthetic::job(1000);
     let partial = home.path().join("x.parquet.partial");
-    let gone = home.path().join("gone");
+    let moved_folder = home.path().join("gone");
     let engine = FormulaEngine::new(|point| {
         if point == 40 {
             while !partial.join("part-00000000.parquet").exists() {
                 std::thread::yield_now();
             }
-            fs::rename(&partial, &gone).unwrap();
+            fs::rename(&partial, &moved_folder).unwrap();
         }
     });
     let error = run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap_err();
     let text = error.to_string();
     assert!(text.contains("x.parquet.partial") && text.contains("bring it back"), "{text}");
     assert!(engine.evaluated.into_inner() < 1000, "the run ends early");
-    fs::rename(&gone, &partial).unwrap();
-    let resumed = FormulaEngine::new(|_| {});
-    run(&resumed, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    assert!(resumed.evaluated.into_inner() < 1000, "the rows of the folder are used");
+    fs::rename(&moved_folder, &partial).unwrap();
+    let resumed_engine = FormulaEngine::new(|_| {});
+    run(&resumed_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+    assert!(resumed_engine.evaluated.into_inner() < 1000, "the rows of the folder are used");
     assert!(fs::read(output(&home)).unwrap() == whole_run(1000, 1));
 }

@@ -203,8 +203,9 @@ fn list_differences(differences: &[PlanDifference]) -> String {
     /// The number of differences that are shown. Basis: half of the lines of a terminal. Doubling
     /// it shows twice as many.
     const MAX_LISTED: usize = 12;
-    let shown = differences.iter().take(MAX_LISTED);
-    let mut text: String = shown.map(|difference| format!("  {difference}\n")).collect();
+    let first_differences = differences.iter().take(MAX_LISTED);
+    let mut text: String =
+        first_differences.map(|difference| format!("  {difference}\n")).collect();
     if differences.len() > MAX_LISTED {
         let hidden_count = differences.len() - MAX_LISTED;
         let plural = if hidden_count == 1 { "" } else { "s" };

@@ -112,7 +112,8 @@ pub(super) fn holders(folder: &Folder) -> Vec<Holder> {
     locks.sort_unstable();
     let mut holders: Vec<Holder> =
         locks.iter().filter_map(|(shard, path)| holder(path, Some(*shard))).collect();
-    // While shards share the folder's lock, its file names the last process that held it alone.
+    // While shards share the folder's lock, the lock's file names the last process that held the
+    // lock alone.
     if holders.is_empty() {
         holders.extend(holder(&folder.file(LOCK), None));
     }

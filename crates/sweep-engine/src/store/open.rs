@@ -44,7 +44,7 @@ pub struct OpenOptions<'a> {
 pub enum OpenOutcome<F, T> {
     /// The output exists, complete and of the same plan.
     Finished(F),
-    /// There is work left; the value holds the lock.
+    /// Work remains to be done. The value holds the lock.
     Open(T),
 }
 
@@ -352,8 +352,8 @@ pub(super) fn read_part<T>(
     chunk: u64,
     read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
 ) -> Result<Result<Option<T>, Damage>, StoreError> {
-    let found = parts.open(folder, chunk).and_then(|part| part.as_ref().map(read).transpose());
-    PartError::damage(found)
+    let result = parts.open(folder, chunk).and_then(|part| part.as_ref().map(read).transpose());
+    PartError::damage(result)
 }
 
 /// Renames a damaged part to `*.damaged`, and returns a note about it.

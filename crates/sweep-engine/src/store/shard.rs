@@ -98,13 +98,13 @@ impl ShardLayout {
 
     /// Returns the shards, numbered from 1, of which a chunk is missing.
     pub(super) fn incomplete(self, chunks: u64, complete_chunks: &BTreeSet<u64>) -> Vec<u64> {
-        let mut done: BTreeMap<u64, u64> = BTreeMap::new();
+        let mut chunks_done: BTreeMap<u64, u64> = BTreeMap::new();
         for chunk in complete_chunks {
-            *done.entry(chunk % self.shards + 1).or_default() += 1;
+            *chunks_done.entry(chunk % self.shards + 1).or_default() += 1;
         }
         let lacks_chunk = |index: &u64| {
             let own_chunks = Shard { index: *index, count: self.shards }.chunks(chunks);
-            done.get(index).copied().unwrap_or(0) < own_chunks
+            chunks_done.get(index).copied().unwrap_or(0) < own_chunks
         };
         (1..=self.shards).filter(lacks_chunk).collect()
     }
@@ -344,9 +344,9 @@ mod tests {
     #[test]
     fn a_count_of_shards_that_differs_from_the_file_is_refused() {
         let stored_layout = Some(ShardLayout { shards: 4, first_array_id: 1 });
-        let given = Some(ShardRequest::Given(Shard { index: 1, count: 8 }));
+        let requested_shard = Some(ShardRequest::Given(Shard { index: 1, count: 8 }));
         assert!(
-            refusal(resolve_shard(given, &environment(&[]), stored_layout))
+            refusal(resolve_shard(requested_shard, &environment(&[]), stored_layout))
                 .contains("into 4 shards")
         );
         let kubernetes = environment(&[("JOB_COMPLETION_INDEX", "1")]);

@@ -18,11 +18,11 @@ pub struct PlanChange {
 /// Returns a file's plan and versions, and for a trace or modes the settings of the request, as one
 /// JSON object.
 fn provenance(file: &ParquetFile) -> Value {
-    let read = |name: &str| {
+    let read_metadata = |name: &str| {
         let text = file.value(name)?;
         Some(serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned())))
     };
-    let mut provenance = match read(key::PLAN) {
+    let mut provenance = match read_metadata(key::PLAN) {
         Some(Value::Object(plan)) => plan,
         _ => Map::new(),
     };
@@ -32,7 +32,7 @@ fn provenance(file: &ParquetFile) -> Value {
         ("trace", key::TRACE),
         ("modes", key::MODES),
     ] {
-        provenance.extend(read(key).map(|value| (name.to_owned(), value)));
+        provenance.extend(read_metadata(key).map(|value| (name.to_owned(), value)));
     }
     Value::Object(provenance)
 }

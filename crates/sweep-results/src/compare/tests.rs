@@ -52,9 +52,12 @@ fn flips_are_found_and_sensitive_rows_are_separate() {
     assert_eq!(count_lost(&comparison), 1);
     ratios[0] = None; // reliable before
     assert_eq!(count_lost(&compare(&map(&RATIOS), &map(&ratios)).unwrap()), 2);
-    let greatest = comparison.most_deviating(3, false, SharedRow::ratio_deviation);
-    assert_eq!(greatest.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [3, 2, 1]);
-    assert!((greatest[1].ratio_deviation() - 1.0).abs() < 1e-12, "2.5 to 1.25 is a factor of two");
+    let most_deviating = comparison.most_deviating(3, false, SharedRow::ratio_deviation);
+    assert_eq!(most_deviating.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [3, 2, 1]);
+    assert!(
+        (most_deviating[1].ratio_deviation() - 1.0).abs() < 1e-12,
+        "2.5 to 1.25 is a factor of two"
+    );
     let gap_row = comparison.most_deviating(2, false, SharedRow::gap_deviation_m)[1];
     assert!((gap_row.gap_deviation_m() - 1.25e-3).abs() < 1e-12, "{gap_row:?}");
     assert!(comparison.shared.iter().filter(|row| row.differs).count() == 4);

@@ -57,9 +57,9 @@ pub(super) fn write(
 /// Formats a number with the fewest digits that parse to the same number, with an exponent if that
 /// is shorter.
 fn format_number(number: f64) -> String {
-    let plain = number.to_string();
+    let plain_text = number.to_string();
     let with_exponent = format!("{number:e}");
-    if plain.len() <= with_exponent.len() { plain } else { with_exponent }
+    if plain_text.len() <= with_exponent.len() { plain_text } else { with_exponent }
 }
 
 /// Escapes a comment so that it is one line and no spreadsheet finds a formula in it.

@@ -134,14 +134,14 @@ fn write_rows(
 /// Writes the sheet of columns.
 fn write_columns(workbook: &mut Workbook, table: &ResultTable) -> Result<(), XlsxError> {
     let mut sheet = SheetWriter::new(workbook, "columns", 1)?;
-    let longest = |text: fn(&Column) -> &str| {
+    let longest_text = |text: fn(&Column) -> &str| {
         let texts = table.columns.iter().map(text);
         texts.max_by_key(|text| text.chars().count()).unwrap_or_default()
     };
     let longest_texts = [
-        longest(|column| &column.name),
-        longest(|column| &column.unit),
-        longest(|column| &column.description),
+        longest_text(|column| &column.name),
+        longest_text(|column| &column.unit),
+        longest_text(|column| &column.description),
     ];
     sheet.set_widths(longest_texts.into_iter())?;
     sheet.write_row(["column", "unit", "description"].map(text_cell))?;
@@ -162,8 +162,8 @@ fn write_plan(workbook: &mut Workbook, table: &ResultTable) -> Result<(), XlsxEr
     if let Some(plan) = &table.plan {
         collect_leaves(plan, &mut settings);
     }
-    let longest = settings.iter().map(|(path, _)| path.as_str()).max_by_key(|path| path.len());
-    sheet.set_widths(longest.into_iter())?;
+    let longest_path = settings.iter().map(|(path, _)| path.as_str()).max_by_key(|path| path.len());
+    sheet.set_widths(longest_path.into_iter())?;
     sheet.write_row(["setting", "value"].map(text_cell))?;
     for (path, value) in settings {
         let value = match &value {

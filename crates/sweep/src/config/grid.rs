@@ -61,7 +61,7 @@ fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
             let title = format!("cannot read the machine file {short_path}: {error}");
             let expected =
                 format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
-            let refusal = Diagnostic::new(title).at(&name.at, expected);
+            let refusal = Diagnostic::new(title).at(&name.location, expected);
             report.push(refusal.nearest(name.value, MACHINES));
             Machine::paper()
         }
@@ -93,7 +93,7 @@ pub(super) fn walk_stability(
     if let (KeyWalk::Set(_), Field::Given(location)) = (&keys.walk, metrics_field) {
         if let (Some(metric), None, Some(report)) = (held_metric, &speeds, keys.report()) {
             let expected = "expected a grid file with this metric and a section [stability]";
-            report.refuse::<()>(&location.at, needs_speeds(metric), expected);
+            report.refuse::<()>(&location.location, needs_speeds(metric), expected);
         }
         speeds.take_if(|_| held_metric.is_none());
     }
@@ -115,7 +115,7 @@ pub(super) fn walk_stability(
             Ok(list) => *speeds = Some(list),
             Err(expected) => {
                 let title = format!("`speed_rpm` = \"{text}\" is no list of speeds");
-                report.refuse::<()>(&found.at, title, expected);
+                report.refuse::<()>(&found.location, title, expected);
             }
         }
     });
@@ -126,7 +126,7 @@ pub(super) fn walk_stability(
                 "[stability] is for the metrics `growth` and `dwell`, and neither is asked for";
             let expected = "expected metrics = [\"growth\"] or [\"dwell\"] at the top of the \
                             file, or no [stability]; `sweep stability` takes its speeds as --speed";
-            root.report.refuse::<()>(&section.at, title, expected);
+            root.report.refuse::<()>(&section.location, title, expected);
         }
         (Field::Absent, Some(metric)) => {
             let expected =

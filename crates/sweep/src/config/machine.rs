@@ -441,7 +441,7 @@ impl MachineKey {
                 for (parameter, number) in parameters.iter().zip(numbers) {
                     parameter.set(machine, &mut no_spin(), number);
                     if !self.is_vector() {
-                        report.put(parameter.name(), location.at.clone());
+                        report.put(parameter.name(), location.location.clone());
                     }
                 }
             }

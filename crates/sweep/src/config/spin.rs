@@ -102,11 +102,11 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     };
     let joints = Joints::ALL.into_iter().find(|(_, name)| *name == word);
     let joints = joints.map_or(Joints::Straight, |(joints, _)| joints);
-    *spin = match cycle::read(&beside(path, &file_name), joints, &location.at, report) {
+    *spin = match cycle::read(&beside(path, &file_name), joints, &location.location, report) {
         Some((time_s, speed_rpm)) => {
             for (column, values) in [("time_s", &time_s), ("speed_rpm", &speed_rpm)] {
                 for k in 0..values.len() {
-                    report.put(format!("spin_{column}[{k}]"), location.at.clone());
+                    report.put(format!("spin_{column}[{k}]"), location.location.clone());
                 }
             }
             Spin::Table { time_s, speed_rpm }

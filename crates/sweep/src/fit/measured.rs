@@ -258,7 +258,7 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
     let title = format!("the column `{}` does not name a channel", column.header);
     let expected = "expected a channel of `sweep trace` with its unit, as in \
                     tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";
-    let refusal = Diagnostic::new(title).at(&column.name.at, expected);
+    let refusal = Diagnostic::new(title).at(&column.name.location, expected);
     Some(refusal.nearest(&column.header, names.iter().map(String::as_str)))
 }
 
@@ -286,7 +286,7 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
             continue;
         }
         let name = column.name.value.as_str();
-        let at = &column.name.at;
+        let at = &column.name.location;
         if seen.contains(&name) {
             let title = format!("the column `{name}` is given twice");
             report.push(Diagnostic::new(title).at(at, "expected each column once"));
@@ -427,7 +427,7 @@ fn read_pulses(
     if measured.speed_rpm.is_some() || measured.pulses.is_some() {
         let title = format!("the column `{name}` is a second tachometer");
         let expected = "expected speed_rpm or one column of pulses";
-        report.push(Diagnostic::new(title).at(&column.name.at, expected));
+        report.push(Diagnostic::new(title).at(&column.name.location, expected));
         return;
     }
     match Pulses::read(&measured.time_s, &column.values[measured.early..], per_turn) {
@@ -436,7 +436,7 @@ fn read_pulses(
             let title = format!("the column `{name}` has {}", counted(count, "pulse"));
             let expected = "expected three at least: a signal, no count, that rises through half \
                             of its range once a pulse";
-            report.push(Diagnostic::new(title).at(&column.name.at, expected));
+            report.push(Diagnostic::new(title).at(&column.name.location, expected));
         }
         Err(PulseError::Fast(row)) => report.push_with(|sources| {
             let title = format!("pulses of `{name}` are as fast as half of the sampling rate");

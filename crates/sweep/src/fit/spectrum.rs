@@ -53,7 +53,7 @@ mod tests {
         let noise = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 3 };
         let value = |k: u64| {
             let tone = (TAU * 6.25 * 0.002 * k as f64).sin();
-            tone + normal.quantile(noise.place(k, 0).unwrap())
+            tone + normal.quantile(noise.position(k, 0).unwrap())
         };
         let values: Vec<f64> = (0..12_000).map(value).collect();
         let (hz, density) = spectrum(&values, 0.002);

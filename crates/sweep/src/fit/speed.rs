@@ -218,7 +218,7 @@ mod tests {
         let speed: Vec<f64> = time_s
             .iter()
             .enumerate()
-            .map(|(k, t)| course(*t) + normal.quantile(noise.place(k as u64, 0).unwrap()))
+            .map(|(k, t)| course(*t) + normal.quantile(noise.position(k as u64, 0).unwrap()))
             .collect();
         let found = smoothed(&time_s, &speed).unwrap();
         assert!((found.noise_rpm - 1.5).abs() < 0.1, "{found:?}");

@@ -91,7 +91,7 @@ pub(super) fn noise(seed: u64, signal: usize, count: usize, correlation: f64) ->
     let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed };
     let mut last = 0.0;
     let values = (0..(count + SETTLED) as u64).map(|row| {
-        let fresh = normal.quantile(draw.place(row, signal).unwrap());
+        let fresh = normal.quantile(draw.position(row, signal).unwrap());
         last = correlation * last + (1.0 - correlation * correlation).sqrt() * fresh;
         last
     });

@@ -3,7 +3,7 @@
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
 /// Days from the first of March of the year 0 to the first of January 1970, counted from 1.
-const BEFORE_1970: f64 = 719_469.0;
+const DAYS_BEFORE_1970: f64 = 719_469.0;
 
 /// Returns the seconds since midnight of a time of day, or since 1970 if it has a date.
 pub(super) fn seconds(cell: &str) -> Option<f64> {
@@ -14,20 +14,20 @@ pub(super) fn seconds(cell: &str) -> Option<f64> {
     };
     let days = date.map_or(Some(0.0), days)?;
     let mut parts = time.split(':');
-    let hours = whole(parts.next()?, 24)?;
-    let minutes = whole(parts.next()?, 59)?;
+    let hours = parse_whole(parts.next()?, 24)?;
+    let minutes = parse_whole(parts.next()?, 59)?;
     let seconds = parts.next().unwrap_or("0").replace(',', ".");
-    let begins_right = seconds.starts_with(|letter: char| letter.is_ascii_digit());
+    let begins_with_digit = seconds.starts_with(|letter: char| letter.is_ascii_digit());
     let seconds: f64 = seconds.parse().ok()?;
-    let is_time = begins_right && (0.0..61.0).contains(&seconds) && parts.next().is_none();
+    let is_time = begins_with_digit && (0.0..61.0).contains(&seconds) && parts.next().is_none();
     is_time.then_some(days * DAY_S + hours * 3600.0 + minutes * 60.0 + seconds)
 }
 
-/// Returns a whole number of at most four digits, if it is no greater than `most`.
-fn whole(text: &str, most: u32) -> Option<f64> {
-    let is_plain = (1..=4).contains(&text.len()) && text.bytes().all(|it| it.is_ascii_digit());
+/// Returns a whole number of at most four digits, if it is no greater than `max`.
+fn parse_whole(text: &str, max: u32) -> Option<f64> {
+    let is_plain = (1..=4).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
     let number: u32 = text.parse().ok().filter(|_| is_plain)?;
-    (number <= most).then_some(f64::from(number))
+    (number <= max).then_some(f64::from(number))
 }
 
 /// Returns the days since 1970 of a date: year, month, day with `-` or `/`, or day, month, year
@@ -40,16 +40,16 @@ fn days(date: &str) -> Option<f64> {
         (_, 4, true) => (last, first),
         _ => return None,
     };
-    let year = whole(year, 9999)?;
-    let month = whole(month, 12).filter(|month| *month > 0.0)?;
-    let day = whole(day, 31).filter(|day| *day > 0.0)?;
+    let year = parse_whole(year, 9999)?;
+    let month = parse_whole(month, 12).filter(|month| *month > 0.0)?;
+    let day = parse_whole(day, 31).filter(|day| *day > 0.0)?;
     // Years begin in March, so that the leap day is their last.
-    let is_early = month <= 2.0;
-    let year = if is_early { year - 1.0 } else { year };
-    let month = if is_early { month + 9.0 } else { month - 3.0 };
+    let is_january_or_february = month <= 2.0;
+    let year = if is_january_or_february { year - 1.0 } else { year };
+    let month = if is_january_or_february { month + 9.0 } else { month - 3.0 };
     let days_of_years = 365.0 * year + (year / 4.0).floor() - (year / 100.0).floor();
     let days_of_months = ((153.0 * month + 2.0) / 5.0).floor();
-    Some(days_of_years + (year / 400.0).floor() + days_of_months + day - BEFORE_1970)
+    Some(days_of_years + (year / 400.0).floor() + days_of_months + day - DAYS_BEFORE_1970)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::layout::{TableLayout, TextLine, lines, separator_words};
 use super::names::Names;
 use super::notation::{Evidence, Notation, NotationEvidence, Unclear};
 use super::units::UnitScale;
-use super::{ID, ListColumn, ListError, check_size, is_index};
+use super::{ID_COLUMN, ListColumn, ListError, check_size, is_index};
 
 /// A table that is read from text.
 #[derive(Default)]
@@ -26,16 +26,16 @@ pub(super) struct TextTable {
 }
 
 /// The name of a column of times (s), whose cells may be times of day.
-const TIME: &str = "time_s";
+const TIME_COLUMN: &str = "time_s";
 
 /// Texts of cells without a value, in lower case.
-const MISSING: [&str; 9] = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
+const MISSING_VALUES: [&str; 9] = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
 
 /// Reads a text; mistakes are reported.
 pub(super) fn read(
     text: &str,
     source: SourceId,
-    gaps: bool,
+    allows_missing: bool,
     names: &Names<'_>,
     report: &Report,
 ) -> Result<TextTable, ListError> {
@@ -45,20 +45,21 @@ pub(super) fn read(
     let separator = layout.separator;
     let headers = headers(&layout)?;
     let width = headers.len();
-    let mut read = TextTable { separator, preamble: layout.preamble, ..TextTable::default() };
+    let mut table = TextTable { separator, preamble: layout.preamble, ..TextTable::default() };
     let mut scales: Vec<Option<UnitScale>> = Vec::new();
-    for (place, (header, at)) in headers.into_iter().enumerate() {
+    for (place, (header, location)) in headers.into_iter().enumerate() {
         let unit = layout.units.get(place).map(String::as_str);
-        let (column, scale) = column(header, place, unit, Location::new(source, at), names, report);
-        read.columns.push(column);
+        let (column, scale) =
+            column(header, place, unit, Location::new(source, location), names, report);
+        table.columns.push(column);
         scales.push(scale);
     }
     let rows = lines(text, layout.rows);
-    let notation = match layout.notation.map_or_else(|| notation(rows.clone(), &read), Ok) {
+    let notation = match layout.notation.map_or_else(|| notation(rows.clone(), &table), Ok) {
         Ok(notation) => notation,
         Err(unclear) => {
             report.push(refusal(&unclear, source));
-            return Ok(read);
+            return Ok(table);
         }
     };
     for line in rows {
@@ -69,25 +70,25 @@ pub(super) fn read(
         if is_padded && cells.clone().all(|(cell, _)| cell.is_empty()) {
             continue;
         }
-        let mut further = cells.clone().skip(width);
-        let ends_empty = is_padded && further.all(|(cell, _)| cell.is_empty());
-        if count < width || !(count == width || ends_empty || layout.is_labview) {
-            report.push_with(|_| wrong_row(line, count, width, separator, source));
+        let mut extra_cells = cells.clone().skip(width);
+        let has_empty_end = is_padded && extra_cells.all(|(cell, _)| cell.is_empty());
+        if count < width || !(count == width || has_empty_end || layout.is_labview) {
+            report.push_with(|_| wrong_row_length(line, count, width, separator, source));
             continue;
         }
-        check_size(read.starts.len() as u64 + 1, width)?;
-        // The cast fits: no list has 4 GiB.
-        read.starts.push(line.start as u32);
-        for (((cell, at), column), scale) in cells.zip(&mut read.columns).zip(&scales) {
+        check_size(table.starts.len() as u64 + 1, width)?;
+        // The cast loses nothing, because a list is smaller than 4 GiB.
+        table.starts.push(line.start as u32);
+        for (((cell, location), column), scale) in cells.zip(&mut table.columns).zip(&scales) {
             let Some(scale) = scale else { continue };
-            if gaps && is_missing(cell) {
+            if allows_missing && is_missing(cell) {
                 column.values.push(f64::NAN);
                 continue;
             }
-            let is_time = column.name.value == TIME;
+            let is_time = column.name.value == TIME_COLUMN;
             let clock = || clock::seconds(cell).filter(|_| is_time);
             if let Some(value) = notation.number(cell).or_else(clock)
-                && (gaps || !value.is_nan())
+                && (allows_missing || !value.is_nan())
             {
                 column.values.push(scale.apply(value));
                 continue;
@@ -96,19 +97,19 @@ pub(super) fn read(
             report.push_with(|_| {
                 let title = format!("`{}` is not a number", short(cell));
                 let expected = "expected a number such as 0.25, 80 or 1e7";
-                Diagnostic::new(title).at(&Location::new(source, at), expected)
+                Diagnostic::new(title).at(&Location::new(source, location), expected)
             });
         }
     }
-    let rows = read.starts.len();
-    for (column, scale) in read.columns.iter_mut().zip(&scales) {
-        // A column of row identifiers has zeros in place of numbers.
-        if scale.is_none() && column.name.value == ID {
+    let rows = table.starts.len();
+    for (column, scale) in table.columns.iter_mut().zip(&scales) {
+        // A column of row identifiers has no numbers, so zeros fill it.
+        if scale.is_none() && column.name.value == ID_COLUMN {
             column.values = vec![0.0; rows];
         }
     }
-    read.columns.retain(|column| column.is_known || !is_index(&column.name.value));
-    Ok(read)
+    table.columns.retain(|column| column.is_known || !is_index(&column.name.value));
+    Ok(table)
 }
 
 /// Returns the names in the line of names with their positions; empty names at its end are dropped.
@@ -127,36 +128,36 @@ fn headers<'t>(
     if let (true, Some((name, _))) = (layout.is_labview, headers.first_mut())
         && *name == "X_Value"
     {
-        *name = TIME;
+        *name = TIME_COLUMN;
     }
     Ok(headers)
 }
 
-/// Returns a column without its numbers, and the factor to the unit of its name; no factor if it is
-/// ignored.
+/// Returns a column without its numbers, and the factor to the unit of its name; `None` instead of
+/// the factor for an ignored column.
 fn column(
     header: &str,
     place: usize,
     unit: Option<&str>,
-    at: Location,
+    location: Location,
     names: &Names<'_>,
     report: &Report,
 ) -> (ListColumn, Option<UnitScale>) {
     let named_column = |name: String, is_known| ListColumn {
-        name: Located { value: name, at: at.clone() },
+        name: Located { value: name, location: location.clone() },
         header: header.to_owned(),
         place,
         is_known,
         values: Vec::new(),
     };
-    if header == ID {
+    if header == ID_COLUMN {
         return (named_column(header.to_owned(), true), None);
     }
     match names.find(header, unit) {
         Ok(Some(found)) => (named_column(found.name, true), Some(found.scale)),
         Ok(None) => (named_column(header.to_owned(), false), None),
         Err([title, expected]) => {
-            report.refuse::<()>(&at, title, expected);
+            report.refuse::<()>(&location, title, expected);
             (named_column(header.to_owned(), true), None)
         }
     }
@@ -164,22 +165,22 @@ fn column(
 
 /// Returns whether a cell marks a missing value.
 fn is_missing(cell: &str) -> bool {
-    cell.len() <= 4 && MISSING.contains(&cell.to_lowercase().as_str())
+    cell.len() <= 4 && MISSING_VALUES.contains(&cell.to_lowercase().as_str())
 }
 
 /// Returns the mistake of a row with too few or too many cells.
-fn wrong_row(
+fn wrong_row_length(
     line: TextLine<'_>,
     count: usize,
     width: usize,
     separator: char,
     source: SourceId,
 ) -> Diagnostic {
-    let at = Location::new(source, line.offset..line.offset + line.text.len());
-    let [names, numbers] = ["name", "number"].map(|what| counted(width, what));
+    let location = Location::new(source, line.offset..line.offset + line.text.len());
+    let [names, numbers] = ["name", "number"].map(|noun| counted(width, noun));
     let title = format!("a row of {} under {names}", counted(count, "number"));
     let expected = format!("expected {numbers}, separated by {}", separator_words(separator));
-    let refusal = Diagnostic::new(title).at(&at, expected);
+    let refusal = Diagnostic::new(title).at(&location, expected);
     let help = "commas separate cells here: if they separate decimals or thousands too, write the \
                 file with semicolons or tabs between cells";
     if separator == ',' && count > width { refusal.help(help) } else { refusal }
@@ -188,27 +189,27 @@ fn wrong_row(
 /// Returns the notation of the numbers in these lines.
 fn notation<'t>(
     rows: impl Iterator<Item = TextLine<'t>> + Clone,
-    read: &TextTable,
+    table: &TextTable,
 ) -> Result<Notation, Unclear> {
-    // Commas separate cells, so that a mark within a cell is a decimal point.
-    let is_by_commas = read.separator == ',' && read.columns.len() > 1;
+    // If commas separate cells, a mark within a cell is a decimal point.
+    let has_comma_separator = table.separator == ',' && table.columns.len() > 1;
     let mut seen = NotationEvidence::default();
-    if is_by_commas && !rows.clone().any(|line| line.text.contains('"')) {
+    if has_comma_separator && !rows.clone().any(|line| line.text.contains('"')) {
         return Ok(Notation::POINT);
     }
     for line in rows {
-        for ((cell, at), column) in line.cells(read.separator).zip(&read.columns) {
-            if column.name.value != ID {
-                seen.note(cell, at);
+        for ((cell, location), column) in line.cells(table.separator).zip(&table.columns) {
+            if column.name.value != ID_COLUMN {
+                seen.note(cell, location);
             }
         }
     }
-    seen.notation(is_by_commas)
+    seen.notation(has_comma_separator)
 }
 
 /// Returns the mistake of numbers that can be read in two ways.
 fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
-    let place = |evidence: &Evidence| Location::new(source, evidence.at.clone());
+    let evidence_location = |evidence: &Evidence| Location::new(source, evidence.location.clone());
     match unclear {
         Unclear::TwoNotations(point, comma) => {
             let title = format!(
@@ -217,8 +218,8 @@ fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
                 short(&comma.cell)
             );
             Diagnostic::new(title)
-                .at(&place(comma), "expected one decimal mark in the whole file")
-                .at(&place(point), "the other one")
+                .at(&evidence_location(comma), "expected one decimal mark in the whole file")
+                .at(&evidence_location(point), "the other one")
                 .help("write every number of the file with the same decimal mark")
         }
         Unclear::OneCell(evidence) => {
@@ -229,7 +230,7 @@ fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
                  {decimals}0"
             );
             let expected = "expected a number without separators of thousands";
-            Diagnostic::new(title).at(&place(evidence), expected).help(help)
+            Diagnostic::new(title).at(&evidence_location(evidence), expected).help(help)
         }
     }
 }

@@ -7,8 +7,8 @@ use super::notation::Notation;
 use super::units::is_unit;
 use super::{ListError, MAX_COLUMNS};
 
-/// Number of lines among which the line of names is searched. Basis: no logger writes as long a
-/// preamble.
+/// Number of lines among which the line of names is searched. Basis: no logger writes a preamble of
+/// that length. Doubling it accepts longer preambles.
 const MAX_HEADER_LINE: usize = 200;
 
 /// The separator of cells that are separated by white space.
@@ -27,7 +27,7 @@ pub(super) fn separator_words(separator: char) -> &'static str {
 /// A line of the table.
 #[derive(Clone, Copy)]
 pub(super) struct TextLine<'t> {
-    /// The byte at which it begins.
+    /// The byte at which the line begins.
     pub(super) start: usize,
     /// The text without byte order mark and line end.
     pub(super) text: &'t str,
@@ -54,12 +54,12 @@ impl<'t> TextLine<'t> {
 /// Yields the lines of a text from a byte on, without empty lines and comments.
 pub(super) fn lines(text: &str, from: usize) -> impl Iterator<Item = TextLine<'_>> + Clone {
     let mut next = from;
-    let all = text[from..].split_inclusive('\n').map(move |line| {
+    let all_lines = text[from..].split_inclusive('\n').map(move |line| {
         let start = next;
         next += line.len();
         TextLine::at(text, start)
     });
-    all.filter(|line| {
+    all_lines.filter(|line| {
         let line = line.text.trim();
         !line.is_empty() && !line.starts_with('#')
     })
@@ -94,8 +94,8 @@ impl<'t> Iterator for LineCells<'t> {
         let start = self.line.offset + from + (cell.len() - cell.trim_start().len());
         let trimmed = cell.trim();
         let quoted = trimmed.len() >= 2 && trimmed.starts_with('"') && trimmed.ends_with('"');
-        let inner = if quoted { &trimmed[1..trimmed.len() - 1] } else { trimmed };
-        Some((inner, start..start + trimmed.len()))
+        let unquoted = if quoted { &trimmed[1..trimmed.len() - 1] } else { trimmed };
+        Some((unquoted, start..start + trimmed.len()))
     }
 }
 
@@ -108,12 +108,12 @@ fn end_of_cell(text: &str, separator: char) -> usize {
     };
     let mut is_quoted = false;
     let mut may_begin = true;
-    let found = text.find(|letter: char| {
+    let cell_end = text.find(|letter: char| {
         is_quoted ^= letter == '"' && (is_quoted || may_begin);
         may_begin = letter == '"' || may_begin && letter.is_whitespace();
         is_separator(letter) && !is_quoted
     });
-    found.unwrap_or(text.len())
+    cell_end.unwrap_or(text.len())
 }
 
 /// The layout of a table in text.
@@ -141,59 +141,62 @@ impl<'t> TableLayout<'t> {
     /// # Errors
     /// A kind of LabVIEW file that is not supported.
     pub(super) fn find(text: &'t str, names: &Names<'_>) -> Result<Option<Self>, ListError> {
-        let mut first: Vec<TextLine<'_>> = lines(text, 0).take(MAX_HEADER_LINE).collect();
-        let Some(opening) = first.first().copied() else { return Ok(None) };
-        if opening.text.starts_with("LabVIEW Measurement") {
-            return Self::labview(text, &first).map(Some);
+        let mut first_lines: Vec<TextLine<'_>> = lines(text, 0).take(MAX_HEADER_LINE).collect();
+        let Some(first_line) = first_lines.first().copied() else { return Ok(None) };
+        if first_line.text.starts_with("LabVIEW Measurement") {
+            return Self::labview(text, &first_lines).map(Some);
         }
-        let stated = stated_separator(opening.text);
-        if stated.is_some() {
-            first.remove(0);
+        let stated_separator_char = stated_separator(first_line.text);
+        if stated_separator_char.is_some() {
+            first_lines.remove(0);
         }
-        let Some(opening) = first.first().copied() else { return Ok(None) };
-        let by_line = |line: &TextLine<'_>| stated.unwrap_or_else(|| separator(line.text));
+        let Some(first_line) = first_lines.first().copied() else { return Ok(None) };
+        let line_separator =
+            |line: &TextLine<'_>| stated_separator_char.unwrap_or_else(|| separator(line.text));
         let words = |line: &TextLine<'_>| line.cells(WHITE_SPACE).count();
-        // A single name may have several words; cells separated by spaces are so in every row.
-        let separator_at = |k: usize| match by_line(&first[k]) {
-            WHITE_SPACE if first.get(k + 1).map(words) != Some(words(&first[k])) => ',',
+        // A single name may have several words, whereas cells that spaces separate are separated so
+        // in every row.
+        let separator_at = |k: usize| match line_separator(&first_lines[k]) {
+            WHITE_SPACE if first_lines.get(k + 1).map(words) != Some(words(&first_lines[k])) => ',',
             found => found,
         };
-        // The best line has known names and stands above rows of numbers; others serve if there is
-        // none.
+        // The best line has known names and stands above rows of numbers. If there is no such line,
+        // a line with one of these properties is taken.
         let rank = |k: usize| {
             let separator = separator_at(k);
-            let Some(cells) = texts(first[k], separator) else { return (0, false, 0) };
-            let known =
+            let Some(cells) = texts(first_lines[k], separator) else { return (0, false, 0) };
+            let known_count =
                 cells.into_iter().filter(|cell| !is_number(cell) && names.has(cell)).count();
-            (known.min(1), is_above_rows(&first[k..], separator), known)
+            (known_count.min(1), is_above_rows(&first_lines[k..], separator), known_count)
         };
         let mut place = 0;
-        let mut best = rank(0);
-        for k in 1..first.len() {
-            // Rows follow, and a line of names cannot come after them.
-            if best.0 == 1 && best.1 {
+        let mut best_rank = rank(0);
+        for k in 1..first_lines.len() {
+            // Rows follow this line, and a line of names cannot come after rows.
+            if best_rank.0 == 1 && best_rank.1 {
                 break;
             }
             let next = rank(k);
-            if next > best {
-                (place, best) = (k, next);
+            if next > best_rank {
+                (place, best_rank) = (k, next);
             }
         }
-        let header = first.get(place).copied().unwrap_or(opening);
-        if let Some(commented) = commented_header(text, header, &by_line) {
+        let header = first_lines.get(place).copied().unwrap_or(first_line);
+        if let Some(commented) = commented_header(text, header, &line_separator) {
             return Ok(Some(commented));
         }
         let separator = separator_at(place);
-        let below = first.get(place + 1);
+        let next_line = first_lines.get(place + 1);
         let count = texts(header, separator).map_or(0, |names| names.len());
-        let units = below.and_then(|line| units(*line, separator, count));
-        let last = if units.is_some() { below.copied().unwrap_or(header) } else { header };
+        let units = next_line.and_then(|line| units(*line, separator, count));
+        let last_header_line =
+            if units.is_some() { next_line.copied().unwrap_or(header) } else { header };
         Ok(Some(Self {
             separator,
             header,
             units: units.unwrap_or_default(),
             notation: None,
-            rows: end_of_line(text, last),
+            rows: end_of_line(text, last_header_line),
             is_labview: false,
             preamble: place,
         }))
@@ -201,19 +204,19 @@ impl<'t> TableLayout<'t> {
 
     /// Finds the layout of a LabVIEW measurement file (.lvm).
     fn labview(text: &'t str, first: &[TextLine<'t>]) -> Result<Self, ListError> {
-        /// The line at the end of a header.
-        const END: &str = "***End_of_Header***";
-        let ends = |line: &TextLine<'_>| line.text.starts_with(END);
+        /// The text of the line that ends a header.
+        const HEADER_END: &str = "***End_of_Header***";
+        let is_header_end = |line: &TextLine<'_>| line.text.starts_with(HEADER_END);
         let value = |key: &str| {
-            let rest = first.iter().find_map(|line| line.text.strip_prefix(key));
-            rest.map(|rest| rest.trim_matches([',', '\t', ';']).to_owned())
+            let key_value = first.iter().find_map(|line| line.text.strip_prefix(key));
+            key_value.map(|key_value| key_value.trim_matches([',', '\t', ';']).to_owned())
         };
         let separator = match value("Separator").as_deref() {
             Some("Comma") => ',',
             _ => '\t',
         };
         let notation = match value("Decimal_Separator").as_deref() {
-            // A comma that ends the line is the value itself if commas separate cells.
+            // If commas separate cells, a comma at the end of the line is the value itself.
             Some(",") => Notation::COMMA,
             Some("") if separator == '\t' => Notation::COMMA,
             _ => Notation::POINT,
@@ -226,25 +229,27 @@ impl<'t> TableLayout<'t> {
             ));
         }
         /// The message about a file of several segments.
-        const SEGMENTS: &str = "it is a LabVIEW file of several segments: export one of them";
-        let all: Vec<usize> = (0..first.len()).filter(|k| ends(&first[*k])).collect();
-        // A file has a header of its own and one of its segment.
-        let end = match all.as_slice() {
+        const SEVERAL_SEGMENTS: &str =
+            "it is a LabVIEW file of several segments: export one of them";
+        let header_ends: Vec<usize> =
+            (0..first.len()).filter(|k| is_header_end(&first[*k])).collect();
+        // A file has two headers: its own and that of its segment.
+        let end = match header_ends.as_slice() {
             [] => return Err("it is a LabVIEW file whose header has no end".to_owned()),
             [end] | [_, end] => *end,
-            _ => return Err(SEGMENTS.to_owned()),
+            _ => return Err(SEVERAL_SEGMENTS.to_owned()),
         };
         let Some(header) = first.get(end + 1).copied() else {
             return Err("it is a LabVIEW file without signals".to_owned());
         };
         let rows = end_of_line(text, header);
-        if text[rows..].contains(END) {
-            return Err(SEGMENTS.to_owned());
+        if text[rows..].contains(HEADER_END) {
+            return Err(SEVERAL_SEGMENTS.to_owned());
         }
         let mut units = vec!["s".to_owned()];
-        let labels = first.iter().find(|line| line.text.starts_with("Y_Unit_Label"));
-        let labels = labels.into_iter().flat_map(|line| line.cells(separator).skip(1));
-        units.extend(labels.map(|(unit, _)| unit.to_owned()));
+        let unit_labels = first.iter().find(|line| line.text.starts_with("Y_Unit_Label"));
+        let unit_labels = unit_labels.into_iter().flat_map(|line| line.cells(separator).skip(1));
+        units.extend(unit_labels.map(|(unit, _)| unit.to_owned()));
         Ok(Self {
             separator,
             header,
@@ -264,8 +269,8 @@ fn commented_header<'t>(
     row: TextLine<'t>,
     separator: &dyn Fn(&TextLine<'_>) -> char,
 ) -> Option<TableLayout<'t>> {
-    let above = text[..row.start].trim_end();
-    let start = above.rfind('\n').map_or(0, |end| end + 1);
+    let preceding_text = text[..row.start].trim_end();
+    let start = preceding_text.rfind('\n').map_or(0, |end| end + 1);
     let line = TextLine::at(text, start);
     let names = line.text.trim_start().strip_prefix('#')?;
     let offset = line.offset + line.text.len() - names.len();
@@ -308,16 +313,16 @@ fn stated_separator(line: &str) -> Option<char> {
 
 /// Returns the separator of a line of names.
 fn separator(line: &str) -> char {
-    let is_there = |wanted: &char| {
+    let occurs = |wanted: &char| {
         let mut is_quoted = false;
         line.chars().any(|letter| {
             is_quoted ^= letter == '"';
             letter == *wanted && !is_quoted
         })
     };
-    let found = [';', '\t', ','].into_iter().find(is_there);
+    let occurring_separator = [';', '\t', ','].into_iter().find(occurs);
     let has_words = line.split_whitespace().nth(1).is_some() && !line.contains('"');
-    found.unwrap_or(if has_words { WHITE_SPACE } else { ',' })
+    occurring_separator.unwrap_or(if has_words { WHITE_SPACE } else { ',' })
 }
 
 /// Returns whether a cell is a number in any notation.
@@ -330,14 +335,18 @@ fn is_number(cell: &str) -> bool {
 
 /// Returns whether the first of these lines has as many names as the next row has numbers.
 fn is_above_rows(lines: &[TextLine<'_>], separator: char) -> bool {
-    let [header, below @ ..] = lines else { return false };
+    let [header, following_lines @ ..] = lines else { return false };
     let Some(names) = texts(*header, separator) else { return false };
     if names.iter().any(|name| is_number(name)) {
         return false;
     }
     let has_units = |line: &&TextLine<'_>| units(**line, separator, names.len()).is_some();
-    let below = if below.first().as_ref().is_some_and(has_units) { &below[1..] } else { below };
-    let Some(row) = below.first() else { return false };
+    let following_lines = if following_lines.first().as_ref().is_some_and(has_units) {
+        &following_lines[1..]
+    } else {
+        following_lines
+    };
+    let Some(row) = following_lines.first() else { return false };
     let Some(row) = texts(*row, separator) else { return false };
     let names = names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
     row.len() >= names
@@ -348,15 +357,15 @@ fn is_above_rows(lines: &[TextLine<'_>], separator: char) -> bool {
 /// Returns the units in a row of units: units and empty cells, with or without brackets. Returns
 /// `None` if the line is no such row.
 fn units(line: TextLine<'_>, separator: char, columns: usize) -> Option<Vec<String>> {
-    let plain = |cell: &str| cell.trim_matches(['[', ']', '(', ')', ' ']).to_owned();
-    let cells: Vec<String> = texts(line, separator)?.into_iter().map(plain).collect();
+    let strip_brackets = |cell: &str| cell.trim_matches(['[', ']', '(', ')', ' ']).to_owned();
+    let cells: Vec<String> = texts(line, separator)?.into_iter().map(strip_brackets).collect();
     let is_empty = |cell: &String| ["", "-", "1"].contains(&cell.as_str());
     let is_row = cells.len() == columns
         && cells.iter().all(|cell| is_empty(cell) || !is_number(cell))
         && cells.iter().any(|cell| is_unit(cell));
-    let known = cells.iter().filter(|cell| is_empty(cell) || is_unit(cell)).count();
+    let known_count = cells.iter().filter(|cell| is_empty(cell) || is_unit(cell)).count();
     // Units of ignored columns may be unknown, such as volts or degrees Celsius.
-    let is_row = is_row && 2 * known > cells.len();
+    let is_row = is_row && 2 * known_count > cells.len();
     is_row.then(|| {
         cells.into_iter().map(|cell| if is_empty(&cell) { String::new() } else { cell }).collect()
     })

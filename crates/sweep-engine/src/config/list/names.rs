@@ -1,16 +1,17 @@
-//! The names of a table's columns: by the user's own names, and by units in brackets, in a row of
-//! units or at the end of a header.
+//! The names of a table's columns. A column is recognised by the name that the user gives its
+//! header, and by its unit in brackets, in a row of units or at the end of the header.
 
 use super::super::section::short;
-use super::units::{UnitScale, endings, is_unit, scale, unit_from_suffix};
+use super::units::{UnitScale, is_unit, scale, unit_from_suffix, unit_suffixes};
 
-/// The unit of a quantity whose size does not matter, such as a signal of pulses: columns may be in
-/// any unit, and are not converted.
+/// The unit of a quantity whose scale does not matter, such as a signal of pulses. Its column may
+/// have any unit, and is not converted.
 pub const ANY_UNIT: &str = "any unit";
 
-/// The names that a reader of a table knows.
+/// The column names that the reader of a table knows.
 pub struct Names<'a> {
-    /// Returns the name of the quantity that a text names, and its unit.
+    /// The function that returns the name and the unit of the quantity that a text names, if the
+    /// reader knows it.
     pub known: &'a dyn Fn(&str) -> Option<(String, String)>,
     /// Headers of the file with the names that the user gives them.
     pub renamed: &'a [(String, String)],
@@ -18,10 +19,10 @@ pub struct Names<'a> {
 
 /// A known column.
 #[derive(Debug, PartialEq)]
-pub(super) struct Match {
+pub(super) struct KnownName {
     /// The name of the quantity.
     pub(super) name: String,
-    /// The factor to the unit of that name.
+    /// The factor to the unit in the quantity's name.
     pub(super) scale: UnitScale,
 }
 
@@ -29,7 +30,8 @@ pub(super) struct Match {
 pub(super) type Contradiction = [String; 2];
 
 impl Names<'_> {
-    /// Finds the quantity of a column, if it is known; `unit` is that of a row of units.
+    /// Finds the quantity of a column, if it is known. `unit` is the column's unit in the row of
+    /// units, if there is one.
     ///
     /// # Errors
     /// A unit that contradicts the name.
@@ -37,52 +39,62 @@ impl Names<'_> {
         &self,
         header: &str,
         unit: Option<&str>,
-    ) -> Result<Option<Match>, Contradiction> {
+    ) -> Result<Option<KnownName>, Contradiction> {
         let (stem, bracketed) = split_bracketed(header);
         let unit = bracketed.or(unit).filter(|unit| !unit.is_empty());
-        let by_user = |(written, _): &&(String, String)| {
-            let written = written.trim();
-            written == header || written == stem
+        let is_renamed = |(header_text, _): &&(String, String)| {
+            let header_text = header_text.trim();
+            header_text == header || header_text == stem
         };
-        if let Some((_, name)) = self.renamed.iter().find(by_user) {
-            let Some((name, own)) = (self.known)(name) else {
+        if let Some((_, name)) = self.renamed.iter().find(is_renamed) {
+            let Some((name, unit_of_name)) = (self.known)(name) else {
                 let title = format!("the column `{}` is called `{}`", short(header), short(name));
                 return Err([title, "expected a name of what is read here".to_owned()]);
             };
-            return converted(header, name, unit, &own).map(Some);
+            return match_with_scale(header, name, unit, &unit_of_name).map(Some);
         }
-        let stem = plain(stem);
-        let exact = (self.known)(header).or_else(|| (self.known)(&stem));
-        let by_unit = || {
-            let names = endings(unit?).into_iter().map(|ending| format!("{stem}_{ending}"));
+        let stem = normalise(stem);
+        let exact_match = (self.known)(header).or_else(|| (self.known)(&stem));
+        let find_by_unit = || {
+            let names = unit_suffixes(unit?).into_iter().map(|suffix| format!("{stem}_{suffix}"));
             names.filter_map(|name| (self.known)(&name)).next()
         };
-        if let Some((name, own)) = exact {
-            let found = converted(header, name, unit, &own);
-            let says_unit = ending(&stem).is_some();
-            return match (found, by_unit()) {
-                (Ok(found), _) if found.scale == UnitScale::ONE || !says_unit => Ok(Some(found)),
-                (Err(_), Some((name, own))) if !says_unit => {
-                    converted(header, name, unit, &own).map(Some)
+        if let Some((name, unit_of_name)) = exact_match {
+            let match_result = match_with_scale(header, name, unit, &unit_of_name);
+            let has_unit_suffix = split_unit_suffix(&stem).is_some();
+            return match (match_result, find_by_unit()) {
+                (Ok(match_result), _)
+                    if match_result.scale == UnitScale::ONE || !has_unit_suffix =>
+                {
+                    Ok(Some(match_result))
+                }
+                (Err(_), Some((name, unit_of_name))) if !has_unit_suffix => {
+                    match_with_scale(header, name, unit, &unit_of_name).map(Some)
                 }
                 (Err(contradiction), _) => Err(contradiction),
-                (Ok(found), _) => Err([
+                (Ok(match_result), _) => Err([
                     format!("the column `{}` names two units", short(header)),
-                    format!("expected {own}, which the name `{}` ends with", found.name),
+                    format!(
+                        "expected {unit_of_name}, which the name `{}` ends with",
+                        match_result.name
+                    ),
                 ]),
             };
         }
-        if let Some((name, own)) = by_unit() {
-            return converted(header, name, unit, &own).map(Some);
+        if let Some((name, unit_of_name)) = find_by_unit() {
+            return match_with_scale(header, name, unit, &unit_of_name).map(Some);
         }
-        // A header such as mass_g stands for mass_kg.
+        // A header such as `mass_g` names the quantity `mass_kg`, in another unit.
         if unit.is_none()
-            && let Some((stem, suffix)) = ending(&stem)
+            && let Some((stem, suffix)) = split_unit_suffix(&stem)
         {
-            let written = unit_from_suffix(suffix);
-            let names = endings(&written).into_iter().map(|ending| format!("{stem}_{ending}"));
-            if let Some((name, own)) = names.filter_map(|name| (self.known)(&name)).next() {
-                return converted(header, name, Some(&written), &own).map(Some);
+            let written_unit = unit_from_suffix(suffix);
+            let names =
+                unit_suffixes(&written_unit).into_iter().map(|suffix| format!("{stem}_{suffix}"));
+            if let Some((name, unit_of_name)) = names.filter_map(|name| (self.known)(&name)).next()
+            {
+                return match_with_scale(header, name, Some(&written_unit), &unit_of_name)
+                    .map(Some);
             }
         }
         Ok(None)
@@ -95,24 +107,27 @@ impl Names<'_> {
 }
 
 /// Returns a known column with the factor from its unit.
-fn converted(
+fn match_with_scale(
     header: &str,
     name: String,
     unit: Option<&str>,
-    own: &str,
-) -> Result<Match, Contradiction> {
-    let Some(unit) = unit else { return Ok(Match { name, scale: UnitScale::ONE }) };
-    if unit == own || own == ANY_UNIT {
-        return Ok(Match { name, scale: UnitScale::ONE });
+    unit_of_name: &str,
+) -> Result<KnownName, Contradiction> {
+    let Some(unit) = unit else { return Ok(KnownName { name, scale: UnitScale::ONE }) };
+    if unit == unit_of_name || unit_of_name == ANY_UNIT {
+        return Ok(KnownName { name, scale: UnitScale::ONE });
     }
-    match scale(unit, own) {
-        Some(scale) => Ok(Match { name, scale }),
+    match scale(unit, unit_of_name) {
+        Some(scale) => Ok(KnownName { name, scale }),
         None => {
-            let title =
-                format!("the column `{}` is in `{}`, not in {own}", short(header), short(unit));
+            let title = format!(
+                "the column `{}` is in `{}`, not in {unit_of_name}",
+                short(header),
+                short(unit)
+            );
             let kind =
                 if is_unit(unit) { "a unit of the same kind as" } else { "a known unit, as" };
-            Err([title, format!("expected {kind} {own}, the unit of `{name}`")])
+            Err([title, format!("expected {kind} {unit_of_name}, the unit of `{name}`")])
         }
     }
 }
@@ -129,15 +144,15 @@ fn split_bracketed(header: &str) -> (&str, Option<&str>) {
 }
 
 /// Returns a text in the form of names: lower case, words joined by underscores.
-fn plain(text: &str) -> String {
+fn normalise(text: &str) -> String {
     let words = text.split(|letter: char| letter.is_whitespace() || letter == '-');
     let words: Vec<String> = words.filter(|word| !word.is_empty()).map(str::to_lowercase).collect();
     words.join("_")
 }
 
 /// Splits a name into its stem and the unit at its end.
-fn ending(name: &str) -> Option<(&str, &str)> {
-    let splits = name.match_indices('_').map(|(at, _)| (&name[..at], &name[at + 1..]));
+fn split_unit_suffix(name: &str) -> Option<(&str, &str)> {
+    let splits = name.match_indices('_').map(|(index, _)| (&name[..index], &name[index + 1..]));
     splits.into_iter().find(|(_, suffix)| is_unit(&unit_from_suffix(suffix)))
 }
 
@@ -183,8 +198,8 @@ mod tests {
             ("unbalance_mass_g", None, "unbalance_mass_kg", 1e-3),
             ("Unbalance mass [kg]", None, "unbalance_mass_kg", 1.0),
         ] {
-            let found = find(header, unit).unwrap().unwrap_or_else(|| panic!("{header}"));
-            assert_eq!(found, (name.to_owned(), factor), "{header}");
+            let known_name = find(header, unit).unwrap().unwrap_or_else(|| panic!("{header}"));
+            assert_eq!(known_name, (name.to_owned(), factor), "{header}");
         }
     }
 

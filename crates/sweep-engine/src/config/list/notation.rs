@@ -10,8 +10,8 @@ const MARKS: [char; 2] = ['.', ','];
 /// The marks that only separate thousands: apostrophes, and spaces of several widths.
 const GROUP_MARKS: [char; 6] = ['\'', '\u{2019}', ' ', '\u{a0}', '\u{202f}', '\u{2009}'];
 
-/// The number of digits in a group.
-const GROUP: usize = 3;
+/// The number of digits in a group of thousands.
+const GROUP_DIGITS: usize = 3;
 
 /// The evidence of a cell about the notation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,10 +29,10 @@ enum MarkEvidence {
 /// A cell with evidence about the notation.
 #[derive(Clone, Debug)]
 pub(super) struct Evidence {
-    /// The cell's text.
+    /// The text of the cell.
     pub(super) cell: String,
-    /// The cell's bytes.
-    pub(super) at: Range<usize>,
+    /// The range of the cell in the file, in bytes.
+    pub(super) location: Range<usize>,
 }
 
 /// The evidence so far: the first cell of each kind for each mark.
@@ -70,7 +70,7 @@ impl Notation {
         if self == Self::POINT && !cell.contains(',') && !cell.contains(GROUP_MARKS) {
             return cell.parse().ok();
         }
-        let cell = ungrouped(cell);
+        let cell = remove_groups(cell);
         let thousands = other_mark(self.decimal);
         match mark_evidence(&cell) {
             MarkEvidence::Nothing if cell.contains(MARKS) => None,
@@ -83,18 +83,18 @@ impl Notation {
 
 impl NotationEvidence {
     /// Adds the evidence of a cell.
-    pub(super) fn note(&mut self, cell: &str, at: Range<usize>) {
+    pub(super) fn note(&mut self, cell: &str, location: Range<usize>) {
         if !cell.contains(MARKS) {
             return;
         }
-        let text = ungrouped(cell);
+        let text = remove_groups(cell);
         let (kinds, mark) = match mark_evidence(&text) {
             MarkEvidence::Nothing => return,
             MarkEvidence::Decimal(mark) => (&mut self.decimal, mark),
             MarkEvidence::Thousands(mark) => (&mut self.thousands, mark),
             MarkEvidence::Either(mark) => (&mut self.either, mark),
         };
-        kinds[mark_index(mark)].get_or_insert_with(|| Evidence { cell: cell.to_owned(), at });
+        kinds[mark_index(mark)].get_or_insert_with(|| Evidence { cell: cell.to_owned(), location });
     }
 
     /// Returns the notation in which every cell is a number. `has_commas` says that commas separate
@@ -124,7 +124,7 @@ impl NotationEvidence {
 impl Evidence {
     /// Returns both numbers that the cell can be: with thousands, and with decimals.
     pub(super) fn readings(&self) -> [String; 2] {
-        let text = ungrouped(&self.cell);
+        let text = remove_groups(&self.cell);
         [text.replace(MARKS, ""), text.replace(MARKS, ".")]
     }
 }
@@ -175,20 +175,20 @@ fn is_digits(text: &str) -> bool {
 fn is_grouped(text: &str, mark: char) -> bool {
     let mut groups = text.split(mark);
     let first = groups.next().unwrap_or_default();
-    let is_first = (1..=GROUP).contains(&first.len()) && is_digits(first);
+    let is_first = (1..=GROUP_DIGITS).contains(&first.len()) && is_digits(first);
     is_first
         && !first.starts_with('0')
-        && groups.all(|group| group.len() == GROUP && is_digits(group))
+        && groups.all(|group| group.len() == GROUP_DIGITS && is_digits(group))
 }
 
 /// Returns a cell without marks that only separate thousands.
-fn ungrouped(cell: &str) -> Cow<'_, str> {
+fn remove_groups(cell: &str) -> Cow<'_, str> {
     let Some(mark) = cell.chars().find(|mark| GROUP_MARKS.contains(mark)) else {
         return Cow::Borrowed(cell);
     };
     let number = cell.strip_prefix(['+', '-']).unwrap_or(cell);
-    let whole = number.split(MARKS).next().unwrap_or_default();
-    match is_grouped(whole, mark) {
+    let integer_part = number.split(MARKS).next().unwrap_or_default();
+    match is_grouped(integer_part, mark) {
         true => Cow::Owned(cell.replace(mark, "")),
         false => Cow::Borrowed(cell),
     }
@@ -240,8 +240,8 @@ mod tests {
     #[test]
     fn cells_without_a_number_are_no_evidence() {
         for cell in ["1.2.3", "12:30", "a,b", "1,05,000", "1,0,5", ".", "1,050.", "01,050.2"] {
-            let found = read(&["0.5", cell], false).unwrap();
-            assert!(found[1].is_none() || cell == "1,050.", "{cell}: {found:?}");
+            let numbers = read(&["0.5", cell], false).unwrap();
+            assert!(numbers[1].is_none() || cell == "1,050.", "{cell}: {numbers:?}");
         }
     }
 }

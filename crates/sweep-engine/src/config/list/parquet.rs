@@ -12,7 +12,7 @@ use sweep_files::batches::{self, Batches};
 use sweep_files::{cells, footer, panics};
 
 use super::super::section::short;
-use super::names::{Match, Names};
+use super::names::{KnownName, Names};
 use super::units::UnitScale;
 use super::{ListError, check_size, is_index};
 
@@ -30,32 +30,36 @@ pub(super) struct ParquetColumn {
     pub(super) values: Option<Vec<f64>>,
 }
 
-/// Returns the columns of a file without its index. If `gaps` is true, a null is NaN.
+/// Returns the columns of a file without its index. If `allows_missing` is true, a null is NaN.
 pub(super) fn columns(
     bytes: Vec<u8>,
-    gaps: bool,
+    allows_missing: bool,
     names: &Names<'_>,
 ) -> Result<Vec<ParquetColumn>, ListError> {
     let panicked = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
-    panics::caught(|| read(bytes.into(), gaps, names)).unwrap_or_else(panicked)
+    panics::caught(|| read(bytes.into(), allows_missing, names)).unwrap_or_else(panicked)
 }
 
-fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn>, ListError> {
+fn read(
+    bytes: Bytes,
+    allows_missing: bool,
+    names: &Names<'_>,
+) -> Result<Vec<ParquetColumn>, ListError> {
     let metadata = footer::metadata(&bytes).map_err(damaged)?;
     let schema = batches::schema(&metadata);
     let fields = schema.fields();
     check_size(0, fields.len())?;
     let mut columns: Vec<ParquetColumn> = Vec::new();
-    let mut known: Vec<(usize, usize, UnitScale)> = Vec::new();
-    for (place, field) in fields.iter().enumerate() {
+    let mut known_columns: Vec<(usize, usize, UnitScale)> = Vec::new();
+    for (column_index, field) in fields.iter().enumerate() {
         let header = field.name().clone();
-        let found = names.find(&header, None);
-        match found.map_err(|[title, expected]| format!("{title}: {expected}"))? {
-            Some(Match { name, scale }) => {
+        let known_name = names.find(&header, None);
+        match known_name.map_err(|[title, expected]| format!("{title}: {expected}"))? {
+            Some(KnownName { name, scale }) => {
                 if !cells::is_number(field.data_type()) {
                     return Err(no_numbers(&header, field.data_type()));
                 }
-                known.push((columns.len(), place, scale));
+                known_columns.push((columns.len(), column_index, scale));
                 columns.push(ParquetColumn { name, header, values: Some(Vec::new()) });
             }
             None if is_index(&header) => {}
@@ -64,12 +68,12 @@ fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn
     }
     check_row_groups(&metadata, fields.len())?;
     let mut rows = 0;
-    let fields = known.iter().map(|(_, place, _)| *place).collect();
+    let fields = known_columns.iter().map(|(_, column_index, _)| *column_index).collect();
     let reader = Batches::new(bytes, Arc::new(metadata), &schema, fields);
     let mut reader = reader.map_err(damaged)?;
     while let Some(batch) = reader.batch().map_err(damaged)? {
-        check_size((rows + batch.num_rows()) as u64, known.len())?;
-        for ((column, _, scale), array) in known.iter().zip(batch.columns()) {
+        check_size((rows + batch.num_rows()) as u64, known_columns.len())?;
+        for ((column, _, scale), array) in known_columns.iter().zip(batch.columns()) {
             let ParquetColumn { header, values: Some(values), .. } = &mut columns[*column] else {
                 continue;
             };
@@ -78,7 +82,7 @@ fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn
                 let row = rows + k + 1;
                 let no_value =
                     || format!("its column `{}` has no value in row {row}", short(header));
-                let value = if gaps { value.or(Some(f64::NAN)) } else { value };
+                let value = if allows_missing { value.or(Some(f64::NAN)) } else { value };
                 values.push(scale.apply(value.ok_or_else(no_value)?));
             }
         }
@@ -89,12 +93,12 @@ fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn
 
 /// Returns the mistake of a column without numbers.
 fn no_numbers(header: &str, data_type: &DataType) -> ListError {
-    let found = match data_type {
+    let type_name = match data_type {
         DataType::Boolean => "true and false",
         text if cells::is_text(text) => "text",
         _ => "dates, times, lists or bytes",
     };
-    format!("its column `{}` holds no numbers but {found}", short(header))
+    format!("its column `{}` holds no numbers but {type_name}", short(header))
 }
 
 /// Rejects a file of too many rows, or of an unknown compression, before its pages are read.
@@ -105,7 +109,8 @@ fn check_row_groups(metadata: &ParquetMetaData, columns: usize) -> Result<(), Li
         check_size(rows, columns)?;
         for column in group.columns() {
             let codec = column.compression();
-            // These codecs need features of `parquet` that the workspace's Cargo.toml leaves out.
+            // The parquet library has these codecs only with features that the workspace's
+            // Cargo.toml leaves out.
             if matches!(codec, Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO) {
                 let name = short(&column.column_path().string());
                 // The level in brackets does not matter to the user.

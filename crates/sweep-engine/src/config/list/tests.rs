@@ -13,16 +13,16 @@ use super::*;
 const NAME: &str = "unbalance_mass_kg";
 
 /// Names that are all known and have no unit.
-const ANY: Names<'_> =
+const ANY_NAMES: Names<'_> =
     Names { known: &|name: &str| Some((name.to_owned(), String::new())), renamed: &[] };
 
 /// Returns the known columns of a Parquet file.
-fn parquet_of(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, ListError> {
-    let columns = parquet::columns(bytes, false, &ANY)?;
-    Ok(columns.into_iter().map(|it| (it.name, it.values.unwrap_or_default())).collect())
+fn read_parquet(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, ListError> {
+    let columns = parquet::columns(bytes, false, &ANY_NAMES)?;
+    Ok(columns.into_iter().map(|column| (column.name, column.values.unwrap_or_default())).collect())
 }
 
-fn readable() -> [Compression; 5] {
+fn supported_codecs() -> [Compression; 5] {
     [
         Compression::UNCOMPRESSED,
         Compression::SNAPPY,
@@ -48,8 +48,8 @@ fn compressed(codec: Compression, version: WriterVersion) -> WriterProperties {
     WriterProperties::builder().set_compression(codec).set_writer_version(version).build()
 }
 
-/// Returns a file with a mass and a whole number of kilograms.
-fn small(codec: Compression, version: WriterVersion) -> Vec<u8> {
+/// Returns a file with a column of masses and a column of whole numbers.
+fn small_file(codec: Compression, version: WriterVersion) -> Vec<u8> {
     let masses = (0..300).map(|k| 0.1 + 0.001 * f64::from(k % 50)).collect::<Vec<_>>();
     let frames = (0..300).map(|k| 20 + k % 7).collect::<Vec<_>>();
     let masses: ArrayRef = Arc::new(Float64Array::from(masses));
@@ -58,33 +58,34 @@ fn small(codec: Compression, version: WriterVersion) -> Vec<u8> {
 }
 
 fn refusal(bytes: Vec<u8>) -> String {
-    parquet_of(bytes).expect_err("not a list")
+    read_parquet(bytes).expect_err("not a list")
 }
 
 #[test]
 fn supported_compressions_give_the_same_numbers() {
-    let plain = small(Compression::UNCOMPRESSED, WriterVersion::PARQUET_1_0);
-    let plain = parquet_of(plain).unwrap();
-    assert_eq!((plain[0].1[49], plain[1].1[6]), (0.1 + 0.001 * 49.0, 26.0));
-    for codec in readable() {
+    let uncompressed = small_file(Compression::UNCOMPRESSED, WriterVersion::PARQUET_1_0);
+    let uncompressed = read_parquet(uncompressed).unwrap();
+    assert_eq!((uncompressed[0].1[49], uncompressed[1].1[6]), (0.1 + 0.001 * 49.0, 26.0));
+    for codec in supported_codecs() {
         for version in [WriterVersion::PARQUET_1_0, WriterVersion::PARQUET_2_0] {
-            let read = parquet_of(small(codec, version));
-            assert_eq!(read.unwrap(), plain, "{codec}, {version:?}");
+            let columns = read_parquet(small_file(codec, version));
+            assert_eq!(columns.unwrap(), uncompressed, "{codec}, {version:?}");
         }
     }
 }
 
 #[test]
 fn an_unsupported_compression_is_named_with_the_supported_ones() {
-    let snappy = small(Compression::SNAPPY, WriterVersion::PARQUET_1_0);
+    let snappy = small_file(Compression::SNAPPY, WriterVersion::PARQUET_1_0);
     // The codec of a column follows its name in the metadata, as an i32.
-    let place = [NAME.as_bytes(), &[0x15, 0x02]].concat();
-    let found = snappy.windows(place.len()).position(|window| window == place);
-    let place = found.unwrap() + place.len() - 1;
+    let codec_pattern = [NAME.as_bytes(), &[0x15, 0x02]].concat();
+    let pattern_start =
+        snappy.windows(codec_pattern.len()).position(|window| window == codec_pattern);
+    let codec_pattern = pattern_start.unwrap() + codec_pattern.len() - 1;
     for (code, name) in [(3, "lzo"), (4, "brotli"), (5, "lz4")] {
-        let mut other = snappy.clone();
-        other[place] = 2 * code;
-        let message = refusal(other);
+        let mut changed = snappy.clone();
+        changed[codec_pattern] = 2 * code;
+        let message = refusal(changed);
         let expected = format!("`{NAME}` is compressed by {name}, which this program does not");
         assert!(message.contains(&expected) && message.contains("snappy, zstd, gzip"), "{message}");
     }
@@ -111,16 +112,16 @@ fn a_small_file_with_too_many_rows_is_rejected_unread() {
 
 #[test]
 fn a_damaged_file_gives_an_error_or_a_list() {
-    for codec in readable() {
-        let whole = small(codec, WriterVersion::PARQUET_2_0);
-        for length in (0..whole.len()).step_by(7) {
-            assert!(parquet_of(whole[..length].to_vec()).is_err(), "{codec}: {length} bytes");
+    for codec in supported_codecs() {
+        let undamaged = small_file(codec, WriterVersion::PARQUET_2_0);
+        for length in (0..undamaged.len()).step_by(7) {
+            assert!(read_parquet(undamaged[..length].to_vec()).is_err(), "{codec}: {length} bytes");
         }
-        for at in 0..whole.len() {
+        for byte_index in 0..undamaged.len() {
             for bit in [0, 3, 7] {
-                let mut flipped = whole.clone();
-                flipped[at] ^= 1 << bit;
-                if let Ok(columns) = parquet_of(flipped) {
+                let mut flipped = undamaged.clone();
+                flipped[byte_index] ^= 1 << bit;
+                if let Ok(columns) = read_parquet(flipped) {
                     assert!(columns.iter().all(|(_, values)| values.len() as u64 <= MAX_NUMBERS));
                 }
             }
@@ -133,20 +134,20 @@ fn cell_span(text: &str, start: usize, by: char, column: usize) -> std::ops::Ran
     TextLine::at(text, start).cells(by).nth(column).expect("it is there").1
 }
 
-fn csv_of(text: &str) -> Result<csv::TextTable, ListError> {
+fn read_csv(text: &str) -> Result<csv::TextTable, ListError> {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
-    csv::read(text, source, false, &ANY, &report)
+    csv::read(text, source, false, &ANY_NAMES, &report)
 }
 
 #[test]
 fn a_text_with_too_many_numbers_or_columns_is_rejected() {
     let rows = "1,2\n".repeat((MAX_NUMBERS / 2) as usize);
-    let csv::TextTable { columns, starts, .. } = csv_of(&format!("a,b\n{rows}")).unwrap();
+    let csv::TextTable { columns, starts, .. } = read_csv(&format!("a,b\n{rows}")).unwrap();
     assert_eq!((columns[1].values.len(), starts.len()), (10_000_000, 10_000_000));
-    let refused = |text: &str| csv_of(text).map(|_| ()).unwrap_err().to_string();
-    assert!(refused(&format!("a,b\n{rows}1,2\n")).contains("more than 20000000 numbers"));
-    assert!(refused(&",".repeat(100_000_000)).contains("it has 100000001 columns"));
+    let refusal_text = |text: &str| read_csv(text).map(|_| ()).unwrap_err().to_string();
+    assert!(refusal_text(&format!("a,b\n{rows}1,2\n")).contains("more than 20000000 numbers"));
+    assert!(refusal_text(&",".repeat(100_000_000)).contains("it has 100000001 columns"));
 }
 
 #[test]
@@ -154,19 +155,22 @@ fn a_row_of_too_many_numbers_is_one_mistake() {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
     let text = format!("a,b\n{}\n1,2\n", ",".repeat(100_000_000));
-    assert!(csv::read(&text, source, false, &ANY, &report).is_ok());
+    assert!(csv::read(&text, source, false, &ANY_NAMES, &report).is_ok());
     assert_eq!(report.into_diagnostics().count(), 1);
 }
 
 #[test]
 fn the_location_of_a_value_is_its_cell() {
     let text = "\u{feff}# by hand\r\n a , \"b\"\r\n\r\n 1,2 \r\n3 , \"4\"\r\n";
-    let csv::TextTable { columns, starts, separator: by, .. } = csv_of(text).unwrap();
+    let csv::TextTable { columns, starts, separator: by, .. } = read_csv(text).unwrap();
     assert_eq!([&columns[0].values, &columns[1].values], [&[1.0, 3.0], &[2.0, 4.0]]);
-    let found = |row: usize, column| &text[cell_span(text, starts[row] as usize, by, column)];
-    assert_eq!([found(0, 0), found(0, 1), found(1, 0), found(1, 1)], ["1", "2", "3", "\"4\""]);
+    let cell = |row: usize, column| &text[cell_span(text, starts[row] as usize, by, column)];
+    assert_eq!([cell(0, 0), cell(0, 1), cell(1, 0), cell(1, 1)], ["1", "2", "3", "\"4\""]);
     assert_eq!(
-        [&text[columns[0].name.at.span.clone()], &text[columns[1].name.at.span.clone()]],
+        [
+            &text[columns[0].name.location.span.clone()],
+            &text[columns[1].name.location.span.clone()]
+        ],
         ["a", "\"b\""]
     );
 }
@@ -174,20 +178,20 @@ fn the_location_of_a_value_is_its_cell() {
 #[test]
 fn a_quoted_cell_may_contain_the_separator() {
     let text = "id,b\n\"a,b\",2\n\"5\"\" pipe, short\",3\n5\" pipe,4\n";
-    let csv::TextTable { columns, .. } = csv_of(text).unwrap();
+    let csv::TextTable { columns, .. } = read_csv(text).unwrap();
     assert_eq!(columns[1].values, [2.0, 3.0, 4.0]);
 }
 
 #[test]
 fn semicolons_tabs_and_decimal_commas_are_read() {
     for text in ["a;b\n1,5;2\n3;-4,25e2\n", "a\tb\n1.5\t2\n3\t-425\n"] {
-        let csv::TextTable { columns, starts, separator: by, .. } = csv_of(text).unwrap();
+        let csv::TextTable { columns, starts, separator: by, .. } = read_csv(text).unwrap();
         assert_eq!([&columns[0].values, &columns[1].values], [&[1.5, 3.0], &[2.0, -425.0]]);
         assert_eq!(text[cell_span(text, starts[0] as usize, by, 1)], *"2");
     }
     let report = Report::default();
     let source = report.add("list.csv", String::new());
-    assert!(csv::read("a;b\n1;2;3\n", source, false, &ANY, &report).is_ok());
+    assert!(csv::read("a;b\n1;2;3\n", source, false, &ANY_NAMES, &report).is_ok());
     let message = report.into_diagnostics().to_string();
     assert!(message.contains("expected 2 numbers, separated by semicolons"), "{message}");
 }
@@ -198,32 +202,32 @@ fn a_file_has_one_decimal_mark() {
     let american = "unbalance_mass_kg\tdamping_n_s_per_m\n0.9\t950\n0.9\t1,050\n";
     let quoted = "unbalance_mass_kg,damping_n_s_per_m\n0.9,950\n0.9,\"1,050\"\n";
     for text in [german, american, quoted] {
-        let csv::TextTable { columns, .. } = csv_of(text).unwrap();
+        let csv::TextTable { columns, .. } = read_csv(text).unwrap();
         assert_eq!([&columns[0].values, &columns[1].values], [&[0.9, 0.9], &[950.0, 1050.0]]);
     }
     let commas = "a,b\n1.050,950\n\"1.100\",970\n";
-    assert_eq!(csv_of(commas).unwrap().columns[0].values, [1.05, 1.1]);
+    assert_eq!(read_csv(commas).unwrap().columns[0].values, [1.05, 1.1]);
     let message = |text: &str| {
         let report = Report::default();
         let source = report.add("list.csv", String::new());
-        let read = csv::read(text, source, true, &ANY, &report);
+        let table = csv::read(text, source, true, &ANY_NAMES, &report);
         report.fill(source, text.to_owned());
-        assert!(read.unwrap().columns.iter().all(|column| column.values.is_empty()));
+        assert!(table.unwrap().columns.iter().all(|column| column.values.is_empty()));
         report.into_diagnostics().to_string()
     };
-    let mixed = message("a;b\n0,9;950\n0.9;1050\n");
+    let mixed_marks = message("a;b\n0,9;950\n0.9;1050\n");
     for part in ["decimal points, as in `0.9`", "commas, as in `0,9`", ":2:1", ":3:1", "the same"] {
-        assert!(mixed.contains(part), "{part}: {mixed}");
+        assert!(mixed_marks.contains(part), "{part}: {mixed_marks}");
     }
-    let unclear = message("a;b\n2;950\n3;1.050\n");
+    let unclear_mark = message("a;b\n2;950\n3;1.050\n");
     for part in ["`1.050` may be 1050 or 1.050", ":3:3", "write 1050, or 1.0500"] {
-        assert!(unclear.contains(part), "{part}: {unclear}");
+        assert!(unclear_mark.contains(part), "{part}: {unclear_mark}");
     }
     assert!(message("a\n950\n1.050\n").contains("may be 1050"));
 }
 
 /// Returns the columns of a logger's file for a reader of four names with units, and the notes.
-fn logged(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
+fn read_logger_file(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
     const KNOWN: [(&str, &str); 4] =
         [("time_s", "s"), ("speed_rpm", "rpm"), ("arm_yaw_rad", "rad"), ("acc_m_per_s2", "m/s^2")];
     let known = |name: &str| {
@@ -245,41 +249,41 @@ fn logged(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
 
 #[test]
 fn files_of_loggers_and_spreadsheets_are_read() {
-    let plain = "time_s,arm_yaw_rad\n0,0.5\n0.02,-0.25\n";
-    let utf16 = format!("\u{feff}{}", plain.replace(',', "\t"));
+    let expected_text = "time_s,arm_yaw_rad\n0,0.5\n0.02,-0.25\n";
+    let utf16 = format!("\u{feff}{}", expected_text.replace(',', "\t"));
     let utf16: Vec<u8> = utf16.encode_utf16().flat_map(u16::to_le_bytes).collect();
     let texts = [
-        plain.to_owned(),
-        plain.replace('\n', "\r"),
-        plain.replace('\n', "\r\n"),
-        format!("Logger 7\nRate,50 Hz\n\n{plain}"),
-        format!("Name,abc\nRate,50\n{plain}"),
-        plain.replace("rad\n", "rad\ns,rad\n"),
-        plain.replace("rad\n", "rad\n[s],[rad]\n"),
-        plain.replace('\n', ",\n"),
-        format!("{plain},\n,\n"),
-        format!("sep=;\n{}", plain.replace(',', ";").replace('.', ",")),
+        expected_text.to_owned(),
+        expected_text.replace('\n', "\r"),
+        expected_text.replace('\n', "\r\n"),
+        format!("Logger 7\nRate,50 Hz\n\n{expected_text}"),
+        format!("Name,abc\nRate,50\n{expected_text}"),
+        expected_text.replace("rad\n", "rad\ns,rad\n"),
+        expected_text.replace("rad\n", "rad\n[s],[rad]\n"),
+        expected_text.replace('\n', ",\n"),
+        format!("{expected_text},\n,\n"),
+        format!("sep=;\n{}", expected_text.replace(',', ";").replace('.', ",")),
         "time_s,arm_yaw_rad\n\"0\",\"0,5\"\n\"0,02\",\"-0,25\"\n".to_owned(),
-        plain.replace(',', "  "),
-        format!("# {plain}"),
+        expected_text.replace(',', "  "),
+        format!("# {expected_text}"),
         ",time_s,arm_yaw_rad\n0,0,0.5\n1,0.02,-0.25\n".to_owned(),
         "time_s,temp_c,arm_yaw_rad,note\n0,21,0.5,a b\n0.02,warm,-0.25,\n".to_owned(),
         "Time [ms],Arm yaw [rad]\n0,0.5\n20,-0.25\n".to_owned(),
         "Time;Arm yaw\nms;rad\n0;0,5\n20;-0,25\n".to_owned(),
     ];
-    let all = texts.iter().map(|text| text.as_bytes().to_vec()).chain([utf16]);
-    for bytes in all {
-        let shown = String::from_utf8_lossy(&bytes).into_owned();
-        let (columns, _) = logged(&bytes);
+    let files = texts.iter().map(|text| text.as_bytes().to_vec()).chain([utf16]);
+    for bytes in files {
+        let file_text = String::from_utf8_lossy(&bytes).into_owned();
+        let (columns, _) = read_logger_file(&bytes);
         let expected = [("time_s", vec![0.0, 0.02]), ("arm_yaw_rad", vec![0.5, -0.25])];
         let expected = expected.map(|(name, values)| (name.to_owned(), values));
-        assert_eq!(columns, expected, "{shown}");
+        assert_eq!(columns, expected, "{file_text}");
     }
 }
 
 #[test]
 fn a_name_of_several_words_is_one_column() {
-    let (columns, _) = logged(b"Arm yaw [rad]\n0.5\n-0.25\n");
+    let (columns, _) = read_logger_file(b"Arm yaw [rad]\n0.5\n-0.25\n");
     assert_eq!(columns, [("arm_yaw_rad".to_owned(), vec![0.5, -0.25])]);
 }
 
@@ -287,7 +291,7 @@ fn a_name_of_several_words_is_one_column() {
 fn ignored_and_renamed_columns_are_noted() {
     let text = "Logger 7\nTime [s];Acc front [g];Temp [\u{b0}C];n (Hz)\n0,0;1,0;21,5;2\n";
     let latin: Vec<u8> = text.chars().map(|letter| letter as u8).collect();
-    let (columns, notes) = logged(&latin);
+    let (columns, notes) = read_logger_file(&latin);
     assert_eq!(columns[1], ("acc_m_per_s2".to_owned(), vec![9.80665]));
     let notes = notes.join("\n");
     for message in
@@ -306,13 +310,13 @@ fn a_labview_file_is_read_with_its_units_and_its_decimal_mark() {
         Delta_X\t0,001\t0,001\t\n***End_of_Header***\t\t\t\n\
         X_Value\tAcc front\tVoltage\tComment\n";
     let text = format!("{header}0,000000\t1,500\t2,0\n0,001000\t-1,250\t2,0\tstart\n");
-    let (columns, _) = logged(text.as_bytes());
+    let (columns, _) = read_logger_file(text.as_bytes());
     let expected = [1.5, -1.25].map(|g| g * 9.80665).to_vec();
     assert_eq!(columns[0], ("time_s".to_owned(), vec![0.0, 0.001]));
     assert_eq!(columns[1], ("acc_m_per_s2".to_owned(), expected));
-    let refused = |text: &str| csv_of(text).map(|_| ()).unwrap_err();
-    assert!(refused(&header.replace("X_Columns\tOne", "X_Columns\tMulti")).contains("Multi"));
-    assert!(refused(&format!("{text}{header}")).contains("several segments"));
+    let refusal_text = |text: &str| read_csv(text).map(|_| ()).unwrap_err();
+    assert!(refusal_text(&header.replace("X_Columns\tOne", "X_Columns\tMulti")).contains("Multi"));
+    assert!(refusal_text(&format!("{text}{header}")).contains("several segments"));
 }
 
 #[test]
@@ -352,7 +356,7 @@ fn parquet_decimals_are_numbers() {
     column.close().unwrap();
     group.close().unwrap();
     writer.close().unwrap();
-    let read: Vec<Vec<f64>> =
-        parquet_of(bytes).unwrap().into_iter().map(|(_, values)| values).collect();
-    assert_eq!(read, [vec![120.5, -0.5], vec![0.3, 12.345], vec![2.56, -1.0]]);
+    let values_by_column: Vec<Vec<f64>> =
+        read_parquet(bytes).unwrap().into_iter().map(|(_, values)| values).collect();
+    assert_eq!(values_by_column, [vec![120.5, -0.5], vec![0.3, 12.345], vec![2.56, -1.0]]);
 }

@@ -4,7 +4,7 @@
 use super::ListError;
 
 /// Kinds of files that are no text, by their first bytes, with advice.
-const OTHER_KINDS: [(&[u8], &str); 7] = [
+const BINARY_KINDS: [(&[u8], &str); 7] = [
     (b"PK\x03\x04", "it is an Excel workbook or another zip file: save its sheet as CSV"),
     (b"\xd0\xcf\x11\xe0", "it is an old Excel workbook: save its sheet as CSV"),
     (b"\x1f\x8b", "it is packed by gzip: unpack it first"),
@@ -14,29 +14,29 @@ const OTHER_KINDS: [(&[u8], &str); 7] = [
     (b"ARROW1", "it is an Arrow file: write it as Parquet"),
 ];
 
-/// Number of bytes by which UTF-16 without a byte order mark is recognised. Basis: enough letters
-/// of a header.
-const DETECTION_BYTES: usize = 512;
+/// Number of bytes by which UTF-16 without a byte order mark is recognised. Basis: a header has
+/// letters enough within it. Doubling it reads more of the file for that.
+const UTF16_DETECTION_BYTES: usize = 512;
 
 /// Returns the text of a file.
 ///
 /// # Errors
 /// The kind of the file, if it is no text.
 pub(super) fn text(bytes: Vec<u8>) -> Result<String, ListError> {
-    if let Some((_, kind)) = OTHER_KINDS.iter().find(|(first, _)| bytes.starts_with(first)) {
+    if let Some((_, kind)) = BINARY_KINDS.iter().find(|(first, _)| bytes.starts_with(first)) {
         return Err((*kind).to_owned());
     }
     let text = match utf16_decoder(&bytes) {
-        Some(read) => {
-            let units = bytes.chunks_exact(2).map(|pair| read([pair[0], pair[1]]));
+        Some(decode) => {
+            let units = bytes.chunks_exact(2).map(|pair| decode([pair[0], pair[1]]));
             let units: Vec<u16> = units.collect();
             String::from_utf16(&units).map_err(|_| "it is damaged UTF-16 text".to_owned())?
         }
         None => decode_bytes(bytes)?,
     };
     // Old systems end lines by carriage returns alone.
-    let has_old_ends = text.contains('\r') && !text.contains('\n');
-    Ok(if has_old_ends { text.replace('\r', "\n") } else { text })
+    let has_carriage_returns_only = text.contains('\r') && !text.contains('\n');
+    Ok(if has_carriage_returns_only { text.replace('\r', "\n") } else { text })
 }
 
 /// Returns the decoder of byte pairs if the text is UTF-16: by its mark, or by zeros in every other
@@ -47,9 +47,10 @@ fn utf16_decoder(bytes: &[u8]) -> Option<fn([u8; 2]) -> u16> {
         [0xfe, 0xff, ..] => return Some(u16::from_be_bytes),
         _ => {}
     }
-    let begin = &bytes[..bytes.len().min(DETECTION_BYTES)];
-    let zeros = |parity: usize| begin.iter().skip(parity).step_by(2).filter(|b| **b == 0).count();
-    let pairs = begin.len() / 2;
+    let first_bytes = &bytes[..bytes.len().min(UTF16_DETECTION_BYTES)];
+    let zeros =
+        |parity: usize| first_bytes.iter().skip(parity).step_by(2).filter(|b| **b == 0).count();
+    let pairs = first_bytes.len() / 2;
     match [zeros(0), zeros(1)] {
         [0, odd] if pairs > 0 && odd * 10 > pairs * 9 => Some(u16::from_le_bytes),
         [even, 0] if pairs > 0 && even * 10 > pairs * 9 => Some(u16::from_be_bytes),
@@ -64,15 +65,15 @@ fn decode_bytes(bytes: Vec<u8>) -> Result<String, ListError> {
         Err(error) => error.into_bytes(),
     };
     let is_control = |byte: &u8| *byte < 0x20 && !b"\t\r\n\x0c".contains(byte);
-    if let Some(place) = bytes.iter().position(is_control) {
-        return Err(format!("it is neither Parquet nor text: byte {} is wrong", place + 1));
+    if let Some(byte_index) = bytes.iter().position(is_control) {
+        return Err(format!("it is neither Parquet nor text: byte {} is wrong", byte_index + 1));
     }
-    Ok(bytes.into_iter().map(letter).collect())
+    Ok(bytes.into_iter().map(cp1252_letter).collect())
 }
 
 /// Returns the letter of a byte in Windows code page 1252: those of Latin-1, and others in place of
 /// its control characters.
-fn letter(byte: u8) -> char {
+fn cp1252_letter(byte: u8) -> char {
     /// The first byte whose letter differs from Latin-1.
     const FIRST: u8 = 0x80;
     /// The letters from that byte on.
@@ -81,8 +82,8 @@ fn letter(byte: u8) -> char {
         '\u{8f}', '\u{90}', '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}',
         'ž', 'Ÿ',
     ];
-    let place = byte.checked_sub(FIRST).map(usize::from);
-    place.and_then(|place| LETTERS.get(place)).copied().unwrap_or(char::from(byte))
+    let byte_index = byte.checked_sub(FIRST).map(usize::from);
+    byte_index.and_then(|byte_index| LETTERS.get(byte_index)).copied().unwrap_or(char::from(byte))
 }
 
 #[cfg(test)]
@@ -105,8 +106,8 @@ mod tests {
             wide(u16::to_le_bytes, ""),
             wide(u16::to_be_bytes, ""),
         ] {
-            let read = text(bytes).unwrap();
-            assert_eq!(read.trim_start_matches('\u{feff}'), expected);
+            let decoded = text(bytes).unwrap();
+            assert_eq!(decoded.trim_start_matches('\u{feff}'), expected);
         }
         assert_eq!(text(b"\x80 \x93".to_vec()).unwrap(), "€ “");
     }

@@ -38,8 +38,8 @@ const G: f64 = 9.806_65;
 /// The ratio of a circle's circumference to its diameter.
 const PI: f64 = std::f64::consts::PI;
 
-/// The units that are read. `g` is listed twice: the measured quantity decides whether it is a
-/// mass.
+/// The units that are read. `g` is listed twice, as grams and as standard gravity: the measured
+/// quantity decides which one it is.
 static UNITS: &[UnitEntry] = &[
     unit(&["s", "sec", "secs", "second", "seconds", "sek"], "s", 1.0, 1.0),
     unit(&["ms", "msec", "millisecond", "milliseconds"], "s", 1.0, 1e3),
@@ -88,7 +88,7 @@ static UNITS: &[UnitEntry] = &[
 ];
 
 /// Returns a unit's name in the form of the table.
-fn plain(name: &str) -> String {
+fn normalise(name: &str) -> String {
     let letters = name.chars().flat_map(char::to_lowercase);
     let letter = |letter: char| match letter {
         ' ' | '\u{a0}' | '*' | '·' | '⋅' | '.' => String::new(),
@@ -108,19 +108,19 @@ fn plain(name: &str) -> String {
 }
 
 /// Yields every unit of this name.
-fn named(name: &str) -> impl Iterator<Item = &'static UnitEntry> {
-    let name = plain(name);
+fn units_named(name: &str) -> impl Iterator<Item = &'static UnitEntry> {
+    let name = normalise(name);
     UNITS.iter().filter(move |unit| unit.names.contains(&name.as_str()))
 }
 
 /// Returns whether a text is the name of a unit.
 pub(super) fn is_unit(name: &str) -> bool {
-    named(name).next().is_some()
+    units_named(name).next().is_some()
 }
 
 /// Returns the factor from one unit to another, if both measure the same kind of quantity.
 pub(super) fn scale(from: &str, to: &str) -> Option<UnitScale> {
-    let mut pairs = named(from).flat_map(|from| named(to).map(move |to| (from, to)));
+    let mut pairs = units_named(from).flat_map(|from| units_named(to).map(move |to| (from, to)));
     let (from, to) = pairs.find(|(from, to)| from.base == to.base)?;
     if from.size == to.size {
         return Some(UnitScale::ONE);
@@ -131,8 +131,8 @@ pub(super) fn scale(from: &str, to: &str) -> Option<UnitScale> {
     })
 }
 
-/// The endings of names for each base unit.
-const ENDINGS: [(&str, &[&str]); 14] = [
+/// The unit suffixes of names for each base unit.
+const UNIT_SUFFIXES: [(&str, &[&str]); 14] = [
     ("s", &["s"]),
     ("m", &["m"]),
     ("rad", &["rad"]),
@@ -149,14 +149,14 @@ const ENDINGS: [(&str, &[&str]); 14] = [
     ("nm/rad", &["n_m_per_rad"]),
 ];
 
-/// Returns the endings of names whose unit a unit converts to.
-pub(super) fn endings(name: &str) -> Vec<&'static str> {
-    let bases: Vec<&str> = named(name).map(|unit| unit.base).collect();
-    let all = ENDINGS.iter().filter(|(base, _)| bases.contains(base));
-    all.flat_map(|(_, endings)| endings.iter().copied()).collect()
+/// Returns the suffixes of the units to which a unit converts.
+pub(super) fn unit_suffixes(name: &str) -> Vec<&'static str> {
+    let bases: Vec<&str> = units_named(name).map(|unit| unit.base).collect();
+    let matching = UNIT_SUFFIXES.iter().filter(|(base, _)| bases.contains(base));
+    matching.flat_map(|(_, unit_suffixes)| unit_suffixes.iter().copied()).collect()
 }
 
-/// Returns the name of the unit that an ending of a name such as `m_per_s2` gives.
+/// Returns the name of the unit that a suffix such as `m_per_s2` gives.
 pub(super) fn unit_from_suffix(suffix: &str) -> String {
     suffix.replace("_per_", "/").replace('_', "")
 }

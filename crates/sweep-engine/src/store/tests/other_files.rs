@@ -134,7 +134,7 @@ fn several_damaged_files_of_one_part_are_all_kept() {
         fs::read_to_string(home.partial().join(name)).unwrap()
     };
     assert_eq!(["", "-2", "-3"].map(read_damaged), ["first", "second", "third"]);
-    // A run whose result exists keeps them too.
+    // A run whose result exists keeps the damaged files as well.
     assert!(matches!(
         OpenRun::open(&home.output(), &job, options()).unwrap(),
         OpenOutcome::Finished(..)

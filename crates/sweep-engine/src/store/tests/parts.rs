@@ -72,8 +72,8 @@ proptest! {
         let mut run = open(&home.output(), &job);
         prop_assert_eq!(run.take_notes().len(), damaged_chunks.len());
         for chunk in &damaged_chunks {
-            let damaged = format!("{}.damaged", part_name(*chunk));
-            prop_assert!(home.partial().join(damaged).exists());
+            let damaged_name = format!("{}.damaged", part_name(*chunk));
+            prop_assert!(home.partial().join(damaged_name).exists());
         }
         prop_assert_eq!(write_missing(&run), damaged_chunks.len() as u64);
         finish(run, &job);
@@ -319,8 +319,10 @@ fn write_and_find_damage(home: &Home, job: &Job<'_>, index: u64, bytes: &[u8]) -
     let folder = Folder::new(&home.output(), &job.layout).unwrap();
     fs::create_dir_all(&folder.path).unwrap();
     fs::write(folder.file(part_name(index)), bytes).unwrap();
-    let read = |part: &PointPart<'_>| part.outcomes();
-    super::super::open::read_part(&PointParts::new(job), &folder, index, read).unwrap().err()
+    let read_outcomes = |part: &PointPart<'_>| part.outcomes();
+    super::super::open::read_part(&PointParts::new(job), &folder, index, read_outcomes)
+        .unwrap()
+        .err()
 }
 
 #[test]
@@ -367,10 +369,10 @@ fn parts_of_another_plan_index_or_layout_are_foreign() {
         Some(Damage::Foreign),
         "another build"
     );
-    let mut narrower = synthetic::job(POINTS);
-    narrower.layout.columns.pop();
+    let mut job_with_fewer_columns = synthetic::job(POINTS);
+    job_with_fewer_columns.layout.columns.pop();
     assert_eq!(
-        write_and_find_damage(&home, &narrower, 3, &bytes),
+        write_and_find_damage(&home, &job_with_fewer_columns, 3, &bytes),
         Some(Damage::Foreign),
         "another layout"
     );

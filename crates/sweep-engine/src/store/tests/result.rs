@@ -220,10 +220,11 @@ fn results_whose_names_differ_after_a_dot_have_different_sidecars() {
     for (old_name, new_name) in [("v1.0", "w.parquet"), ("v1.0.run.json", "w.run.json")] {
         fs::rename(home.0.path().join(old_name), home.0.path().join(new_name)).unwrap();
     }
-    let renamed = OpenRun::open(&home.0.path().join("w.parquet"), &job, options()).unwrap();
-    assert!(matches!(renamed, OpenOutcome::Finished(..)));
-    // A result whose sidecar would be that of another result, and a foreign file with the name of
-    // the sidecar.
+    let outcome_after_rename =
+        OpenRun::open(&home.0.path().join("w.parquet"), &job, options()).unwrap();
+    assert!(matches!(outcome_after_rename, OpenOutcome::Finished(..)));
+    // Two outputs are refused: one whose sidecar is that of another result, and one with a foreign
+    // file under the sidecar's name.
     let refusal = |output: &Path| {
         let error = OpenRun::open(output, &job, options()).unwrap_err();
         assert!(error.is_refusal());

@@ -119,8 +119,8 @@ fn a_damaged_part_loses_only_the_trials_in_it() {
     fs::write(folder.join("part-00000001.parquet"), "my thesis").unwrap();
     drop(open(&output, &job));
     let names: Vec<String> = parts(&output);
-    let read = |name: &String| fs::read(folder.join(name)).unwrap();
-    assert!(names.iter().any(|name| read(name) == b"my thesis"), "{names:?}");
+    let read_part = |name: &String| fs::read(folder.join(name)).unwrap();
+    assert!(names.iter().any(|name| read_part(name) == b"my thesis"), "{names:?}");
 }
 
 #[test]

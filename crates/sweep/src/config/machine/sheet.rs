@@ -112,10 +112,10 @@ impl SheetKeys {
         if table.key_at(UNBALANCE_X).is_some() {
             let title = format!("`{UNBALANCE_PLANE}` beside `{UNBALANCE_X}`");
             let expected = "expected only one of them: both say where the unbalance is";
-            table.report.refuse::<()>(&location.at, title, expected);
+            table.report.refuse::<()>(&location.location, title, expected);
         }
         let name = format!("{}{UNBALANCE_X}", section.prefix(k));
-        table.report.put(name.as_str(), location.at);
+        table.report.put(name.as_str(), location.location);
         // The paper's machine has no further unbalances, so it has no parameters of them.
         let machine = with_unbalances(k + 1);
         self.planes.extend(find_parameter(&name, &machine).map(|parameter| (parameter, plane)));

@@ -95,7 +95,7 @@ fn column<'t>(
     let first = matching.next();
     if let Some(second) = matching.next() {
         let title = format!("the cycle's file has two columns of {quantity}");
-        return report.refuse(&second.name.at, title, "expected one");
+        return report.refuse(&second.name.location, title, "expected one");
     }
     if first.is_none() {
         let headers: Vec<&str> =
