@@ -408,7 +408,7 @@ impl<'a> SpeedSearch<'a> {
             let response_states: Vec<_> =
                 if responses.is_empty() { vec![kicked_state] } else { response_states.collect() };
             let to_perturbed_start =
-                |first| (perturb(point, &frozen_modes, first), Origin::Response);
+                |start| (perturb(point, &frozen_modes, start), Origin::Response);
             states.extend(response_states.iter().map(to_perturbed_start));
             let count = rule.count.saturating_sub(states.len());
             for kick in kicks(count, rule.max_kick_rad_per_s) {
@@ -440,8 +440,8 @@ impl<'a> SpeedSearch<'a> {
 
     fn start(&mut self, state: [f64; STATES], origin: Origin) {
         let held = HeldState { setup: self.held_case.setup, state };
-        let grows = |response: &&Response| response.growth_per_s() > 0.0;
-        let unstable = self.responses.iter().filter(grows);
+        let is_unstable = |response: &&Response| response.growth_per_s() > 0.0;
+        let unstable = self.responses.iter().filter(is_unstable);
         let unstable_orbits = unstable.map(|response| vec![response.start]).collect();
         self.trajectories.push(HeldTrajectory::new(held, unstable_orbits, self.max_time_s));
         self.origins.push(origin);
@@ -453,14 +453,14 @@ impl<'a> SpeedSearch<'a> {
             if !self.trajectories[chaotic].is_chaotic() || self.find_survivors(chaotic).is_some() {
                 continue;
             }
-            let first = self.trajectories.len();
+            let first_survivor = self.trajectories.len();
             let unstable_orbits = self.trajectories[chaotic].unstable_orbits().to_vec();
             for state in self.trajectories[chaotic].recent_states() {
                 let held = HeldState { setup: self.held_case.setup, state };
                 self.trajectories.push(HeldTrajectory::survivor(held, unstable_orbits.clone()));
                 self.origins.push(Origin::Trajectory);
             }
-            self.survivors.push((chaotic, first..self.trajectories.len()));
+            self.survivors.push((chaotic, first_survivor..self.trajectories.len()));
         }
     }
 
@@ -522,7 +522,7 @@ impl<'a> SpeedSearch<'a> {
                 }
             }
             kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let first_above = kicks.iter().position(|(_, returns)| !returns);
+            let first_above = kicks.iter().position(|(_, has_returned)| !has_returned);
             self.brackets[direction] = first_above.map(|first_above| {
                 let last_below =
                     first_above.checked_sub(1).map_or(0.0, |last_below| kicks[last_below].0);
@@ -546,11 +546,11 @@ impl<'a> SpeedSearch<'a> {
     fn bisect_brackets(&mut self) {
         let midpoints = self.brackets.iter().flatten().count();
         for trajectory in self.trajectories.len() - midpoints..self.trajectories.len() {
-            let returns = self.returns_to_first(trajectory);
+            let has_returned = self.returns_to_first(trajectory);
             if let Origin::Kicked((direction, size)) = self.origins[trajectory]
                 && let Some(bracket) = &mut self.brackets[direction]
             {
-                bracket[usize::from(!returns)] = size;
+                bracket[usize::from(!has_returned)] = size;
             }
         }
     }

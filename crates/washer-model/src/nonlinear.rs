@@ -180,12 +180,12 @@ pub(crate) fn assemble_tub<T: Lane>(
     let axis_drift = tilt.to_cabinet_axes(&motion.axis_acceleration);
     let drift = scale(centre, axis_drift);
 
-    let axial = (b.tub_mass * drift[0]).v();
+    let axial_force = (b.tub_mass * drift[0]).v();
     let torque_yaw = tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]
         - force[1] * arm_yaw_z
-        - axial * arm_yaw_x;
+        - axial_force * arm_yaw_x;
     let torque_pitch =
-        moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
+        moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial_force * arm_pitch[0];
 
     let axial_yaw = (b.tub_mass * arm_yaw_x).v();
     let s = tilt.sin_pitch;
@@ -378,7 +378,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         -(flexure_9 + drum_moment_e[1]),
         -(flexure_10 + drum_moment_e[2]),
     ];
-    let axial = (b.rotor_mass * drift[0]).v();
+    let axial_force = (b.rotor_mass * drift[0]).v();
     let axis_drift = tilt.to_cabinet_axes(axis_acceleration);
 
     let mut inertia = rotor_inertia::<T, SKEWED>(b, spin, &tilt, &k, &rho_s, (s9, c9));
@@ -396,7 +396,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
             arm,
             axis: tilt.axis_partials(),
             axis_drift: [axis_drift[1], axis_drift[2]],
-            torque: subtract(torque, &scale(axial, axial_arm)),
+            torque: subtract(torque, &scale(axial_force, axial_arm)),
         },
         inertia,
         tilt,

@@ -68,7 +68,8 @@ pub(crate) struct SpeedAmplitudeSearch {
 }
 
 impl SpeedAmplitudeSearch {
-    /// Starts a search at the point's speeds; `None` if all are given.
+    /// Starts a search at the point's friction speeds. Returns `None` if none of them follows from
+    /// the motion.
     pub(crate) fn new(point: &Point) -> Option<Self> {
         let motion_dampers: Vec<_> = point
             .friction_speeds
@@ -138,8 +139,8 @@ impl SpeedAmplitudeSearch {
             self.inverse_jacobian.iter().map(|row| -dot(row, &residuals)).collect();
         // Dampers that move together may need steps against their own residuals.
         let relative = |number: f64, k: usize| number / self.reciprocals[k];
-        let agreement = |k: usize| relative(steps[k], k) * relative(residuals[k], k);
-        let follows_residuals = (0..steps.len()).map(agreement).sum::<f64>() > 0.0;
+        let step_residual_product = |k: usize| relative(steps[k], k) * relative(residuals[k], k);
+        let follows_residuals = (0..steps.len()).map(step_residual_product).sum::<f64>() > 0.0;
         let next_reciprocals: Vec<f64> = (0..steps.len())
             .map(|k| self.next_reciprocal(k, residuals[k], steps[k], follows_residuals))
             .collect();

@@ -78,7 +78,7 @@ pub fn simulate_with(
 }
 
 /// Integrates one model at every point, like [`simulate_with`]. Returns `None` if `cancel` is
-/// requested before the end of all trajectories, which is polled at least every
+/// requested before the end of all trajectories. `cancel` is polled at least every
 /// [`CANCEL_POLL_STEPS`](lane_ode::CANCEL_POLL_STEPS) steps.
 pub fn simulate_until(
     simd: Simd,

@@ -96,7 +96,7 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     };
     let total_power = squares(&residuals);
     let frequency_at = |trial: usize| 0.5 * trial as f64 / (TRIALS_PER_SAMPLE * count) as f64;
-    // The first frequencies belong to the mean's own line.
+    // The lowest frequencies are excluded, because the mean dominates them.
     let trials: Vec<usize> = (2 * TRIALS_PER_SAMPLE * 2..=TRIALS_PER_SAMPLE * count).collect();
     let mut best = (0.0, *trials.first()?);
     for trials in trials.chunks(FREQUENCIES_AT_ONCE) {

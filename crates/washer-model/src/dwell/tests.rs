@@ -58,19 +58,19 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
             })
             .collect();
         let start_time = std::time::Instant::now();
-        let found =
+        let search_results =
             find_attractors(Simd::best(), &dwells, &[], &StartRule::default(), Cancel::Never);
         println!(
             "{name}: {} speeds in {:.1} s",
             reference_points.len(),
             start_time.elapsed().as_secs_f64()
         );
-        for (reference_point, found) in reference_points.iter().zip(found) {
-            let found = found.unwrap();
+        for (reference_point, search_result) in reference_points.iter().zip(search_results) {
+            let search_result = search_result.unwrap();
             let speed_rpm = reference_point["speed_rpm"].as_f64().unwrap();
-            let growth = found.responses[0].growth_per_s();
+            let growth = search_result.responses[0].growth_per_s();
             println!("{name} {speed_rpm}: growth {growth:.4}");
-            for motion in &found.attractors {
+            for motion in &search_result.attractors {
                 let ends = reference_point["ends"].as_array().unwrap();
                 let errors = ends.iter().map(|end| relative_error(motion, end));
                 let nearest = errors.fold(f64::INFINITY, f64::min);
@@ -81,22 +81,25 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
                     motion.status,
                     motion.motion_kind,
                     motion.starts,
-                    found.starts,
+                    search_result.starts,
                     motion.time_s,
                     motion.exponent,
                 );
             }
-            check_motions(name, speed_rpm, reference_point, &found);
+            check_motions(name, speed_rpm, reference_point, &search_result);
         }
     }
 }
 
-fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, found: &Attractors) {
+fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, search_result: &Attractors) {
     // In this case all starts of the reference return to the response, and the reference lacks the
     // other motion.
     if name == "friction_stops" && speed_rpm > 300.0 {
         let yaw_rad = |motion: &Attractor| motion.peaks[Channel::TubYaw.index()];
-        assert!(found.attractors.iter().any(|motion| yaw_rad(motion) > 0.13), "{speed_rpm}");
+        assert!(
+            search_result.attractors.iter().any(|motion| yaw_rad(motion) > 0.13),
+            "{speed_rpm}"
+        );
     }
     let reference_ends = reference_point["ends"].as_array().unwrap();
     for end in reference_ends {
@@ -109,7 +112,7 @@ fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, found: &At
             continue;
         }
         if name == "paper_140" && speed_rpm == 305.0 {
-            let chaotic_attractors: Vec<&Attractor> = found
+            let chaotic_attractors: Vec<&Attractor> = search_result
                 .attractors
                 .iter()
                 .filter(|motion| motion.motion_kind == Some(MotionKind::Chaotic))
@@ -127,7 +130,7 @@ fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, found: &At
         let by_error = |a: &&Attractor, b: &&Attractor| {
             relative_error(a, end).total_cmp(&relative_error(b, end))
         };
-        let motion = found.attractors.iter().min_by(by_error).unwrap();
+        let motion = search_result.attractors.iter().min_by(by_error).unwrap();
         // Close to the edge of a tongue the reference has an error by its steps of 2e-4 s: RK4 of
         // this crate with these steps gives its 29.34 and 31.75 mrad, with 2.5e-5 s 29.64 and
         // 32.07.
@@ -163,10 +166,10 @@ fn slow_decay_is_not_taken_for_a_doubled_period() {
         prepare_at(&json!({ "unbalance_mass_kg": 0.4, "damping_n_s_per_m": 140.0 }), 100.0, 1.0);
     let dwells = [HeldSpeed { point: &point, speed_rpm: 317.0 }];
     let starts = StartRule { max_time_s: 120.0, ..StartRule::default() };
-    let found =
+    let search_result =
         find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
-    assert!((-2e-3..0.0).contains(&found.responses[0].growth_per_s()));
-    for motion in &found.attractors {
+    assert!((-2e-3..0.0).contains(&search_result.responses[0].growth_per_s()));
+    for motion in &search_result.attractors {
         let settled = motion.motion_kind;
         assert!(matches!(settled, None | Some(MotionKind::Periodic { turns: 1 })), "{settled:?}");
     }
@@ -213,9 +216,9 @@ fn random_motions_continue_unchanged_in_short_steps() {
         let starts =
             StartRule { count: 4, max_kick_rad_per_s: kick_rad_per_s, ..StartRule::default() };
         let dwells = [HeldSpeed { point: &point, speed_rpm }];
-        let found =
+        let search_result =
             find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
-        for motion in &found.attractors {
+        for motion in &search_result.attractors {
             counts[motion.kind()] += 1;
             if matches!(motion.motion_kind, None | Some(MotionKind::Chaotic)) {
                 continue;
@@ -225,7 +228,7 @@ fn random_motions_continue_unchanged_in_short_steps() {
                 .peaks
                 .iter()
                 .zip(peaks)
-                .map(|(found, expected)| (found / expected - 1.0).abs());
+                .map(|(peak, expected)| (peak / expected - 1.0).abs());
             let error = errors.fold(0.0, f64::max);
             println!(
                 "{number}: {speed_rpm:.1} rpm {:?} {:.0} s, error {error:.1e} {keys}",
@@ -248,7 +251,7 @@ fn random_motions_continue_unchanged_in_short_steps() {
 /// Kicks in random directions end in motions that the search found, except for at most one in
 /// fifty. The kicks act on the response or on the machine at rest, and classical Runge-Kutta
 /// without capped modes integrates the next three minutes. The environment variables SEED, MACHINES
-/// and KICKS select others.
+/// and KICKS change the seed and the numbers of machines and kicks.
 #[test]
 #[ignore = "minutes"]
 fn random_kicks_end_in_motions_that_the_search_found() {
@@ -261,11 +264,11 @@ fn random_kicks_end_in_motions_that_the_search_found() {
         let point = prepare_at(&keys, 100.0, 1.0);
         let dwells = [HeldSpeed { point: &point, speed_rpm }];
         let starts = StartRule::default();
-        let found =
+        let search_result =
             find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
         let case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
         let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
-        let response = found.responses.first().map_or(rest, |response| response.start);
+        let response = search_result.responses.first().map_or(rest, |response| response.start);
         let held: Vec<HeldState<'_>> = (0..number_from_env("KICKS", 16))
             .map(|kick| {
                 let mut state = if kick % 2 == 0 { rest } else { response };
@@ -284,21 +287,23 @@ fn random_kicks_end_in_motions_that_the_search_found() {
             })
             .collect();
         let turns = (FOLLOWED_S / case.setup.turn_s()) as usize;
-        for (kick, turned) in integrate_turns(Simd::best(), &held, turns).into_iter().enumerate() {
+        for (kick, turn_records) in
+            integrate_turns(Simd::best(), &held, turns).into_iter().enumerate()
+        {
             let peaks = |turns: &[turns::TurnRecord]| -> [f64; CHANNELS] {
                 core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))
             };
             let description = format!("machine {number}, kick {kick}, {speed_rpm:.2} rpm {keys}");
-            if turned.len() < turns {
+            if turn_records.len() < turns {
                 settled += 1;
                 let has_left_range =
                     |motion: &Attractor| matches!(motion.status, AttractorStatus::LeftRange { .. });
-                if !found.attractors.iter().any(has_left_range) {
+                if !search_result.attractors.iter().any(has_left_range) {
                     missed.push(format!("{description}: leaves the range"));
                 }
                 continue;
             }
-            let (before, last) = turned[turns - 2 * WINDOW_TURNS..].split_at(WINDOW_TURNS);
+            let (before, last) = turn_records[turns - 2 * WINDOW_TURNS..].split_at(WINDOW_TURNS);
             let before = peaks(before);
             let last = peaks(last);
             if !are_close(&before, &last, SETTLED_TOLERANCE) {
@@ -312,7 +317,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
                 };
                 are_close(&motion.peaks, &last, share)
             };
-            if !found.attractors.iter().any(is_this_motion) {
+            if !search_result.attractors.iter().any(is_this_motion) {
                 missed.push(format!("{description}: {last:.4?}"));
             }
         }

@@ -168,8 +168,14 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Returns [`SURVIVOR_COUNT`] equally spaced states of the last turns.
     pub(super) fn recent_states(&self) -> Vec<[f64; STATES]> {
-        let every = (self.turns.len() / SURVIVOR_COUNT).max(1);
-        self.turns.iter().rev().step_by(every).take(SURVIVOR_COUNT).map(|turn| turn.end).collect()
+        let interval_turns = (self.turns.len() / SURVIVOR_COUNT).max(1);
+        self.turns
+            .iter()
+            .rev()
+            .step_by(interval_turns)
+            .take(SURVIVOR_COUNT)
+            .map(|turn| turn.end)
+            .collect()
     }
 
     /// Returns the known unstable periodic orbits.
@@ -205,8 +211,8 @@ impl<'a> HeldTrajectory<'a> {
             return;
         }
         self.turns.extend(turns);
-        let surplus = self.turns.len().saturating_sub(2 * WINDOW_TURNS);
-        self.turns.drain(..surplus);
+        let surplus_turns = self.turns.len().saturating_sub(2 * WINDOW_TURNS);
+        self.turns.drain(..surplus_turns);
         if let Some(last) = self.turns.last() {
             self.held.state = last.end;
         }
@@ -342,10 +348,10 @@ impl<'a> HeldTrajectory<'a> {
                     orbit.iter().map(|state| distance(&self.held.setup, &turn.end, state));
                 distances.fold(f64::INFINITY, f64::min) / size
             };
-            let greatest =
+            let max_distance =
                 |turns: &[TurnRecord]| turns.iter().map(orbit_distance).fold(0.0, f64::max);
-            let last = greatest(after);
-            let previous = greatest(&before[before.len() - window..]);
+            let last = max_distance(after);
+            let previous = max_distance(&before[before.len() - window..]);
             last < CLOSE_ORBIT_DISTANCE
                 || (last < NEAR_ORBIT_DISTANCE && last > DEPARTURE_RATIO * previous)
         })
@@ -382,18 +388,20 @@ impl<'a> HeldTrajectory<'a> {
     }
 
     /// Returns the remaining change of a periodic motion, as a share of its size. The changes
-    /// between stretches of whole periods are extrapolated as a geometric series.
+    /// between windows of whole periods are extrapolated as a geometric series.
     fn remaining_change(&self, period: u32) -> f64 {
-        let stretch = PERIOD_TEST_TURNS / 2 / period as usize * period as usize;
-        let Some(first) = self.turns.len().checked_sub(3 * stretch) else { return f64::INFINITY };
+        let window_turns = PERIOD_TEST_TURNS / 2 / period as usize * period as usize;
+        let Some(first) = self.turns.len().checked_sub(3 * window_turns) else {
+            return f64::INFINITY;
+        };
         let change = |from: usize| {
             let change_at = |k: usize| {
-                distance(&self.held.setup, &self.turns[k].end, &self.turns[k + stretch].end)
+                distance(&self.held.setup, &self.turns[k].end, &self.turns[k + window_turns].end)
             };
-            (from..from + stretch).map(change_at).fold(0.0, f64::max)
+            (from..from + window_turns).map(change_at).fold(0.0, f64::max)
         };
         let previous = change(first);
-        let last = change(first + stretch);
+        let last = change(first + window_turns);
         let ratio = (last / previous).min(1.0 - MIN_DECREASE);
         last * ratio / (1.0 - ratio) / largest_deviation(self.held.setup.point, &self.held.state)
     }

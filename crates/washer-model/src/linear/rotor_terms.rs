@@ -69,9 +69,9 @@ lane_struct! {
     #[derive(Clone, Debug)]
     RotorCoefficients {
         inertia: InertiaTerms<T>,
-        others: RotorTerms<T>,
+        loads: RotorTerms<T>,
         further_inertia: FurtherTerms<T>,
-        further_others: FurtherTerms<T>,
+        further_loads: FurtherTerms<T>,
     }
 }
 
@@ -90,9 +90,9 @@ impl<T: Lane> RotorCoefficients<T> {
     /// Computes the entries of arms, force, stiffness and damping from the functions of the spin at
     /// an instant.
     #[inline(always)]
-    pub(crate) fn sum_others(&self, functions: &[N<T>; FUNCTIONS], sums: &mut [N<T>; ENTRIES]) {
-        self.others.sum(functions, sums);
-        self.further_others.add(functions, sums);
+    pub(crate) fn sum_loads(&self, functions: &[N<T>; FUNCTIONS], sums: &mut [N<T>; ENTRIES]) {
+        self.loads.sum(functions, sums);
+        self.further_loads.add(functions, sums);
     }
 }
 
@@ -100,20 +100,19 @@ impl RotorCoefficients<f64> {
     /// Selects the terms of a machine from all coefficients. Only a skewed drum has further terms.
     pub(crate) fn select_coefficients(
         inertia: &[[f64; FUNCTIONS]; INERTIA_ENTRIES],
-        others: &[[f64; FUNCTIONS]; ENTRIES],
+        loads: &[[f64; FUNCTIONS]; ENTRIES],
         is_skewed: bool,
     ) -> Self {
         let mut terms = Self {
             inertia: InertiaTerms::select_coefficients(inertia),
-            others: RotorTerms::select_coefficients(others),
+            loads: RotorTerms::select_coefficients(loads),
             further_inertia: FurtherTerms::NONE,
-            further_others: FurtherTerms::NONE,
+            further_loads: FurtherTerms::NONE,
         };
         if is_skewed {
             terms.further_inertia =
                 FurtherTerms::select_coefficients(inertia, &InertiaTerms::POSITIONS);
-            terms.further_others =
-                FurtherTerms::select_coefficients(others, &RotorTerms::POSITIONS);
+            terms.further_loads = FurtherTerms::select_coefficients(loads, &RotorTerms::POSITIONS);
         }
         terms
     }
@@ -125,10 +124,10 @@ impl RotorCoefficients<f64> {
         functions: &[N<f64>; FUNCTIONS],
     ) -> ([N<f64>; INERTIA_ENTRIES], [N<f64>; ENTRIES]) {
         let mut inertia = [N(0.0); INERTIA_ENTRIES];
-        let mut others = [N(0.0); ENTRIES];
+        let mut loads = [N(0.0); ENTRIES];
         self.sum_inertia(functions, &mut inertia);
-        self.sum_others(functions, &mut others);
-        (inertia, others)
+        self.sum_loads(functions, &mut loads);
+        (inertia, loads)
     }
 }
 

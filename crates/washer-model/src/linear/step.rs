@@ -188,7 +188,7 @@ impl<T: Lane> RotorArrays<T> {
     ) {
         let functions = harmonics::spin_functions(spin);
         let zero = spin.sin.lit(0.0);
-        terms.sum_others(&functions, &mut self.entries);
+        terms.sum_loads(&functions, &mut self.entries);
         // The inverse is a long chain of dependent operations. It comes last, because a stage
         // begins with operations that do not need it.
         let mut sums = [zero; INERTIA_ENTRIES];

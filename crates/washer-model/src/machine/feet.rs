@@ -90,19 +90,19 @@ impl Feet {
             // The load of this foot per unit of the sum of all loads, and per unit of their first
             // moments about the feet's mean position.
             let per_sum = 1.0 / count as f64;
-            let per_x = (zz * x - xz * z) / determinant;
-            let per_z = (xx * z - xz * x) / determinant;
-            weight_loads[k] =
-                N(weight_n * (per_sum + per_x * (centre_x - mean_x) + per_z * (centre_z - mean_z)));
+            let slope_x = (zz * x - xz * z) / determinant;
+            let slope_z = (xx * z - xz * x) / determinant;
+            weight_loads[k] = N(weight_n
+                * (per_sum + slope_x * (centre_x - mean_x) + slope_z * (centre_z - mean_z)));
             // The sum of the feet's loads is -F_y, the first moments of the loads in x and z are
             // -M_z - y F_x and M_x - y F_z.
             loads_per_component[k] = [
-                -per_x * mean_y,
-                per_x * mean_x + per_z * mean_z - per_sum,
-                -per_z * mean_y,
-                per_z,
+                -slope_x * mean_y,
+                slope_x * mean_x + slope_z * mean_z - per_sum,
+                -slope_z * mean_y,
+                slope_z,
                 0.0,
-                -per_x,
+                -slope_x,
             ]
             .map(N);
         }
@@ -226,7 +226,7 @@ mod tests {
     /// Computes the force and the moment about O that remain after adding the floor's forces.
     fn residual(machine: &Machine, load: &[f64; LOAD_COMPONENTS]) -> [f64; LOAD_COMPONENTS] {
         let feet = Feet::new(machine).unwrap();
-        let cross = |a: [f64; 3], b: [f64; 3]| {
+        let cross_product = |a: [f64; 3], b: [f64; 3]| {
             [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
         };
         let cabinet = machine.cabinet.unwrap();
@@ -237,7 +237,7 @@ mod tests {
         }
         let mut sum = *load;
         for (position, force) in forces {
-            let moment = cross(position, force);
+            let moment = cross_product(position, force);
             for i in 0..3 {
                 sum[i] += force[i];
                 sum[3 + i] += moment[i];

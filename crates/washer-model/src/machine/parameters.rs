@@ -181,8 +181,9 @@ impl MachineParameter {
                             "" => ("the spin's table", "point"),
                             _ => ("the machine", list.element),
                         };
-                        let last = list.first + count - 1;
-                        let existing_numbers = format!("{owner} has {last} {}", plural(noun, last));
+                        let last_number = list.first + count - 1;
+                        let existing_numbers =
+                            format!("{owner} has {last_number} {}", plural(noun, last_number));
                         Err(UnknownParameter::in_other_models(format!(
                             "{existing_numbers}, numbered from 1"
                         )))

@@ -115,9 +115,9 @@ impl Ringing {
         };
         for angle_rad in ANGLES_RAD {
             let at_rest = matrices_at(angle_rad, 0.0);
-            let accelerated = matrices_at(angle_rad, jump_sum_rad_per_s2);
+            let during_jump = matrices_at(angle_rad, jump_sum_rad_per_s2);
             let load: [f64; COORDINATES] =
-                core::array::from_fn(|i| accelerated.force[i] - at_rest.force[i]);
+                core::array::from_fn(|i| during_jump.force[i] - at_rest.force[i]);
             // The system has no solution if bearings or hinge have no stiffness; no level is stable
             // for such a machine.
             let Some(free) = FreeMachine::new(&at_rest) else { continue };

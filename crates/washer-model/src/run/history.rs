@@ -100,7 +100,7 @@ pub struct HistoryRequest<'a> {
 
 /// Integrates one model at several points. If the method of all is RK4, as many points as there are
 /// lanes are integrated at once. The bits of a history do not depend on the other points. Histories
-/// end early once `cancel` is requested, which is polled at least every
+/// end early once `cancel` is requested. `cancel` is polled at least every
 /// [`CANCEL_POLL_STEPS`](lane_ode::CANCEL_POLL_STEPS) steps.
 pub fn histories<'a>(
     model: ModelKind,
@@ -178,7 +178,7 @@ impl<'a> History<'a> {
         self.states.len()
     }
 
-    /// Returns whether there are no instants, which is never the case: the start is one.
+    /// Always false, because the start is an instant.
     pub fn is_empty(&self) -> bool {
         self.states.is_empty()
     }

@@ -39,8 +39,8 @@ sweep_parameter::named! {
     }
 }
 
-/// The gauges in use, in the order of [`Gauge::ALL`].
-pub(crate) type Gauges = [bool; Gauge::ALL.len()];
+/// Whether each gauge is in use, in the order of [`Gauge::ALL`].
+pub(crate) type GaugeSelection = [bool; Gauge::ALL.len()];
 
 /// A reference that is greater than all loads (N). Peaks record only greatest values, so that the
 /// least load is the reference less the greatest difference of reference and load.
@@ -226,7 +226,7 @@ impl<T: Lane> Loads<T> {
     #[inline(always)]
     pub(crate) fn new(
         zero: N<T>,
-        gauges: Gauges,
+        gauges: GaugeSelection,
         model: ModelKind,
         point: &Point,
         substeps: u32,

@@ -201,7 +201,7 @@ pub(crate) trait Stepper {
 
 /// A stepper of fixed steps, which has no parameters.
 pub(crate) trait FixedStepper: Stepper {
-    /// The stepper.
+    /// The only value of the stepper's type.
     const INSTANCE: Self;
     /// The formula of the stepper.
     const FORMULA: Formula;

@@ -1,7 +1,7 @@
 //! The optional recorders of a trajectory, and their readings.
 
 use super::Checkpoints;
-use super::loads::{Gauge, Gauges};
+use super::loads::{Gauge, GaugeSelection};
 use crate::Snapshot;
 use crate::channel::CHANNELS;
 
@@ -13,7 +13,7 @@ pub struct Recorders {
     /// Whether the largest deviations in every turn of the drum are recorded.
     pub turns: bool,
     /// The [`Gauge`](super::Gauge)s in use.
-    pub gauges: Gauges,
+    pub gauges: GaugeSelection,
     /// Whether the coordinates at the ends of segments are recorded
     /// ([`Timing::checkpoints`](crate::Timing)).
     pub checkpoints: bool,

@@ -30,7 +30,7 @@ lane_struct! {
         by_speed: [N<T>; TUB.len()],
         /// The derivatives of the motion's speed by the tub's coordinates.
         by_coordinate: [N<T>; TUB.len()],
-        /// The accelerations by a unit of force along the motion.
+        /// The accelerations that a unit of force along the motion causes.
         response: [N<T>; COORDINATES],
         /// The derivatives of the response by [`RESPONSE_COORDINATES`].
         response_derivative: [[N<T>; RESPONSE_COORDINATES.len()]; COORDINATES],

@@ -55,7 +55,7 @@ pub(super) struct SmoothMonodromy<'a, T> {
     pub(super) zero: N<T>,
     /// The result of [`interpolation_weights`].
     pub(super) weights: &'a [Vec<f64>],
-    /// The model, with the turns in lanes one after another, repeated.
+    /// The model. Lane k has turn k modulo `turn_count`.
     pub(super) model: Nonlinear<Dual<T>>,
     pub(super) grid: StepGrid<T>,
     pub(super) turn_count: usize,

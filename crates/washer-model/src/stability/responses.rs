@@ -201,7 +201,7 @@ impl<'a> ResponseCurves<'a> {
             cases.push(held_case);
         }
         let mut linear = linear_responses_with_motion_friction(&setups, cancel).into_iter();
-        let (mut sought, mut searches): (Vec<SoughtResponse<'_>>, Vec<NewtonSearch<'_>>) =
+        let (mut sought_responses, mut searches): (Vec<SoughtResponse<'_>>, Vec<NewtonSearch<'_>>) =
             Default::default();
         for (request, (held_case, (curve, speed_rpm))) in cases.iter().zip(requests).enumerate() {
             let Ok(held_case) = held_case else { continue };
@@ -224,7 +224,7 @@ impl<'a> ResponseCurves<'a> {
                     guess.state,
                     guess.factors.clone(),
                 ));
-                sought.push(SoughtResponse {
+                sought_responses.push(SoughtResponse {
                     request,
                     held_case: held_case.clone(),
                     guess,
@@ -235,29 +235,35 @@ impl<'a> ResponseCurves<'a> {
         if !run_searches(&mut searches, cancel) {
             return stopped_results();
         }
-        let mut found: Vec<Result<Response, ResponseError>> = sought
+        let mut results: Vec<Result<Response, ResponseError>> = sought_responses
             .iter()
             .zip(searches)
-            .map(|(sought, search)| sought.to_response(search))
+            .map(|(sought_response, search)| sought_response.to_response(search))
             .collect();
-        if cancel.is_requested() || !retry_missing_responses(&sought, &mut found, cancel) {
+        if cancel.is_requested()
+            || !retry_missing_responses(&sought_responses, &mut results, cancel)
+        {
             return stopped_results();
         }
-        discard_known_responses(&sought, &mut found);
-        if !find_lost_branches(&sought, &mut found, cancel) {
+        discard_known_responses(&sought_responses, &mut results);
+        if !find_lost_branches(&sought_responses, &mut results, cancel) {
             return stopped_results();
         }
         // Responses whose stability is uncertain, or which caps change, are computed again without
         // caps.
-        let are_changed_by_caps = are_changed_by_caps(&sought, &found, cancel);
+        let are_changed_by_caps = are_changed_by_caps(&sought_responses, &results, cancel);
         let mut uncertain = Vec::new();
-        for (index, response) in found.iter().enumerate() {
+        for (index, response) in results.iter().enumerate() {
             let Ok(response) = response else { continue };
             let is_uncertain = response.growth_per_s().abs() < UNCERTAIN_GROWTH_PER_S;
             if (is_uncertain || are_changed_by_caps[index])
-                && sought[index].held_case.setup.caps.is_some()
+                && sought_responses[index].held_case.setup.caps.is_some()
             {
-                uncertain.push((index, sought[index].held_case.without_caps(), response.start));
+                uncertain.push((
+                    index,
+                    sought_responses[index].held_case.without_caps(),
+                    response.start,
+                ));
             }
         }
         let mut searches: Vec<(usize, NewtonSearch<'_>)> = Vec::new();
@@ -265,14 +271,14 @@ impl<'a> ResponseCurves<'a> {
             match held_case {
                 Ok(held_case) => {
                     searches.push((index, NewtonSearch::new(held_case.setup, start, None)));
-                    sought[index].held_case = held_case;
+                    sought_responses[index].held_case = held_case;
                 }
-                Err(error) => found[index] = Err(error),
+                Err(error) => results[index] = Err(error),
             }
         }
         let starts: Vec<(usize, [f64; STATES])> =
             searches.iter().map(|(index, search)| (*index, search.state())).collect();
-        if !run_and_store(&sought, &mut found, searches, cancel) {
+        if !run_and_store(&sought_responses, &mut results, searches, cancel) {
             return stopped_results();
         }
         // If a harmonic excites the hinge, the response may be far from the one with caps.
@@ -283,32 +289,32 @@ impl<'a> ResponseCurves<'a> {
             },
         ];
         for retry in retries {
-            let missing = starts.iter().filter(|(index, _)| is_missing(&found[*index]));
-            let searches =
-                missing.map(|(index, start)| (*index, retry(&sought[*index].held_case, *start)));
+            let missing = starts.iter().filter(|(index, _)| is_missing(&results[*index]));
+            let searches = missing
+                .map(|(index, start)| (*index, retry(&sought_responses[*index].held_case, *start)));
             let searches: Vec<(usize, NewtonSearch<'_>)> = searches.collect();
-            if !run_and_store(&sought, &mut found, searches, cancel) {
+            if !run_and_store(&sought_responses, &mut results, searches, cancel) {
                 return stopped_results();
             }
         }
-        if !find_lost_branches(&sought, &mut found, cancel) {
+        if !find_lost_branches(&sought_responses, &mut results, cancel) {
             return stopped_results();
         }
         let error = |held_case: Result<HeldCase<'_>, ResponseError>| {
             held_case.err().unwrap_or(ResponseError::NoResponse)
         };
-        let mut answers: Vec<Result<Vec<Response>, ResponseError>> =
+        let mut request_results: Vec<Result<Vec<Response>, ResponseError>> =
             cases.into_iter().map(|held_case| Err(error(held_case))).collect();
-        for (sought, response) in sought.iter().zip(found) {
-            let answer = &mut answers[sought.request];
-            match (response, answer.as_mut()) {
+        for (sought_response, response) in sought_responses.iter().zip(results) {
+            let request_result = &mut request_results[sought_response.request];
+            match (response, request_result.as_mut()) {
                 (Ok(response), Ok(responses)) => responses.push(response),
-                (Ok(response), Err(_)) => *answer = Ok(vec![response]),
-                (Err(error), Err(first)) => *first = error,
+                (Ok(response), Err(_)) => *request_result = Ok(vec![response]),
+                (Err(error), Err(previous_error)) => *previous_error = error,
                 (Err(_), Ok(_)) => {}
             }
         }
-        answers
+        request_results
     }
 }
 
@@ -363,13 +369,13 @@ fn continue_between<'a>(
 /// its transient has decayed, which may lead to a stable response. Returns false once `cancel` is
 /// requested.
 fn retry_missing_responses(
-    sought: &[SoughtResponse<'_>],
-    found: &mut [Result<Response, ResponseError>],
+    sought_responses: &[SoughtResponse<'_>],
+    results: &mut [Result<Response, ResponseError>],
     cancel: Cancel<'_>,
 ) -> bool {
     let mut retries: Vec<(usize, NewtonSearch<'_>)> = Vec::new();
-    for (index, sought_response) in sought.iter().enumerate() {
-        if sought_response.guess.is_followed() && is_missing(&found[index]) {
+    for (index, sought_response) in sought_responses.iter().enumerate() {
+        if sought_response.guess.is_followed() && is_missing(&results[index]) {
             retries.push((
                 index,
                 NewtonSearch::damped(
@@ -380,14 +386,14 @@ fn retry_missing_responses(
             ));
         }
     }
-    if !run_and_store(sought, found, retries, cancel) {
+    if !run_and_store(sought_responses, results, retries, cancel) {
         return false;
     }
     let mut retries: Vec<(usize, NewtonSearch<'_>)> = Vec::new();
-    for (index, sought_response) in sought.iter().enumerate() {
-        let mut same_request = sought
+    for (index, sought_response) in sought_responses.iter().enumerate() {
+        let mut same_request = sought_responses
             .iter()
-            .zip(found.iter())
+            .zip(results.iter())
             .filter(|(other, _)| other.request == sought_response.request);
         if !sought_response.guess.is_followed()
             && same_request.all(|(_, response)| is_missing(response))
@@ -398,7 +404,7 @@ fn retry_missing_responses(
             retries.push((index, NewtonSearch::after_transient(setup, state, turn_count)));
         }
     }
-    run_and_store(sought, found, retries, cancel)
+    run_and_store(sought_responses, results, retries, cancel)
 }
 
 /// Finds branches whose searches ended in the responses of neighbouring branches.
@@ -408,27 +414,29 @@ fn retry_missing_responses(
 /// one branch was missed: deflated searches, which the known responses repel, find it. Returns
 /// false once `cancel` is requested.
 fn find_lost_branches(
-    sought: &[SoughtResponse<'_>],
-    found: &mut [Result<Response, ResponseError>],
+    sought_responses: &[SoughtResponse<'_>],
+    results: &mut [Result<Response, ResponseError>],
     cancel: Cancel<'_>,
 ) -> bool {
-    discard_duplicates(sought, found);
+    discard_duplicates(sought_responses, results);
     let mut searches: Vec<(usize, NewtonSearch<'_>)> = Vec::new();
-    let indices: Vec<usize> =
-        (0..sought.len()).filter(|&index| sought[index].guess.is_followed()).collect();
-    let curve_key = |index: usize| (sought[index].request, sought[index].guess.is_on_curve);
+    let indices: Vec<usize> = (0..sought_responses.len())
+        .filter(|&index| sought_responses[index].guess.is_followed())
+        .collect();
+    let curve_key =
+        |index: usize| (sought_responses[index].request, sought_responses[index].guess.is_on_curve);
     for curve_indices in indices.chunk_by(|&a, &b| curve_key(a) == curve_key(b)) {
-        let missing_indices = curve_indices.iter().filter(|&&index| is_missing(&found[index]));
+        let missing_indices = curve_indices.iter().filter(|&&index| is_missing(&results[index]));
         let missing_indices: Vec<usize> = missing_indices.copied().collect();
         if missing_indices.len().is_multiple_of(2) {
             continue;
         }
         let known_responses: Vec<[f64; STATES]> = curve_indices
             .iter()
-            .filter_map(|&index| Some(found[index].as_ref().ok()?.start))
+            .filter_map(|&index| Some(results[index].as_ref().ok()?.start))
             .collect();
         for index in missing_indices {
-            let SoughtResponse { held_case, guess, .. } = &sought[index];
+            let SoughtResponse { held_case, guess, .. } = &sought_responses[index];
             let search = NewtonSearch::deflated(
                 held_case.setup,
                 guess.state,
@@ -438,31 +446,31 @@ fn find_lost_branches(
             searches.push((index, search));
         }
     }
-    let is_complete = run_and_store(sought, found, searches, cancel);
-    discard_duplicates(sought, found);
+    let is_complete = run_and_store(sought_responses, results, searches, cancel);
+    discard_duplicates(sought_responses, results);
     is_complete
 }
 
 /// Discards duplicates among a curve's responses at a speed: of two equal responses, the one closer
 /// to its guess stays.
 fn discard_duplicates(
-    sought: &[SoughtResponse<'_>],
-    found: &mut [Result<Response, ResponseError>],
+    sought_responses: &[SoughtResponse<'_>],
+    results: &mut [Result<Response, ResponseError>],
 ) {
     let max_distance = |a: &[f64; STATES], b: &[f64; STATES]| {
         (0..COORDINATES).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
     };
-    for index in 0..found.len() {
-        for other_index in index + 1..found.len() {
-            let SoughtResponse { guess, request, .. } = &sought[index];
-            let other = &sought[other_index];
+    for index in 0..results.len() {
+        for other_index in index + 1..results.len() {
+            let SoughtResponse { guess, request, .. } = &sought_responses[index];
+            let other = &sought_responses[other_index];
             if other.request != *request {
                 break;
             }
             let are_followed = guess.is_followed() && other.guess.is_followed();
             let are_separate =
                 max_distance(&guess.state, &other.guess.state) > SEPARATE_GUESS_DISTANCE;
-            let (Ok(a), Ok(b)) = (&found[index], &found[other_index]) else { continue };
+            let (Ok(a), Ok(b)) = (&results[index], &results[other_index]) else { continue };
             if are_followed
                 && are_separate
                 && max_distance(&a.start, &b.start) < SAME_RESPONSE_DISTANCE
@@ -471,7 +479,7 @@ fn discard_duplicates(
                 let second_distance = max_distance(&b.start, &other.guess.state);
                 let farther_index =
                     if first_distance > second_distance { index } else { other_index };
-                found[farther_index] = Err(ResponseError::NoResponse);
+                results[farther_index] = Err(ResponseError::NoResponse);
             }
         }
     }
@@ -493,8 +501,8 @@ fn transient_turns(held_case: &HeldCase<'_>) -> usize {
 /// Runs searches, and stores their responses at the given indices. Returns false once `cancel` is
 /// requested.
 fn run_and_store<'a>(
-    sought: &[SoughtResponse<'a>],
-    found: &mut [Result<Response, ResponseError>],
+    sought_responses: &[SoughtResponse<'a>],
+    results: &mut [Result<Response, ResponseError>],
     searches: Vec<(usize, NewtonSearch<'a>)>,
     cancel: Cancel<'_>,
 ) -> bool {
@@ -503,7 +511,7 @@ fn run_and_store<'a>(
         return false;
     }
     for (index, search) in indices.into_iter().zip(searches) {
-        found[index] = sought[index].to_response(search);
+        results[index] = sought_responses[index].to_response(search);
     }
     true
 }
@@ -512,24 +520,25 @@ fn run_and_store<'a>(
 /// from the linear response that are on a curve, and those of the downward curve that are on the
 /// upward one.
 fn discard_known_responses(
-    sought: &[SoughtResponse<'_>],
-    found: &mut [Result<Response, ResponseError>],
+    sought_responses: &[SoughtResponse<'_>],
+    results: &mut [Result<Response, ResponseError>],
 ) {
-    for index in 0..found.len() {
-        let SoughtResponse { request, guess, .. } = &sought[index];
-        let Ok(Response { start, .. }) = &found[index] else { continue };
+    for index in 0..results.len() {
+        let SoughtResponse { request, guess, .. } = &sought_responses[index];
+        let Ok(Response { start, .. }) = &results[index] else { continue };
         let is_same = |other: &Response| {
             (0..COORDINATES).all(|i| (other.start[i] - start[i]).abs() < SAME_RESPONSE_DISTANCE)
         };
-        let first = sought.partition_point(|sought_response| sought_response.request < *request);
-        let last = if guess.is_followed() { index } else { found.len() };
-        let same_request =
-            (first..last).take_while(|other_index| sought[*other_index].request == *request);
+        let first =
+            sought_responses.partition_point(|sought_response| sought_response.request < *request);
+        let last = if guess.is_followed() { index } else { results.len() };
+        let same_request = (first..last)
+            .take_while(|other_index| sought_responses[*other_index].request == *request);
         let mut other_indices = same_request.filter(|other_index| *other_index != index);
         let is_known = !guess.is_on_curve
-            && other_indices.any(|other_index| found[other_index].as_ref().is_ok_and(is_same));
+            && other_indices.any(|other_index| results[other_index].as_ref().is_ok_and(is_same));
         if is_known {
-            found[index] = Err(ResponseError::NoResponse);
+            results[index] = Err(ResponseError::NoResponse);
         }
     }
 }
@@ -537,14 +546,14 @@ fn discard_known_responses(
 /// Returns for each response whether a turn without caps fails to close. Only responses are tested
 /// for which a harmonic of the drum's speed may be near the hinge's frequency.
 fn are_changed_by_caps(
-    sought: &[SoughtResponse<'_>],
-    found: &[Result<Response, ResponseError>],
+    sought_responses: &[SoughtResponse<'_>],
+    results: &[Result<Response, ResponseError>],
     cancel: Cancel<'_>,
 ) -> Vec<bool> {
-    let mut are_changed_by_caps = vec![false; sought.len()];
+    let mut are_changed_by_caps = vec![false; sought_responses.len()];
     let mut indices = Vec::new();
     let mut requests = Vec::new();
-    for (index, (sought_response, response)) in sought.iter().zip(found).enumerate() {
+    for (index, (sought_response, response)) in sought_responses.iter().zip(results).enumerate() {
         let hinge_rpm =
             sought_response.held_case.frozen_modes.modes[SUSPENSION_MODES].frequency_rpm();
         let is_near = sought_response.held_case.setup.has_corners()
@@ -696,7 +705,7 @@ mod tests {
             ResponseCurves::continue_curves(&[(&point, 255.0)], None, Cancel::Never).remove(0);
         let held_case = curves.upward.settings.held_case(255.0).unwrap();
         let guesses = curves.guesses(255.0).into_iter();
-        let sought: Vec<SoughtResponse<'_>> = guesses
+        let sought_responses: Vec<SoughtResponse<'_>> = guesses
             .map(|guess| SoughtResponse {
                 request: 0,
                 held_case: held_case.clone(),
@@ -704,34 +713,41 @@ mod tests {
                 linear_peaks: [0.0; CHANNELS],
             })
             .collect();
-        let searches = sought.iter();
+        let searches = sought_responses.iter();
         let searches = searches.map(|sought_response| {
             NewtonSearch::new(sought_response.held_case.setup, sought_response.guess.state, None)
         });
         let mut solved_searches: Vec<NewtonSearch<'_>> = searches.collect();
         assert!(run_searches(&mut solved_searches, Cancel::Never));
-        let answers = sought
+        let results: Vec<Result<Response, ResponseError>> = sought_responses
             .iter()
             .zip(solved_searches)
-            .map(|(sought_response, search)| sought_response.to_response(search));
-        let found: Vec<Result<Response, ResponseError>> = answers.collect();
-        let branches = found.iter().map(|response| response.as_ref().unwrap().branch);
+            .map(|(sought_response, search)| sought_response.to_response(search))
+            .collect();
+        let branches = results.iter().map(|response| response.as_ref().unwrap().branch);
         assert_eq!(branches.collect::<Vec<_>>(), [0, 1, 2]);
         for index in 0..3 {
-            for replacement in [Err(ResponseError::NoResponse), found[(index + 1) % 3].clone()] {
-                let mut lost = found.clone();
-                lost[index] = replacement;
-                assert!(find_lost_branches(&sought, &mut lost, Cancel::Never));
-                let [found_again, original] =
-                    [&lost, &found].map(|found| found[index].as_ref().unwrap().start);
+            for replacement in [Err(ResponseError::NoResponse), results[(index + 1) % 3].clone()] {
+                let mut restored_results = results.clone();
+                restored_results[index] = replacement;
+                assert!(find_lost_branches(
+                    &sought_responses,
+                    &mut restored_results,
+                    Cancel::Never
+                ));
+                let [found_again, original] = [&restored_results, &results]
+                    .map(|responses| responses[index].as_ref().unwrap().start);
                 let differences = (0..COORDINATES).map(|i| (found_again[i] - original[i]).abs());
                 assert!(differences.fold(0.0, f64::max) < SAME_RESPONSE_DISTANCE, "{index}");
             }
         }
         // An even number of missing responses may have vanished at a fold, so that no search runs.
-        let mut both_missing =
-            vec![Err(ResponseError::NoResponse), found[1].clone(), Err(ResponseError::NoResponse)];
-        assert!(find_lost_branches(&sought, &mut both_missing, Cancel::Never));
+        let mut both_missing = vec![
+            Err(ResponseError::NoResponse),
+            results[1].clone(),
+            Err(ResponseError::NoResponse),
+        ];
+        assert!(find_lost_branches(&sought_responses, &mut both_missing, Cancel::Never));
         assert!(is_missing(&both_missing[0]) && is_missing(&both_missing[2]));
     }
 }

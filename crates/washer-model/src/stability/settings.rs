@@ -17,9 +17,9 @@ use std::sync::Arc;
 /// up to twice as many steps as needed.
 const STEP_COUNT_INCREASE: f64 = 1.5;
 
-/// The share of a motion that does not turn with the drum, to which the shift by a capped hinge
-/// applies. Basis: the law of the capped hinge is exact for motion that turns with the drum, which
-/// most motion does. Doubling it takes more steps.
+/// The assumed share of a motion that does not rotate with the drum. Only this share has the
+/// frequency error of a capped hinge. Basis: the law of the capped hinge is exact for motion that
+/// turns with the drum, which most motion does. Doubling it takes more steps.
 const FREE_MOTION_SHARE: f64 = 0.1;
 
 /// The product of step and frequency of the fastest mode (rad), if none is capped. Doubling it

@@ -102,29 +102,31 @@ fn find_response(setup: &TurnSetup<'_>, start: [f64; STATES]) -> ([f64; STATES],
 #[test]
 fn val_growth_and_amplitudes_match_an_independent_program() {
     for case in reference_list("points") {
-        let ours = response_at(case_machine(&case), number(&case, "speed_rpm"));
+        let computed = response_at(case_machine(&case), number(&case, "speed_rpm"));
         let [growth, frequency] = ["growth_per_s", "frequency_cpm"].map(|name| number(&case, name));
         // If all disturbances decay, the slowest is that of the hinge, which is not compared.
         if growth > 0.0 {
-            let difference = ours.growth_per_s() - growth;
+            let difference = computed.growth_per_s() - growth;
             assert!(difference.abs() < 1e-3, "{case}: {difference:e}");
-            let difference = ours.frequency_cpm() - frequency;
+            let difference = computed.frequency_cpm() - frequency;
             assert!(difference.abs() < 1e-2, "{case}: {difference:e}");
         }
         for (channel, name) in [(6, "amplitude_tub_yaw_rad"), (7, "amplitude_tub_pitch_rad")] {
-            let error = ours.nonlinear_peaks[channel] / number(&case, name) - 1.0;
-            println!("{name} {error:e} growth {:e}", ours.growth_per_s() - growth);
+            let error = computed.nonlinear_peaks[channel] / number(&case, name) - 1.0;
+            println!("{name} {error:e} growth {:e}", computed.growth_per_s() - growth);
             // The reference takes the largest value at the ends of its steps, 1e-4 s apart, and
             // thereby misses up to this share of a peak.
-            let between_steps = 0.5 * (PI * 1e-4 * ours.speed_rpm / 60.0).powi(2);
+            let between_steps = 0.5 * (PI * 1e-4 * computed.speed_rpm / 60.0).powi(2);
             assert!(-1e-5 < error && error < 1e-5 + between_steps, "{case}: {error:e}");
         }
         let kind = match (growth > 0.0, number(&case, "frequency_cpm")) {
             (false, _) => StabilityKind::Stable,
-            (true, frequency) if 2.0 * frequency == ours.speed_rpm => StabilityKind::PeriodDoubling,
+            (true, frequency) if 2.0 * frequency == computed.speed_rpm => {
+                StabilityKind::PeriodDoubling
+            }
             (true, _) => StabilityKind::QuasiPeriodic,
         };
-        assert_eq!(ours.kind(), kind, "{case}");
+        assert_eq!(computed.kind(), kind, "{case}");
     }
 }
 
@@ -171,19 +173,19 @@ fn multipliers_are_those_of_the_machine_without_caps() {
         (machine_with(1.0, 250.0), 303.0),
         (machine_with(0.4, 140.0), 1200.0),
     ] {
-        let ours = response_at(machine.clone(), speed_rpm);
-        let theirs = reference_multipliers(machine, speed_rpm, ours.start);
-        let mu = c64::new(ours.multiplier[0], ours.multiplier[1]);
-        let nearest = theirs
+        let computed = response_at(machine.clone(), speed_rpm);
+        let expected = reference_multipliers(machine, speed_rpm, computed.start);
+        let mu = c64::new(computed.multiplier[0], computed.multiplier[1]);
+        let nearest = expected
             .iter()
             .min_by(|a, b| (**a - mu).norm().total_cmp(&(**b - mu).norm()))
             .map(|mu| growth_per_s([mu.re, mu.im], speed_rpm))
             .unwrap();
-        let difference = ours.growth_per_s() - nearest;
-        println!("{speed_rpm}: {} {difference:e}", ours.growth_per_s());
+        let difference = computed.growth_per_s() - nearest;
+        println!("{speed_rpm}: {} {difference:e}", computed.growth_per_s());
         assert!(difference.abs() < 2e-4, "{speed_rpm}: {nearest} {difference:e}");
         // No other disturbance grows; the hinge's disturbances decay slowly.
-        for other in theirs.iter().map(|mu| growth_per_s([mu.re, mu.im], speed_rpm)) {
+        for other in expected.iter().map(|mu| growth_per_s([mu.re, mu.im], speed_rpm)) {
             let is_ours = other <= nearest.max(-0.1) + 1e-9;
             assert!(is_ours, "{speed_rpm}: {other} against {nearest}");
         }
@@ -259,11 +261,11 @@ fn largest_multiplier(moves: &[[f64; COORDINATES]]) -> f64 {
         use faer::linalg::solvers::SolveLstsq as _;
         let rows = (late_moves.len() - count) * COORDINATES;
         let at = |row: usize, turn: usize| late_moves[row / COORDINATES + turn][row % COORDINATES];
-        let earlier_moves = Mat::from_fn(rows, count, at);
-        let next_moves = Mat::from_fn(rows, 1, |i, _| at(i, count));
-        let factors = earlier_moves.qr().solve_lstsq(&next_moves);
-        let relative_residual =
-            (&earlier_moves * &factors - &next_moves).norm_l2() / next_moves.norm_l2();
+        let current_displacements = Mat::from_fn(rows, count, at);
+        let next_displacements = Mat::from_fn(rows, 1, |i, _| at(i, count));
+        let factors = current_displacements.qr().solve_lstsq(&next_displacements);
+        let relative_residual = (&current_displacements * &factors - &next_displacements).norm_l2()
+            / next_displacements.norm_l2();
         let companion = Mat::from_fn(count, count, |i, k| match i + 1 == count {
             true => factors[(k, 0)],
             false => f64::from(u8::from(k == i + 1)),
@@ -373,7 +375,7 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
         let setup = Settings::new(&point).held_case(speed_rpm).unwrap().setup;
         let rest_state =
             core::array::from_fn(|i| if i < COORDINATES { point.equilibrium()[i] } else { 0.0 });
-        let ours = find_response(&setup, rest_state).1;
+        let computed = find_response(&setup, rest_state).1;
         // The eigenvalues of the suspension's motions.
         let suspension_eigenvalues =
             system.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
@@ -385,7 +387,8 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
         );
         for s in suspension_eigenvalues {
             let mu = (s * turn_s).exp();
-            let nearest = ours.iter().map(|our| (our - mu).norm()).fold(f64::INFINITY, f64::min);
+            let nearest =
+                computed.iter().map(|our| (our - mu).norm()).fold(f64::INFINITY, f64::min);
             println!("{speed_rpm}: {s} {nearest:e}");
             assert!(nearest < 1e-4, "{speed_rpm}: {s} {nearest:e}");
         }
@@ -451,18 +454,19 @@ fn val_branches_match_an_independent_program() {
             for (reference_row, responses) in reference_rows.iter().zip(all_responses(&held_speeds))
             {
                 let responses = responses.unwrap();
-                let ours =
+                let computed =
                     if direction == "up" { responses.first() } else { responses.last() }.unwrap();
                 for (channel, name) in [(6, "tub_yaw_rad"), (7, "tub_pitch_rad")] {
-                    let error = ours.nonlinear_peaks[channel] / number(reference_row, name) - 1.0;
+                    let error =
+                        computed.nonlinear_peaks[channel] / number(reference_row, name) - 1.0;
                     assert!(error.abs() < 1e-4, "{reference_row}: {name} {error:e}");
                 }
                 let growth = number(reference_row, "growth_per_s");
                 if growth > 0.0 {
-                    let difference = ours.growth_per_s() - growth;
+                    let difference = computed.growth_per_s() - growth;
                     assert!(difference.abs() < 5e-3, "{reference_row}: {difference:e}");
                 }
-                folds_rpm.extend(ours.fold_speeds_rpm);
+                folds_rpm.extend(computed.fold_speeds_rpm);
             }
             if let Some(lost_rpm) = case[lost_key].as_f64() {
                 let nearest = folds_rpm.iter().flatten().map(|rpm: &f64| (rpm - lost_rpm).abs());
@@ -479,12 +483,13 @@ fn val_branches_match_an_independent_program() {
 fn if_the_upward_curve_is_lost_a_downward_curve_is_continued() {
     let point = prepared(machine_with(0.9, 20.0), 100.0);
     let held_speeds = [240.0, 260.0, 340.0].map(|speed_rpm| HeldSpeed { point: &point, speed_rpm });
-    let found: Vec<_> = all_responses(&held_speeds).into_iter().map(Result::unwrap).collect();
+    let responses_by_speed: Vec<_> =
+        all_responses(&held_speeds).into_iter().map(Result::unwrap).collect();
     // The response of the search from the linear model's response comes first.
-    let [searched, downward] = &found[0][..] else { panic!("{found:?}") };
+    let [searched, downward] = &responses_by_speed[0][..] else { panic!("{responses_by_speed:?}") };
     assert_eq!((searched.branch, searched.fold_speeds_rpm), (downward.branch + 1, [None; 2]));
-    for responses in &found[1..] {
-        let [response] = &responses[..] else { panic!("{found:?}") };
+    for responses in &responses_by_speed[1..] {
+        let [response] = &responses[..] else { panic!("{responses_by_speed:?}") };
         assert_eq!(
             (response.branch, response.fold_speeds_rpm),
             (downward.branch, downward.fold_speeds_rpm)
@@ -492,10 +497,10 @@ fn if_the_upward_curve_is_lost_a_downward_curve_is_continued() {
     }
     assert!(
         downward.fold_speeds_rpm[0].is_some()
-            && !found.concat().iter().any(|response| response.is_on_curve)
+            && !responses_by_speed.concat().iter().any(|response| response.is_on_curve)
     );
     assert_eq!(
-        [1, 2].map(|k| found[k][0].kind()),
+        [1, 2].map(|k| responses_by_speed[k][0].kind()),
         [StabilityKind::PeriodDoubling, StabilityKind::Stable]
     );
 }
@@ -566,8 +571,8 @@ fn growth_of_random_machines_agrees_with_simulations() {
         let speeds: Vec<f64> = (0..40).map(|_| 60.0 + 300.0 * numbers.f64()).collect();
         let held_speeds: Vec<_> =
             speeds.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
-        let found = all_responses(&held_speeds);
-        let first_responses = || found.iter().flatten().filter_map(|responses| responses.first());
+        let results = all_responses(&held_speeds);
+        let first_responses = || results.iter().flatten().filter_map(|responses| responses.first());
         for response in first_responses()
             .filter(|response| (0.2..2.0).contains(&response.growth_per_s()))
             .take(2)
@@ -673,11 +678,12 @@ fn continued_responses_are_those_of_short_steps() {
         let mut searches = searches.into_iter();
         for (k, state) in states.iter_mut().enumerate() {
             let Some(previous_state) = *state else { continue };
-            let found = searches.next().unwrap().into_response().map(|(found, _)| found);
+            let next_state = searches.next().unwrap().into_response().map(|(start, _)| start);
             let distance = |to: &[f64; STATES]| {
                 (0..COORDINATES).map(|i| (to[i] - previous_state[i]).abs()).fold(0.0, f64::max)
             };
-            *state = found.filter(|found| distance(found) < f64::max(1e-3, 5.0 * last_changes[k]));
+            *state =
+                next_state.filter(|start| distance(start) < f64::max(1e-3, 5.0 * last_changes[k]));
             last_changes[k] = state.as_ref().map_or(0.0, distance);
             if state.is_none() {
                 jumps.push((k, speed_rpm_at(step)));
@@ -728,26 +734,26 @@ fn responses_near_resonances_of_the_hinge_are_those_without_caps() {
     let speeds: Vec<f64> = (0..=20)
         .flat_map(|k| [630.0, 760.0, 830.0, 960.0].map(|from| from + 3.0 * f64::from(k)))
         .collect();
-    let ours = responses_of_point(&point, &speeds);
+    let computed = responses_of_point(&point, &speeds);
     let mut uncapped_searches: Vec<NewtonSearch<'_>> = speeds
         .iter()
-        .zip(&ours)
-        .map(|(&rpm, ours)| {
+        .zip(&computed)
+        .map(|(&rpm, computed)| {
             NewtonSearch::new(
                 settings.held_case(rpm).unwrap().without_caps().unwrap().setup,
-                ours.start,
+                computed.start,
                 None,
             )
         })
         .collect();
     assert!(run_searches(&mut uncapped_searches, Cancel::Never));
     let mut max_error = 0.0_f64;
-    for (ours, uncapped) in ours.iter().zip(uncapped_searches) {
+    for (computed, uncapped) in computed.iter().zip(uncapped_searches) {
         let uncapped_peaks = uncapped.into_response().unwrap().1.peaks;
         for k in 0..CHANNELS {
-            let difference = (ours.nonlinear_peaks[k] / uncapped_peaks[k] - 1.0).abs();
+            let difference = (computed.nonlinear_peaks[k] / uncapped_peaks[k] - 1.0).abs();
             max_error = max_error.max(difference);
-            assert!(difference < 6e-5, "{} rpm, channel {k}: {difference:e}", ours.speed_rpm);
+            assert!(difference < 6e-5, "{} rpm, channel {k}: {difference:e}", computed.speed_rpm);
         }
     }
     println!("{max_error:e}");
@@ -770,18 +776,19 @@ fn val_machines_with_elements_match_an_independent_program() {
         for (reference_row, responses) in reference_rows.iter().zip(all_responses(&held_speeds)) {
             assert_eq!(reference_row["converged"], true);
             let description = format!("{} at {} rpm", case["name"], reference_row["speed_rpm"]);
-            let ours = responses.unwrap_or_else(|none| panic!("{description}: {none}")).remove(0);
+            let computed =
+                responses.unwrap_or_else(|none| panic!("{description}: {none}")).remove(0);
             for channel in [0, 1, 6, 7] {
                 let name = Channel::ALL[channel].name();
                 let unit = Channel::ALL[channel].unit();
-                let theirs = number(reference_row, &format!("amplitude_{name}_{unit}"));
-                let error = ours.nonlinear_peaks[channel] / theirs - 1.0;
+                let expected = number(reference_row, &format!("amplitude_{name}_{unit}"));
+                let error = computed.nonlinear_peaks[channel] / expected - 1.0;
                 assert!(error.abs() < 1.2e-5, "{description}: {name} {error:e}");
             }
             // If all disturbances decay, the slowest is that of the hinge, which is not compared.
             let growth = number(reference_row, "growth_per_s");
             if growth > 0.0 {
-                let difference = ours.growth_per_s() - growth;
+                let difference = computed.growth_per_s() - growth;
                 assert!(difference.abs() < 1e-3, "{description}: {difference:e}");
             }
             compared += 1;

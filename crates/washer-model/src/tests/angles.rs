@@ -26,8 +26,8 @@ fn drum_point<T: Real>(
     let from_hinge = about_3(q[9].sin_cos(), [x - hinge_x_m, y, z]);
     let [x, y, z] = about_2(q[8].sin_cos(), from_hinge);
     let (sin, cos) = theta.sin_cos();
-    let unspun = [x + hinge_x_m, cos * y - sin * z, sin * y + cos * z];
-    let [x, y, z] = about_2(q[6].sin_cos(), about_3(q[7].sin_cos(), unspun));
+    let tub_position = [x + hinge_x_m, cos * y - sin * z, sin * y + cos * z];
+    let [x, y, z] = about_2(q[6].sin_cos(), about_3(q[7].sin_cos(), tub_position));
     [x, y + q[2], z + q[3]]
 }
 
@@ -128,19 +128,26 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
 
 #[test]
 fn an_unbalance_at_an_angle_in_other_lanes_does_not_change_the_bits() {
-    let mut turned = paper(0.6, 90.0);
-    turned.unbalance.angle_deg = 40.0;
-    let [plain, turned] = [paper(0.6, 90.0), turned].map(|m| prepared(m, triangular(), 1.5));
+    let mut rotated_unbalance = paper(0.6, 90.0);
+    rotated_unbalance.unbalance.angle_deg = 40.0;
+    let [reference, rotated_unbalance] =
+        [paper(0.6, 90.0), rotated_unbalance].map(|m| prepared(m, triangular(), 1.5));
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
             let simulate_points =
                 |points: &[&Point]| simulate(simd, model, &Method::Rk4 { step_s: 2e-4 }, points);
-            let together = simulate_points(&[&plain, &turned, &plain, &turned, &plain]);
-            let alone = simulate_points(&[&plain])[0];
+            let together = simulate_points(&[
+                &reference,
+                &rotated_unbalance,
+                &reference,
+                &rotated_unbalance,
+                &reference,
+            ]);
+            let alone = simulate_points(&[&reference])[0];
             assert_eq!([together[0], together[2], together[4]], [alone; 3], "{model:?} {simd:?}");
             assert_eq!(
                 [together[1], together[3]],
-                [simulate_points(&[&turned])[0]; 2],
+                [simulate_points(&[&rotated_unbalance])[0]; 2],
                 "{model:?} {simd:?}"
             );
         }

@@ -149,8 +149,8 @@ fn evaluation_cost<M: LaneModel<Counting>, P: LaneModel<f64>>(
     let (forcing, forcing_cost) = count_operations(|| model.forcing(N(Counting(7.3))));
     let (dx, derivative_cost) =
         count_operations(|| model.derivative(&forcing, &x.map(|x| N(Counting(x)))));
-    let plain = P::splat(N(0.0), &point, Coupling::new(N(0.0), caps.as_ref()));
-    let expected = plain.derivative(&plain.forcing(N(7.3)), &x.map(N));
+    let uncounted_model = P::splat(N(0.0), &point, Coupling::new(N(0.0), caps.as_ref()));
+    let expected = uncounted_model.derivative(&uncounted_model.forcing(N(7.3)), &x.map(N));
     for i in 0..STATES {
         assert_eq!(dx[i].0.0.to_bits(), expected[i].0.to_bits(), "state {i}");
     }

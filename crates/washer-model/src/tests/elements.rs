@@ -362,23 +362,33 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
 
 #[test]
 fn elements_without_force_and_machines_in_other_lanes_do_not_change_bits() {
-    let plain = paper(0.6, 90.0);
-    let mut frictionless = plain.clone();
-    frictionless.dampers.iter_mut().for_each(|d| d.friction_linear_speed_m_per_s = Some(0.2));
-    let mut friction = frictionless.clone();
-    friction.dampers.iter_mut().for_each(|d| d.friction_n = 60.0);
-    friction.springs.iter_mut().for_each(|s| s.cubic_n_per_m3 = 1e6);
+    let without_friction = paper(0.6, 90.0);
+    let mut with_friction_speed = without_friction.clone();
+    with_friction_speed
+        .dampers
+        .iter_mut()
+        .for_each(|d| d.friction_linear_speed_m_per_s = Some(0.2));
+    let mut with_friction = with_friction_speed.clone();
+    with_friction.dampers.iter_mut().for_each(|d| d.friction_n = 60.0);
+    with_friction.springs.iter_mut().for_each(|s| s.cubic_n_per_m3 = 1e6);
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 };
-    let [plain, frictionless, friction] =
-        [plain, frictionless, friction].map(|machine| prepared(machine, spin(), 1.5));
+    let [without_friction, with_friction_speed, with_friction] =
+        [without_friction, with_friction_speed, with_friction]
+            .map(|machine| prepared(machine, spin(), 1.5));
     let method = Method::Rk4 { step_s: 2e-4 };
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         let records = |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);
-        let alone = records(&[&plain])[0];
-        assert_eq!(alone, records(&[&frictionless])[0], "{simd:?}");
-        let together = records(&[&plain, &friction, &frictionless, &friction, &plain]);
+        let alone = records(&[&without_friction])[0];
+        assert_eq!(alone, records(&[&with_friction_speed])[0], "{simd:?}");
+        let together = records(&[
+            &without_friction,
+            &with_friction,
+            &with_friction_speed,
+            &with_friction,
+            &without_friction,
+        ]);
         assert_eq!([together[0], together[2], together[4]], [alone; 3], "{simd:?}");
-        assert_eq!([together[1], together[3]], [records(&[&friction])[0]; 2], "{simd:?}");
+        assert_eq!([together[1], together[3]], [records(&[&with_friction])[0]; 2], "{simd:?}");
         assert!(together[1].amplitudes[0] < 0.8 * alone.amplitudes[0], "{together:?}");
     }
 }

@@ -27,7 +27,7 @@ pub(super) fn position(
     std::array::from_fn(|i| start[i] + (0..3).map(|k| components[k] * axes[k][i]).sum::<f64>())
 }
 
-fn length(a: PlainVector, b: PlainVector) -> f64 {
+fn distance(a: PlainVector, b: PlainVector) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -56,8 +56,8 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     let unbalances = m.unbalances().map(height);
     let mut energy = m.gravity_m_per_s2 * heights.into_iter().chain(unbalances).sum::<f64>();
     for s in &m.springs {
-        let free = s.free_length_m.unwrap_or_else(|| length(s.cabinet_m, s.tub_m));
-        let elongation = length(position(p_t, &tub, s.tub_m), s.cabinet_m) - free;
+        let free = s.free_length_m.unwrap_or_else(|| distance(s.cabinet_m, s.tub_m));
+        let elongation = distance(position(p_t, &tub, s.tub_m), s.cabinet_m) - free;
         energy += 0.5 * s.stiffness_n_per_m * elongation.powi(2);
         energy += 0.25 * s.cubic_n_per_m3 * elongation.powi(4);
     }
@@ -98,9 +98,9 @@ fn depth_m(stop: &BumpStop, displacement: PlainVector) -> f64 {
     component_along(displacement, stop.direction) - stop.clearance_m
 }
 
-/// Returns the component along a direction of any length.
+/// Returns the component along a direction vector of any length.
 fn component_along(a: PlainVector, direction: PlainVector) -> f64 {
-    (0..3).map(|i| a[i] * direction[i]).sum::<f64>() / length(direction, [0.0; 3])
+    (0..3).map(|i| a[i] * direction[i]).sum::<f64>() / distance(direction, [0.0; 3])
 }
 
 /// Computes the power (W) that dampers, friction, stops and bushings dissipate.
@@ -127,12 +127,12 @@ fn losses_w(
     let mut losses = 0.0;
     for d in &m.dampers {
         let end = tub_point(d.tub_m);
-        let rest_m = length(position([0.0, at_rest[0], at_rest[1]], &rest, d.tub_m), d.cabinet_m);
+        let rest_m = distance(position([0.0, at_rest[0], at_rest[1]], &rest, d.tub_m), d.cabinet_m);
         let v =
             component_along(velocity(d.tub_m), std::array::from_fn(|i| end[i] - d.cabinet_m[i]));
         losses += d.damping_n_s_per_m * v * v;
         let stage = d.friction_n / v.hypot(d.friction_speed_m_per_s) + d.outer_damping_n_s_per_m;
-        losses += engagement(d, length(end, d.cabinet_m) - rest_m) * stage * v * v;
+        losses += engagement(d, distance(end, d.cabinet_m) - rest_m) * stage * v * v;
     }
     for s in &m.stops {
         let moved = tub_point(s.tub_m);

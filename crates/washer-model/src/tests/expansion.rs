@@ -96,9 +96,9 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
                 force[i] = -at_rest[i];
             }
         }
-        let pairs =
+        let matrices =
             [(computed.mass, mass), (computed.damping, damping), (computed.stiffness, stiffness)];
-        for (kind, (computed, expected)) in pairs.into_iter().enumerate() {
+        for (kind, (computed, expected)) in matrices.into_iter().enumerate() {
             let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
             let difference = computed.iter().flatten().zip(expected.iter().flatten());
             max_errors[kind] =
@@ -173,12 +173,12 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
             axes.channels(&bodies, &motion).into_iter().chain(axes.radial(&bodies, &motion));
         for ((computed, expected), rest) in computed.zip(expected).zip(rest) {
             let order_zero = expected.value.0.value - rest;
-            let pairs = [
+            let sampled_values = [
                 (computed.value.0, order_zero + expected.value.0.slope),
                 (computed.slope.0, expected.slope.0.value + expected.slope.0.slope),
                 (computed.curvature.0, expected.curvature.0.value + expected.curvature.0.slope),
             ];
-            for (k, (computed, expected)) in pairs.into_iter().enumerate() {
+            for (k, (computed, expected)) in sampled_values.into_iter().enumerate() {
                 max_errors[k] = max_errors[k].max((computed - expected).abs() / scales[k]);
             }
             max_rest_value = max_rest_value.max(order_zero.abs());

@@ -76,8 +76,8 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
     let recorders = Recorders::gauge(Gauge::DamperSpeed);
     for friction_n in [45.0, 50.0, 55.0] {
         let point = prepared(&[machine_with(None, friction_n)]).remove(0);
-        let found = point.friction_speeds().iter().map(|amplitude| amplitude.speed_m_per_s);
-        let found: Vec<f64> = found.collect();
+        let speeds_m_per_s: Vec<f64> =
+            point.friction_speeds().iter().map(|amplitude| amplitude.speed_m_per_s).collect();
         // Newton's method for both speeds, with finite differences between long runs.
         let motion = |speeds: &[f64]| -> Vec<f64> {
             let mut machine = machine_with(Some(1.0), friction_n);
@@ -90,7 +90,7 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
             let reciprocals = readings[0].gauge(Gauge::DamperSpeed).iter().map(|speed| 1.0 / speed);
             reciprocals.collect()
         };
-        let mut reciprocals: Vec<f64> = found.iter().map(|speed| 1.0 / speed).collect();
+        let mut reciprocals: Vec<f64> = speeds_m_per_s.iter().map(|speed| 1.0 / speed).collect();
         for _ in 0..4 {
             let speeds = |x: &[f64]| -> Vec<f64> { x.iter().map(|x| 1.0 / x).collect() };
             let residual = |x: &[f64]| -> [f64; 2] {
@@ -113,9 +113,10 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
             reciprocals[0] -= (d * residual_here[0] - b * residual_here[1]) / determinant;
             reciprocals[1] -= (a * residual_here[1] - c * residual_here[0]) / determinant;
         }
-        let ratio = found.iter().zip(&reciprocals).map(|(speed, reciprocal)| speed * reciprocal);
+        let ratio =
+            speeds_m_per_s.iter().zip(&reciprocals).map(|(speed, reciprocal)| speed * reciprocal);
         let ratios: Vec<f64> = ratio.collect();
-        println!("{friction_n} N: {found:?} are {ratios:?} of the fixed point");
+        println!("{friction_n} N: {speeds_m_per_s:?} m/s are {ratios:?} of the fixed point");
         assert!(
             ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.01),
             "{friction_n} N: {ratios:?}"
@@ -135,9 +136,9 @@ fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
     let point = prepare(Simd::best(), &[(machine, spin)], &timing).remove(0).unwrap();
     let expected_m_per_s = [0.622_071, 0.388_478];
     assert_eq!(point.friction_speeds().len(), 2);
-    for (found, expected) in point.friction_speeds().iter().zip(expected_m_per_s) {
-        let ratio = found.speed_m_per_s / expected;
-        assert!((ratio - 1.0).abs() < 0.02, "{ratio}: {found:?}");
+    for (friction_speed, expected) in point.friction_speeds().iter().zip(expected_m_per_s) {
+        let ratio = friction_speed.speed_m_per_s / expected;
+        assert!((ratio - 1.0).abs() < 0.02, "{ratio}: {friction_speed:?}");
     }
 }
 

@@ -97,9 +97,8 @@ fn readings_agree_with_densely_sampled_histories() {
                 "{name}: {exact_turns} of {} turns",
                 reading.turns.len()
             );
-            let greatest =
-                reading.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
-            assert_close(name, greatest, records[0].amplitudes[i], 1e-9);
+            let amplitude = reading.turns.iter().map(|turn| turn[i]).fold(0.0, f64::max);
+            assert_close(name, amplitude, records[0].amplitudes[i], 1e-9);
         }
         assert_close(
             "force",
@@ -124,28 +123,28 @@ fn readings_do_not_depend_on_the_method() {
             simulate_with(Simd::best(), model, &method, &[&point], ALL_RECORDERS).1.remove(0)
         };
         let reference = run(Method::Rk4 { step_s: 2e-4 });
-        for other in [run(Method::Dopri5(tolerance)), run(Method::Additive(tolerance))] {
+        for reading in [run(Method::Dopri5(tolerance)), run(Method::Additive(tolerance))] {
             let root_mean_squares =
-                [&other, &reference].map(|reading| reading.root_mean_squares.unwrap());
+                [&reading, &reference].map(|reading| reading.root_mean_squares.unwrap());
             root_mean_squares[0]
                 .iter()
                 .zip(root_mean_squares[1])
-                .for_each(|(found, expected)| assert_close("rms", *found, expected, 1e-4));
-            assert_eq!(other.turns.len(), reference.turns.len());
-            for (found, expected) in
-                other.turns.iter().flatten().zip(reference.turns.iter().flatten())
+                .for_each(|(value, expected)| assert_close("rms", *value, expected, 1e-4));
+            assert_eq!(reading.turns.len(), reference.turns.len());
+            for (value, expected) in
+                reading.turns.iter().flatten().zip(reference.turns.iter().flatten())
             {
-                assert_close("turn", *found, *expected, 1e-3);
+                assert_close("turn", *value, *expected, 1e-3);
             }
             assert_close(
                 "force",
-                other.gauge(Gauge::CabinetForce)[0],
+                reading.gauge(Gauge::CabinetForce)[0],
                 reference.gauge(Gauge::CabinetForce)[0],
                 1e-4,
             );
             assert_close(
                 "clash",
-                other.gauge(Gauge::ClashTime)[0],
+                reading.gauge(Gauge::ClashTime)[0],
                 reference.gauge(Gauge::ClashTime)[0],
                 1e-3,
             );

@@ -30,8 +30,8 @@ fn run(model: ModelKind, method: &Method, point: &Point) -> Record {
 fn difference(a: &Record, b: &Record) -> f64 {
     assert_eq!((a.failure, b.failure), (None, None));
     let gap = (a.min_gap_m - b.min_gap_m).abs() / b.min_gap_m;
-    Channel::ALL.iter().map(|channel| channel.index()).fold(gap, |greatest, i| {
-        greatest.max((a.amplitudes[i] - b.amplitudes[i]).abs() / b.amplitudes[i])
+    Channel::ALL.iter().map(|channel| channel.index()).fold(gap, |max_difference, i| {
+        max_difference.max((a.amplitudes[i] - b.amplitudes[i]).abs() / b.amplitudes[i])
     })
 }
 

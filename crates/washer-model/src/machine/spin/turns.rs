@@ -122,10 +122,12 @@ impl MonotonePiece<'_> {
         if segment.wave_turns.0 == 0.0 {
             let sign =
                 if segment.turns(self.to_s) < segment.turns(self.from_s) { -1.0 } else { 1.0 };
-            let rate = sign * segment.rate(self.from_s);
-            // Solves turns = rate t + sign b t^2 by the formula without cancellation.
-            let root = (rate * rate + 4.0 * sign * segment.turns_per_s2.0 * turns).max(0.0).sqrt();
-            let elapsed_s = if turns > 0.0 { 2.0 * turns / (rate + root) } else { 0.0 };
+            let turn_rate = sign * segment.turn_rate(self.from_s);
+            // Solves turns = turn_rate t + sign b t^2 by the formula without cancellation.
+            let root = (turn_rate * turn_rate + 4.0 * sign * segment.turns_per_s2.0 * turns)
+                .max(0.0)
+                .sqrt();
+            let elapsed_s = if turns > 0.0 { 2.0 * turns / (turn_rate + root) } else { 0.0 };
             return (self.from_s + elapsed_s).clamp(earliest, self.to_s);
         }
         let mut low = earliest;
@@ -138,9 +140,9 @@ impl MonotonePiece<'_> {
             } else {
                 high = t;
             }
-            let newton = t + remaining_turns / segment.rate(t).abs();
+            let newton_s = t + remaining_turns / segment.turn_rate(t).abs();
             let next_estimate =
-                if low < newton && newton < high { newton } else { 0.5 * (low + high) };
+                if low < newton_s && newton_s < high { newton_s } else { 0.5 * (low + high) };
             if next_estimate == t {
                 break;
             }
@@ -158,7 +160,7 @@ impl SpinSegment {
     }
 
     /// Returns the turns per second at `t` after the start.
-    fn rate(&self, t: f64) -> f64 {
+    fn turn_rate(&self, t: f64) -> f64 {
         let (sin, _) = trig::sin_cos_turns(N(self.wave_hz.0 * t));
         self.turns_per_s.0 + 2.0 * self.turns_per_s2.0 * t
             - TAU * self.wave_hz.0 * self.wave_turns.0 * sin.0
