@@ -216,7 +216,7 @@ macro_rules! entry {
     };
 }
 
-// SAFETY (of each `first` below): inside the entry function of its instruction set.
+// SAFETY (of each `splat` below): inside the entry function of its instruction set.
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
@@ -225,9 +225,9 @@ mod x86 {
     use crate::x86::{F64x4, F64x8};
 
     entry!(avx512, Kernel, "avx2,fma,avx512f,avx512dq,avx512vl", Avx512, |kernel| {
-        kernel.run(unsafe { F64x8::first(0.0) })
+        kernel.run(unsafe { F64x8::splat(0.0) })
     });
-    entry!(avx2, Kernel, "avx2,fma", Avx2, |kernel| kernel.run(unsafe { F64x4::first(0.0) }));
+    entry!(avx2, Kernel, "avx2,fma", Avx2, |kernel| kernel.run(unsafe { F64x4::splat(0.0) }));
     entry!(scalar, Kernel, "avx2,fma", Avx2, |kernel| kernel.run(0.0_f64));
     entry!(one_lane, OutOfLine, "avx2,fma", Avx2, |work| work.run());
 }
@@ -238,7 +238,7 @@ mod aarch64 {
     use super::Kernel;
     use crate::aarch64::F64x2;
 
-    entry!(neon, Kernel, "neon", Neon, |kernel| kernel.run(unsafe { F64x2::first(0.0) }));
+    entry!(neon, Kernel, "neon", Neon, |kernel| kernel.run(unsafe { F64x2::splat(0.0) }));
 }
 
 #[cfg(target_arch = "wasm32")]
@@ -248,6 +248,6 @@ mod wasm32 {
     use crate::wasm32::F64x2;
 
     entry!(simd128, Kernel, "simd128", Simd128, |kernel| {
-        kernel.run(unsafe { F64x2::first(0.0) })
+        kernel.run(unsafe { F64x2::splat(0.0) })
     });
 }

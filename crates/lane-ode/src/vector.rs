@@ -24,7 +24,7 @@ macro_rules! vector {
             /// # Safety
             /// The processor must have this type's instruction set.
             #[inline(always)]
-            pub(crate) unsafe fn first(value: f64) -> Self {
+            pub(crate) unsafe fn splat(value: f64) -> Self {
                 // SAFETY: the caller guarantees the instruction set.
                 Self(unsafe { $set1(value) })
             }

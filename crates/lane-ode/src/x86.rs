@@ -1,9 +1,9 @@
 //! AVX2 and AVX-512 lanes: intrinsics behind newtypes.
 //!
 //! Every function of this module is inlined into the entry function of its instruction set
-//! (`simd::dispatch`). Only that function makes a first value, after a check of the processor. So a
-//! value of these types exists only on processors with the instructions, which makes the `unsafe`
-//! below sound.
+//! (`simd::dispatch`). Only that function makes a first value of its type (`splat`), after a check
+//! of the processor. So a value of these types exists only on processors with the instructions,
+//! which makes the `unsafe` below sound.
 #![allow(unsafe_code)]
 
 use crate::vector::vector;

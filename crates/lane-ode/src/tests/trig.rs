@@ -121,7 +121,7 @@ fn sines_of_any_number_of_turns_are_within_1_6_ulp() {
 fn whole_turns_are_removed_without_rounding() {
     for fraction in [0.0, 0.125, 0.2, -0.3, 0.499] {
         let [near, far] = [1.0, 1048576.0].map(|turns| {
-            // The fraction, rounded as in a sum with `turns`.
+            // The fraction, rounded such that the sum with `turns` is exact.
             let rounded: f64 = (fraction + turns) - turns;
             (trig::sin_cos_turns(N(rounded)), trig::sin_cos_turns(N(rounded + turns)))
         });
