@@ -1,5 +1,5 @@
 //! Makes any oscillator a model of the engine: its equations are written once over
-//! [`lane_ode::Real`], and have every command of `sweep_engine::commands`.
+//! [`lane_ode::Real`], and all commands of `sweep_engine::commands` apply to it.
 //!
 //! An [`Oscillator`] declares its parameters, coordinates and accelerations. The linear model
 //! follows from them by dual numbers at the equilibrium. Both models are integrated in lanes, by

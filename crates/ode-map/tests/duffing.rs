@@ -33,7 +33,7 @@ fn numbers(rows: &RecordBatch, name: &str) -> Vec<f64> {
 }
 
 /// Returns whether each row is `ok`.
-fn are_ok(rows: &RecordBatch) -> Vec<bool> {
+fn ok_flags(rows: &RecordBatch) -> Vec<bool> {
     let statuses = rows.column_by_name("status").unwrap().as_dictionary::<Int32Type>();
     let statuses = statuses.downcast_dict::<arrow_array::StringArray>().unwrap();
     statuses.into_iter().map(|status| status == Some("ok")).collect()
@@ -79,7 +79,7 @@ fn a_softening_spring_breaks_most_easily_at_the_frequency_given_by_davis() {
          [[axis]]\nparameter = \"forcing\"\nrange = { from = 0.07, to = 0.13, count = 61 }\n");
     let frequencies = numbers(&rows, "frequency");
     let forcings = numbers(&rows, "forcing");
-    let broken = are_ok(&rows).into_iter().map(|is_ok| !is_ok);
+    let broken = ok_flags(&rows).into_iter().map(|is_ok| !is_ok);
     let broken_rows =
         (0..rows.num_rows()).zip(broken).filter_map(|(row, is_broken)| is_broken.then_some(row));
     let weakest = broken_rows.min_by(|a, b| forcings[*a].total_cmp(&forcings[*b])).unwrap();
