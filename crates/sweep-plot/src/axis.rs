@@ -154,9 +154,9 @@ fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
 /// dense ticks on short axes.
 pub(crate) const MIN_TICKS: i64 = 3;
 
-/// Factor of the wanted step that a round step must reach. Basis: rounding of the range must not
-/// choose a step twice as long. It is just below 1; half of it would allow steps that are half as
-/// long as wanted.
+/// Minimum ratio of a round step to the wanted step. Basis: rounding of the range must not choose a
+/// step twice as long, so that the ratio is just below 1. Half of it would allow steps that are
+/// half as long as wanted.
 pub(crate) const STEP_TOLERANCE: f64 = 0.999;
 
 /// Returns the candidate sets of ticks of a logarithmic scale, from sparse to dense; empty sets if
@@ -206,7 +206,7 @@ pub(crate) fn is_log_spaced(values: &[f64]) -> bool {
         let steps = values.windows(2).map(|pair| position(pair[1]) - position(pair[0]));
         extremes(steps).map_or(f64::INFINITY, |(least, greatest)| greatest / least)
     };
-    // A linear axis is easier to read, so the logarithm must fit clearly better.
+    // A linear axis is easier to read, so that logarithmic spacing must fit clearly better.
     step_ratio(&f64::ln) * 1.2 < step_ratio(&|value| value)
 }
 

@@ -201,9 +201,9 @@ impl ColourScale {
     }
 }
 
-/// Returns the colour at `share` (0 to 1) between evenly spaced anchors.
-fn blend(anchors: &[u32], share: f64) -> Colour {
-    let position = share.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
+/// Returns the colour at `fraction` (0 to 1) of the range between evenly spaced anchors.
+fn blend(anchors: &[u32], fraction: f64) -> Colour {
+    let position = fraction.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
     let lower = (position as usize).min(anchors.len() - 2);
     let weight = position - lower as f64;
     let from = Colour::hex(anchors[lower]).rgb;

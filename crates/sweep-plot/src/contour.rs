@@ -83,8 +83,8 @@ fn crossing(
 ) -> [f64; 2] {
     let start = value(from.0, from.1);
     let end = value(x, y);
-    let share = start / (start - end);
-    [xs[from.0] + share * (xs[x] - xs[from.0]), ys[from.1] + share * (ys[y] - ys[from.1])]
+    let fraction = start / (start - end);
+    [xs[from.0] + fraction * (xs[x] - xs[from.0]), ys[from.1] + fraction * (ys[y] - ys[from.1])]
 }
 
 /// Joins segments into lines; open lines come first, from one of their ends.

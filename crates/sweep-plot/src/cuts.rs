@@ -35,7 +35,7 @@ pub(crate) struct Cuts {
 pub(crate) struct Cut {
     /// The position of the cut's value in the picks, for each axis beyond the second.
     pub(crate) other_picks: Vec<usize>,
-    /// The name that distinguishes it from the other cuts.
+    /// The name that distinguishes the cut from the others.
     pub(crate) name: Option<String>,
 }
 
@@ -113,10 +113,12 @@ impl Cuts {
         let cut_short =
             further_axes.iter().zip(&picks).filter(|(axis, pick)| pick.len() < axis.values.len());
         let notes = cut_short.map(|(axis, pick)| omission_note(axis, pick.len())).collect();
-        let pick_of_pin = |(pick, pin): (&Vec<usize>, &Option<usize>)| {
-            pin.and_then(|pin| pick.iter().position(|index| *index == pin)).unwrap_or(0)
+        let fixed_position = |(pick, fixed_index): (&Vec<usize>, &Option<usize>)| {
+            fixed_index
+                .and_then(|fixed_index| pick.iter().position(|index| *index == fixed_index))
+                .unwrap_or(0)
         };
-        let other_picks = picks.iter().zip(&fixed_values).map(pick_of_pin).collect();
+        let other_picks = picks.iter().zip(&fixed_values).map(fixed_position).collect();
         Ok(Self { picks, cuts: vec![Cut { other_picks, name: None }], notes })
     }
 }

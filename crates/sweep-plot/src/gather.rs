@@ -70,8 +70,8 @@ pub(crate) struct CellMap {
     pub(crate) grid: Grid,
     /// The number of points of each kind in each cell.
     pub(crate) counts: Vec<PointCounts>,
-    /// The range of each column over all rows, and the sides of its limit in each cell; no sides
-    /// without a limit, or if each cell is one point.
+    /// The range of each column over all rows, and the sides of the column's limit in each cell. A
+    /// column without a limit has no sides, and no column has sides if each cell is one point.
     pub(crate) ranges_and_sides: BTreeMap<String, (ValueRange, Option<CellSides>)>,
     /// The number of rows of the file by status.
     pub(crate) statuses: BTreeMap<String, usize>,
@@ -332,8 +332,8 @@ impl<'a> CellCollector<'a> {
 }
 
 impl CellColumn<'_> {
-    /// Adds a row's value of the column, to a cell if the row lies in one. The `bool` beside the
-    /// cell says whether the row has the greatest ratio of the cell so far.
+    /// Adds a row's value of the column to the range, and to a cell if the row lies in one. The
+    /// `bool` in `cell` says whether the row has the greatest ratio of the cell so far.
     fn add(
         &mut self,
         (row, column): (FigureRow<'_>, usize),

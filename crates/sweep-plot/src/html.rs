@@ -256,8 +256,8 @@ fn write_page(
         (live_part.scripts, live_part.templates)
     });
     let scripts = [scripts_before, scripts, scripts_after].concat();
-    // The distances of linear ticks with the decimals of their labels, and the rule that chooses
-    // one.
+    // The steps of linear ticks with the decimals of their labels, and the rule that chooses a
+    // step.
     let steps: Value =
         TickStep::all().map(|step| json!([step.length(), step.decimals()])).collect();
     data["ticks"] = json!({ "steps": steps, "slack": STEP_TOLERANCE, "least": MIN_TICKS });

@@ -68,7 +68,7 @@ pub(crate) struct DividingLimit {
     pub(crate) value: f64,
     /// Whether distances from the limit are taken of logarithms.
     pub(crate) is_log: bool,
-    /// The bad side.
+    /// The side of the limit on which values are bad.
     pub(crate) worse: Worse,
     /// The name of the line.
     pub(crate) line_name: String,
@@ -160,8 +160,8 @@ pub(crate) fn requested_column(
     }
 }
 
-/// Returns the columns that the options request, or else the first column of the file; `None`
-/// stands for the status.
+/// Returns the columns that the options request; without a request, the first column of the file.
+/// `None` stands for the status.
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a column that the file does not have.
@@ -232,7 +232,7 @@ impl ShownColumn {
         &self.facts.name
     }
 
-    /// Returns the bad direction of the values, if there is one.
+    /// Returns the direction in which values are bad, if there is one.
     pub(crate) const fn worse(&self) -> Option<Worse> {
         self.facts.worse
     }

@@ -67,7 +67,7 @@ pub(crate) fn write(scene: &Scene) -> Vec<u8> {
     objects.finish(catalogue_object, information_object)
 }
 
-/// Returns the name of a weight's font in the page's resources.
+/// Returns the name of the plain or the bold font in the page's resources.
 const fn font_name(bold: bool) -> &'static str {
     if bold { "F1" } else { "F0" }
 }
@@ -76,7 +76,7 @@ const fn font_name(bold: bool) -> &'static str {
 #[derive(Default)]
 struct Page {
     operators: String,
-    /// The glyphs that are set in each weight, with their letters.
+    /// The glyphs that are used of the plain and of the bold font, with their letters.
     glyphs: BTreeMap<bool, BTreeMap<u16, char>>,
     alphas: BTreeSet<u8>,
 }
@@ -190,7 +190,7 @@ impl Page {
     }
 }
 
-/// Returns a place in hundredths of a pixel as two numbers of pixels.
+/// Returns a position in hundredths of a pixel as two numbers of pixels.
 fn format_point(hundredths: [i64; 2]) -> String {
     let [x, y] = hundredths.map(|value| format_pixels(value as f64 / 100.0));
     format!("{x} {y}")
@@ -232,8 +232,8 @@ impl Objects {
         self.0.len()
     }
 
-    /// Adds a weight of the typeface with the widths and letters of its glyphs; returns the font's
-    /// number.
+    /// Adds the plain or the bold font with the widths and letters of its glyphs; returns the
+    /// number of its object.
     fn add_font(&mut self, bold: bool, glyphs: &BTreeMap<u16, char>) -> usize {
         let face = typeface(bold);
         let units = f64::from(face.units_per_em());
@@ -281,7 +281,7 @@ impl Objects {
         ))
     }
 
-    /// Returns the document: the objects, and the table of their places.
+    /// Returns the document: the objects, and the table of their positions.
     fn finish(self, catalogue_object: usize, information_object: usize) -> Vec<u8> {
         let mut bytes = PDF_START.to_vec();
         let mut table = String::new();
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn every_object_is_where_the_table_says() {
+    fn every_object_is_at_its_position_in_the_table() {
         let document = write(&scene());
         let text = String::from_utf8_lossy(&document);
         let table = text.rfind("xref\n0 ").unwrap();

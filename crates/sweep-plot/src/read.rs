@@ -25,8 +25,8 @@ pub struct FigureKind {
     pub name: &'static str,
     /// The columns that identify the kind. Axes stand before the first of these.
     pub columns: &'static [&'static str],
-    /// Prefixes; a file of the kind also has a column that begins with one of these, if there are
-    /// any.
+    /// The prefixes of names, if any: a file of the kind also has a column whose name begins with
+    /// one of them.
     pub prefixes: &'static [&'static str],
     /// Whether the rows belong to points, which `--at` chooses.
     pub has_points: bool,
@@ -99,7 +99,7 @@ pub struct FigureFile {
     pub provenance: Vec<(String, Value)>,
     /// The number of rows.
     pub rows: usize,
-    /// The kinds and sections of the model.
+    /// The model's kinds of files and sections of plans.
     pub model_kinds: ModelKinds,
     /// The name of the run with the settings of its command line, if the file has them.
     pub run_name: Option<String>,
@@ -213,8 +213,8 @@ impl FigureFile {
         ))
     }
 
-    /// Rejects an option that was given and has no effect on this file. `has_effect` says whether
-    /// it has one; `valid_files` names the files on which it has one.
+    /// Rejects an option that has no effect on this file. `has_effect` says whether the option has
+    /// an effect; `valid_files` names the files on which it has one.
     ///
     /// # Errors
     /// [`PlotError::Unfit`].
@@ -299,8 +299,8 @@ impl FigureFile {
         })
     }
 
-    /// Returns the limit of a column in its unit: the column's own, or that of the run for ratios.
-    /// The ratios of two files may have two limits, so that they have none here.
+    /// Returns the limit of a column in its unit: the column's own, or the run's for ratios. Ratios
+    /// in a file of differences have no limit, because each of the two runs has its own.
     pub fn column_limit(&self, column: &ColumnFacts) -> Option<f64> {
         let has_run_limit = is_ratio(column) && self.kind != FigureKind::DIFFERENCES;
         column.limit.or_else(|| has_run_limit.then(|| self.ratio_limit()))
@@ -418,7 +418,7 @@ pub fn bracket_columns<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
     Some((find_with_word(&["low", "lower", "min"])?, find_with_word(&["high", "upper", "max"])?))
 }
 
-/// Completes unit and direction from the column's name, for files that lost their metadata in
+/// Completes unit and bad direction from the column's name, for files that lost their metadata in
 /// another program.
 fn complete_by_name(column: ColumnFacts, schema: &Schema) -> ColumnFacts {
     let unit = schema.field(column.field).metadata().get("unit");

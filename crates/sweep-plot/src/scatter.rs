@@ -16,9 +16,9 @@ const MAX_KEPT_VALUES: usize = 600_000;
 /// The side of the limit on which a point lies, or the reason why it lies on none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// The good side: reliable, or a gap that stays open.
+    /// The good side of the limit, such as reliable or a gap that stays open.
     Good,
-    /// The bad side.
+    /// The bad side of the limit.
     Bad,
     /// A point without a value that did not fail, because nothing was excited.
     Undefined,
@@ -67,7 +67,7 @@ pub(crate) struct Scatter {
     pub(crate) quantity: Vec<f64>,
     /// The side of each kept point.
     pub(crate) sides: Vec<Side>,
-    /// The number of all points, kept or not, on each of [`Side::ALL`].
+    /// The number of points on each of [`Side::ALL`], including points that are not kept.
     pub(crate) counts: [u64; 4],
 }
 

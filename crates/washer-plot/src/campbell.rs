@@ -174,8 +174,8 @@ pub(crate) fn interpolate(xs: &[f64], ys: &[f64], x: f64) -> f64 {
     if step == 0.0 {
         return ys[upper];
     }
-    let share = ((x - xs[lower]) / step).clamp(0.0, 1.0);
-    ys[lower] + share * (ys[upper] - ys[lower])
+    let fraction = ((x - xs[lower]) / step).clamp(0.0, 1.0);
+    ys[lower] + fraction * (ys[upper] - ys[lower])
 }
 
 /// Returns the modes of a file by number.
@@ -234,8 +234,8 @@ fn crossings(speeds: &[f64], frequencies: &[f64]) -> Vec<f64> {
     (1..excess.len())
         .filter(|&k| excess[k - 1] > 0.0 && excess[k] <= 0.0)
         .map(|k| {
-            let share = excess[k - 1] / (excess[k - 1] - excess[k]);
-            speeds[k - 1] + share * (speeds[k] - speeds[k - 1])
+            let fraction = excess[k - 1] / (excess[k - 1] - excess[k]);
+            speeds[k - 1] + fraction * (speeds[k] - speeds[k - 1])
         })
         .collect()
 }

@@ -31,7 +31,7 @@ const ATTRACTOR_KINDS: [(&str, &str, Colour); 6] = [
 const RISING_SERIES: &str = "nonlinear model, speed rising";
 
 /// Minimum ratio of the largest to the smallest deviation for a logarithmic axis. Basis: on a
-/// linear axis the smaller ones would be flat.
+/// linear axis the smaller deviations would be flat. Doubling it gives linear axes to wider ranges.
 const MIN_LOG_RATIO: f64 = 10.0;
 
 /// The column of the turn at which a state was recorded.

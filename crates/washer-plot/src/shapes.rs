@@ -164,8 +164,8 @@ fn shape_series(positions: &AxisPositions, phasors: &[Phasor]) -> Vec<Series> {
 /// Returns the greatest distance between the axes of drum and tub.
 fn max_separation(positions: &AxisPositions, tub: &[Phasor], drum: &[Phasor]) -> f64 {
     let tub_deflection = |x: f64| {
-        let share = (x - positions.tub[0]) / (positions.tub[1] - positions.tub[0]);
-        [0, 1].map(|k| tub[0][k] + share * (tub[1][k] - tub[0][k]))
+        let fraction = (x - positions.tub[0]) / (positions.tub[1] - positions.tub[0]);
+        [0, 1].map(|k| tub[0][k] + fraction * (tub[1][k] - tub[0][k]))
     };
     let points = positions.drum.into_iter().zip(drum);
     let separations = points.map(|(x, deflection)| {

@@ -14,7 +14,8 @@ use sweep_plot::table::FigureTable;
 use sweep_plot::together::{self, NamedPoint};
 use sweep_plot::{DISTINCT, LINEAR, NONLINEAR, PlotError};
 
-/// Maximum number of points whose growth is drawn: each needs a distinct colour.
+/// Maximum number of points whose growth is drawn. Basis: each point needs a distinct colour.
+/// Doubling it repeats colours.
 const MAX_CURVES: usize = DISTINCT.len();
 
 /// The channels whose responses are drawn by default, as in charts of traces.
@@ -205,10 +206,11 @@ fn stability_part(curve: &[f64], growth: &[f64], is_unstable: bool) -> Vec<f64> 
     (0..curve.len()).map(|i| if is_in_part(i) { curve[i] } else { f64::NAN }).collect()
 }
 
-/// Returns whether each channel is drawn: the requested ones, or else the default ones, or else
-/// all.
+/// Returns whether each channel is drawn: the requested channels, by default the default ones, or
+/// all if the file has none of these.
 ///
 /// # Errors
+///
 /// [`PlotError::Unfit`] for an unknown channel.
 pub(crate) fn shown_channels(
     source: &FigureFile,
@@ -478,19 +480,20 @@ pub(crate) fn intervals_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec
             if k > 0 && y[k - 1] == y[k] && is_within(k) {
                 add([x[k - 1], x[k]]);
             } else if k > 0 && (y[k] - y[k - 1]).is_finite() {
-                // The part of this segment within the range, from 0 to 1 along it.
-                let [share_at_low, share_at_high] =
+                // The part of this segment within the range, as fractions of the segment from 0 to
+                // 1.
+                let [fraction_at_low, fraction_at_high] =
                     [low, high].map(|edge| (edge - y[k - 1]) / (y[k] - y[k - 1]));
-                let [first_share, last_share] = [
-                    share_at_low.min(share_at_high).max(0.0),
-                    share_at_low.max(share_at_high).min(1.0),
+                let [first_fraction, last_fraction] = [
+                    fraction_at_low.min(fraction_at_high).max(0.0),
+                    fraction_at_low.max(fraction_at_high).min(1.0),
                 ];
-                let x_at = |share: f64| match share {
+                let x_at = |fraction: f64| match fraction {
                     1.0 => x[k],
-                    share => x[k - 1] + share * (x[k] - x[k - 1]),
+                    fraction => x[k - 1] + fraction * (x[k] - x[k - 1]),
                 };
-                if last_share > first_share {
-                    add([x_at(first_share), x_at(last_share)]);
+                if last_fraction > first_fraction {
+                    add([x_at(first_fraction), x_at(last_fraction)]);
                 }
             }
             if is_within(k) {

@@ -184,8 +184,8 @@ fn quantities<'a>(table: &'a FigureTable, model_prefixes: [&str; 2]) -> Vec<Trac
     channels.chain(states_and_forces).collect()
 }
 
-/// Returns the largest difference between the two curves of any panel shown, as a share of the
-/// first curve's peak.
+/// Returns the largest difference between the two curves of any panel shown, relative to the first
+/// curve's peak.
 fn largest_difference(panels: &[ChartPanel]) -> Option<f64> {
     let differences = panels.iter().filter(|panel| panel.is_shown).filter_map(|panel| {
         let [first, second] = &panel.series[..] else { return None };
@@ -255,8 +255,8 @@ fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// Returns the subtitle: name of the run, unbalance and damping, the rest of the point if the file
-/// has it, the least gaps (mm), and the difference of two runs.
+/// Returns the subtitle: name of the run, unbalance and damping, the other values of the point if
+/// the file has them, the least gaps (mm), and the difference of two runs.
 pub(crate) fn subtitle(
     table: &FigureTable,
     least_gaps_mm: &[(String, f64)],
@@ -326,8 +326,8 @@ fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> 
             let before = speed[k - 1] - resonance;
             let after = speed[k] - resonance;
             if (before < 0.0) != (after < 0.0) && before.is_finite() && after.is_finite() {
-                let share = before / (before - after);
-                passages.push((time[k - 1] + share * (time[k] - time[k - 1]), resonance));
+                let fraction = before / (before - after);
+                passages.push((time[k - 1] + fraction * (time[k] - time[k - 1]), resonance));
             }
         }
     }

@@ -197,7 +197,7 @@ pub(crate) fn overlay(table: &FigureTable, axes: [&str; 2]) -> Result<Overlay> {
     Ok(Overlay { name, lines: lines.collect() })
 }
 
-/// Returns the limit in words, from the metadata or else that of the ratio.
+/// Returns the limit in words: that of the metadata, or the ratio's limit if the metadata has none.
 fn limit_in_words(table: &FigureTable) -> String {
     let settings = table.source.find_metadata(key::BOUNDARY);
     let limit_in_file = settings.and_then(|settings| settings.get(key::LIMIT)?.as_f64());

@@ -24,17 +24,17 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
                 counts[bin] += 1;
             }
         }
-        let share = |bin: usize| 100.0 * f64::from(counts[bin]) / value_count;
+        let percentage = |bin: usize| 100.0 * f64::from(counts[bin]) / value_count;
         // The bars of a side run from its first bin with points to its last.
         let has_points = |bin: &usize| counts[*bin] > 0;
         let first = (0..counts.len()).find(has_points)?;
         let last = (0..counts.len()).rfind(has_points)?;
         let shares_at_ends = (0..counts.len()).flat_map(|bin| {
             let is_in_range = (first..=last).contains(&bin);
-            [if is_in_range { share(bin) } else { f64::NAN }; 2]
+            [if is_in_range { percentage(bin) } else { f64::NAN }; 2]
         });
         let y: Vec<f64> = shares_at_ends.collect();
-        let low = y.iter().map(|share| 0.0 * share).collect();
+        let low = y.iter().map(|percentage| 0.0 * percentage).collect();
         let style = Style::Band(low, y.clone());
         Some(Series::new(scatter.side_meaning(side), side_colour(side), bin_ends.clone(), y, style))
     });

@@ -301,8 +301,8 @@ impl<'a> CellPainter<'a> {
         let smallest_cell = [0, 1].map(|k| {
             let axis = &self.map.grid.axes[k];
             let scale = axis.scale();
-            let share = |pair: &[f64]| scale.position(pair[1]) - scale.position(pair[0]);
-            axis.borders.windows(2).map(share).fold(1.0, f64::min) * size[k]
+            let extent = |pair: &[f64]| scale.position(pair[1]) - scale.position(pair[0]);
+            axis.borders.windows(2).map(extent).fold(1.0, f64::min) * size[k]
         });
         self.hatches = self.hatches.clone().map(|hatch| hatch.within(smallest_cell));
     }
@@ -453,8 +453,8 @@ impl<'a> CellPainter<'a> {
         (layer, limit): (&Layer, &DividingLimit),
         (cut_indices, lines): (&[usize], &[Vec<Option<[f64; 2]>>]),
     ) {
-        let cell_index_at = |axis: &GridAxis, scale: AxisScale, share: f64| {
-            let index = axis.borders.partition_point(|&border| scale.position(border) <= share);
+        let cell_index_at = |axis: &GridAxis, scale: AxisScale, fraction: f64| {
+            let index = axis.borders.partition_point(|&border| scale.position(border) <= fraction);
             index.clamp(1, axis.borders.len() - 1) - 1
         };
         let axes = &self.map.grid.axes;
@@ -556,16 +556,16 @@ impl<'a> CellPainter<'a> {
     }
 }
 
-/// Returns whether a point of a panel, px from its corner, is as close to a line as neighbouring
-/// samples of the search for a name's place are.
+/// Returns whether a point of a panel (px from its corner) is closer to a line than neighbouring
+/// samples are to each other in the search for a name's position.
 fn is_near_line(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]) -> bool {
     let point = [panel.x + x, panel.y + y];
     let max_distance = (panel.width / 44.0).max(panel.height / 33.0);
     let is_close = |from: [f64; 2], to: [f64; 2]| {
         let [[dx, px], [dy, py]] = [0, 1].map(|k| [to[k] - from[k], point[k] - from[k]]);
         let squared_length = (dx * dx + dy * dy).max(f64::MIN_POSITIVE);
-        let share = ((px * dx + py * dy) / squared_length).clamp(0.0, 1.0);
-        (px - share * dx).hypot(py - share * dy) < max_distance
+        let fraction = ((px * dx + py * dy) / squared_length).clamp(0.0, 1.0);
+        (px - fraction * dx).hypot(py - fraction * dy) < max_distance
     };
     let pairs = lines.iter().flat_map(|line| line.windows(2));
     let mut segments = pairs.filter_map(|pair| pair[0].zip(pair[1]));
