@@ -84,4 +84,4 @@ pub use sweep_engine::{
 };
 pub use trace::TraceExtras;
 pub use washer_model::StartRule;
-pub use washer_row::{CREEP_M_PER_S, Level, Outcome, Status, Trajectory, Verdict};
+pub use washer_row::{Level, MIN_SPEED_SCALE_M_PER_S, Outcome, Status, Trajectory, Verdict};

@@ -26,7 +26,7 @@ mod verdict;
 
 pub use error_control::{MAX_ADAPTIVE_STEPS, refinement_levels};
 pub use levels::{RefinementLevel, RefinementLevels};
-pub use measures::{CREEP_M_PER_S, Criterion, Measures, MetricColumn};
+pub use measures::{Criterion, MIN_SPEED_SCALE_M_PER_S, Measures, MetricColumn};
 pub use metrics::{Metric, MetricProperties, MetricSource, PartKind};
 pub use outcome::{Deviations, DwellPeaks, GrowingMode, Growth, Outcome, Status, Trajectory};
 pub use refinement::{NextStep, OutcomePurpose, RefinementRule, RowRefinement};

@@ -24,7 +24,7 @@ pub(crate) const TURN_FLOOR: f64 = 1e-5;
 ///
 /// Basis: at lower speeds friction nearly holds the damper, and much of the speed comes from
 /// ringing bearings. Doubling it halves the relative differences of slower dampers.
-pub const CREEP_M_PER_S: f64 = 0.01;
+pub const MIN_SPEED_SCALE_M_PER_S: f64 = 0.01;
 
 named! {
     /// The measure of a motion by which the two models are compared.
@@ -107,7 +107,7 @@ impl Metric {
             LeastScale::Value => 0.0,
             LeastScale::Window => window_s[1] - window_s[0],
             LeastScale::Weight => weight_n,
-            LeastScale::Creep => CREEP_M_PER_S,
+            LeastScale::DamperSpeed => MIN_SPEED_SCALE_M_PER_S,
         }
     }
 }
@@ -132,9 +132,9 @@ impl MetricColumn {
     /// Returns the part with its number, such as `stop_1`, with the quantity in the column's name
     /// and the column's description. `None` for the column of all parts.
     fn part_name_and_texts(self) -> Option<(String, [&'static str; 2])> {
-        let MetricProperties { part, each_part, .. } = self.metric.properties();
+        let MetricProperties { part, part_column, .. } = self.metric.properties();
         let part = format!("{}_{}", part?.name(), self.part? + 1);
-        Some((part, each_part?))
+        Some((part, part_column?))
     }
 
     /// Returns the name of the column.
@@ -191,7 +191,7 @@ impl Measures {
     /// Returns the columns of a metric: first that of all parts together, then one for each part if
     /// there are several.
     pub fn metric_columns(&self, metric: Metric) -> impl Iterator<Item = MetricColumn> + use<> {
-        let parts = match metric.properties().each_part.and(metric.properties().part) {
+        let parts = match metric.properties().part_column.and(metric.properties().part) {
             Some(PartKind::Stop) => self.stops,
             Some(PartKind::Foot) => self.feet,
             Some(PartKind::Damper) => self.dampers,

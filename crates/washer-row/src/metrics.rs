@@ -32,8 +32,8 @@ pub(crate) enum LeastScale {
     Window,
     /// The weight of everything that moves.
     Weight,
-    /// The speed [`CREEP_M_PER_S`](crate::CREEP_M_PER_S).
-    Creep,
+    /// The speed [`MIN_SPEED_SCALE_M_PER_S`](crate::MIN_SPEED_SCALE_M_PER_S).
+    DamperSpeed,
 }
 
 /// The properties of a metric.
@@ -48,7 +48,7 @@ pub struct MetricProperties {
     pub part: Option<PartKind>,
     /// The quantity in the name of one part's column, and that column's description; `None` if
     /// parts have no columns.
-    pub(crate) each_part: Option<[&'static str; 2]>,
+    pub(crate) part_column: Option<[&'static str; 2]>,
     /// The least scale of relative differences.
     pub(crate) scale: LeastScale,
     /// The direction in which values are bad. The value of all parts is that of the worst part.
@@ -63,7 +63,7 @@ const MACHINE_METRIC: MetricProperties = MetricProperties {
     description: "",
     source: MetricSource::Machine,
     part: None,
-    each_part: None,
+    part_column: None,
     scale: LeastScale::Value,
     worse: Worse::Greater,
     limit: None,
@@ -133,7 +133,7 @@ metrics! {
                       tangents of the stops at equilibrium, next to nothing while they are \
                       open",
         part: Some(PartKind::Stop),
-        each_part: Some([
+        part_column: Some([
             "force",
             "greatest push of the stop in the window; the linear model has its tangent at \
              equilibrium, next to nothing while it is open",
@@ -147,7 +147,7 @@ metrics! {
         unit: "s",
         description: "longest time in the window for which any one stop is closed",
         part: Some(PartKind::Stop),
-        each_part: Some(["contact", "time in the window for which the stop is closed"]),
+        part_column: Some(["contact", "time in the window for which the stop is closed"]),
         scale: LeastScale::Window,
         source: MetricSource::Gauge(Gauge::StopContact),
         ..MACHINE_METRIC
@@ -157,7 +157,7 @@ metrics! {
         unit: "N",
         description: "least vertical load of any foot of the cabinet in the window, by \
                       statics; below zero it would lift",
-        each_part: Some([
+        part_column: Some([
             "load",
             "least vertical load of the foot in the window, by statics; below zero it \
              would lift",
@@ -197,8 +197,8 @@ metrics! {
         description: "greatest speed along any damper in the window: what \
                       `friction_linear_speed_m_per_s` should be near",
         part: Some(PartKind::Damper),
-        each_part: Some(["speed", "greatest speed along the damper in the window"]),
-        scale: LeastScale::Creep,
+        part_column: Some(["speed", "greatest speed along the damper in the window"]),
+        scale: LeastScale::DamperSpeed,
         source: MetricSource::Gauge(Gauge::DamperSpeed),
         ..MACHINE_METRIC
     };
