@@ -28,14 +28,14 @@ struct PlanSource {
     /// The text of a grid file, or the absolute path of one.
     text: String,
     is_file: bool,
-    sets: Vec<String>,
+    constants: Vec<String>,
 }
 
 impl PlanSource {
     fn input(&self) -> WasherGridInput {
         match self.is_file {
-            true => WasherGridInput::file(self.text.clone().into(), self.sets.clone()),
-            false => WasherGridInput::text(UNNAMED, self.text.clone(), self.sets.clone()),
+            true => WasherGridInput::file(self.text.clone().into(), self.constants.clone()),
+            false => WasherGridInput::text(UNNAMED, self.text.clone(), self.constants.clone()),
         }
     }
 }
@@ -55,8 +55,8 @@ impl PyPlan {
     fn new(grid: &Bound<'_, PyMapping>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = grid.py();
         let text = mappings::text(grid)?;
-        let sets = assignments(set)?;
-        let source = PlanSource { text, is_file: false, sets };
+        let constants = assignments(set)?;
+        let source = PlanSource { text, is_file: false, constants };
         Self::load(py, source.input(), source)
     }
 
@@ -69,13 +69,13 @@ impl PyPlan {
     #[pyo3(signature = (source, *, set=None))]
     fn from_toml(source: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = source.py();
-        let sets = assignments(set)?;
+        let constants = assignments(set)?;
         // The text of a grid file has a line break or an assignment, and a path has neither.
         let text = source.cast::<PyString>().ok().map(|text| text.to_string());
         let text = text.filter(|text| text.contains('\n') || text.contains('='));
         let (input, source) = match text {
             Some(text) => {
-                let source = PlanSource { text, is_file: false, sets };
+                let source = PlanSource { text, is_file: false, constants };
                 (source.input(), source)
             }
             None => {
@@ -83,8 +83,8 @@ impl PyPlan {
                 // The path is made absolute because another process may work in another folder.
                 let absolute = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
                 let text = absolute.to_string_lossy().into_owned();
-                let source = PlanSource { text, is_file: true, sets: sets.clone() };
-                (WasherGridInput::file(path, sets), source)
+                let source = PlanSource { text, is_file: true, constants: constants.clone() };
+                (WasherGridInput::file(path, constants), source)
             }
         };
         Self::load(py, input, source)
@@ -96,9 +96,9 @@ impl PyPlan {
         py: Python<'_>,
         text: String,
         is_file: bool,
-        sets: Vec<String>,
+        constants: Vec<String>,
     ) -> PyResult<Self> {
-        let source = PlanSource { text, is_file, sets };
+        let source = PlanSource { text, is_file, constants };
         Self::load(py, source.input(), source)
     }
 
@@ -109,8 +109,8 @@ impl PyPlan {
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, (String, bool, Vec<String>))> {
         let constructor = py.get_type::<Self>().getattr("_unpickled")?;
-        let PlanSource { text, is_file, sets } = self.source.clone();
-        Ok((constructor, (text, is_file, sets)))
+        let PlanSource { text, is_file, constants } = self.source.clone();
+        Ok((constructor, (text, is_file, constants)))
     }
 
     /// Evaluates both models at each row of a table. The result's rows are in the same order.
