@@ -484,8 +484,8 @@ fn check_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> TrialTota
             report(|totals| &mut totals.wrong_verdict, "verdict");
         } else {
             totals.greatest_error = totals.greatest_error.max(error / accuracy);
-            let share = &mut totals.error_over_estimate[row.method as usize];
-            *share = share.max(error / estimate);
+            let ratio = &mut totals.error_over_estimate[row.method as usize];
+            *ratio = ratio.max(error / estimate);
             totals.above_error +=
                 u64::from(row.error.is_some_and(|estimate| error > estimate.max(ERROR_FLOOR)));
         }

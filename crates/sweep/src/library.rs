@@ -41,7 +41,7 @@ pub fn list_parameters(plan: Option<&Plan>) -> String {
 }
 
 /// Returns the error for a list of speeds that is refused.
-fn refused_speeds(count: usize, expected: String) -> Error {
+fn speeds_error(count: usize, expected: String) -> Error {
     Error::option("speeds", format!("with {count} values"), expected)
 }
 
@@ -63,5 +63,5 @@ fn check_speeds(
         "from {min_count} to {MAX_SPEEDS} finite speeds in rpm{condition}, each above the one \
          before"
     );
-    Err(refused_speeds(count, expected))
+    Err(speeds_error(count, expected))
 }

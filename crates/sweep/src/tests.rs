@@ -341,12 +341,12 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
 #[test]
 fn plans_without_a_boundary_are_refused_with_the_reason() {
     let mass = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2]\n";
-    let refused = |text: &str, tolerance: Option<f64>| {
+    let refusal = |text: &str, tolerance: Option<f64>| {
         let plan = plan(&format!("{GRID_HEAD}{text}"));
         Task::new(&plan, &options_of_ratio(tolerance, 6)).unwrap_err().to_string()
     };
     assert_eq!(
-        refused(mass, None),
+        refusal(mass, None),
         "a boundary runs over two axes, and this grid has 1: give [[axis]] twice, first the one \
          along which the curve is wanted, then the one that is searched; one that --at gives a \
          value is no axis, one with `values` of one number is"
@@ -354,19 +354,19 @@ fn plans_without_a_boundary_are_refused_with_the_reason() {
     let one_value =
         format!("{mass}[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100.0]\n");
     assert_eq!(
-        refused(&one_value, None),
+        refusal(&one_value, None),
         "the second axis, `damping_n_s_per_m`, has one value: give it the range to search, as \
          range = { from, to, count } or as `values` whose least and greatest are its ends"
     );
     for tolerance in [0.0, -1.0, f64::NAN, 1e9] {
-        let error = refused(AXES, Some(tolerance));
+        let error = refusal(AXES, Some(tolerance));
         assert!(error.contains("--tolerance") && error.contains("240"), "{error}");
     }
     let design = "[design]\nmethod = \"sobol\"\npoints = 8\n\
                   [[axis]]\nparameter = \"unbalance_mass_kg\"\n\
                   range = { from = 0.1, to = 0.2 }\n";
     assert_eq!(
-        refused(design, None),
+        refusal(design, None),
         "a boundary runs over the axes of a grid, and this file has a [design]: remove it, and \
          give [[axis]] twice"
     );
@@ -407,13 +407,13 @@ fn every_column_that_is_worse_in_one_direction_has_a_boundary() {
     let (_, single_channel_plan) = quantity::find_quantity(&plan, "ratio_tub_yaw", None).unwrap();
     assert_eq!(single_channel_plan.reliability.channels.len(), 1);
     assert_eq!(single_channel_plan.reliability.channels[0].name, "tub_yaw");
-    let refused =
+    let refusal =
         |name, limit| quantity::find_quantity(&plan, name, limit).unwrap_err().to_string();
-    assert!(refused("growth_per_s", None).contains("[stability]"));
-    assert!(refused("cabinet_force", None).contains("did you mean `cabinet_force_nonlinear_n`?"));
-    assert!(refused("cabinet_force_linear_n", None).contains("no limit of its own"));
-    assert!(refused("ratio_max", Some(0.0)).contains("greater than 0"));
-    assert!(refused("clash_time_linear_s", Some(0.0)).contains("greater than 0"));
+    assert!(refusal("growth_per_s", None).contains("[stability]"));
+    assert!(refusal("cabinet_force", None).contains("did you mean `cabinet_force_nonlinear_n`?"));
+    assert!(refusal("cabinet_force_linear_n", None).contains("no limit of its own"));
+    assert!(refusal("ratio_max", Some(0.0)).contains("greater than 0"));
+    assert!(refusal("clash_time_linear_s", Some(0.0)).contains("greater than 0"));
 }
 
 #[test]
@@ -447,11 +447,11 @@ fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
         new_task("cabinet_force_nonlinear_n < 900 and min_gap_nonlinear_m > 0", None).unwrap();
     assert_eq!(stricter.quantity.limit, 0.0);
     assert!(stricter.column().is_none());
-    let refused = |quantity, limit| new_task(quantity, limit).unwrap_err().to_string();
-    assert!(refused("2 * ratio_max", None).contains("--limit"));
-    assert!(refused("ratio_max < 2", Some(2.0)).contains("none with a condition"));
-    assert!(refused("ratio_maxx < 2", None).contains("ratio_max"));
-    assert!(refused("max(ratio_max) < 2", None).contains("of a row"));
+    let refusal = |quantity, limit| new_task(quantity, limit).unwrap_err().to_string();
+    assert!(refusal("2 * ratio_max", None).contains("--limit"));
+    assert!(refusal("ratio_max < 2", Some(2.0)).contains("none with a condition"));
+    assert!(refusal("ratio_maxx < 2", None).contains("ratio_max"));
+    assert!(refusal("max(ratio_max) < 2", None).contains("of a row"));
 }
 
 #[test]

@@ -21,7 +21,7 @@ fn from_environment(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 
-/// Tests rows of a kind against the promise.
+/// Asserts that rows of a kind are within their accuracy, as the fast method promises.
 ///
 /// The rows of a machine fail together, so that machines are counted. One exceptional machine more
 /// than `exceptional_share` is accepted: at the rate of [`EXCEPTIONAL_SHARE`]'s basis, one run in

@@ -60,11 +60,11 @@ fn load_with_arguments(path: &Path) -> Result<Plan, Diagnostics> {
             .collect()
     };
     let sets = values("--set");
-    let at = values("--at");
-    if at.is_empty() {
+    let at_values = values("--at");
+    if at_values.is_empty() {
         load(path, &sets)
     } else {
-        WasherGridInput::file(path.to_owned(), sets).load_point(&at).map(|(plan, _)| plan)
+        WasherGridInput::file(path.to_owned(), sets).load_point(&at_values).map(|(plan, _)| plan)
     }
 }
 
@@ -625,7 +625,7 @@ fn a_name_from_the_command_line_replaces_an_invalid_file_name() {
     let text = include_str!("../../../../sweeps/quick.toml").lines();
     let text = text.filter(|line| !line.starts_with("name")).map(|line| format!("{line}\n"));
     let input = WasherGridInput::text("my grid", text.collect(), Vec::new());
-    let refused = input.load().unwrap_err().to_string();
-    assert!(refused.contains("or pass `--name`"), "{refused}");
+    let refusal = input.load().unwrap_err().to_string();
+    assert!(refusal.contains("or pass `--name`"), "{refusal}");
     assert_eq!(input.with_name(Some("mine".to_owned())).load().unwrap().name, "mine");
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Execution, refused_speeds};
+use super::{Execution, speeds_error};
 use crate::config::WasherGridInput;
 use crate::explain::{explain, format, json};
 use crate::speeds::Speeds;
@@ -29,20 +29,20 @@ pub struct Explained {
 /// which responses are sought, and if the machine has no equilibrium or no modes.
 pub fn explain_point(
     grid: &WasherGridInput,
-    at: &[String],
+    point_values: &[String],
     speeds_rpm: Option<&[f64]>,
     execution: Execution<'_>,
 ) -> Result<Option<Explained>, Error> {
-    let (plan, at) = grid.load_point(at)?;
+    let (plan, point_values) = grid.load_point(point_values)?;
     let parse = |speeds: &[f64]| {
         Speeds::from_values(speeds).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
             let expected = "at least two equally spaced speeds in rpm above 0, as those of \
                             range(200, 351)";
-            refused_speeds(speeds.len(), expected.to_owned())
+            speeds_error(speeds.len(), expected.to_owned())
         })
     };
     let speeds = speeds_rpm.map(parse).transpose()?;
-    let found = explain(&plan, at, speeds, execution)?;
+    let found = explain(&plan, point_values, speeds, execution)?;
     if execution.interrupt.stopped() {
         return Ok(None);
     }

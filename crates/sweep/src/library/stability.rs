@@ -1,4 +1,4 @@
-//! Machines at held speeds.
+//! The task to find periodic responses or attractors of machines at held speeds.
 
 use super::check_speeds;
 use super::run::EvaluationTask;

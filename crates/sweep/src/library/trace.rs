@@ -31,21 +31,23 @@ pub struct TraceOptions {
 /// Returns time histories of both models and a message for each integration that failed; `None` if
 /// the work was interrupted.
 ///
-/// `at` has texts `NAME=VALUE`. For one point they give every axis its value and may set other
-/// parameters; for all points they fix the parameters that they name.
+/// `point_values` has texts `NAME=VALUE`. For one point they give every axis its value and may set
+/// other parameters; for all points they fix the parameters that they name.
 ///
 /// # Errors
 ///
 /// Returns an error for mistakes in the grid or the options, and for a machine without equilibrium.
 pub fn trace_point(
     grid: &WasherGridInput,
-    at: &[String],
+    point_values: &[String],
     options: &TraceOptions,
     interrupt: &Interrupt,
 ) -> Result<Option<(MemoryTable, Vec<String>)>, Error> {
-    let (plan, at) = match options.all {
-        true => (grid.clone().with_fixed(at).load()?, None),
-        false => grid.load_point(at).map(|(plan, at)| (plan, Some(at)))?,
+    let (plan, point_values) = match options.all {
+        true => (grid.clone().with_fixed(point_values).load()?, None),
+        false => {
+            grid.load_point(point_values).map(|(plan, point_values)| (plan, Some(point_values)))?
+        }
     };
     let every_s = check_spacing(options.every_s, &plan)?;
     let start = options.start.iter().map(|text| {
@@ -61,7 +63,7 @@ pub fn trace_point(
     };
     let settings = TraceSettings { every_s, models, start, extras: options.extras, capped: None };
     let cancel = Cancel::Flag(interrupt.flag());
-    let trace = trace_in_pool(&plan, at, &settings, cancel).map_err(Error::model)?;
+    let trace = trace_in_pool(&plan, point_values, &settings, cancel).map_err(Error::model)?;
     if interrupt.stopped() {
         return Ok(None);
     }

@@ -180,11 +180,11 @@ fn smooth(time_s: &[f64], speed_rpm: &[f64]) -> CyclePoints {
         for piece in 1..pieces {
             let fraction = piece as f64 / pieces as f64;
             let remainder = 1.0 - fraction;
-            let linear_part = fraction * fraction * (3.0 - 2.0 * fraction);
+            let change_weight = fraction * fraction * (3.0 - 2.0 * fraction);
             let slope_part =
                 fraction * remainder * (remainder * start_slope - fraction * end_slope);
             points.0.push(time_s[k - 1] + fraction * length_s);
-            points.1.push(speed_rpm[k - 1] + linear_part * change + slope_part);
+            points.1.push(speed_rpm[k - 1] + change_weight * change + slope_part);
         }
         points.0.push(time_s[k]);
         points.1.push(speed_rpm[k]);

@@ -45,10 +45,10 @@ fn the_longest_spin_is_checked_and_a_longer_one_is_refused() {
     axes.push_str(&axis("spin_table_2_speed_rpm"));
     let plan = load_text(grid_with_table(spin::MAX_ROWS, &axes), &[]).unwrap();
     assert_eq!(plan.corners(), 64);
-    let refused = load_text(grid_with_table(spin::MAX_ROWS + 1, &axes), &[]).unwrap_err();
-    assert!(refused.contains("`time_s` has 20001 numbers"), "{refused}");
-    assert!(refused.contains("at most 20000"), "{refused}");
-    assert!(!refused.contains("is empty"), "{refused}");
+    let refusal = load_text(grid_with_table(spin::MAX_ROWS + 1, &axes), &[]).unwrap_err();
+    assert!(refusal.contains("`time_s` has 20001 numbers"), "{refusal}");
+    assert!(refusal.contains("at most 20000"), "{refusal}");
+    assert!(!refusal.contains("is empty"), "{refusal}");
 }
 
 #[test]
@@ -60,9 +60,9 @@ fn a_list_of_millions_of_points_is_checked() {
     assert_eq!(plan.points(), 3_000_000);
     assert!((250..=256).contains(&plan.some_corners().len()));
     list.push_str("0.1,0\n");
-    let refused = load_list(MINIMAL_GRID, &list).unwrap_err();
-    assert!(refused.contains("points.csv:3000002:5"), "{refused}");
-    assert!(refused.contains("value 3000001"), "{refused}");
+    let refusal = load_list(MINIMAL_GRID, &list).unwrap_err();
+    assert!(refusal.contains("points.csv:3000002:5"), "{refusal}");
+    assert!(refusal.contains("value 3000001"), "{refusal}");
 }
 
 #[test]
@@ -83,8 +83,8 @@ fn extreme_points_of_a_long_list_are_corners() {
 fn points_that_would_take_minutes_to_check_are_refused() {
     let mut list = "spin_table_2_speed_rpm\n".to_owned();
     list.push_str(&"5\n".repeat(50_001));
-    let refused = load_list(&grid_with_table(20_000, ""), &list).unwrap_err();
-    assert!(refused.contains("50001") && refused.contains("at most 50000 points"), "{refused}");
+    let refusal = load_list(&grid_with_table(20_000, ""), &list).unwrap_err();
+    assert!(refusal.contains("50001") && refusal.contains("at most 50000 points"), "{refusal}");
     // With an axis of a mass the table is the same at all points, so that it is checked once.
     let list = list.replace("spin_table_2_speed_rpm", "tub_mass_kg");
     assert_eq!(load_list(&grid_with_table(20_000, ""), &list).unwrap().points(), 50_001);
@@ -100,9 +100,9 @@ fn load_light_tub(tub_mass_kg: f64, end_s: f64, integrator: &str) -> Result<Plan
 #[test]
 fn a_machine_that_is_too_stiff_is_refused_with_every_explicit_method() {
     for method in ["rk4-mass-scaled", "dopri5", "rk4"] {
-        let refused = load_light_tub(1e-9, 50.0, &format!("method = \"{method}\"")).unwrap_err();
-        assert!(refused.contains("the machine is too stiff"), "{refused}");
-        assert!(refused.contains("use method = \"additive\""), "{refused}");
+        let refusal = load_light_tub(1e-9, 50.0, &format!("method = \"{method}\"")).unwrap_err();
+        assert!(refusal.contains("the machine is too stiff"), "{refusal}");
+        assert!(refusal.contains("use method = \"additive\""), "{refusal}");
     }
     assert!(load_light_tub(1e-9, 50.0, "method = \"additive\"").is_ok());
     assert!(load_light_tub(1e-6, 1.0, "method = \"rk4-mass-scaled\"").is_ok());
@@ -113,18 +113,18 @@ fn a_machine_with_too_stiff_dampers_is_refused_with_the_additive_method() {
     for method in ["dopri5", "additive"] {
         let set = "[set]\ndamping_n_s_per_m = 1e12\n";
         let grid = format!("{MINIMAL_GRID}{set}[integrator]\nmethod = \"{method}\"\n");
-        let refused = load_text(grid, &[]).unwrap_err();
-        assert!(refused.contains("the machine is too stiff"), "{refused}");
-        assert!(!refused.contains("use method"), "it is of no use: {refused}");
+        let refusal = load_text(grid, &[]).unwrap_err();
+        assert!(refusal.contains("the machine is too stiff"), "{refusal}");
+        assert!(!refusal.contains("use method"), "it is of no use: {refusal}");
     }
 }
 
 #[test]
 fn a_step_above_the_stability_limit_is_refused_with_a_suitable_method() {
     let grid = format!("{MINIMAL_GRID}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-3\n");
-    let refused = load_text(grid, &[]).unwrap_err();
-    assert!(refused.contains("past the stability limit of rk4"), "{refused}");
-    assert!(refused.contains("method = \"additive\""), "{refused}");
+    let refusal = load_text(grid, &[]).unwrap_err();
+    assert!(refusal.contains("past the stability limit of rk4"), "{refusal}");
+    assert!(refusal.contains("method = \"additive\""), "{refusal}");
 }
 
 #[test]
@@ -168,13 +168,13 @@ fn mistakes_together_with_an_unknown_choice_are_reported() {
             "`range` is missing",
         ],
     );
-    let refused = load_list(MINIMAL_GRID, "tub_mas_kg,shaft_mass_kg\n1,x\n1,-5\n1\n").unwrap_err();
+    let refusal = load_list(MINIMAL_GRID, "tub_mas_kg,shaft_mass_kg\n1,x\n1,-5\n1\n").unwrap_err();
     for part in
         ["unknown parameter", "`x` is not a number", "value 2 of `shaft_mass_kg`", "a row of"]
     {
-        assert!(refused.contains(part), "no {part} in\n{refused}");
+        assert!(refusal.contains(part), "no {part} in\n{refusal}");
     }
-    assert!(refused.contains("4 mistakes"), "{refused}");
+    assert!(refusal.contains("4 mistakes"), "{refusal}");
 }
 
 #[test]
@@ -187,17 +187,17 @@ fn a_range_with_too_few_different_values_is_refused() {
     };
     let next_but_one = 1.0 + 2.0 * f64::EPSILON;
     for spacing in ["linear", "log"] {
-        let refused = load(1.0, next_but_one, 5, spacing).unwrap_err();
-        assert!(refused.contains("has no 5 different values"), "{refused}");
-        assert!(refused.contains("at most 2"), "{refused}");
+        let refusal = load(1.0, next_but_one, 5, spacing).unwrap_err();
+        assert!(refusal.contains("has no 5 different values"), "{refusal}");
+        assert!(refusal.contains("at most 2"), "{refusal}");
         assert_eq!(load(1.0, next_but_one, 2, spacing).unwrap().points(), 2);
         assert_eq!(load(1.0, 2.0, 1_000_000_000_000, spacing).unwrap().points(), 1_000_000_000_000);
     }
     let design = "[design]\nmethod = \"sobol\"\npoints = 1024\n\
         [[axis]]\nparameter = \"tub_mass_kg\"\n";
     let range = format!("range = {{ from = 1.0, to = {next_but_one:?} }}\n");
-    let refused = load_text(format!("{MINIMAL_GRID}{design}{range}"), &[]).unwrap_err();
-    assert!(refused.contains("has no 1024 different values"), "{refused}");
+    let refusal = load_text(format!("{MINIMAL_GRID}{design}{range}"), &[]).unwrap_err();
+    assert!(refusal.contains("has no 1024 different values"), "{refusal}");
 }
 
 proptest! {
@@ -230,8 +230,8 @@ proptest! {
                 };
                 prop_assert!(values.windows(2).all(ordered), "{values:?}");
             }
-            Err(refused) => {
-                prop_assert!(refused.contains("different values") && count > 2, "{refused}");
+            Err(refusal) => {
+                prop_assert!(refusal.contains("different values") && count > 2, "{refusal}");
             }
         }
     }

@@ -49,7 +49,7 @@ fn a_cycle_is_read_with_its_units() {
 }
 
 #[test]
-fn the_plan_has_the_cycle() {
+fn a_plan_contains_the_points_of_its_cycle() {
     let text = "time_s,speed_rpm\n0,0\n30,300\n60,0\n";
     let plan = load_cycle("", text).unwrap();
     let changed = load_cycle("", &text.replace("300", "301")).unwrap();
@@ -71,14 +71,14 @@ fn mistakes_in_a_cycle_are_reported() {
         ("time_s,speed_rpm\n0,0\n30,fast\n", "`fast` is not a number"),
         ("time_s [ms],speed_rpm\n0,0\n30,300\n", "names two units"),
     ] {
-        let refused = load_cycle("", text).unwrap_err();
-        assert!(refused.contains(part), "{part}: {refused}");
+        let refusal = load_cycle("", text).unwrap_err();
+        assert!(refusal.contains(part), "{part}: {refusal}");
     }
-    let refused = load_cycle("peak_rpm = 300\n", "time_s,speed_rpm\n0,0\n").unwrap_err();
-    assert!(refused.contains("`peak_rpm` does not belong"), "{refused}");
-    let refused = load_cycle("joints = \"round\"\n", "time_s,speed_rpm\n0,0\n").unwrap_err();
-    assert!(refused.contains("unknown joints"), "{refused}");
+    let refusal = load_cycle("peak_rpm = 300\n", "time_s,speed_rpm\n0,0\n").unwrap_err();
+    assert!(refusal.contains("`peak_rpm` does not belong"), "{refusal}");
+    let refusal = load_cycle("joints = \"round\"\n", "time_s,speed_rpm\n0,0\n").unwrap_err();
+    assert!(refusal.contains("unknown joints"), "{refusal}");
     let rows: String = (0..20_001).map(|k| format!("{k},5\n")).collect();
-    let refused = load_cycle("", &format!("time_s,speed_rpm\n{rows}")).unwrap_err();
-    assert!(refused.contains("20001 rows"), "{refused}");
+    let refusal = load_cycle("", &format!("time_s,speed_rpm\n{rows}")).unwrap_err();
+    assert!(refusal.contains("20001 rows"), "{refusal}");
 }

@@ -33,10 +33,10 @@ fn the_grid_file_may_name_the_parameters_of_columns() {
     let plan = load_list(columns, "m_u [g]\n300\n").unwrap();
     assert_eq!(plan.axis_values(0), [0.3]);
     let wrong = columns.replace("unbalance_mass_kg", "laundry");
-    let refused = load_list(&wrong, "m_u [g]\n300\n").unwrap_err();
-    assert!(refused.contains("is called `laundry`"), "{refused}");
-    let refused = load_list("[columns]\nx = 5\n", "m_u [g]\n300\n").unwrap_err();
-    assert!(refused.contains("wrong type"), "{refused}");
+    let refusal = load_list(&wrong, "m_u [g]\n300\n").unwrap_err();
+    assert!(refusal.contains("is called `laundry`"), "{refusal}");
+    let refusal = load_list("[columns]\nx = 5\n", "m_u [g]\n300\n").unwrap_err();
+    assert!(refusal.contains("wrong type"), "{refusal}");
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn a_list_without_points_or_parameters_is_refused() {
         ("", "is empty"),
         ("sep=;\n", "is empty"),
     ] {
-        let refused = load_list("", list).unwrap_err();
-        assert!(refused.contains(part), "{list}: {refused}");
+        let refusal = load_list("", list).unwrap_err();
+        assert!(refusal.contains(part), "{list}: {refusal}");
     }
 }

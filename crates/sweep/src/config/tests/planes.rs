@@ -61,19 +61,19 @@ fn loads_have_angles_and_dampers_have_stages() {
     // The text of the machine reads back to the same machine.
     let written = machine_file(&machine, &WrittenIn::default());
     assert_eq!(load(|_| written.clone()).unwrap(), machine);
-    let refused = load(|file| file + &with_angle.replace("-120", "500")).unwrap_err();
-    assert!(refused.contains("angle_deg"), "{refused}");
+    let refusal = load(|file| file + &with_angle.replace("-120", "500")).unwrap_err();
+    assert!(refusal.contains("angle_deg"), "{refusal}");
 }
 
 #[test]
 fn an_unbalance_has_either_a_plane_or_a_position() {
     let with_plane_and_position = FURTHER_UNBALANCE.replace("mass_kg", "x_m = 0.1\nmass_kg");
-    let refused = load(|file| file + &with_plane_and_position).unwrap_err();
-    assert!(refused.contains("`plane` beside `x_m`"), "{refused}");
+    let refusal = load(|file| file + &with_plane_and_position).unwrap_err();
+    assert!(refusal.contains("`plane` beside `x_m`"), "{refusal}");
     let without_position = FURTHER_UNBALANCE.replace("plane = \"front\"\n", "");
-    let refused = load(|file| file + &without_position).unwrap_err();
-    assert!(refused.contains("`x_m` is missing"), "{refused}");
+    let refusal = load(|file| file + &without_position).unwrap_err();
+    assert!(refusal.contains("`x_m` is missing"), "{refusal}");
     let with_unknown_plane = FURTHER_UNBALANCE.replace("front", "middle");
-    let refused = load(|file| file + &with_unknown_plane).unwrap_err();
-    assert!(refused.contains("unknown plane \"middle\""), "{refused}");
+    let refusal = load(|file| file + &with_unknown_plane).unwrap_err();
+    assert!(refusal.contains("unknown plane \"middle\""), "{refusal}");
 }

@@ -25,7 +25,7 @@ fn an_axis_with_a_tolerance_is_about_the_machines_number() {
     let mass = axis("drum_mass_kg", "0.5") + "[set]\ndrum_mass_kg = 8\n";
     let plan = load(&mass, &[]).unwrap();
     assert_eq!(values(&plan), [7.5, 8.0, 8.5]);
-    // The plan has the tolerance beside the values, from which it is read back.
+    // The plan has the tolerance in addition to the values, so that it can be read back.
     let json = plan.to_json();
     assert_eq!(json["axis"][0]["tolerance"], 0.5);
     assert_eq!(load(&damping, &[]).unwrap().to_json()["axis"][0]["tolerance"], "5 %");
@@ -79,14 +79,14 @@ fn wrong_tolerances_are_refused() {
         (axis("1e3", "count = 3\n"), "`drum_mass_kg` = -99"),
         (axis("true", "count = 3\n"), "wrong type"),
     ] {
-        let refused = load(&text, &[]).unwrap_err();
-        assert!(refused.contains(part), "{part}: {refused}");
+        let refusal = load(&text, &[]).unwrap_err();
+        assert!(refusal.contains(part), "{part}: {refusal}");
     }
     let axis = "[[axis]]\nparameter = \"damping_n_s_per_m\"\ntolerance = \"5 %\"\ncount = 3\n";
-    let refused = load(axis, &["damper_1_damping_n_s_per_m=90"]).unwrap_err();
-    assert!(refused.contains("has no single number"), "{refused}");
+    let refusal = load(axis, &["damper_1_damping_n_s_per_m=90"]).unwrap_err();
+    assert!(refusal.contains("has no single number"), "{refusal}");
     // A percentage of 0 is no range.
     let axis = "[[axis]]\nparameter = \"friction_n\"\ntolerance = \"5 %\"\ncount = 3\n";
-    let refused = load(axis, &[]).unwrap_err();
-    assert!(refused.contains("so is every percentage of it"), "{refused}");
+    let refusal = load(axis, &[]).unwrap_err();
+    assert!(refusal.contains("so is every percentage of it"), "{refusal}");
 }
