@@ -11,8 +11,8 @@
 //! Richardson's (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, II.4) without
 //! its extrapolation: the difference of two levels bounds the error of the finer one where the step
 //! shrinks by enough. The second term is for two levels that agree by chance: c is the contraction
-//! of the error from level to level, 1.5 where the step shrinks ([`STEP_CONTRACTION`]), and 10 where
-//! the tolerance does or another method begins ([`TOLERANCE_RATIO`]).
+//! of the error from level to level, 1.5 where the step shrinks ([`STEP_CONTRACTION`]), and 10
+//! where the tolerance does or another method begins ([`TOLERANCE_RATIO`]).
 //!
 //! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge's
 //!    mode is not capped, and limits the first step.
