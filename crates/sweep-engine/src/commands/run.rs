@@ -237,8 +237,12 @@ pub fn failure_reasons(engine: &Engine<'_>, tally: &Tally, job: &Job<'_>) -> Str
 /// Formats the values of the axes at a point.
 fn place(point: u64, job: &Job<'_>) -> String {
     let values = (job.axis_values)(point);
-    let named = job.layout.axes.iter().zip(values);
-    let words = named.map(|(axis, value)| format!("{} {}", axis.name, short(value)));
+    axis_values(job.layout.axes.iter().map(|axis| &*axis.name).zip(values))
+}
+
+/// Formats values of axes with the names of these.
+pub(super) fn axis_values<'a>(values: impl Iterator<Item = (&'a str, f64)>) -> String {
+    let words = values.map(|(axis, value)| format!("{axis} {}", short(value)));
     words.collect::<Vec<_>>().join(", ")
 }
 
@@ -261,7 +265,11 @@ fn share(tally: &Tally) -> String {
 /// words.
 pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
-    let percent = |count: u64| 100.0 * count as f64 / tally.points.max(1) as f64;
+    // The share of rows that have a verdict, as `share(reliable)` counts them.
+    let percent = |count: u64| {
+        let judged = tally.reliable + tally.unreliable;
+        100.0 * count as f64 / judged.max(1) as f64
+    };
     let most = limits.most;
     let range = limits.least.map_or_else(
         || format!("below ratio {most}"),
@@ -270,7 +278,8 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
     let Tally { reliable, unreliable, undefined, over_estimated, sensitive, unconverged, .. } =
         tally;
     let share = percent(*reliable);
-    let others = format!("{unreliable} not, {undefined} undefined");
+    let uncounted = if *undefined > 0 { ", which the share leaves out" } else { "" };
+    let others = format!("{unreliable} not, {undefined} undefined{uncounted}");
     text.line("reliable", format!("{reliable} ({share:.1} %) {range}, {others}"));
     if *over_estimated > 0 {
         let share = percent(*over_estimated);
@@ -333,6 +342,25 @@ mod tests {
     use super::*;
     use crate::store::read::Extreme;
     use sweep_parameter::Worse;
+
+    #[test]
+    fn shares_are_of_the_rows_with_a_verdict() {
+        let tally = Tally {
+            points: 16,
+            reliable: 6,
+            unreliable: 2,
+            undefined: 8,
+            over_estimated: 4,
+            ..Tally::default()
+        };
+        let summary = counts(&tally, 2.0.into(), &|_| String::new());
+        let line = "reliable  6 (75.0 %) below ratio 2, 2 not, 8 undefined, which the share leaves \
+                    out\n";
+        assert!(summary.contains(line), "{summary}");
+        assert!(summary.contains("too high  in 4 (50.0 %)"), "{summary}");
+        let share = share(&tally);
+        assert!(share.starts_with("75.0 %"), "{share}");
+    }
 
     #[test]
     fn an_infinite_error_is_left_out() {
