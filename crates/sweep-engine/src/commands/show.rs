@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::run::counts;
+use super::boundary::limit_in_words;
+use super::run::{axis_values, counts};
 use super::{Lines as _, clipped, conditions, short, span, table, word};
 use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, overview, tally};
 use crate::store::{Holder, Unfinished, refuse_unfinished, unfinished};
@@ -124,9 +125,7 @@ pub fn run(args: &ShowArgs, further: &Further<'_>) -> Result<Exit, Error> {
             let at = |point| {
                 let place = places.iter().find(|(known, _)| *known == point);
                 place.map_or(String::new(), |(_, values)| {
-                    let said =
-                        values.iter().map(|(axis, value)| format!("{axis} {}", short(*value)));
-                    said.collect::<Vec<_>>().join(", ")
+                    axis_values(values.iter().map(|(axis, value)| (axis.as_str(), *value)))
                 })
             };
             text.push_str(&counts(&tally, limits, &at));
@@ -139,7 +138,7 @@ pub fn run(args: &ShowArgs, further: &Further<'_>) -> Result<Exit, Error> {
             if let Some(traced) = opened.json(key::BOUNDARY) {
                 let quantity = traced["quantity"].as_str().unwrap_or("unknown");
                 let limit = traced["limit"].as_f64().map_or("unknown".to_owned(), short);
-                text.line("boundary", format!("where {quantity} = {limit}"));
+                text.line("boundary", limit_in_words(quantity, limit));
             }
         }
     }
