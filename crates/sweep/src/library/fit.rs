@@ -34,7 +34,7 @@ pub fn fit_tables(
         cases.push(fit::case(grid, &constants, measured)?);
     }
     let cancel = Cancel::Flag(effort.interrupt.flag());
-    let work = FitWork { cancel, seen: &|_| {}, output: None, fresh: false };
+    let work = FitWork { cancel, count_evaluations: &|_| {}, output: None, fresh: false };
     let found = threads::pool(effort.threads()?)?.install(|| fit::fit(cases, options, &work))?;
     Ok(found.map(|fitted| Explained { found: json!(fitted.report), text: fitted.report.text() }))
 }
