@@ -424,6 +424,18 @@ fn exports_overwrite_only_files_of_the_same_kind() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_refused_temporary_file_of_an_export_is_a_failure_of_the_system() {
+    let test_folder = folder_with_map();
+    let mut command = test_folder.under(&[]);
+    command.args(["export", MAP, "m.xlsx"]).env("TMPDIR", test_folder.path("missing"));
+    let refused = command.output().expect("the command starts");
+    assert_eq!(exit_code(&refused), Some(1), "{}", all_output(&refused));
+    let text = all_output(&refused);
+    assert!(text.contains("cannot write a temporary file to export"), "{text}");
+}
+
+#[test]
 fn trace_selects_a_point_by_number_or_the_worst_one() {
     let test_folder = folder_with_map();
     let traced = test_folder.sweep(&["trace", "g.toml", "--point", "3", "--out", "t.parquet"]);

@@ -62,7 +62,7 @@ fn every_motion_of_a_held_speed_has_a_row() {
     let drawn = sweep(&folder, &["plot", file, "--at", at, "-o", "a.svg"], None);
     assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
     let picture = fs::read_to_string(folder.path().join("a.svg")).expect("it is there");
-    assert!(picture.contains("ends in: two frequencies"));
+    assert!(picture.contains("motion at a held speed: two frequencies"));
 }
 
 #[test]

@@ -141,7 +141,10 @@ impl Error {
             Self::Store(StoreError::Busy { .. }) => return Exit::Busy,
             Self::Store(error) => error.is_refusal(),
             Self::Threads(error) => error.is_refusal(),
-            Self::File { .. } | Self::Stdout(_) | Self::Plot(PlotError::Drawing(_)) => false,
+            Self::File { .. }
+            | Self::Stdout(_)
+            | Self::Plot(PlotError::Drawing(_))
+            | Self::Results(ResultsError::TemporaryFile { .. }) => false,
             _ => true,
         };
         if is_refusal { Exit::BadInput } else { Exit::Failed }
@@ -259,6 +262,9 @@ mod tests {
         assert_eq!(io("open", io::ErrorKind::NotFound), Exit::BadInput);
         assert_eq!(io("open", io::ErrorKind::Other), Exit::Failed);
         assert_eq!(io("write", io::ErrorKind::PermissionDenied), Exit::Failed);
+        let path = PathBuf::from("x.parquet");
+        let error = ResultsError::TemporaryFile { path, reason: "disk full".to_owned() };
+        assert_eq!(Error::from(error).exit(), Exit::Failed);
         let error = FileError::damaged(&PathBuf::from("x.parquet"));
         assert_eq!(Error::Plot(error.into()).exit(), Exit::BadInput);
     }

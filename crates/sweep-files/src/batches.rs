@@ -6,13 +6,17 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use arrow_array::types::{ArrowPrimitiveType, Float64Type, Int32Type, Int64Type, UInt64Type};
+use arrow_array::types::{
+    ArrowPrimitiveType, Float64Type, Int32Type, Int64Type, Time64MicrosecondType,
+    Time64NanosecondType, TimestampMicrosecondType, TimestampMillisecondType,
+    TimestampNanosecondType, UInt64Type,
+};
 use arrow_array::{
     ArrayRef, BooleanArray, DictionaryArray, Int32Array, PrimitiveArray, RecordBatch,
     RecordBatchOptions, StringArray,
 };
-use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
-use parquet::basic::{ConvertedType, Repetition, Type};
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef, TimeUnit};
+use parquet::basic::{ConvertedType, LogicalType, Repetition, TimeUnit as DeclaredUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArrayType, DataType as Physical};
 use parquet::errors::ParquetError;
@@ -37,6 +41,18 @@ const MAX_WORD_BYTES: usize = 1 << 30;
 /// Returns the columns of a file. A column of a type that is not supported, such as a group or a
 /// time, has the type [`DataType::Null`].
 pub fn schema(file: &ParquetMetaData) -> SchemaRef {
+    described_schema(file, |_| None)
+}
+
+/// Returns the columns of a file like [`schema`], and supports instants and times of day.
+pub fn schema_with_clocks(file: &ParquetMetaData) -> SchemaRef {
+    described_schema(file, clock_type)
+}
+
+fn described_schema(
+    file: &ParquetMetaData,
+    clock_type: impl Fn(&Declared) -> Option<DataType>,
+) -> SchemaRef {
     let about = file.file_metadata();
     let pairs = about.key_value_metadata().into_iter().flatten();
     let described =
@@ -50,7 +66,8 @@ pub fn schema(file: &ParquetMetaData) -> SchemaRef {
         });
         let described: HashMap<String, String> = described.collect();
         let is_nullable = declared.get_basic_info().repetition() != Repetition::REQUIRED;
-        Field::new(declared.name(), data_type(declared), is_nullable).with_metadata(described)
+        let data_type = clock_type(declared).unwrap_or_else(|| data_type(declared));
+        Field::new(declared.name(), data_type, is_nullable).with_metadata(described)
     });
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
@@ -88,6 +105,36 @@ fn data_type(declared: &Declared) -> DataType {
             DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into())
         }
         _ => DataType::Null,
+    }
+}
+
+/// Returns the type of a column of instants or of times of day in units of 64 bits. Instants are
+/// read without their time zone.
+fn clock_type(declared: &Declared) -> Option<DataType> {
+    let about = declared.get_basic_info();
+    let is_plain = !declared.is_group() && about.repetition() != Repetition::REPEATED;
+    if !is_plain || declared.get_physical_type() != Type::INT64 {
+        return None;
+    }
+    let unit = match (about.logical_type_ref(), about.converted_type()) {
+        (Some(LogicalType::Timestamp(time) | LogicalType::Time(time)), _) => match time.unit {
+            DeclaredUnit::MILLIS => TimeUnit::Millisecond,
+            DeclaredUnit::MICROS => TimeUnit::Microsecond,
+            DeclaredUnit::NANOS => TimeUnit::Nanosecond,
+        },
+        (None, ConvertedType::TIMESTAMP_MILLIS) => TimeUnit::Millisecond,
+        (None, ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS) => {
+            TimeUnit::Microsecond
+        }
+        _ => return None,
+    };
+    let is_of_day = matches!(about.logical_type_ref(), Some(LogicalType::Time(_)))
+        || about.converted_type() == ConvertedType::TIME_MICROS;
+    match (is_of_day, unit) {
+        (false, unit) => Some(DataType::Timestamp(unit, None)),
+        // Times of day in milliseconds have 32 bits.
+        (true, TimeUnit::Millisecond) => None,
+        (true, unit) => Some(DataType::Time64(unit)),
     }
 }
 
@@ -200,7 +247,7 @@ fn array(
         Reader::Int64ColumnReader(column) if is_unsigned => {
             numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned())
         }
-        Reader::Int64ColumnReader(column) => numbers::<_, Int64Type>(column, rows, |cell| cell),
+        Reader::Int64ColumnReader(column) => integers(column, data_type, rows),
         Reader::FloatColumnReader(column) => numbers::<_, Float64Type>(column, rows, f64::from),
         Reader::DoubleColumnReader(column) => numbers::<_, Float64Type>(column, rows, |cell| cell),
         Reader::ByteArrayColumnReader(column) => words(column, rows),
@@ -228,6 +275,27 @@ fn read<T: Physical>(
 fn cells<T>((levels, values): (Vec<i16>, Vec<T>)) -> impl Iterator<Item = Option<T>> {
     let mut values = values.into_iter();
     levels.into_iter().map(move |level| if level == 1 { values.next() } else { None })
+}
+
+/// Reads integers as numbers, instants or times of day.
+fn integers(
+    column: &mut ColumnReaderImpl<parquet::data_type::Int64Type>,
+    data_type: &DataType,
+    rows: usize,
+) -> Result<ArrayRef, ParquetError> {
+    macro_rules! read_as {
+        ($type:ty) => {
+            numbers::<_, $type>(column, rows, |cell| cell)
+        };
+    }
+    match data_type {
+        DataType::Timestamp(TimeUnit::Millisecond, _) => read_as!(TimestampMillisecondType),
+        DataType::Timestamp(TimeUnit::Microsecond, _) => read_as!(TimestampMicrosecondType),
+        DataType::Timestamp(TimeUnit::Nanosecond, _) => read_as!(TimestampNanosecondType),
+        DataType::Time64(TimeUnit::Microsecond) => read_as!(Time64MicrosecondType),
+        DataType::Time64(TimeUnit::Nanosecond) => read_as!(Time64NanosecondType),
+        _ => read_as!(Int64Type),
+    }
 }
 
 fn numbers<T: Physical, A: ArrowPrimitiveType>(

@@ -3,11 +3,12 @@
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
-    UInt32Type, UInt64Type,
+    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, Time64MicrosecondType,
+    Time64NanosecondType, TimestampMicrosecondType, TimestampMillisecondType,
+    TimestampNanosecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, BooleanArray, StringArray, TypedDictionaryArray};
-use arrow_schema::{ArrowError, DataType};
+use arrow_schema::{ArrowError, DataType, TimeUnit};
 
 fn unreadable(array: &dyn Array, wanted: &str) -> ArrowError {
     ArrowError::SchemaError(format!("expected a column of {wanted}, found {}", array.data_type()))
@@ -42,6 +43,47 @@ pub fn numbers(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> {
 /// Whether [`numbers`] can read a column of this type.
 pub fn is_number(data_type: &DataType) -> bool {
     data_type.is_integer() || matches!(data_type, DataType::Float64 | DataType::Float32)
+}
+
+/// Reads instants as seconds since 1970, or times of day as seconds since midnight, one per row.
+///
+/// # Errors
+/// [`ArrowError::SchemaError`] if the column has another type.
+pub fn clock_seconds(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> {
+    macro_rules! in_seconds {
+        ($type:ty, $units:literal) => {
+            // Whole seconds come first, because instants in ns have more digits than a number.
+            array
+                .as_primitive::<$type>()
+                .iter()
+                .map(|cell| {
+                    let cell = cell?;
+                    let part = cell.rem_euclid($units) as f64 / $units as f64;
+                    Some(cell.div_euclid($units) as f64 + part)
+                })
+                .collect()
+        };
+    }
+    Ok(match array.data_type() {
+        DataType::Timestamp(TimeUnit::Millisecond, _) => {
+            in_seconds!(TimestampMillisecondType, 1_000)
+        }
+        DataType::Timestamp(TimeUnit::Microsecond, _) => {
+            in_seconds!(TimestampMicrosecondType, 1_000_000)
+        }
+        DataType::Timestamp(TimeUnit::Nanosecond, _) => {
+            in_seconds!(TimestampNanosecondType, 1_000_000_000)
+        }
+        DataType::Time64(TimeUnit::Microsecond) => in_seconds!(Time64MicrosecondType, 1_000_000),
+        DataType::Time64(TimeUnit::Nanosecond) => in_seconds!(Time64NanosecondType, 1_000_000_000),
+        _ => return Err(unreadable(array, "instants or times of day")),
+    })
+}
+
+/// Whether [`clock_seconds`] can read a column of this type, which is one of
+/// [`batches::schema_with_clocks`](crate::batches::schema_with_clocks).
+pub fn is_clock(data_type: &DataType) -> bool {
+    matches!(data_type, DataType::Timestamp(..) | DataType::Time64(_))
 }
 
 /// Reads truth values, one per row.

@@ -82,6 +82,11 @@ pub fn split_model(name: &str) -> (String, &'static str) {
     (words.join(" "), model.unwrap_or(""))
 }
 
+/// Returns the condition, as the user typed it, if a traced quantity is its margin.
+pub fn condition(quantity: &str) -> Option<&str> {
+    quantity.strip_prefix("margin(")?.strip_suffix(')')
+}
+
 /// Returns the name of a result's column in words, without unit and model: `nonlinear_body_front_y`
 /// is "Body front, vertical".
 pub fn quantity_in_words(name: &str) -> String {

@@ -281,6 +281,27 @@ fn a_boundary_is_drawn_with_its_bracket() {
 }
 
 #[test]
+fn a_boundary_by_a_condition_has_the_words_of_the_user() {
+    let figure = |quantity: &str, limit: f64| {
+        let settings =
+            format!(r#"{{"quantity": "{quantity}", "limit": {limit}, "worse": "less"}}"#);
+        draw_svg(boundary().with_metadata("sweep.boundary", &settings), &PlotOptions::default())
+    };
+    let by_condition = figure("margin(ratio_max / 2 != 1 and nonlinear_tub_yaw != 0)", 0.0);
+    for text in [">Where ratio_max", "nonlinear_tub_yaw != 0<", ">boundary: limit of ratio_max"] {
+        assert!(by_condition.contains(text), "{text}: {by_condition}");
+    }
+    let by_expression = figure("ratio_max / nonlinear_tub_yaw", 1.5);
+    for text in [
+        ">Where ratio_max / nonlinear_tub_yaw = 1.5<",
+        ">boundary: ratio_max / nonlinear_tub_yaw = 1.5, bracket shaded<",
+    ] {
+        assert!(by_expression.contains(text), "{text}: {by_expression}");
+    }
+    assert!(figure("nonlinear_tub_yaw", 1.5).contains(">Where tub yaw, nonlinear model = 1.5<"));
+}
+
+#[test]
 fn a_png_is_twice_the_size_of_its_figure() {
     let image = draw(map(), &PlotOptions::default(), "a.png").unwrap();
     assert_eq!(&image[..8], b"\x89PNG\r\n\x1a\n");

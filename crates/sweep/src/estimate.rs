@@ -58,6 +58,10 @@ const RESULT_COLUMN_BYTES: f64 = 800.0;
 /// points with 36 columns. Doubling it doubles the disk that small chunks are said to take.
 const PART_COLUMN_BYTES: f64 = 300.0;
 
+/// The estimated time (s) of work above which a command says what makes it shorter. Basis: a user's
+/// patience. Doubling it lets more users wait who need not.
+pub(crate) const LONG_WORK_S: f64 = 180.0;
+
 /// Estimates the cost of a run on a number of threads: it integrates some points of the plan, for a
 /// few seconds at most, and extrapolates.
 ///

@@ -16,10 +16,13 @@ use washer_model::{
 };
 
 use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
+use crate::estimate::LONG_WORK_S;
 use crate::plan::{self, Plan, Scenario, compared_channels};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
-use sweep_engine::{Error, Execution, Interrupt, Progress, RunContext, threads};
+use sweep_engine::{
+    Error, Execution, Interrupt, Progress, ProgressMode, RunContext, duration, tell, threads,
+};
 
 pub(crate) use cause::Cause;
 use sweep_parameter::RatioLimits;
@@ -36,6 +39,14 @@ const STEP_RPM: f64 = 1.0;
 /// `--speed` gives another. Basis: parametric resonances of a mode of frequency f are at 2 f / k,
 /// and this is the fourth. Doubling it leaves out the third and the fourth.
 const LOWEST_SPEED: f64 = 0.5;
+
+/// Greatest time of the whole work, as a multiple of the scan's. Basis: 2.4 for the machine of
+/// docs/examples/friction.toml at 0.4 kg. Doubling it doubles the announced time.
+const WORK_AFTER_SCAN: f64 = 3.0;
+
+/// Time (s) of work from which on it is announced. Basis: a user does not wonder before. Doubling
+/// it announces less.
+const NOTICED_S: f64 = 10.0;
 
 /// The tongues of a point, and their part in its verdict.
 pub(crate) struct Explanation {
@@ -119,7 +130,7 @@ fn explain_in_pool(
     plan: &Plan,
     at: NamedValues,
     speeds: Option<Speeds>,
-    Execution { progress, interrupt, .. }: Execution<'_>,
+    Execution { progress: progress_mode, interrupt, .. }: Execution<'_>,
 ) -> Result<Explanation, Error> {
     let simd = simd_from_environment()?;
     let scenario = plan.scenario(0);
@@ -132,7 +143,7 @@ fn explain_in_pool(
     let speed_count = |direction: &TurningDirection| direction.scanned.values().len() as u64;
     let total: u64 = directions.iter().map(speed_count).sum();
     let done = AtomicU64::new(0);
-    let progress = Progress::for_search(progress, total, "speeds looked at", 0);
+    let progress = Progress::for_search(progress_mode, total, "speeds looked at", 0);
     let count_speeds = |speeds: usize| {
         let done = done.fetch_add(speeds as u64, Ordering::Relaxed) + speeds as u64;
         progress.show_search(done.min(total), done);
@@ -152,6 +163,16 @@ fn explain_in_pool(
         };
         finder.follow(direction.scanned.to.max(direction.fastest_rpm));
         finders.push(finder);
+    }
+    if progress_mode != ProgressMode::None {
+        let scans = finders.iter().zip(&directions);
+        let thread_s: f64 = scans
+            .map(|(finder, direction)| {
+                speed_count(direction) as f64 * finder.seconds_per_speed(direction.scanned)
+            })
+            .sum();
+        let scan_s = thread_s / rayon::current_num_threads() as f64;
+        announcement(total, scan_s).iter().for_each(|line| tell(line));
     }
     let scan = || {
         finders
@@ -201,6 +222,25 @@ fn explain_in_pool(
         cause,
         swept,
     })
+}
+
+/// Returns the time of a scan over a number of speeds, if a user notices it, and what makes a long
+/// one shorter.
+fn announcement(speeds: u64, scan_s: f64) -> Option<String> {
+    let whole_s = WORK_AFTER_SCAN * scan_s;
+    if whole_s < NOTICED_S {
+        return None;
+    }
+    let scan = duration(scan_s);
+    let whole = duration(whole_s);
+    let mut text = format!(
+        "{speeds} speeds take about {scan}; the edges, endings and remedies of unstable bands may \
+         add to {whole}"
+    );
+    if whole_s > LONG_WORK_S {
+        text += "\nit is shorter with fewer speeds (--speed FROM:TO:STEP)";
+    }
+    Some(text)
 }
 
 /// A direction in which the drum turns in a run. A machine that turns backwards moves like its
@@ -365,4 +405,22 @@ fn find_crossings(
         });
     }
     (passages, peaks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_scan_is_announced_with_what_makes_it_shorter() {
+        assert_eq!(announcement(20, 1.0), None);
+        let text = announcement(296, 25.0).expect("it is noticed");
+        assert_eq!(
+            text,
+            "296 speeds take about 25 s; the edges, endings and remedies of unstable bands may add \
+             to 1 min 15 s"
+        );
+        let text = announcement(296, 3600.0).expect("it is noticed");
+        assert!(text.contains("3 h 00 min\n") && text.contains("--speed FROM:TO:STEP"), "{text}");
+    }
 }

@@ -1,9 +1,9 @@
-//! `sweep fit`: the numbers that make the model follow a measurement, how well they are known, and
-//! what the map says of that machine.
+//! `sweep fit`: the numbers with which the model follows a measurement, their errors, and the
+//! verdict of the fitted machine.
 //!
 //! `measured`, `pulses` and `speed` read a measurement. `model` compares it with the model and its
-//! derivatives, `search` finds the least cost, `statistics` says how well the numbers are known,
-//! and `report` holds all of it. `evaluations` keeps what a fit has found out.
+//! derivatives, `search` finds the least cost, `statistics` computes the errors of the fitted
+//! numbers, and `report` holds the results. `evaluations` stores the evaluations of a fit.
 
 mod algebra;
 mod curves;
@@ -37,23 +37,27 @@ use sweep_engine::{Design, Diagnostics, Distribution, Error};
 
 use algebra::Symmetric;
 pub(crate) use evaluations::Evaluations;
-use known::Known;
+use known::FixedNumbers;
 pub(crate) use measured::Measurement;
 use measured::REST_SPEED_RATIO;
 pub(crate) use model::FitCase;
-use model::{Against, Free, Problem, Summary};
+use model::{FreeParameter, NormalEquations, Problem, SignalComparison};
 pub(crate) use report::FitReport;
 use search::{Descent, DescentEnd, MAX_EVALUATIONS, descend};
 use statistics::Statistics;
 
-/// Shares of a start between which further starts lie, where no range is given.
-const AROUND: [f64; 2] = [0.3, 1.7];
-/// Starts from which a descent begins, of all that are looked at.
-const DESCENTS: usize = 3;
-/// Seed of all draws.
+/// The range of further starts without a given range, as parts of the first start. Basis: a data
+/// sheet is seldom wrong by more. Doubling the width tries more distant minima with fewer starts
+/// near the first.
+const START_RANGE: [f64; 2] = [0.3, 1.7];
+/// The greatest number of starts from which a descent begins: those with the least cost. Basis: the
+/// test data have two minima. Doubling it doubles the time of a fit with `--starts`.
+const MAX_DESCENTS: usize = 3;
+/// The seed of all draws.
 const SEED: u64 = 1;
-/// Half the step may move no number by more than this share of its standard error.
-const STEP_EFFECT: f64 = 0.3;
+/// The greatest change of a number by half the step, in standard errors. Basis: it adds some five
+/// percent to an error. Doubling it adds four times as much.
+const MAX_STEP_EFFECT: f64 = 0.3;
 /// The greatest number of halvings of the step. Basis: test `reference_data_lead_to_the_truth`
 /// needs none. Doubling it makes a fit that needs them four times as long.
 const HALVINGS: usize = 2;
@@ -112,13 +116,13 @@ impl FitOptions {
     }
 }
 
-/// A fit that was made.
+/// A finished fit.
 pub(crate) struct Fitted<'a> {
     pub(crate) problem: Problem<'a>,
     pub(crate) x: Vec<f64>,
-    against: Vec<Against>,
+    against: Vec<SignalComparison>,
     pub(crate) report: FitReport,
-    /// The evaluations that it keeps until its machine file is in place.
+    /// The stored evaluations, which are deleted once the machine file is written.
     pub(crate) evaluations: Option<Evaluations>,
 }
 
@@ -126,18 +130,18 @@ pub(crate) struct Fitted<'a> {
 pub(crate) struct FitWork<'a> {
     /// The cancellation. The result of a cancelled fit means nothing.
     pub(crate) cancel: Cancel<'a>,
-    /// The listener that is called after every evaluation with their number.
-    pub(crate) seen: &'a (dyn Fn(usize) + Sync),
-    /// The machine file beside which evaluations are kept.
+    /// A function that is called after every evaluation with the number of evaluations.
+    pub(crate) count_evaluations: &'a (dyn Fn(usize) + Sync),
+    /// The machine file beside which evaluations are stored.
     pub(crate) output: Option<&'a Path>,
-    /// Whether to discard evaluations that are kept.
+    /// Whether to discard stored evaluations.
     pub(crate) fresh: bool,
 }
 
 /// Prepares a case of a fit: a measurement with the grid and its own constants.
 ///
 /// # Errors
-/// Mistakes in the grid and the constants. An axis without a constant stands at its middle.
+/// Returns mistakes in the grid and the constants. An axis without a constant has its middle value.
 pub(crate) fn case(
     grid: &WasherGridInput,
     constants: &[String],
@@ -152,7 +156,8 @@ pub(crate) fn case(
 /// Returns the middle value of every axis that has several values and no constant, as NAME=VALUE.
 fn middle(grid: &WasherGridInput, constants: &[String]) -> Result<Vec<String>, Diagnostics> {
     let plan = grid.load()?;
-    let is_given = |name: &str| constants.iter().any(|it| it.split('=').next() == Some(name));
+    let is_given =
+        |name: &str| constants.iter().any(|constant| constant.split('=').next() == Some(name));
     let several =
         plan.axes.iter().filter(|axis| axis.values.len() > 1 && !is_given(&axis.parameter.name));
     let value = |axis: &crate::plan::Axis| {
@@ -162,32 +167,36 @@ fn middle(grid: &WasherGridInput, constants: &[String]) -> Result<Vec<String>, D
     Ok(several.map(value).collect())
 }
 
-/// Reads the free numbers.
-fn free(options: &FitOptions, cases: &[FitCase]) -> Result<Vec<Free>, Diagnostics> {
+/// Reads the free parameters.
+fn free_parameters(
+    options: &FitOptions,
+    cases: &[FitCase],
+) -> Result<Vec<FreeParameter>, Diagnostics> {
     let mistakes = Mistakes::default();
-    let mut found: Vec<Free> = Vec::new();
+    let mut free: Vec<FreeParameter> = Vec::new();
     let shared = options.free.iter().map(|text| (text, "--free", &cases[..1]));
     let own = options.own.iter().map(|text| (text, "--own", cases));
     for (text, option, cases) in shared.chain(own) {
-        let at = Location::new(mistakes.add(option, text.as_str()), 0..text.len());
+        let location = Location::new(mistakes.add(option, text.as_str()), 0..text.len());
         for (k, case) in cases.iter().enumerate() {
-            let known: &[Free] = if cases.len() == 1 { &found } else { &[] };
-            let Some(free) = free_number(text, case, known, (&at, &mistakes)) else { break };
-            found.push(Free { case: (option == "--own").then_some(k), ..free });
+            let known: &[FreeParameter] = if cases.len() == 1 { &free } else { &[] };
+            let Some(read) = free_parameter(text, case, known, (&location, &mistakes)) else {
+                break;
+            };
+            free.push(FreeParameter { case: (option == "--own").then_some(k), ..read });
         }
     }
-    mistakes.finish(Some(found))
+    mistakes.finish(Some(free))
 }
 
-/// Reads a free parameter of a case, in addition to those already read, and reports what is wrong
-/// with it.
-fn free_number(
+/// Reads a free parameter of a case, in addition to `known` ones, and reports its mistakes.
+fn free_parameter(
     text: &str,
     case: &FitCase,
-    known: &[Free],
-    (at, mistakes): (&Location, &Mistakes),
-) -> Option<Free> {
-    let refuse = |title: String, expected: &str| mistakes.refuse(at, title, expected);
+    known: &[FreeParameter],
+    (location, mistakes): (&Location, &Mistakes),
+) -> Option<FreeParameter> {
+    let refuse = |title: String, expected: &str| mistakes.refuse(location, title, expected);
     let (name, range) = match text.split_once('=') {
         Some((name, range)) => (name.trim(), Some(range)),
         None => (text.trim(), None),
@@ -202,7 +211,7 @@ fn free_number(
         Err(error) => {
             let known = MachineParameter::all(machine, spin);
             let title = format!("`{name}` cannot be fitted: {error}");
-            let refusal = Diagnostic::new(title).at(at, "expected a parameter");
+            let refusal = Diagnostic::new(title).at(location, "expected a parameter");
             mistakes.push(refusal.nearest(name, known.iter().map(|known| known.name())));
             return None;
         }
@@ -221,7 +230,7 @@ fn free_number(
         let expected = "expected NAME=FROM:TO with FROM below TO, both allowed";
         return refuse(format!("`{text}` is no range"), expected);
     };
-    let value = parameter.get(machine, spin).filter(|it| (range[0]..=range[1]).contains(it));
+    let value = parameter.get(machine, spin).filter(|value| (range[0]..=range[1]).contains(value));
     let start = match value {
         _ if parsed.is_some() => Some(value.unwrap_or(0.5 * (range[0] + range[1]))),
         value => value.filter(|value| *value != 0.0),
@@ -231,32 +240,33 @@ fn free_number(
         let is = if value.is_some() { "is 0" } else { "differs from part to part" };
         return refuse(format!("`{name}` {is}: there is no value to start from"), expected);
     };
-    Some(Free { parameter, range, start, case: None })
+    Some(FreeParameter { parameter, range, start, case: None })
 }
 
-/// Fits; `None` if it was stopped. On all threads of the rayon pool it is called in.
+/// Fits the free parameters on all threads of the current rayon pool; `None` after a cancellation.
 ///
 /// # Errors
-/// Mistakes in the options; data that cannot tell; a model that does not get through.
+/// Returns mistakes in the options, and errors for data that do not depend on a parameter and for a
+/// model whose trajectory fails.
 pub(crate) fn fit<'a>(
     cases: Vec<FitCase>,
     options: &FitOptions,
     work: &FitWork<'a>,
 ) -> Result<Option<Fitted<'a>>, Error> {
-    match fitted(cases, options, work) {
+    match run_fit(cases, options, work) {
         Ok(fitted) => Ok(Some(fitted)),
         Err(DescentEnd::Stopped) => Ok(None),
         Err(DescentEnd::Refused(error)) => Err(error),
     }
 }
 
-fn fitted<'a>(
+fn run_fit<'a>(
     cases: Vec<FitCase>,
     options: &FitOptions,
     work: &FitWork<'a>,
 ) -> Result<Fitted<'a>, DescentEnd> {
-    let free = free(options, &cases)?;
-    let known = Known::read(&options.known, &cases[0], &free)?;
+    let free = free_parameters(options, &cases)?;
+    let known = FixedNumbers::read(&options.known, &cases[0], &free)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
     let model = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
     let simd = simd_from_environment()?;
@@ -267,77 +277,92 @@ fn fitted<'a>(
     let unknowns = problem.unknowns() + problem.signals().count();
     if unknowns >= samples {
         let expected = "expected more samples, or fewer `--free`";
-        let said = format!("{unknowns} unknowns for {samples} samples: {expected}");
-        return Err(Error::Refused(said).into());
+        let message = format!("{unknowns} unknowns for {samples} samples: {expected}");
+        return Err(Error::Refused(message).into());
     }
     for case in &problem.cases {
         let rpm = case.first_rpm().unwrap_or_default();
         if rpm.abs() > REST_SPEED_RATIO * case.greatest_rpm() {
             let unknown = "where its unbalance was then is not known: expected the record from \
                            rest on";
-            let said = format!("{} begins at {rpm:.0} rpm, and {unknown}", case.measured.name);
-            return Err(Error::Refused(said).into());
+            let message = format!("{} begins at {rpm:.0} rpm, and {unknown}", case.measured.name);
+            return Err(Error::Refused(message).into());
         }
     }
     let open = |output| Evaluations::open(output, &problem, work.fresh);
-    let kept = work.output.map(open).transpose()?;
-    let made = AtomicUsize::new(0);
-    let search = MinimumSearch { problem: &problem, kept: kept.as_ref(), work, made: &made };
-    let minima = search.minima(u64::from(options.starts));
-    kept.as_ref().map_or(Ok(()), Evaluations::write)?;
+    let stored = work.output.map(open).transpose()?;
+    let evaluations_made = AtomicUsize::new(0);
+    // A search in a wrong unit takes long and comes to nothing.
+    let mut suspicions = units::suspicions(&problem)?;
+    let is_suspect = suspicions.iter().any(Option::is_some);
+    let search = MinimumSearch {
+        problem: &problem,
+        stored: stored.as_ref(),
+        work,
+        evaluations_made: &evaluations_made,
+        max_evaluations: if is_suspect { units::TRIAL_EVALUATIONS } else { MAX_EVALUATIONS },
+    };
+    let starts = u64::from(options.starts);
+    let mut minima = search.minima(starts);
+    let is_explained = |minima: &Vec<Descent>| {
+        minima.first().is_some_and(|best| units::is_explained(&problem, best))
+    };
+    if is_suspect && minima.as_ref().is_ok_and(is_explained) {
+        minima = MinimumSearch { max_evaluations: MAX_EVALUATIONS, ..search }.minima(starts);
+    }
+    stored.as_ref().map_or(Ok(()), Evaluations::write)?;
     let mut minima = minima?;
     let mut best = minima.first().cloned().ok_or_else(no_answer)?;
     let mut step_effect = None;
-    // A step too long for the forces' corners shows in the numbers: then it is halved.
+    // A step that is too long for the corners of forces changes the numbers; then it is halved.
     for _ in 0..=HALVINGS {
         let Method::Rk4 { step_s } = problem.method else { break };
         if !best.is_settled {
             break;
         }
-        let against = problem.against(&best.x).ok_or(DescentEnd::Stopped)?;
+        let against = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
         problem.method = Method::Rk4 { step_s: 0.5 * step_s };
-        let finer = problem.against(&best.x).ok_or(DescentEnd::Stopped)?;
+        let finer = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
         let bread = algebra::inverse(&best.summary.normal);
-        let moved = effect(&bread, &best.summary, &against, &finer);
-        let moved = moved.into_iter().fold(0.0, f64::max);
-        step_effect = Some(moved);
-        if moved < STEP_EFFECT {
+        let changes = effect(&bread, &best.summary, &against, &finer);
+        let greatest_change = changes.into_iter().fold(0.0, f64::max);
+        step_effect = Some(greatest_change);
+        if greatest_change < MAX_STEP_EFFECT {
             problem.method = Method::Rk4 { step_s };
             break;
         }
-        let search = MinimumSearch { problem: &problem, kept: None, work, made: &made };
+        let search = MinimumSearch::further(&problem, work, &evaluations_made);
         best = search.from(&best.x)?.ok_or_else(no_answer)?;
         minima[0] = best.clone();
     }
-    let evaluations = made.load(Ordering::Relaxed);
-    let against = problem.against(&best.x).ok_or(DescentEnd::Stopped)?;
-    // A wrong unit may lead numbers so far away that only the start shows it.
-    let at_start = problem.against(&problem.start()).unwrap_or_else(|| against.clone());
-    let mut statistics = Statistics::of(&problem, &against, &best.summary);
-    let further = by_tachometer(&problem, &best, &against);
-    statistics::add(&mut statistics.covariance, &further, 1.0);
+    let evaluations = evaluations_made.load(Ordering::Relaxed);
+    let against = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
+    // A wrong unit may change the numbers so much that only the start shows the unit.
+    let at_start = problem.compare(&problem.start()).unwrap_or_else(|| against.clone());
+    let mut statistics = Statistics::at_end(&problem, &against, &best.summary);
+    let by_tachometer = covariance_by_tachometer(&problem, &best, &against);
+    statistics::add(&mut statistics.covariance, &by_tachometer, 1.0);
     if problem.model == ModelKind::Linear {
-        // The numbers may make up for what the linear model lacks and leave no residual.
+        // The numbers may compensate for the terms that the linear model lacks, without a residual.
         problem.model = ModelKind::Nonlinear;
         statistics.bias = problem
-            .against(&best.x)
+            .compare(&best.x)
             .map(|nonlinear| effect(&statistics.covariance, &best.summary, &against, &nonlinear));
         problem.model = ModelKind::Linear;
     }
-    let mut repeated = None;
+    let mut resampled = None;
     if options.bootstrap > 0 && best.is_settled {
-        repeated = Some(bootstrap(&mut problem, &best.x, &against, options.bootstrap, work)?);
+        resampled = Some(bootstrap(&mut problem, &best.x, &against, options.bootstrap, work)?);
     }
     if best.is_settled && statistics.objection(&problem).is_none() {
         let variances = statistics.variances(&best.summary);
         statistics.influences =
             known.influences(&problem, &best.x, &against, &best.summary, &variances);
     }
-    let suspicions = match statistics.unexplained() {
-        Some(_) => units::suspicions(&problem)?,
-        None => vec![None; problem.cases.len()],
-    };
-    let found = report::ReportData {
+    if statistics.unexplained().is_none() {
+        suspicions.fill(None);
+    }
+    let report_data = report::ReportData {
         problem: &problem,
         suspicions: &suspicions,
         minima: &minima,
@@ -346,72 +371,78 @@ fn fitted<'a>(
         statistics: &statistics,
         evaluations,
         step_effect,
-        repeated: repeated.as_deref(),
+        resampled: resampled.as_deref(),
         draws: options.draws.into(),
     };
-    let report = found.report()?;
+    let report = report_data.report()?;
     if cancel.is_requested() {
         return Err(DescentEnd::Stopped);
     }
-    Ok(Fitted { problem, x: best.x, against, report, evaluations: kept })
+    Ok(Fitted { problem, x: best.x, against, report, evaluations: stored })
 }
 
+/// Returns the error of a start at which the model fails.
 fn no_answer() -> Error {
-    let said = "the model does not get through the record at the starting values: expected a start \
-                from which it does (`--set NAME=VALUE`)";
-    Error::Refused(said.to_owned())
+    let message = "the model does not get through the record at the starting values: expected a \
+                   start from which it does (`--set NAME=VALUE`)";
+    Error::Refused(message.to_owned())
 }
 
-/// Returns the move of each unknown by another model, in standard errors.
+/// Returns the change of each unknown by another model, in standard errors.
 fn effect(
     covariance: &[Vec<f64>],
-    summary: &Summary,
-    model: &[Against],
-    other: &[Against],
+    summary: &NormalEquations,
+    model: &[SignalComparison],
+    other: &[SignalComparison],
 ) -> Vec<f64> {
     let mut pull = vec![0.0; covariance.len()];
     for ((model, other), sigma) in model.iter().zip(other).zip(&summary.sigma) {
         let pairs = model.residual.iter().zip(&other.residual);
-        let apart: Vec<f64> = pairs.map(|(model, other)| model - other).collect();
+        let difference: Vec<f64> = pairs.map(|(model, other)| model - other).collect();
         for (pull, slope) in pull.iter_mut().zip(&model.slopes) {
-            *pull -= algebra::dot(slope, &apart) / (sigma * sigma);
+            *pull -= algebra::dot(slope, &difference) / (sigma * sigma);
         }
     }
     let bread = algebra::inverse(&summary.normal);
-    let share = |k: usize| {
-        let size = covariance[k][k];
-        let moved = algebra::dot(&bread[k], &pull);
-        if size > 0.0 { moved.abs() / size.sqrt() } else { 0.0 }
+    let standardised = |k: usize| {
+        let variance = covariance[k][k];
+        let change = algebra::dot(&bread[k], &pull);
+        if variance > 0.0 { change.abs() / variance.sqrt() } else { 0.0 }
     };
-    (0..pull.len()).map(share).collect()
+    (0..pull.len()).map(standardised).collect()
 }
 
-/// Computes the covariance that noise of the tachometers gives the unknowns.
-fn by_tachometer(problem: &Problem<'_>, best: &Descent, against: &[Against]) -> Vec<Vec<f64>> {
+/// Computes the part of the unknowns' covariance that is due to the noise of the tachometers.
+fn covariance_by_tachometer(
+    problem: &Problem<'_>,
+    best: &Descent,
+    against: &[SignalComparison],
+) -> Vec<Vec<f64>> {
     let n = problem.unknowns();
     let bread = algebra::inverse(&best.summary.normal);
     let mut covariance = vec![vec![0.0; n]; n];
     for (case, one_case) in problem.cases.iter().enumerate() {
-        let drawn = one_case.smoothed.as_ref().map(|it| &it.drawn[..]).unwrap_or_default();
+        let drawn =
+            one_case.smoothed.as_ref().map(|smoothed| &smoothed.drawn[..]).unwrap_or_default();
         let sigma = &best.summary.sigma[..];
         let pulls = problem.pulls(case, &best.x, (against, sigma), drawn.len(), |k, _, spin| {
             *spin = drawn[k].clone();
         });
         let pulls: Vec<Vec<f64>> = pulls.into_iter().flatten().collect();
         for pull in &pulls {
-            let moved: Vec<f64> = bread.iter().map(|row| algebra::dot(row, pull)).collect();
-            algebra::add_outer(&mut covariance, &moved, 1.0 / pulls.len() as f64);
+            let changes: Vec<f64> = bread.iter().map(|row| algebra::dot(row, pull)).collect();
+            algebra::add_outer(&mut covariance, &changes, 1.0 / pulls.len() as f64);
         }
     }
     covariance
 }
 
-/// Fits so many times again, with residuals resampled in blocks longer than they are correlated,
-/// and returns the free numbers of each fit.
+/// Fits `count` times with residuals that are resampled in blocks (the block bootstrap), and
+/// returns the free parameters of each fit.
 fn bootstrap(
     problem: &mut Problem<'_>,
     x: &[f64],
-    against: &[Against],
+    against: &[SignalComparison],
     count: u32,
     work: &FitWork<'_>,
 ) -> Result<Vec<Vec<f64>>, DescentEnd> {
@@ -422,7 +453,7 @@ fn bootstrap(
     let measured = problem.cases.clone();
     let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
     let mut drawn = 0;
-    let mut found = Vec::new();
+    let mut fits = Vec::new();
     for _ in 0..count {
         for one in against {
             let residual = &one.residual;
@@ -439,52 +470,64 @@ fn bootstrap(
                 signal.values[row] = one.model[row] + one.offset + residual;
             }
         }
-        let made = AtomicUsize::new(0);
-        let search = MinimumSearch { problem, kept: None, work, made: &made };
-        let again = search.from(x)?.filter(|again| again.is_settled);
-        found.extend(again.map(|again| again.x[..problem.free.len()].to_vec()));
+        let evaluations_made = AtomicUsize::new(0);
+        let search = MinimumSearch::further(problem, work, &evaluations_made);
+        let refit = search.from(x)?.filter(|refit| refit.is_settled);
+        fits.extend(refit.map(|refit| refit.x[..problem.free.len()].to_vec()));
     }
     problem.cases = measured;
-    Ok(found)
+    Ok(fits)
 }
 
 /// A search for the least cost of a problem.
 struct MinimumSearch<'a> {
     problem: &'a Problem<'a>,
-    kept: Option<&'a Evaluations>,
+    stored: Option<&'a Evaluations>,
     work: &'a FitWork<'a>,
     /// The number of evaluations so far.
-    made: &'a AtomicUsize,
+    evaluations_made: &'a AtomicUsize,
+    /// The greatest number of evaluations of a descent.
+    max_evaluations: usize,
 }
 
-impl MinimumSearch<'_> {
-    fn evaluate(&self, x: &[f64]) -> Result<Option<Summary>, DescentEnd> {
+impl<'a> MinimumSearch<'a> {
+    /// Returns a search whose evaluations are not stored.
+    fn further(
+        problem: &'a Problem<'a>,
+        work: &'a FitWork<'a>,
+        evaluations_made: &'a AtomicUsize,
+    ) -> Self {
+        Self { problem, stored: None, work, evaluations_made, max_evaluations: MAX_EVALUATIONS }
+    }
+
+    /// Computes the normal equations at a point, or reads stored ones.
+    fn evaluate(&self, x: &[f64]) -> Result<Option<NormalEquations>, DescentEnd> {
         let find = || {
-            let found = self.problem.against(x);
+            let comparisons = self.problem.compare(x);
             if self.problem.cancel.is_requested() {
                 return Err(DescentEnd::Stopped);
             }
-            Ok(found.map(|against| self.problem.summary(&against)))
+            Ok(comparisons.map(|against| self.problem.normal_equations(&against)))
         };
-        let found = self.kept.map_or_else(find, |kept| kept.answer(x, find))?;
-        (self.work.seen)(1 + self.made.fetch_add(1, Ordering::Relaxed));
-        Ok(found)
+        let equations = self.stored.map_or_else(find, |stored| stored.answer(x, find))?;
+        (self.work.count_evaluations)(1 + self.evaluations_made.fetch_add(1, Ordering::Relaxed));
+        Ok(equations)
     }
 
     /// Descends from a start.
     fn from(&self, start: &[f64]) -> Result<Option<Descent>, DescentEnd> {
         let ranges: Vec<[f64; 2]> =
             (0..self.problem.unknowns()).map(|k| self.problem.range(k)).collect();
-        descend(start, &ranges, MAX_EVALUATIONS, &|x| self.evaluate(x))
+        descend(start, &ranges, self.max_evaluations, &|x| self.evaluate(x))
     }
 
-    /// Finds the minima from so many starts, the least first.
+    /// Finds the minima from a number of starts, the least first.
     fn minima(&self, starts: u64) -> Result<Vec<Descent>, DescentEnd> {
         let start = self.problem.start();
-        let dead = |summary: &Summary| {
-            let dead = |k: &usize| summary.normal[*k][*k] == 0.0;
-            let dead = (0..self.problem.free.len()).filter(dead);
-            let names: Vec<&str> = dead.map(|k| self.problem.free[k].parameter.name()).collect();
+        let without_influence = |equations: &NormalEquations| {
+            let has_none = |k: &usize| equations.normal[*k][*k] == 0.0;
+            let numbers = (0..self.problem.free.len()).filter(has_none);
+            let names: Vec<&str> = numbers.map(|k| self.problem.free[k].parameter.name()).collect();
             (!names.is_empty()).then(|| names.join(", "))
         };
         let no_influence = |names: &str| {
@@ -492,8 +535,8 @@ impl MinimumSearch<'_> {
                             leave it out of `--free`";
             Error::Refused(format!("the measurement does not depend on {names}: {expected}"))
         };
-        let dead_at_start = self.evaluate(&start)?.as_ref().and_then(dead);
-        if let (Some(names), 1) = (&dead_at_start, starts) {
+        let idle_at_start = self.evaluate(&start)?.as_ref().and_then(without_influence);
+        if let (Some(names), 1) = (&idle_at_start, starts) {
             return Err(no_influence(names).into());
         }
         let mut chosen = vec![start.clone()];
@@ -501,11 +544,14 @@ impl MinimumSearch<'_> {
             let design =
                 Design::Spread { rule: DesignRule::LatinHypercube, points: starts - 1, seed: SEED };
             let place = |point: u64, k: usize| {
-                let Free { range, start, .. } = &self.problem.free[k];
-                let around = AROUND.map(|share| share * start);
+                let FreeParameter { range, start, .. } = &self.problem.free[k];
+                let range_of_starts = START_RANGE.map(|share| share * start);
                 let is_bounded = range.iter().all(|end| end.is_finite());
-                let [from, to] =
-                    if is_bounded { *range } else { [around[0].max(range[0]), around[1]] };
+                let [from, to] = if is_bounded {
+                    *range
+                } else {
+                    [range_of_starts[0].max(range[0]), range_of_starts[1]]
+                };
                 from + design.position(point, k).unwrap_or(0.5) * (to - from)
             };
             let sets: Vec<Vec<f64>> = (0..starts - 1)
@@ -518,7 +564,7 @@ impl MinimumSearch<'_> {
             let costs = self.problem.costs(&sets);
             let mut order: Vec<usize> = (0..sets.len()).filter(|&k| costs[k].is_finite()).collect();
             order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-            chosen.extend(order.into_iter().take(DESCENTS - 1).map(|k| sets[k].clone()));
+            chosen.extend(order.into_iter().take(MAX_DESCENTS - 1).map(|k| sets[k].clone()));
         }
         let ended: Vec<_> = chosen.par_iter().map(|start| self.from(start)).collect();
         let mut minima: Vec<Descent> = Vec::new();
@@ -526,33 +572,33 @@ impl MinimumSearch<'_> {
             minima.extend(descent?);
         }
         minima.sort_by(|a, b| a.summary.cost.total_cmp(&b.summary.cost));
-        // From another start all numbers may count.
-        let is_dead = |minimum: &Descent| dead(&minimum.summary).is_some();
-        if let Some(names) = dead_at_start.filter(|_| minima.iter().all(is_dead)) {
+        // All numbers may have an influence at another start.
+        let is_idle = |minimum: &Descent| without_influence(&minimum.summary).is_some();
+        if let Some(names) = idle_at_start.filter(|_| minima.iter().all(is_idle)) {
             return Err(no_influence(&names).into());
         }
-        let mut apart: Vec<Descent> = Vec::new();
+        let mut distinct: Vec<Descent> = Vec::new();
         for minimum in minima {
-            if !apart.iter().any(|other| self.is_same(other, &minimum)) {
-                apart.push(minimum);
+            if !distinct.iter().any(|other| self.is_same(other, &minimum)) {
+                distinct.push(minimum);
             }
         }
-        Ok(apart)
+        Ok(distinct)
     }
 
     /// Whether two descents ended in one minimum: within a few standard errors, or a thousandth.
     fn is_same(&self, a: &Descent, b: &Descent) -> bool {
         let bread = algebra::inverse(&a.summary.normal);
         (0..self.problem.free.len()).all(|k| {
-            let reach = (5.0 * bread[k][k].max(0.0).sqrt()).max(1e-3 * a.x[k].abs());
-            (a.x[k] - b.x[k]).abs() <= reach
+            let tolerance = (5.0 * bread[k][k].max(0.0).sqrt()).max(1e-3 * a.x[k].abs());
+            (a.x[k] - b.x[k]).abs() <= tolerance
         })
     }
 }
 
 /// Returns a function of a draw and k: the k-th component of one of `count` draws from the standard
 /// normal distribution by a Latin hypercube.
-fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
+fn normal_draws(count: u64) -> impl Fn(u64, usize) -> f64 {
     let design = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed: SEED };
     let shape = DistributionShape::Normal { mean: 0.0, sd: 1.0 };
     let normal = Distribution { shape, from: -6.0, to: 6.0 };
@@ -561,9 +607,9 @@ fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
 
 /// Draws free numbers from the fitted distribution, evenly spread, each within its range.
 fn draws(problem: &Problem<'_>, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
-    let normal = evenly(count);
+    let normal = normal_draws(count);
     let (unit, scale) = algebra::scaled(covariance);
-    let eigen = Symmetric::of(&unit);
+    let eigen = Symmetric::from_matrix(&unit);
     let draw = |point: u64| {
         let even: Vec<f64> = (0..scale.len()).map(|k| normal(point, k)).collect();
         let moved = eigen.apply(&even, |value| value.max(0.0).sqrt());

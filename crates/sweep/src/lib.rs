@@ -74,6 +74,7 @@ pub use library::{
 pub use method::{Integrator, rk4, rk4_mass_scaled};
 pub use model::Washer;
 pub use plan::Plan;
+pub use sweep_engine::config::section::counted;
 pub use sweep_engine::progress::ProgressMode;
 pub use sweep_engine::run::{RunEnd, RunOptions, run};
 pub use sweep_engine::store::{

@@ -75,7 +75,7 @@ pub(crate) fn chart(
                 attractors_with_kind(kind).map(|(speed, _, values)| (speed, values[k] * factor));
             let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
             if !y.is_empty() {
-                let name = format!("ends in: {words}");
+                let name = format!("motion at a held speed: {words}");
                 series.push(Series::new(name, *colour, x, y, Style::Dots));
             }
         }

@@ -26,7 +26,7 @@ const DEFAULT_CHANNELS: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "t
 const MAX_EDGES: usize = 16;
 
 /// The legend entry of unstable speeds.
-pub(crate) const UNSTABLE: &str = "a dwell at this speed is unstable";
+pub(crate) const UNSTABLE: &str = "speeds at which the periodic response is unstable";
 
 /// The responses at one point over speed.
 #[derive(Clone, Default)]
@@ -185,25 +185,43 @@ pub(crate) fn response_series(
 ) -> Vec<Series> {
     let [linear, periodic]: [Vec<f64>; 2] =
         [2 * k, 2 * k + 1].map(|k| curves.columns[k].iter().map(|value| value * factor).collect());
-    let part = |is_unstable: bool| stability_part(&periodic, &curves.growth, is_unstable);
-    let [stable, unstable] = ["stable", "unstable"].map(|word| format!("{name}, {word}"));
+    let [stable, unstable] = stability_parts(&curves.speed, &periodic, &curves.growth);
+    let part = |word: &str, colour, (speed, values): (Vec<f64>, Vec<f64>), style| {
+        Series::new(format!("{name}, {word}"), colour, speed, values, style)
+    };
     vec![
         Series::new("linear model", LINEAR, curves.speed.clone(), linear, Style::Solid(1.6)),
-        Series::new(stable, NONLINEAR, curves.speed.clone(), part(false), Style::Solid(2.2)),
-        Series::new(unstable, NONLINEAR, curves.speed.clone(), part(true), Style::Dashed),
+        part("stable", NONLINEAR, stable, Style::Solid(2.2)),
+        part("unstable", NONLINEAR, unstable, Style::Dashed),
     ]
 }
 
-/// Returns the unstable or the stable part of a curve over speed; other values are NaN. Both parts
-/// share the points at which they meet.
-fn stability_part(curve: &[f64], growth: &[f64], is_unstable: bool) -> Vec<f64> {
-    let has_stability =
-        |i: usize| growth.get(i).is_some_and(|growth| (*growth > 0.0) == is_unstable);
-    let is_in_part = |i: usize| {
-        has_stability(i)
-            || (!is_unstable && (i > 0 && has_stability(i - 1) || has_stability(i + 1)))
+/// Returns the stable and the unstable part of a curve over speed, each with its speeds; gaps are
+/// NaN. The parts meet where growth passes 0, as the shaded ranges end there.
+fn stability_parts(speed: &[f64], curve: &[f64], growth: &[f64]) -> [(Vec<f64>, Vec<f64>); 2] {
+    let mut parts = [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())];
+    let mut add = |part: usize, speed: f64, value: f64| {
+        parts[part].0.push(speed);
+        parts[part].1.push(value);
     };
-    (0..curve.len()).map(|i| if is_in_part(i) { curve[i] } else { f64::NAN }).collect()
+    for k in 0..speed.len() {
+        let part = usize::from(growth[k] > 0.0);
+        let value = if growth[k].is_nan() { f64::NAN } else { curve[k] };
+        add(part, speed[k], value);
+        let Some(&next_growth) = growth.get(k + 1) else { continue };
+        let next_part = usize::from(next_growth > 0.0);
+        if next_growth.is_nan() || growth[k].is_nan() {
+            add(part, speed[k], f64::NAN);
+        } else if next_part != part {
+            let share = growth[k] / (growth[k] - next_growth);
+            let between = |values: &[f64]| values[k] + share * (values[k + 1] - values[k]);
+            let edge = between(speed);
+            add(part, edge, between(curve));
+            add(part, edge, f64::NAN);
+            add(next_part, edge, between(curve));
+        }
+    }
+    parts
 }
 
 /// Returns whether each channel is drawn: the requested channels, by default the default ones, or
@@ -516,6 +534,22 @@ mod tests {
         assert_eq!(unstable_ranges(&speed, &growth), [[1.5, 3.5], [6.0, 7.0]]);
         assert_eq!(stability_edges(&speed, &growth), [1.5, 3.5]);
         assert!(unstable_ranges(&speed[..1], &growth[..1]).is_empty());
+    }
+
+    #[test]
+    fn a_curve_is_dashed_from_edge_to_edge_of_its_unstable_range() {
+        let speed = [200.0, 210.0, 220.0, 230.0, 240.0];
+        let growth = [-1.0, 1.0, -3.0, f64::NAN, 1.0];
+        let curve = [1.0, 3.0, 7.0, 9.0, 11.0];
+        let [stable, unstable] = stability_parts(&speed, &curve, &growth);
+        let known = |(speed, values): (Vec<f64>, Vec<f64>)| -> Vec<(f64, f64)> {
+            speed.into_iter().zip(values).filter(|(_, value)| !value.is_nan()).collect()
+        };
+        assert_eq!(known(stable), [(200.0, 1.0), (205.0, 2.0), (212.5, 4.0), (220.0, 7.0)]);
+        assert_eq!(known(unstable), [(205.0, 2.0), (210.0, 3.0), (212.5, 4.0), (240.0, 11.0)]);
+        // A last speed alone in its part is the end of a line, no dot.
+        let [_, unstable] = stability_parts(&speed[..2], &curve[..2], &growth[..2]);
+        assert_eq!(known(unstable), [(205.0, 2.0), (210.0, 3.0)]);
     }
 
     #[test]

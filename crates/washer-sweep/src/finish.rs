@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sweep::{Error, EvaluationTask, MemoryTable, RanToFile};
+use sweep::{Error, EvaluationTask, MemoryTable, RanToFile, counted};
 
-use crate::counted;
 use crate::errors;
 use crate::result::PyResultTable;
 use crate::work::{Supervised, WorkOptions, supervise};
@@ -19,7 +18,7 @@ pub(crate) fn rows_or_raise(
     let table = evaluated.value_or_raise(py, |evaluated| match evaluated {
         Err(error) => errors::error(py, &error),
         Ok(table) => {
-            let rows = counted(table.rows() as u64, "row");
+            let rows = counted(table.rows(), "row");
             let text = format!("interrupted; `result` of this exception holds {rows}");
             interruption(py, text, Some(table))
         }

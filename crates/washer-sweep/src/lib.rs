@@ -16,11 +16,6 @@ mod work;
 
 use pyo3::pymodule;
 
-/// Returns a count with its noun, whose plural ends in s.
-pub(crate) fn counted(count: u64, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
 /// The module from which `washer_sweep` imports its names.
 #[pymodule]
 mod _native {

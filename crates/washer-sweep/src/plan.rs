@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
-use sweep::{BoundaryOptions, PlanEvaluator, TraceExtras, TraceOptions, WasherGridInput};
+use sweep::{BoundaryOptions, PlanEvaluator, TraceExtras, TraceOptions, WasherGridInput, counted};
 
 use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
 use crate::work::{WorkOptions, supervise, supervise_abandonable};
-use crate::{columns, counted, errors, finish};
+use crate::{columns, errors, finish};
 
 /// The name of a plan without a file and without a name.
 const UNNAMED: &str = "plan";
@@ -285,7 +285,7 @@ impl PyPlan {
         let plan = self.evaluator.plan();
         let axes: Vec<&str> = plan.axes.iter().map(|axis| &*axis.parameter.name).collect();
         let axes = if axes.is_empty() { "no axes".to_owned() } else { axes.join(", ") };
-        let points = counted(plan.points(), "point");
+        let points = counted(plan.points() as usize, "point");
         format!("<washer_sweep.Plan {}: {points} over {axes}>", plan.name)
     }
 }

@@ -1,5 +1,6 @@
 //! `sweep boundary GRID.toml`: traces the curve on which a quantity is at its limit.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -16,6 +17,7 @@ use crate::store::{DeclaredColumn, OpenOutcome, Trials};
 use crate::{Error, Execution, ExecutionArgs, Exit, Model, Plan, Progress, duration, show, tell};
 use sweep_files::{FileKind, Output};
 use sweep_parameter::Worse;
+use sweep_plot::label;
 
 /// Arguments of `sweep boundary`.
 #[derive(Debug, clap::Args)]
@@ -121,14 +123,21 @@ fn print_summary(mut text: String, output: &Path) -> Exit {
     Exit::Done
 }
 
+/// Formats the limit that is traced: a quantity's, or a condition as the user typed it.
+pub(super) fn limit_in_words(quantity: &str, limit: impl Display) -> String {
+    match label::condition(quantity) {
+        Some(condition) => format!("the limit of {condition}"),
+        None => format!("{quantity} = {limit}"),
+    }
+}
+
 fn summary<M: Model>(task: &BoundaryTask<M>, traced: &TracedBoundary, wall_s: f64) -> String {
     let BoundaryTask { plan, quantity, search, .. } = task;
     let grid_points: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
     let mut text = format!(
-        "{}: {} = {} traced with {} (the grid has {grid_points}) in {}, {}\n",
+        "{}: {} traced with {} (the grid has {grid_points}) in {}, {}\n",
         plan.name,
-        quantity.name,
-        quantity.limit,
+        limit_in_words(&quantity.name, quantity.limit),
         counted(traced.trials, "point"),
         counted(traced.rounds, "round"),
         duration(wall_s)
@@ -209,4 +218,16 @@ pub fn search<M: Model>(
     drop(distances);
     progress.finish();
     Ok((SearchStop::interrupted_to_none(traced)?, evaluator.into_cache()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_condition_is_told_as_it_was_typed() {
+        assert_eq!(limit_in_words("ratio_max", 2.0), "ratio_max = 2");
+        let margin = "margin(ratio_max < 2 and growth_per_s < 0)";
+        assert_eq!(limit_in_words(margin, 0.0), "the limit of ratio_max < 2 and growth_per_s < 0");
+    }
 }

@@ -38,6 +38,19 @@ pub fn format_number(value: f64) -> String {
     }
 }
 
+/// Returns the shortest decimal that differs from a number by rounding noise only, for display:
+/// 43.5 for 43.49999999999999.
+pub(super) fn without_rounding_noise(value: f64) -> f64 {
+    /// Greatest difference, in units of the last place. Basis: a number that follows from others
+    /// by some ten operations. Doubling it hides more of the last digit.
+    const ROUNDING_ULPS: f64 = 4.0;
+    let noise = ROUNDING_ULPS * f64::EPSILON * value.abs();
+    let mut candidates =
+        (0..15).filter_map(|digits| format!("{value:.digits$e}").parse::<f64>().ok());
+    let is_near = |candidate: &f64| (candidate - value).abs() <= noise;
+    candidates.find(is_near).unwrap_or(value)
+}
+
 /// Formats a range by a function. If both ends become the same text, they are written with all
 /// digits.
 pub fn format_range([from, to]: [f64; 2], format: impl Fn(f64) -> String) -> String {
@@ -86,6 +99,24 @@ pub fn format_table(headings: &[String], rows: &[Vec<String>], indent: &str) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rounding_noise_is_not_shown_and_digits_are_kept() {
+        for (value, shown) in [
+            (43.499_999_999_999_99, "43.5"),
+            (23.887_500_000_000_003, "23.8875"),
+            (0.1 + 0.2, "0.3"),
+            (-0.449_999_999_999_999_96, "-0.45"),
+            (1.0 / 3.0, "0.3333333333333333"),
+            (0.181_584_158_415_841_58, "0.18158415841584158"),
+            (43.499_999, "43.499999"),
+            (2e8, "200000000"),
+            (0.0, "0"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(without_rounding_noise(value).to_string(), shown);
+        }
+    }
 
     #[test]
     fn numbers_have_six_digits() {

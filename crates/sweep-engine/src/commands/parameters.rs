@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 use sweep_parameter::Range;
 
+use super::cells::without_rounding_noise;
 use crate::{Error, Exit, GridInput, Model, ModelParameter, Plan, show};
 
 /// Arguments of `sweep parameters`.
@@ -61,7 +62,8 @@ pub fn list_parameters<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<
 
 fn as_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
     let value_text = |row: &ListedParameter<M>| {
-        row.value.map_or_else(|| "-".to_owned(), |value_text| value_text.to_string())
+        let shown = row.value.map(|value| without_rounding_noise(value).to_string());
+        shown.unwrap_or_else(|| "-".to_owned())
     };
     let max_width =
         |length: &dyn Fn(&ListedParameter<M>) -> usize| rows.iter().map(length).max().unwrap_or(0);

@@ -245,8 +245,12 @@ pub fn failure_reasons(engine: &Engine<'_>, tally: &Tally, job: &Job<'_>) -> Str
 /// Formats the values of the axes at a point.
 fn format_axis_values(point: u64, job: &Job<'_>) -> String {
     let values = (job.axis_values)(point);
-    let named_values = job.layout.axes.iter().zip(values);
-    let words = named_values.map(|(axis, value)| format!("{} {}", axis.name, format_number(value)));
+    name_axis_values(job.layout.axes.iter().map(|axis| &*axis.name).zip(values))
+}
+
+/// Formats values of axes with the names of these.
+pub(super) fn name_axis_values<'a>(values: impl Iterator<Item = (&'a str, f64)>) -> String {
+    let words = values.map(|(axis, value)| format!("{axis} {}", format_number(value)));
     words.collect::<Vec<_>>().join(", ")
 }
 
@@ -273,7 +277,11 @@ pub fn count_lines_at(
     axis_values: &dyn Fn(u64) -> String,
 ) -> String {
     let mut text = String::new();
-    let percent = |count: u64| 100.0 * count as f64 / tally.points.max(1) as f64;
+    // The share of rows that have a verdict, as `share(reliable)` counts them.
+    let percent = |count: u64| {
+        let judged = tally.reliable + tally.unreliable;
+        100.0 * count as f64 / judged.max(1) as f64
+    };
     let upper = limits.upper;
     let range = limits.lower.map_or_else(
         || format!("below ratio {upper}"),
@@ -282,7 +290,8 @@ pub fn count_lines_at(
     let Tally { reliable, unreliable, undefined, over_estimated, sensitive, unconverged, .. } =
         tally;
     let share = percent(*reliable);
-    let others = format!("{unreliable} not, {undefined} undefined");
+    let uncounted = if *undefined > 0 { ", which the share leaves out" } else { "" };
+    let others = format!("{unreliable} not, {undefined} undefined{uncounted}");
     text.line("reliable", format!("{reliable} ({share:.1} %) {range}, {others}"));
     if *over_estimated > 0 {
         let share = percent(*over_estimated);
@@ -349,6 +358,25 @@ mod tests {
     use super::*;
     use crate::store::read::Extreme;
     use sweep_parameter::Worse;
+
+    #[test]
+    fn shares_are_of_the_rows_with_a_verdict() {
+        let tally = Tally {
+            points: 16,
+            reliable: 6,
+            unreliable: 2,
+            undefined: 8,
+            over_estimated: 4,
+            ..Tally::default()
+        };
+        let summary = count_lines_at(&tally, 2.0.into(), &|_| String::new());
+        let line = "reliable  6 (75.0 %) below ratio 2, 2 not, 8 undefined, which the share leaves \
+                    out\n";
+        assert!(summary.contains(line), "{summary}");
+        assert!(summary.contains("too high  in 4 (50.0 %)"), "{summary}");
+        let share = format_share(&tally);
+        assert!(share.starts_with("75.0 %"), "{share}");
+    }
 
     #[test]
     fn an_infinite_error_is_left_out() {

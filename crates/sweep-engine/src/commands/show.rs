@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::run::count_lines_at;
+use super::boundary::limit_in_words;
+use super::run::{count_lines_at, name_axis_values};
 use super::{
     Lines as _, conditions, format_cell, format_number, format_range, format_table, shorten,
 };
@@ -135,10 +136,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
             let axis_values = |point| {
                 let location = locations.iter().find(|(extreme, _)| *extreme == point);
                 location.map_or(String::new(), |(_, values)| {
-                    let assignments = values
-                        .iter()
-                        .map(|(axis, value)| format!("{axis} {}", format_number(*value)));
-                    assignments.collect::<Vec<_>>().join(", ")
+                    name_axis_values(values.iter().map(|(axis, value)| (axis.as_str(), *value)))
                 })
             };
             text.push_str(&count_lines_at(&tally, limits, &axis_values));
@@ -152,7 +150,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
                 let quantity = boundary_settings["quantity"].as_str().unwrap_or("unknown");
                 let limit =
                     boundary_settings["limit"].as_f64().map_or("unknown".to_owned(), format_number);
-                text.line("boundary", format!("where {quantity} = {limit}"));
+                text.line("boundary", limit_in_words(quantity, limit));
             }
         }
     }

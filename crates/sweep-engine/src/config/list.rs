@@ -40,6 +40,9 @@ const MAX_PATH_CHARACTERS: usize = 1000;
 /// The name of a column that identifies rows for people and is no parameter.
 pub(super) const ID_COLUMN: &str = "id";
 
+/// The name of a column of times (s), whose cells may be times of day.
+const TIME_COLUMN: &str = "time_s";
+
 /// The names of columns in which programs number rows, beside empty names.
 const INDEX_COLUMNS: [&str; 3] = ["__index_level_0__", "Unnamed: 0", "index"];
 
@@ -97,7 +100,7 @@ impl NumberTable {
                 None => (header.clone(), Vec::new()),
             };
             let name = Located { value, location };
-            table.push(ListColumn { name, header, place, is_known, values });
+            table.push(ListColumn { name, header, place, is_known, values, is_clock: false });
         }
         Self {
             columns: table,
@@ -183,6 +186,16 @@ pub struct ListColumn {
     pub is_known: bool,
     /// The value of each row.
     pub values: Vec<f64>,
+    /// Whether the values stand for instants or times of day in a file without text.
+    pub is_clock: bool,
+}
+
+impl ListColumn {
+    /// Returns a value as a clock time, if the column holds instants or times of day in a file
+    /// without text.
+    pub fn clock_time(&self, row: usize) -> Option<String> {
+        self.values.get(row).filter(|_| self.is_clock).map(|seconds| clock::text(*seconds))
+    }
 }
 
 /// The locations of rows.
@@ -217,11 +230,11 @@ fn table(
         for (place, parquet_column) in
             parquet::columns(bytes, allows_missing, names)?.into_iter().enumerate()
         {
-            let parquet::ParquetColumn { name, header, values } = parquet_column;
+            let parquet::ParquetColumn { name, header, values, is_clock } = parquet_column;
             let name = Located { value: name, location: file.clone() };
             let is_known = values.is_some();
             let values = values.unwrap_or_default();
-            columns.push(ListColumn { name, header, place, is_known, values });
+            columns.push(ListColumn { name, header, place, is_known, values, is_clock });
         }
         return Ok((
             NumberTable { columns, rows: RowLocations::Binary(file.clone()), preamble: 0 },

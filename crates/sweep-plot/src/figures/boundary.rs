@@ -92,7 +92,10 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart> {
         title: match quantity_name(table) {
             growth if is_growth(growth) => "Where the machine may dwell at any speed".to_owned(),
             ratio if is_ratio(ratio) => "Boundary of the linear model's reliability".to_owned(),
-            other => format!("Limit of the {}", quantity_in_words(other)),
+            other => match label::condition(other) {
+                Some(condition) => format!("Where {condition}"),
+                None => format!("Where {}", limit_in_words(table)),
+            },
         },
         subtitle: table.source.subtitle(&format!("{} values of {x_name}{region_note}", grid.len())),
         x_label: x_column.label(),
@@ -134,6 +137,7 @@ fn side_words(table: &FigureTable) -> [&'static str; 2] {
     let settings = table.source.find_metadata(key::BOUNDARY);
     let worse = settings.and_then(|settings| Worse::named(settings.get(key::WORSE)?.as_str()?));
     match (quantity_name(table), worse) {
+        (margin, _) if label::condition(margin).is_some() => ["it does not hold", "it holds"],
         (growth, _) if is_growth(growth) => ["stable", "unstable"],
         ("ratio_min", _) => ["unreliable", "reliable"],
         (ratio, _) if is_ratio(ratio) => ["reliable", "unreliable"],
@@ -144,11 +148,20 @@ fn side_words(table: &FigureTable) -> [&'static str; 2] {
 
 /// Returns whether a quantity is a ratio of both models.
 fn is_ratio(quantity: &str) -> bool {
-    quantity.starts_with("ratio_")
+    is_column(quantity) && quantity.starts_with("ratio_")
 }
 
-/// Returns the quantity in words, as in "least gap, nonlinear model".
+/// Returns whether a quantity is a column, not an expression of columns.
+fn is_column(quantity: &str) -> bool {
+    quantity.chars().all(|letter| letter.is_ascii_alphanumeric() || letter == '_')
+}
+
+/// Returns the quantity in words, as in "least gap, nonlinear model"; an expression of columns is
+/// as the user typed it.
 fn quantity_in_words(quantity: &str) -> String {
+    if !is_column(quantity) {
+        return quantity.to_owned();
+    }
     match label::split_model(quantity) {
         (words, "") => words,
         (words, model) => format!("{words}, {model} model"),
@@ -157,7 +170,7 @@ fn quantity_in_words(quantity: &str) -> String {
 
 /// Returns whether a quantity is the growth of disturbances.
 fn is_growth(quantity: &str) -> bool {
-    quantity.starts_with("growth")
+    is_column(quantity) && quantity.starts_with("growth")
 }
 
 /// Returns the parts of a plan on which the boundary depends, except its limit, which the figure
@@ -210,7 +223,10 @@ fn limit_in_words(table: &FigureTable) -> String {
         growth if is_growth(growth) && limit_in_file.is_none_or(|limit| limit == 0.0) => {
             "no growth at any speed".to_owned()
         }
-        other => format!("{} {limit}", quantity_in_words(other)),
+        other => match label::condition(other) {
+            Some(condition) => format!("limit of {condition}"),
+            None => format!("{} = {limit}", quantity_in_words(other)),
+        },
     }
 }
 

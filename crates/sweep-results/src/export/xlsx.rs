@@ -30,10 +30,13 @@ const FILTER_BUTTON_WIDTH: usize = 3;
 /// Encodes a table as a workbook.
 pub(super) fn encode(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
     // The library panics where the system refuses its temporary files.
-    panics::caught(|| write_workbook(table)).unwrap_or_else(|panic| {
-        let reason = format!("the system refused a temporary file: {panic}");
-        Err(export_error(table, ExportFormat::Xlsx, &reason))
-    })
+    panics::caught(|| write_workbook(table))
+        .unwrap_or_else(|panic| Err(temporary_file_error(table, panic.to_string())))
+}
+
+/// Returns the error of a temporary file that the system refused.
+fn temporary_file_error(table: &ResultTable, reason: String) -> ResultsError {
+    ResultsError::TemporaryFile { path: table.path().to_owned(), reason }
 }
 
 fn write_workbook(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
@@ -46,7 +49,10 @@ fn write_workbook(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
         return Err(export_error(format!("more than {MAX_COLUMNS} columns")));
     }
     let mut workbook = Workbook::new();
-    let from_xlsx = |error: XlsxError| export_error(error.to_string());
+    let from_xlsx = |error: XlsxError| match error {
+        XlsxError::IoError(error) => temporary_file_error(table, error.to_string()),
+        other => export_error(other.to_string()),
+    };
     let mut rows = SheetWriter::new(&mut workbook, "rows", 2).map_err(from_xlsx)?;
     write_rows(&mut rows, table, from_xlsx)?;
     write_columns(&mut workbook, table).map_err(from_xlsx)?;

@@ -3,13 +3,16 @@
 
 use arrow_array::Array;
 use sweep_engine::commands::check as engine_check;
+use sweep_engine::config::section::counted;
 use sweep_engine::{
-    AxisValues, Design, Error, Execution, Exit, Interrupt, ProgressMode, show, tell,
+    AxisValues, Design, Error, Estimate, Execution, Exit, Interrupt, ProgressMode, duration, show,
+    tell, threads,
 };
 use sweep_files::cells;
 use washer_model::{MachineParameter, Range, decimal};
 use washer_row::Metric;
 
+use crate::estimate::{LONG_WORK_S, estimate};
 use crate::library::PlanEvaluator;
 use crate::model::Washer;
 use crate::plan::Plan;
@@ -44,7 +47,8 @@ pub(crate) fn run(args: &WasherCheckArgs) -> Result<Exit, Error> {
         return show("the machine file leaves out no number: nothing is assumed\n");
     }
     let trial = Trial::new(&plan, assumed);
-    tell(&format!("{} rows are computed", trial.rows()));
+    let estimate = estimate(&trial.plan, threads::count(None, &threads::process)?)?;
+    tell(&trial.announcement(&estimate));
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let execution =
         Execution { threads: None, progress: ProgressMode::default(), interrupt: &interrupt };
@@ -126,8 +130,8 @@ struct Effect {
     verdicts: usize,
     /// The relative change of the greatest ratio.
     ratio: f64,
-    /// The change of the growth (1/s).
-    growth_per_s: f64,
+    /// The change of the growth (1/s); `None` if it is not known at any point.
+    growth_per_s: Option<f64>,
 }
 
 impl Trial {
@@ -172,6 +176,23 @@ impl Trial {
 
     fn rows(&self) -> u64 {
         self.plan.points()
+    }
+
+    /// Returns the number of rows and the time that they take, and what makes a long time shorter.
+    fn announcement(&self, estimate: &Estimate) -> String {
+        let points = counted(self.rows() as usize / self.stride, "point");
+        let threads = counted(estimate.threads, "thread");
+        let time = duration(estimate.wall_s);
+        let rows = self.rows();
+        let mut text = format!(
+            "{rows} rows, {} for each of {points}, take about {time} on {threads}",
+            self.stride
+        );
+        if estimate.wall_s > LONG_WORK_S {
+            text += "\nit is shorter with fewer points (--at NAME=VALUE fixes an axis), with an \
+                     earlier end of [time], and for each number that the machine file gives";
+        }
+        text
     }
 
     /// Computes every row. Returns `None` if the work was interrupted.
@@ -237,11 +258,15 @@ impl Trial {
             };
             let verdicts = format!("{} of {points}", effect.verdicts);
             let ratio = format!("{:.1} %", 100.0 * effect.ratio);
+            let growth = match effect.growth_per_s {
+                None => "unknown".to_owned(),
+                Some(0.0) => "0 /s".to_owned(),
+                Some(change) => format!("{change:.2e} /s"),
+            };
             text += &format!(
-                "{:width$}  {:>10}  {expected:>22}  {verdicts:>12}  {ratio:>9}  {:.2e} /s\n",
+                "{:width$}  {:>10}  {expected:>22}  {verdicts:>12}  {ratio:>9}  {growth}\n",
                 name(number),
                 decimal(rounded(number.value)),
-                effect.growth_per_s
             );
         }
         let decisive: Vec<String> = ranked
@@ -250,7 +275,10 @@ impl Trial {
             .map(|(number, _)| name(number))
             .collect();
         text + &match decisive.as_slice() {
-            [] => format!("none of them changes a verdict at {points} points of the plan\n"),
+            [] => {
+                let points = counted(points, "point");
+                format!("none of them changes a verdict at {points} of the plan\n")
+            }
             [one] => format!("measure {one}: it changes verdicts\n"),
             many => format!("measure these first, which change verdicts: {}\n", many.join(", ")),
         }
@@ -267,7 +295,8 @@ impl Effect {
                 self.ratio = self.ratio.max((end / assumed - 1.0).abs());
             }
             if let (Some(assumed), Some(end)) = (assumed.growth_per_s, end.growth_per_s) {
-                self.growth_per_s = self.growth_per_s.max((end - assumed).abs());
+                let change = (end - assumed).abs();
+                self.growth_per_s = Some(self.growth_per_s.map_or(change, |most| most.max(change)));
             }
         }
     }
@@ -330,6 +359,24 @@ mod tests {
     }
 
     #[test]
+    fn long_work_is_announced_with_what_makes_it_shorter() {
+        let plan = plan("[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.3]\n");
+        let trial = Trial::new(&plan, Assumed::all(&plan));
+        let estimate = estimate(&trial.plan, 2).unwrap();
+        assert!(estimate.wall_s > 0.0 && estimate.sampled.values().sum::<u64>() > 0);
+        let announced = |wall_s: f64| {
+            let estimate = Estimate { wall_s, ..estimate.clone() };
+            trial.announcement(&estimate)
+        };
+        let rows = trial.rows();
+        let line = format!("{rows} rows, {} for each of 2 points, take about ", trial.stride);
+        assert_eq!(announced(90.0), format!("{line}1 min 30 s on 2 threads"));
+        let text = announced(7200.0);
+        assert!(text.starts_with(&format!("{line}2 h 00 min on 2 threads\n")), "{text}");
+        assert!(text.contains("--at NAME=VALUE"), "{text}");
+    }
+
+    #[test]
     fn numbers_that_change_a_verdict_come_first() {
         let outcome = |verdict, ratio| TrialOutcome {
             verdict: Some(verdict),
@@ -342,5 +389,18 @@ mod tests {
         unchanging.add(outcome(true, 1.0), &[outcome(true, 1.9)]);
         assert_eq!((changing.verdicts, unchanging.verdicts), (1, 0));
         assert!(changing > unchanging && unchanging.ratio > changing.ratio);
+    }
+
+    #[test]
+    fn a_number_without_effect_has_an_effect_of_0() {
+        let plan = plan("[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1]\n");
+        let trial = Trial::new(&plan, Assumed::all(&plan));
+        let outcome = |growth_per_s| TrialOutcome { growth_per_s, ..TrialOutcome::default() };
+        let table = |growth| trial.table(&vec![outcome(growth); trial.stride]);
+        let [known, unknown] = [table(Some(-1.0)), table(None)];
+        let row = |table: &str| table.lines().nth(1).expect("a number is assumed").to_owned();
+        assert!(row(&known).ends_with("  0 /s"), "{known}");
+        assert!(row(&unknown).ends_with("  unknown"), "{unknown}");
+        assert!(known.ends_with("at 1 point of the plan\n"), "{known}");
     }
 }

@@ -49,8 +49,8 @@ Columns are channels of `sweep trace` with their units: tub_front_y_m, tub_yaw_r
 (tub_yaw_rad_per_s), accelerations (tub_front_y_m_per_s2), cabinet_force_y_n. Other units are \
 converted: 'Tub yaw [deg]', time_ms. Further columns are left out. A missing sample is empty. The \
 run begins at time 0, at rest; with speed_rpm, or pulses of a tachometer (tacho_pulses, or \
-tacho_60_pulses for 60 a turn), the spin is the measured one, else the grid's. An \
-offset of every column is fitted beside the parameters.
+tacho_60_pulses for 60 a turn) or their number (tacho_60_count, tacho_60_count_per_row), the spin \
+is the measured one, else the grid's. An offset of every column is fitted beside the parameters.
 
 With --out, what an interrupted fit has found out stays in FILE.partial, and the same command goes \
 on from there. docs/fit.md explains every line.";
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let seen = |made: usize| progress.show_search(0, made as u64);
     let cancel = Cancel::Flag(interrupt.flag());
     let output = args.out.as_deref();
-    let work = FitWork { cancel, seen: &seen, output, fresh: args.fresh };
+    let work = FitWork { cancel, count_evaluations: &seen, output, fresh: args.fresh };
     let threads = threads::count(args.execution.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
     progress.finish();
@@ -126,7 +126,8 @@ fn header_and_name(text: &str) -> Result<(String, String), String> {
             Ok((header.to_owned(), name.to_owned()))
         }
         Some((_, name)) => Err(format!(
-            "`{name}` is not a channel with its unit, time_s, speed_rpm or tacho_pulses"
+            "`{name}` is not a channel with its unit, time_s, speed_rpm, tacho_pulses or \
+             tacho_count"
         )),
         None => Err("expected HEADER=NAME".to_owned()),
     }

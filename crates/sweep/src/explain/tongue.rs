@@ -60,6 +60,10 @@ const DAMPING_FACTOR_RATIO: f64 = 1.55;
 /// reported with three digits. Doubling it saves less than one round.
 const DAMPING_FACTOR_TOLERANCE: f64 = 5e-4;
 
+/// Greatest number of speeds by which the time of a scan is estimated. Basis: the lanes of the
+/// widest instruction set. Doubling it doubles the time of an estimate.
+const TIMED_SPEEDS: usize = 8;
+
 /// Positions of trials about the root that linear interpolation gives, in tolerances. Basis: the
 /// inner two bracket the root within the tolerance if growth is nearly linear, and the outer two if
 /// it is less so. Doubling them needs another round where growth is linear.
@@ -99,6 +103,18 @@ impl ResponseFinder<'_> {
     pub(crate) fn follow(&mut self, fastest_rpm: f64) {
         let cancel = Cancel::Flag(self.interrupt.flag());
         self.curves = ResponseCurves::continue_curves(&[(self.point, fastest_rpm)], None, cancel);
+    }
+
+    /// Measures the time (s) of one thread for the response at a speed, by a few of the speeds.
+    pub(crate) fn seconds_per_speed(&self, speeds: Speeds) -> f64 {
+        let speeds_rpm = speeds.values();
+        let distance = speeds_rpm.len().div_ceil(TIMED_SPEEDS);
+        let timed: Vec<(usize, f64)> =
+            speeds_rpm.iter().step_by(distance).map(|&speed_rpm| (0, speed_rpm)).collect();
+        let cancel = Cancel::Flag(self.interrupt.flag());
+        let began = std::time::Instant::now();
+        ResponseCurves::find_at_speeds(&mut self.curves.clone(), &timed, cancel);
+        began.elapsed().as_secs_f64() / timed.len() as f64
     }
 
     /// Returns the response of a machine that runs up at each speed, if there is one. It uses all

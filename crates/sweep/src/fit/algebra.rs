@@ -2,7 +2,7 @@
 
 /// A symmetric matrix as its eigenvalues and eigenvectors.
 pub(crate) struct Symmetric {
-    /// In rising order.
+    /// The eigenvalues in ascending order.
     pub(crate) values: Vec<f64>,
     /// The eigenvector of each eigenvalue, of unit length.
     pub(crate) vectors: Vec<Vec<f64>>,
@@ -12,7 +12,7 @@ impl Symmetric {
     /// Decomposes a matrix by Jacobi's rotations, to the same bits on any machine.
     ///
     /// G. H. Golub, C. F. Van Loan, Matrix Computations, section 8.5.
-    pub(crate) fn of(matrix: &[Vec<f64>]) -> Self {
+    pub(crate) fn from_matrix(matrix: &[Vec<f64>]) -> Self {
         let n = matrix.len();
         let mut a = matrix.to_vec();
         let mut v: Vec<Vec<f64>> =
@@ -51,12 +51,13 @@ impl Symmetric {
         }
     }
 
-    /// Returns f of the matrix times a vector, with f of the eigenvalues.
+    /// Returns the product of a function of the matrix, which is that of its eigenvalues, and a
+    /// vector.
     pub(crate) fn apply(&self, x: &[f64], f: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         for (value, vector) in self.values.iter().zip(&self.vectors) {
-            let along = f(*value) * dot(vector, x);
-            out.iter_mut().zip(vector).for_each(|(out, v)| *out += along * v);
+            let component = f(*value) * dot(vector, x);
+            out.iter_mut().zip(vector).for_each(|(out, v)| *out += component * v);
         }
         out
     }
@@ -67,8 +68,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Returns a matrix with unit diagonal and the square roots that were its scale. A row of zeros
-/// keeps its zero, on scale 1.
+/// Scales a matrix to a unit diagonal, and returns it with the square roots of its diagonal. A row
+/// of zeros stays, with the scale 1.
 pub(crate) fn scaled(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let scale: Vec<f64> = (0..matrix.len())
         .map(|i| if matrix[i][i] > 0.0 { matrix[i][i].sqrt() } else { 1.0 })
@@ -79,11 +80,11 @@ pub(crate) fn scaled(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
     (matrix.iter().enumerate().map(row).collect(), scale)
 }
 
-/// Returns the inverse of a symmetric matrix, without directions that it does not know: those of
-/// which nothing is left in double precision once its diagonal is one.
+/// Returns the pseudo-inverse of a symmetric matrix. Once its diagonal is one, eigenvalues below
+/// 1e-13 count as zero, because rounding errors are as large.
 pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let (unit, scale) = scaled(matrix);
-    let eigen = Symmetric::of(&unit);
+    let eigen = Symmetric::from_matrix(&unit);
     let column = |j: usize| {
         let mut e = vec![0.0; unit.len()];
         e[j] = 1.0 / scale[j];
@@ -93,21 +94,21 @@ pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (0..matrix.len()).map(column).collect()
 }
 
-/// Numbers less their mean, and the mean.
+/// Subtracts the mean from numbers, and returns them with the mean.
 pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     values.iter_mut().for_each(|value| *value -= mean);
     (values, mean)
 }
 
-/// Returns the value below which such a part of some numbers lies; `None` of none.
+/// Returns the quantile of some numbers below which a part of them lies; `None` without numbers.
 pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values.get((part * (values.len() as f64 - 1.0)).round() as usize).copied()
 }
 
-/// Returns the quantiles between which 95 % of some numbers lie; `None` of none.
+/// Returns the quantiles of some numbers between which 95 % of them lie; `None` without numbers.
 pub(super) fn middle_95(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]> {
     Some([quantile(values.clone(), 0.025)?, quantile(values, 0.975)?])
 }
@@ -129,8 +130,8 @@ mod tests {
         let matrix: Vec<Vec<f64>> = (0..4)
             .map(|i| {
                 let entry = |j: usize| {
-                    let near = if i == j { 1.0 } else { 0.7_f64.powi((i + j) as i32) };
-                    near * scales[i] * scales[j]
+                    let correlation = if i == j { 1.0 } else { 0.7_f64.powi((i + j) as i32) };
+                    correlation * scales[i] * scales[j]
                 };
                 (0..4).map(entry).collect()
             })
@@ -143,7 +144,7 @@ mod tests {
                 assert!((product - expected).abs() < 1e-11, "{i} {j}: {product}");
             }
         }
-        let eigen = Symmetric::of(&[vec![2.0, 1.0], vec![1.0, 2.0]]);
+        let eigen = Symmetric::from_matrix(&[vec![2.0, 1.0], vec![1.0, 2.0]]);
         assert!((eigen.values[0] - 1.0).abs() < 1e-15 && (eigen.values[1] - 3.0).abs() < 1e-15);
     }
 }

@@ -1,4 +1,4 @@
-//! A fit as curves: the measurement, the model and what is left, for figures.
+//! The curves of a fit for figures: the measurement, the model and the residual.
 
 use serde_json::{Value, json};
 use sweep_engine::Table;
@@ -6,7 +6,7 @@ use sweep_files::key;
 
 use super::algebra::inverse;
 use super::measured::usual_step;
-use super::model::Against;
+use super::model::SignalComparison;
 use super::spectrum::spectrum;
 use super::{Fitted, Problem};
 
@@ -19,16 +19,16 @@ impl Fitted<'_> {
     /// fitted again to first order.
     fn profiles(&self) -> Value {
         let Problem { free, .. } = &self.problem;
-        let summary = self.problem.summary(&self.against);
+        let summary = self.problem.normal_equations(&self.against);
         let bread = inverse(&summary.normal);
         let deviations: Vec<f64> =
             (-PROFILE_REACH..=PROFILE_REACH).map(|k| 0.5 * f64::from(k)).collect();
         let set = |k: usize, deviation: f64| -> Vec<f64> {
-            let along = deviation / bread[k][k].max(f64::MIN_POSITIVE).sqrt();
+            let step = deviation / bread[k][k].max(f64::MIN_POSITIVE).sqrt();
             (0..self.x.len())
                 .map(|j| {
                     let [from, to] = self.problem.range(j);
-                    (self.x[j] + along * bread[k][j]).clamp(from, to)
+                    (self.x[j] + step * bread[k][j]).clamp(from, to)
                 })
                 .collect()
         };
@@ -38,12 +38,14 @@ impl Fitted<'_> {
             .collect();
         let costs = self.problem.costs(&sets);
         let profile = |k: usize| {
-            let own = k * deviations.len()..(k + 1) * deviations.len();
+            let points = k * deviations.len()..(k + 1) * deviations.len();
+            let rises: Vec<f64> =
+                costs[points.clone()].iter().map(|cost| cost - summary.cost).collect();
             json!({
                 "name": free[k].parameter.name(),
-                "values": sets[own.clone()].iter().map(|set| set[k]).collect::<Vec<_>>(),
+                "values": sets[points].iter().map(|set| set[k]).collect::<Vec<_>>(),
                 "deviations": deviations,
-                "cost_above": costs[own].iter().map(|cost| cost - summary.cost).collect::<Vec<_>>(),
+                "cost_above": rises,
             })
         };
         (0..free.len()).map(profile).collect()
@@ -55,8 +57,8 @@ impl Fitted<'_> {
         let measured = &self.problem.cases[case].measured;
         let step_s = usual_step(&measured.time_s).unwrap_or(1.0);
         let mut hz = Vec::new();
-        let mut column = |one: &Against| {
-            let signal = &measured.signals[one.signal];
+        let mut column = |comparison: &SignalComparison| {
+            let signal = &measured.signals[comparison.signal];
             let mut spectral_density = |values: &[f64]| {
                 let mut all = vec![0.0; measured.time_s.len()];
                 signal.samples().zip(values).for_each(|((row, _), value)| all[row] = *value);
@@ -68,51 +70,53 @@ impl Fitted<'_> {
                 "name": signal.quantity.column(),
                 "unit": signal.quantity.units().0,
                 "measured": spectral_density(&signal.swing()),
-                "residual": spectral_density(&one.residual),
+                "residual": spectral_density(&comparison.residual),
             })
         };
-        let own = self.against.iter().filter(|one| one.case == case);
-        let columns: Vec<Value> = own.map(&mut column).collect();
+        let comparisons = self.against.iter().filter(|comparison| comparison.case == case);
+        let columns: Vec<Value> = comparisons.map(&mut column).collect();
         json!({ "hz": hz, "columns": columns })
     }
 
     /// Returns the curves of a case.
     pub(crate) fn curves(&self, case: usize) -> Table {
-        let at = &self.problem.cases[case];
-        let measured = &at.measured;
+        let fit_case = &self.problem.cases[case];
+        let measured = &fit_case.measured;
         let mut table = Table::new(crate::identity::BUILD);
         let times = &measured.time_s;
         table.numbers("time_s", "s", "time since the start", times.iter().copied().map(Some));
         let shift_s = self.problem.shift_s(case, &self.x);
-        let speeds = at.spin().speeds_rpm(times.iter().map(|time| time + shift_s)).map(Some);
+        let speeds = fit_case.spin().speeds_rpm(times.iter().map(|time| time + shift_s)).map(Some);
         table.numbers("speed_rpm", "rpm", "spin of the shaft, smoothed if measured", speeds);
-        for one in self.against.iter().filter(|one| one.case == case) {
-            let Against { signal, offset, model, .. } = one;
+        for comparison in self.against.iter().filter(|comparison| comparison.case == case) {
+            let SignalComparison { signal, offset, model, .. } = comparison;
             let signal = &measured.signals[*signal];
-            let (name, (unit, _)) = (signal.quantity.column(), signal.quantity.units());
+            let name = signal.quantity.column();
+            let (unit, _) = signal.quantity.units();
             let known = |value: f64| (!value.is_nan()).then_some(value);
             let mut add =
-                |what: &str, said: &str, values: &mut dyn Iterator<Item = Option<f64>>| {
-                    table.numbers(&format!("{what}_{name}"), &unit, said, values);
+                |prefix: &str, description: &str, values: &mut dyn Iterator<Item = Option<f64>>| {
+                    table.numbers(&format!("{prefix}_{name}"), &unit, description, values);
                 };
             let values = signal.values.iter().copied();
             add("measured", "as measured", &mut values.clone().map(known));
-            let shown = || model.iter().map(|model| model + offset);
-            add("model", "the fitted model, with the offset", &mut shown().map(Some));
-            let left = values.zip(shown()).map(|(measured, model)| known(measured - model));
-            add("residual", "measured less model", &mut { left });
+            let with_offset = || model.iter().map(|model| model + offset);
+            add("model", "the fitted model, with the offset", &mut with_offset().map(Some));
+            let residual =
+                values.zip(with_offset()).map(|(measured, model)| known(measured - model));
+            add("residual", "measured less model", &mut { residual });
         }
-        let mut plan = at.plan.clone();
+        let mut plan = fit_case.plan.clone();
         plan.model.machine = self.problem.machine(case, &self.x).0;
-        // Constants at which the search began are not the fitted machine's.
-        let free: Vec<&str> = self.problem.free.iter().map(|it| it.parameter.name()).collect();
+        // The starting values of the search are not the fitted values.
+        let free: Vec<&str> = self.problem.free.iter().map(|free| free.parameter.name()).collect();
         plan.set.retain(|(name, _)| !free.contains(&name.as_str()));
         table.metadata(key::PLAN, &plan.to_json());
-        let mut found = json!({ "report": self.report, "spectra": self.spectra(case) });
+        let mut results = json!({ "report": self.report, "spectra": self.spectra(case) });
         if self.report.follows {
-            found["profiles"] = self.profiles();
+            results["profiles"] = self.profiles();
         }
-        table.metadata(key::FIT, &found);
+        table.metadata(key::FIT, &results);
         table
     }
 }

@@ -1,5 +1,5 @@
-//! The evaluations of a fit, kept as the trials of a search are: the same fit again runs over those
-//! that are there, and ends in the same bits.
+//! The stored evaluations of a fit. A repeated fit reads them in place of computing them, and gives
+//! the same bits.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -14,10 +14,10 @@ use sweep_engine::tell;
 use sweep_files::FileKind;
 use sweep_files::panics::lock;
 
-use super::model::{Problem, Summary};
+use super::model::{NormalEquations, Problem};
 
 /// The time of an evaluation that is written at once. Basis: a write takes some milliseconds.
-/// Doubling it doubles what a kill may lose.
+/// Doubling it doubles the computing time that a killed process may lose.
 const COSTLY: Duration = Duration::from_millis(100);
 
 /// The evaluations of a problem, in the store.
@@ -53,33 +53,33 @@ impl Evaluations {
         Ok(Self { unknowns, signals, trials: Mutex::new(trials) })
     }
 
-    /// Returns the answer for some unknowns, kept or found now.
+    /// Returns the normal equations at some unknowns, stored or computed now.
     ///
     /// # Errors
     /// Returns the errors of `find` and of the file system.
     pub(crate) fn answer<E: From<StoreError>>(
         &self,
         x: &[f64],
-        find: impl FnOnce() -> Result<Option<Summary>, E>,
-    ) -> Result<Option<Summary>, E> {
+        find: impl FnOnce() -> Result<Option<NormalEquations>, E>,
+    ) -> Result<Option<NormalEquations>, E> {
         let key: TrialKey = x.iter().map(|x| x.to_bits()).collect();
         if let Some(cells) = lock(&self.trials).find_response(&key) {
             return Ok(self.summary(cells));
         }
         let began = Instant::now();
-        let found = find()?;
+        let equations = find()?;
         let is_costly = began.elapsed() >= COSTLY;
-        let cells = self.cells(found.as_ref());
+        let cells = self.cells(equations.as_ref());
         let mut trials = lock(&self.trials);
         trials.add(key, cells)?;
         if is_costly || trials.is_due() {
             trials.write()?;
         }
         drop(trials);
-        Ok(found)
+        Ok(equations)
     }
 
-    /// Writes what is not written.
+    /// Writes the evaluations that are only in memory.
     ///
     /// # Errors
     /// [`StoreError::File`].
@@ -87,28 +87,29 @@ impl Evaluations {
         lock(&self.trials).write()
     }
 
-    /// Removes them once the machine file is in place; a failure is only worth a note.
+    /// Removes the stored evaluations once the machine file is written, and returns a note if that
+    /// fails.
     pub(crate) fn complete(self) -> Option<String> {
         sweep_files::panics::unlocked(self.trials).complete()
     }
 
-    /// Returns a summary's cells, in the order of [`columns`].
-    fn cells(&self, summary: Option<&Summary>) -> RowCells {
-        let Some(Summary { cost, sigma, normal, pull }) = summary else {
+    /// Returns the cells of normal equations, in the order of [`columns`].
+    fn cells(&self, summary: Option<&NormalEquations>) -> RowCells {
+        let Some(NormalEquations { cost, sigma, normal, pull }) = summary else {
             return vec![None; 1 + self.signals + (self.unknowns + 1) * self.unknowns];
         };
         let numbers = std::iter::once(cost).chain(sigma).chain(normal.iter().flatten()).chain(pull);
         numbers.map(|number| Some(number.to_bits())).collect()
     }
 
-    /// Returns the summary that some cells hold, if there is one.
-    fn summary(&self, cells: &RowCells) -> Option<Summary> {
+    /// Returns the normal equations that some cells hold; `None` for a failed evaluation.
+    fn summary(&self, cells: &RowCells) -> Option<NormalEquations> {
         let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
         let numbers = numbers?;
         let (cost, rest) = numbers.split_first()?;
         let (sigma, rest) = rest.split_at_checked(self.signals)?;
         let (normal, pull) = rest.split_at_checked(self.unknowns * self.unknowns)?;
-        Some(Summary {
+        Some(NormalEquations {
             cost: *cost,
             sigma: sigma.to_vec(),
             normal: normal.chunks(self.unknowns.max(1)).map(<[f64]>::to_vec).collect(),
@@ -117,7 +118,7 @@ impl Evaluations {
     }
 }
 
-/// Returns the columns of evaluations: the unknowns, then what a descent needs to know of them.
+/// Returns the columns of evaluations: the unknowns, then the cost and the normal equations.
 fn columns(problem: &Problem<'_>) -> TrialColumns {
     let mut keys = Vec::new();
     for free in &problem.free {
@@ -154,7 +155,7 @@ fn columns(problem: &Problem<'_>) -> TrialColumns {
     TrialColumns { keys, responses }
 }
 
-/// Returns the job of a problem: the plans of its cases, and a hash of what was measured.
+/// Returns the job of a problem: the plans of its cases, and a hash of the measurements.
 fn job<'a>(problem: &'a Problem<'_>) -> Job<'a> {
     let mut measured = blake3::Hasher::new();
     for case in &problem.cases {

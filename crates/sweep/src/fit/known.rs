@@ -21,7 +21,7 @@ use washer_model::{Machine, MachineParameter, Spin, Target};
 
 use super::algebra::{Symmetric, add_outer, centred, dot, inverse};
 use super::measured::Signal;
-use super::model::{Against, FitCase, Free, Problem, Summary};
+use super::model::{FitCase, FreeParameter, NormalEquations, Problem, SignalComparison};
 use sweep_engine::Diagnostics;
 use sweep_engine::config::{Location, Report as Mistakes};
 
@@ -36,14 +36,14 @@ const GAIN_RATIO: f64 = 0.03;
 /// 1e-3, as far from rounding as from curvature. Doubling it doubles the derivative's error by
 /// curvature.
 const STEP_TOLERANCES: f64 = 0.02;
-/// The greatest number of values of the slopes by fixed numbers; of longer records every second
-/// sample counts twice, and so on. Basis: 160 MB. Doubling it takes as much more, and is as exact.
+/// The greatest number of values of the slopes by fixed numbers. In longer records every `n`th
+/// sample counts `n` times. Basis: 160 MB. Doubling it doubles the memory.
 const MAX_VALUES: usize = 20_000_000;
 
-/// The endings of the names of lengths that are shorter than a tape measure is exact.
+/// The endings of the names of lengths that are too short for a tape measure.
 const SHORT_LENGTHS: [&str; 2] = ["clearance_m", "softness_m"];
 
-/// A standard deviation: a part of the number, or in its unit.
+/// A standard deviation, as a part of the number or in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum FixedTolerance {
     Relative(f64),
@@ -96,7 +96,7 @@ impl FixedTolerance {
 
 /// The fixed numbers of a fit with their tolerances.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Known {
+pub(super) struct FixedNumbers {
     numbers: Vec<(MachineParameter, f64)>,
     gain_ratio: f64,
 }
@@ -142,30 +142,30 @@ pub(crate) struct FixedInfluences {
 /// An error of a fixed number of one standard deviation.
 struct FixedError {
     influence: FixedInfluence,
-    /// The change of every signal at every sample, or at each of so many.
+    /// The change of every signal at every sample, or at every `stride`th.
     change: Vec<Vec<f64>>,
 }
 
-impl Known {
+impl FixedNumbers {
     /// Reads the tolerances that are given. All other numbers of the machine that are not free have
     /// those of their kind, unless `none` is among the given.
     ///
     /// # Errors
-    /// Every mistake in them.
+    /// Returns every mistake in the tolerances.
     pub(super) fn read(
         given: &[String],
         case: &FitCase,
-        free: &[Free],
+        free: &[FreeParameter],
     ) -> Result<Self, Diagnostics> {
         let mistakes = Mistakes::default();
         let mut parameters: Vec<(MachineParameter, FixedTolerance)> = Vec::new();
         let mut gain: Option<FixedTolerance> = None;
         let is_none = |text: &&String| text.trim() == NONE;
         for text in given.iter().filter(|text| !is_none(text)) {
-            let at = Location::new(mistakes.add("--known", text.as_str()), 0..text.len());
+            let location = Location::new(mistakes.add("--known", text.as_str()), 0..text.len());
             let refuse = |title: String| {
                 let expected = "expected NAME=2% or NAME=0.01 in its unit, gain=3% or none";
-                mistakes.refuse::<()>(&at, title, expected);
+                mistakes.refuse::<()>(&location, title, expected);
             };
             let Some((name, tolerance)) = text.split_once('=') else {
                 refuse(format!("`{text}` has no tolerance"));
@@ -204,15 +204,14 @@ impl Known {
         mistakes.finish(Some(known))
     }
 
-    /// Computes how the unknowns depend on the fixed numbers. `variances` are those of each
-    /// signal's noise over its independent samples. On all threads of the rayon pool it is called
-    /// in.
+    /// Computes the dependence of the unknowns on the fixed numbers, on all threads of the current
+    /// rayon pool. `variances` has the variance of each signal's noise for its independent samples.
     pub(super) fn influences(
         &self,
         problem: &Problem<'_>,
         x: &[f64],
-        against: &[Against],
-        summary: &Summary,
+        against: &[SignalComparison],
+        summary: &NormalEquations,
         variances: &[f64],
     ) -> FixedInfluences {
         let gains = if self.gain_ratio > 0.0 { against.len() } else { 0 };
@@ -230,7 +229,7 @@ impl Known {
         let mut moment = open.clone();
         add_outer(&mut moment, &mean, 1.0);
         let unknowns = problem.unknowns();
-        // B times a vector of errors in standard deviations.
+        // The product of B and a vector of errors in standard deviations.
         let moved = |by: &[f64]| -> Vec<f64> {
             let mut moved = vec![0.0; unknowns];
             for (FixedError { influence, .. }, by) in errors.iter().zip(by) {
@@ -252,7 +251,7 @@ impl Known {
             let moves = moves.iter().enumerate();
             moves.fold(0.0_f64, |most, (k, by)| most.max(by * by / bread[k][k].max(1e-300)))
         };
-        let eigen = Symmetric::of(&moment);
+        let eigen = Symmetric::from_matrix(&moment);
         let direction = |(value, vector): (&f64, &Vec<f64>)| {
             let size = value.max(0.0).sqrt();
             let errors_by: Vec<f64> = vector.iter().map(|entry| size * entry).collect();
@@ -279,14 +278,14 @@ impl Known {
     }
 
     /// Computes the effect on the signals of an error of one standard deviation of each number of
-    /// the machine, with the pull at the unknowns in place of their moves; none where the machine
-    /// cannot have it.
+    /// the machine, with the change of the normal equations' right side in place of the moves. The
+    /// effect is zero if no machine has the changed number.
     fn machine_errors(
         &self,
         problem: &Problem<'_>,
         x: &[f64],
-        against: &[Against],
-        summary: &Summary,
+        against: &[SignalComparison],
+        summary: &NormalEquations,
         stride: usize,
     ) -> Vec<FixedError> {
         let error = |(parameter, tolerance): &(MachineParameter, f64)| FixedError {
@@ -305,19 +304,19 @@ impl Known {
         };
         let mut errors: Vec<FixedError> = self.numbers.iter().map(error).collect();
         for case in 0..problem.cases.len() {
-            // A number at an end of its range can change one way only.
-            let way = |k: usize| {
+            // A number at an end of its range can change in one direction only.
+            let signed_step = |k: usize| {
                 let (mut machine, mut spin) = problem.machine(case, x);
                 change(&self.numbers[k], STEP_TOLERANCES, &mut machine, &mut spin);
                 if machine.violations().is_empty() { STEP_TOLERANCES } else { -STEP_TOLERANCES }
             };
-            let steps: Vec<f64> = (0..self.numbers.len()).map(way).collect();
-            let own: Vec<usize> =
+            let steps: Vec<f64> = (0..self.numbers.len()).map(signed_step).collect();
+            let case_signals: Vec<usize> =
                 (0..against.len()).filter(|&signal| against[signal].case == case).collect();
             let reduce = |changes: Vec<Vec<f64>>| {
                 let mut pull = vec![0.0; x.len()];
                 let mut thinned = Vec::with_capacity(changes.len());
-                for (change, &signal) in changes.into_iter().zip(&own) {
+                for (change, &signal) in changes.into_iter().zip(&case_signals) {
                     let change = centred(change).0;
                     let variance = summary.sigma[signal] * summary.sigma[signal];
                     for (pull, slope) in pull.iter_mut().zip(&against[signal].slopes) {
@@ -330,12 +329,12 @@ impl Known {
             let apply = |k: usize, machine: &mut Machine, spin: &mut Spin| {
                 change(&self.numbers[k], steps[k], machine, spin);
             };
-            let found = problem.changes(case, x, against, (steps.len(), apply), reduce);
-            for ((error, found), step) in errors.iter_mut().zip(found).zip(&steps) {
-                let Some((pull, changes)) = found else { continue };
+            let effects = problem.changes(case, x, against, (steps.len(), apply), reduce);
+            for ((error, effect), step) in errors.iter_mut().zip(effects).zip(&steps) {
+                let Some((pull, changes)) = effect else { continue };
                 let moves = error.influence.moves.iter_mut().zip(pull);
                 moves.for_each(|(sum, pull)| *sum += pull / step);
-                for (change, &signal) in changes.into_iter().zip(&own) {
+                for (change, &signal) in changes.into_iter().zip(&case_signals) {
                     error.change[signal] = change.into_iter().map(|value| value / step).collect();
                 }
             }
@@ -343,32 +342,35 @@ impl Known {
         errors
     }
 
-    /// Computes the effect of an error of each sensor's gain of one standard deviation, with the
-    /// pull at the unknowns in place of their moves.
+    /// Computes the effect of an error of one standard deviation of each sensor's gain, with the
+    /// change of the normal equations' right side in place of the moves.
     fn gain_errors(
         &self,
         problem: &Problem<'_>,
-        against: &[Against],
-        summary: &Summary,
+        against: &[SignalComparison],
+        summary: &NormalEquations,
         stride: usize,
     ) -> Vec<FixedError> {
-        let error = |(k, ((.., signal), one)): (usize, ((usize, usize, &Signal), &Against))| {
-            let variance = summary.sigma[k] * summary.sigma[k];
-            let motion = signal.samples().map(|(row, _)| self.gain_ratio * one.model[row]);
-            let motion = centred(motion.collect()).0;
-            let mut change: Vec<Vec<f64>> =
-                against.iter().map(|one| vec![0.0; one.residual.len().div_ceil(stride)]).collect();
-            change[k] = motion.iter().copied().step_by(stride).collect();
-            let influence = FixedInfluence {
-                name: format!("{GAIN} of {}", signal.quantity.column()),
-                unit: "",
-                tolerance: self.gain_ratio,
-                error: self.gain_ratio,
-                parameter: None,
-                moves: one.slopes.iter().map(|slope| dot(slope, &motion) / variance).collect(),
+        let error =
+            |(k, ((.., signal), one)): (usize, ((usize, usize, &Signal), &SignalComparison))| {
+                let variance = summary.sigma[k] * summary.sigma[k];
+                let motion = signal.samples().map(|(row, _)| self.gain_ratio * one.model[row]);
+                let motion = centred(motion.collect()).0;
+                let mut change: Vec<Vec<f64>> = against
+                    .iter()
+                    .map(|one| vec![0.0; one.residual.len().div_ceil(stride)])
+                    .collect();
+                change[k] = motion.iter().copied().step_by(stride).collect();
+                let influence = FixedInfluence {
+                    name: format!("{GAIN} of {}", signal.quantity.column()),
+                    unit: "",
+                    tolerance: self.gain_ratio,
+                    error: self.gain_ratio,
+                    parameter: None,
+                    moves: one.slopes.iter().map(|slope| dot(slope, &motion) / variance).collect(),
+                };
+                FixedError { influence, change }
             };
-            FixedError { influence, change }
-        };
         problem.signals().zip(against).enumerate().map(error).collect()
     }
 }
@@ -382,7 +384,7 @@ struct Posterior {
 /// Computes the errors of fixed numbers after the record.
 fn posterior(
     errors: &[FixedError],
-    against: &[Against],
+    against: &[SignalComparison],
     variances: &[f64],
     stride: usize,
 ) -> Posterior {
@@ -395,36 +397,36 @@ fn posterior(
             one.residual.iter().step_by(stride).map(move |residual| weight * residual)
         })
         .collect();
-    // The part of each change that the unknowns do not make up for.
-    let left = |error: &FixedError| -> Vec<f64> {
-        let mut left = Vec::with_capacity(residual.len());
+    // The part of each change for which the unknowns do not compensate.
+    let uncompensated = |error: &FixedError| -> Vec<f64> {
+        let mut part = Vec::with_capacity(residual.len());
         for ((change, one), weight) in error.change.iter().zip(against).zip(&weights) {
             let mut change = change.clone();
             for (slope, by) in one.slopes.iter().zip(&error.influence.moves) {
                 let slope = slope.iter().step_by(stride);
                 change.iter_mut().zip(slope).for_each(|(change, slope)| *change -= by * slope);
             }
-            left.extend(change.iter().map(|change| weight * change));
+            part.extend(change.iter().map(|change| weight * change));
         }
-        left
+        part
     };
-    let left: Vec<Vec<f64>> = errors.iter().map(left).collect();
+    let parts: Vec<Vec<f64>> = errors.iter().map(uncompensated).collect();
     let mut information = vec![vec![0.0; errors.len()]; errors.len()];
     for i in 0..errors.len() {
         for j in 0..=i {
-            let product = dot(&left[i], &left[j]);
+            let product = dot(&parts[i], &parts[j]);
             information[i][j] = product;
             information[j][i] = product;
         }
         information[i][i] += 1.0;
     }
     let covariance = inverse(&information);
-    let scores: Vec<f64> = left.iter().map(|left| dot(left, &residual)).collect();
+    let scores: Vec<f64> = parts.iter().map(|part| dot(part, &residual)).collect();
     let mean = covariance.iter().map(|row| dot(row, &scores)).collect();
     Posterior { covariance, mean }
 }
 
-/// Changes a number by so many tolerances.
+/// Changes a number by a multiple of its tolerance.
 fn change(
     (parameter, tolerance): &(MachineParameter, f64),
     count: f64,
@@ -436,28 +438,32 @@ fn change(
     }
 }
 
-/// Returns the fixed numbers of a name with their values: one, or one for every element where a
-/// name is of several elements that differ; or why there are none.
+/// Returns the fixed numbers of a name with their values: one, or one for each element if the name
+/// stands for elements that differ.
+///
+/// # Errors
+/// Returns the reason why the name has no fixed number.
 fn single_numbers(
     name: &str,
     case: &FitCase,
-    free: &[Free],
+    free: &[FreeParameter],
 ) -> Result<Vec<(MachineParameter, f64)>, String> {
     let machine = &case.plan.model.machine;
     let spin = case.spin();
-    let found = MachineParameter::find(name, machine, spin)
+    let parameter = MachineParameter::find(name, machine, spin)
         .map_err(|error| format!("`{name}` has no tolerance: {error}"))?;
-    if !is_fixed_kind(&found) {
+    if !is_fixed_kind(&parameter) {
         return Err(format!("`{name}` is no number of the machine"));
     }
-    let parts = found.single_names(machine);
-    let is_free =
-        |free: &Free| free.parameter.single_names(machine).iter().any(|it| parts.contains(it));
+    let parts = parameter.single_names(machine);
+    let is_free = |free: &FreeParameter| {
+        free.parameter.single_names(machine).iter().any(|name| parts.contains(name))
+    };
     if free.iter().any(is_free) {
         return Err(format!("`{name}` is free: only fixed numbers have a tolerance"));
     }
-    if let Some(value) = found.get(machine, spin) {
-        return Ok(vec![(found, value)]);
+    if let Some(value) = parameter.get(machine, spin) {
+        return Ok(vec![(parameter, value)]);
     }
     let part = |part: &std::borrow::Cow<'static, str>| {
         let parameter = MachineParameter::find(part, machine, spin).ok()?;
@@ -476,11 +482,11 @@ fn is_fixed_kind(parameter: &MachineParameter) -> bool {
     !matches!(parameter.target(), Target::Spin | Target::Window(_))
 }
 
-/// Returns the numbers of a machine that have a tolerance. What several elements share is one
-/// number: they are of one batch.
+/// Returns the numbers of a machine that have a tolerance. A number that several elements share is
+/// one number, because they are of one batch.
 fn fixed_numbers(
     case: &FitCase,
-    free: &[Free],
+    free: &[FreeParameter],
     given: &[(MachineParameter, FixedTolerance)],
     with_defaults: bool,
 ) -> Vec<(MachineParameter, f64)> {
@@ -488,32 +494,32 @@ fn fixed_numbers(
     let spin = case.spin();
     let parts = |parameter: &MachineParameter| parameter.single_names(machine);
     let mut taken: Vec<_> = free.iter().flat_map(|free| parts(&free.parameter)).collect();
-    let mut found = Vec::new();
-    // The last that is given of a number holds.
+    let mut numbers = Vec::new();
+    // The last tolerance of a number holds.
     let given = given.iter().rev().map(|(parameter, tolerance)| (parameter.clone(), *tolerance));
     let all = || MachineParameter::all(machine, spin).into_iter().filter(is_fixed_kind);
     let shared = all().filter(|parameter| parameter.target().has_several_numbers());
     let single = all().filter(|parameter| !parameter.target().has_several_numbers());
-    // A number that a machine file may leave out and does belongs to a part that is not there.
-    let is_there = |parameter: &MachineParameter| {
+    // A number with its default value, such as 0, belongs to a part that the machine does not have.
+    let is_present = |parameter: &MachineParameter| {
         parameter.default_value().is_none_or(|value| parameter.get(machine, spin) != Some(value))
     };
     let by_kind = |parameter: MachineParameter| {
         let tolerance = FixedTolerance::by_kind(parameter.name(), parameter.unit());
         (parameter, tolerance)
     };
-    let defaults = shared.chain(single).filter(is_there).map(by_kind).filter(|_| with_defaults);
+    let defaults = shared.chain(single).filter(is_present).map(by_kind).filter(|_| with_defaults);
     for (parameter, tolerance) in given.chain(defaults) {
-        let own = parts(&parameter);
-        if own.iter().any(|part| taken.contains(part)) {
+        let names = parts(&parameter);
+        if names.iter().any(|part| taken.contains(part)) {
             continue;
         }
         let Some(value) = parameter.get(machine, spin) else { continue };
         let size = tolerance.deviation(value);
-        taken.extend(own);
+        taken.extend(names);
         if size > 0.0 {
-            found.push((parameter, size));
+            numbers.push((parameter, size));
         }
     }
-    found
+    numbers
 }

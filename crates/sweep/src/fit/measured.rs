@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::algebra::{centred, quantile};
-use super::pulses::{PulseError, Pulses};
-use super::speed::{self, Smoothed};
+use super::pulses::{PulseError, PulseSignal, Pulses};
+use super::speed::{self, SmoothedSpin};
 use sweep_engine::Diagnostics;
 use sweep_engine::config::list::{ANY_UNIT, ListColumn, Names, NumberTable};
 use sweep_engine::config::report::{Diagnostic, Report};
@@ -202,7 +202,7 @@ impl Measurement {
     }
 
     /// Fits the spin to the tachometer, if there is one.
-    pub(super) fn smoothed_spin(&self) -> Option<Smoothed> {
+    pub(super) fn smoothed_spin(&self) -> Option<SmoothedSpin> {
         match &self.pulses {
             Some(pulses) => pulses.smoothed(),
             None => speed::smoothed(&self.time_s, self.speed_rpm.as_ref()?),
@@ -228,25 +228,16 @@ fn known(header: &str) -> Option<(String, String)> {
             ["time_s", "s"].map(str::to_owned)
         }
         "speed_rpm" | "rpm" | "drehzahl_rpm" => ["speed_rpm", "rpm"].map(str::to_owned),
-        _ if pulses_per_turn(name).is_some() => [name, ANY_UNIT].map(str::to_owned),
+        _ if PulseSignal::from_name(name).is_some() => [name, ANY_UNIT].map(str::to_owned),
         _ => [name.to_owned(), SignalQuantity::named(name)?.units().0],
     };
     Some((name, unit))
 }
 
-/// Returns the number of pulses of a turn that a name such as `tacho_60_pulses` gives; it is 1 for
-/// `tacho_pulses`.
-fn pulses_per_turn(name: &str) -> Option<u32> {
-    match name.strip_prefix("tacho_")?.strip_suffix("pulses")? {
-        "" => Some(1),
-        count => count.strip_suffix('_')?.parse().ok().filter(|count| *count > 0),
-    }
-}
-
 /// Returns every name that a column may have.
 fn all_names() -> Vec<String> {
     let names = SignalQuantity::all().map(SignalQuantity::column);
-    names.chain(["time_s", "speed_rpm", "tacho_pulses"].map(str::to_owned)).collect()
+    names.chain(["time_s", "speed_rpm", "tacho_pulses", "tacho_count"].map(str::to_owned)).collect()
 }
 
 /// Returns the mistake of a column whose name is near that of a channel: it is meant to be read.
@@ -278,7 +269,7 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();
     let mut measured = Measurement { name, early, notes, headers, ..Measurement::default() };
     let mut seen: Vec<&str> = Vec::new();
-    let mut pulse_columns: Vec<(&ListColumn, u32)> = Vec::new();
+    let mut pulse_columns: Vec<(&ListColumn, (PulseSignal, u32))> = Vec::new();
     for column in &table.columns {
         if !column.is_known {
             let mistake = if is_trace { None } else { misspelt(column) };
@@ -320,7 +311,9 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
                 let title = format!("the column `{name}` has {samples} samples");
                 report.push(Diagnostic::new(title).at(at, format!("expected {FEWEST} at least")));
             }
-            (_, None) => pulse_columns.extend(pulses_per_turn(name).map(|count| (column, count))),
+            (_, None) => {
+                pulse_columns.extend(PulseSignal::from_name(name).map(|kind| (column, kind)));
+            }
         }
     }
     let whole = report.is_clean();
@@ -343,9 +336,9 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
             report.push(naming.into_iter().fold(refusal, Diagnostic::help));
         }
     }
-    for (column, per_turn) in pulse_columns {
+    for (column, kind) in pulse_columns {
         if report.is_clean() {
-            read_pulses(&mut measured, &table, column, per_turn, report);
+            read_pulses(&mut measured, &table, column, kind, report);
         }
     }
     leave_out_drop_outs(&mut measured, |row| {
@@ -372,14 +365,15 @@ fn continue_past_midnight(times: &mut [f64]) -> bool {
     midnights_s > 0.0
 }
 
-/// Returns a time as it stands in the file, if that is a clock time.
+/// Returns the clock time of a row, if the file has clock times: as it stands in a file of text.
 fn clock_time(
     table: &NumberTable,
     column: &ListColumn,
     row: usize,
     report: &Report,
 ) -> Option<String> {
-    table.cell(report, column.place, row).filter(|cell| cell.contains(':'))
+    let text = table.cell(report, column.place, row).filter(|cell| cell.contains(':'));
+    text.or_else(|| column.clock_time(row))
 }
 
 /// Removes drop-outs from the speeds, with a note. `clock_time` returns the clock time of a row.
@@ -420,7 +414,7 @@ fn read_pulses(
     measured: &mut Measurement,
     table: &NumberTable,
     column: &ListColumn,
-    per_turn: u32,
+    kind: (PulseSignal, u32),
     report: &Report,
 ) {
     let name = &column.name.value;
@@ -430,22 +424,55 @@ fn read_pulses(
         report.push(Diagnostic::new(title).at(&column.name.location, expected));
         return;
     }
-    match Pulses::read(&measured.time_s, &column.values[measured.early..], per_turn) {
-        Ok(pulses) => measured.pulses = Some(pulses),
-        Err(PulseError::Few(count)) => {
-            let title = format!("the column `{name}` has {}", counted(count, "pulse"));
-            let expected = "expected three at least: a signal, no count, that rises through half \
-                            of its range once a pulse";
-            report.push(Diagnostic::new(title).at(&column.name.location, expected));
-        }
-        Err(PulseError::Fast(row)) => report.push_with(|sources| {
-            let title = format!("pulses of `{name}` are as fast as half of the sampling rate");
-            let expected = "expected three rows a pulse at least: faster pulses look slower than \
-                            they are";
-            let place = table.place(sources, column.place, measured.early + row);
-            Diagnostic::new(title).at(&place, expected)
-        }),
-    }
+    let counted_name = name.replace("pulses", "count");
+    let voltage_name = name.replace("count_per_row", "pulses").replace("count", "pulses");
+    let (title, expected, row) =
+        match Pulses::read(&measured.time_s, &column.values[measured.early..], kind) {
+            Ok(pulses) => {
+                measured.pulses = Some(pulses);
+                return;
+            }
+            Err(PulseError::FewPulses(count)) => (
+                format!("the column `{name}` has {}", counted(count, "pulse")),
+                format!(
+                    "expected three at least: a signal that rises through half of its range once \
+                     a pulse; the column of a counter is `{counted_name}`"
+                ),
+                None,
+            ),
+            Err(PulseError::FewReadings(count)) => (
+                format!("the count `{name}` tells the turns at {}", counted(count, "time")),
+                "expected three at least, so far apart that the speed between them is known to 1 %"
+                    .to_owned(),
+                None,
+            ),
+            Err(PulseError::Fast(row)) => (
+                format!("pulses of `{name}` are as fast as half of the sampling rate"),
+                "expected three rows a pulse at least: faster pulses look slower than they are"
+                    .to_owned(),
+                Some(row),
+            ),
+            Err(PulseError::Falling(row)) => (
+                format!("the count `{name}` falls in row {}", measured.early + row + 1),
+                format!(
+                    "expected a count that rises, or starts again at 0 after 65536 or 4294967296; \
+                     the column of a voltage is `{voltage_name}`"
+                ),
+                Some(row),
+            ),
+            Err(PulseError::Missing(row)) => (
+                format!("`{name}` has no number in row {}", measured.early + row + 1),
+                "expected the number of pulses since the previous row in each row".to_owned(),
+                Some(row),
+            ),
+        };
+    report.push_with(|sources| {
+        let place = match row {
+            Some(row) => table.place(sources, column.place, measured.early + row),
+            None => column.name.location.clone(),
+        };
+        Diagnostic::new(title).at(&place, expected)
+    });
 }
 
 /// Whether all samples are one number.
@@ -680,13 +707,18 @@ mod tests {
 
     #[test]
     fn a_tachometer_by_pulses_is_read() {
-        for (name, per_turn) in [
-            ("tacho_pulses", Some(1)),
-            ("tacho_60_pulses", Some(60)),
+        for (name, signal) in [
+            ("tacho_pulses", Some((PulseSignal::Voltage, 1))),
+            ("tacho_60_pulses", Some((PulseSignal::Voltage, 60))),
+            ("tacho_count", Some((PulseSignal::Count, 1))),
+            ("tacho_60_count", Some((PulseSignal::Count, 60))),
+            ("tacho_2_count_per_row", Some((PulseSignal::CountPerRow, 2))),
             ("tacho_0_pulses", None),
             ("tacho_60pulses", None),
+            ("tacho__pulses", None),
+            ("tacho_60", None),
         ] {
-            assert_eq!(pulses_per_turn(name), per_turn, "{name}");
+            assert_eq!(PulseSignal::from_name(name), signal, "{name}");
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
@@ -712,6 +744,49 @@ mod tests {
         assert!(text.contains("has 2 pulses") && text.contains("three at least"), "{text}");
         let text = wrong("Time,tub_yaw,tacho_pulses", 2, "");
         assert!(text.contains("half of the sampling rate") && text.contains(":5:"), "{text}");
+    }
+
+    #[test]
+    fn instants_of_pandas_count_from_the_first_row() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/fit");
+        let renamed = [("Acc front".to_owned(), "tub_front_y_m_per_s2".to_owned())];
+        let measured = Measurement::read(&folder.join("pandas_datetime.parquet"), &renamed);
+        let mut measured = measured.unwrap();
+        assert!(measured.notes.join(";").contains("left out the column `logged_at`"));
+        measured.count_from_first_row(24.0);
+        assert_eq!(measured.clock_start().as_deref(), Some("2026-03-01 12:34:56.789"));
+        for (k, time_s) in measured.time_s.iter().enumerate() {
+            assert!((time_s - 0.01 * k as f64).abs() < 5e-7, "{k}: {time_s}");
+        }
+    }
+
+    #[test]
+    fn a_tachometer_by_a_count_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let read = |header: &str, count: &dyn Fn(u32) -> u32| {
+            let rows: String =
+                (0..400).map(|k| format!("{},{k},{}\n", 0.01 * f64::from(k), count(k))).collect();
+            std::fs::write(&path, format!("Time,tub_yaw,{header}\n{rows}")).unwrap();
+            let renamed = [("Pulses".to_owned(), "tacho_60_count".to_owned())];
+            Measurement::read(&path, &renamed)
+        };
+        // 240 rpm are 2.4 pulses a row.
+        let total = |k: u32| 12 * k / 5;
+        for (header, count) in [
+            ("Pulses", &total as &dyn Fn(u32) -> u32),
+            ("tacho_60_count_per_row", &|k| total(k + 1) - total(k)),
+        ] {
+            let measured = read(header, count).unwrap();
+            let spin = measured.smoothed_spin().unwrap().spin;
+            let speeds: Vec<f64> = spin.speeds_rpm([0.5, 2.0, 3.5]).collect();
+            assert!(speeds.iter().all(|speed| (speed - 240.0).abs() < 2.0), "{speeds:?}");
+        }
+        let text = read("Pulses", &|k| k % 100).unwrap_err().to_string();
+        assert!(text.contains("`tacho_60_count` falls in row 101") && text.contains(":102:"));
+        assert!(text.contains("the column of a voltage is `tacho_60_pulses`"), "{text}");
+        let text = read("tacho_60_pulses", &total).unwrap_err().to_string();
+        assert!(text.contains("the column of a counter is `tacho_60_count`"), "{text}");
     }
 
     #[test]

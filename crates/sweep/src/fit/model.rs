@@ -14,32 +14,35 @@ use washer_model::{
 
 use super::algebra::{centred, dot};
 use super::measured::{Measurement, Signal, SignalQuantity};
-use super::speed::Smoothed;
+use super::speed::SmoothedSpin;
 use crate::engine::reference_step_s;
 use crate::method::direct;
 use crate::plan::{Plan, prepare_point};
 use lane_ode::Cancel;
 use sweep_engine::plan::WrittenIn;
 
-/// Neighbours are this share of a number away from it.
-const NEAR: f64 = 1e-5;
-/// The farthest a measurement's clock may be off (s).
-pub(super) const MOST_SHIFT_S: f64 = 0.25;
-/// A neighbour in time (s).
-const NEAR_S: f64 = 1e-5;
+/// The step of a difference quotient, as a part of the number. Basis: the square root of the
+/// rounding error of a trajectory. Doubling it doubles the error of derivatives by curvature.
+const DIFFERENCE_RATIO: f64 = 1e-5;
+/// The greatest shift of a measurement's clock (s). Basis: a logger that starts by hand is set to
+/// the run's start more exactly. Doubling it lengthens every trajectory by a quarter of a second.
+pub(super) const MAX_SHIFT_S: f64 = 0.25;
+/// The step of a difference quotient by the clock's shift (s). Basis: a thousandth of a turn at
+/// 6000 rpm. Doubling it doubles the error of that derivative by curvature.
+const DIFFERENCE_S: f64 = 1e-5;
 
-/// A measurement and the run that it is of.
+/// A measurement and the run that was measured.
 #[derive(Clone, Debug)]
 pub(crate) struct FitCase {
     /// The grid with this run's own constants.
     pub(crate) plan: Plan,
     pub(crate) measured: Measurement,
     /// The spin, if it was measured.
-    pub(crate) smoothed: Option<Smoothed>,
+    pub(crate) smoothed: Option<SmoothedSpin>,
 }
 
 impl FitCase {
-    /// Returns the run's spin.
+    /// Returns the spin of the run.
     pub(crate) fn spin(&self) -> &Spin {
         self.smoothed.as_ref().map_or(&self.plan.model.spin, |smoothed| &smoothed.spin)
     }
@@ -60,75 +63,77 @@ impl FitCase {
         signal.samples().count() as f64 / (times[times.len() - 1] - times[0])
     }
 
-    /// Returns the end of the run (s): late enough for a late clock.
+    /// Returns the end of the run (s), which is later than the record by the greatest shift.
     fn end_s(&self) -> f64 {
-        self.measured.time_s.last().copied().unwrap_or_default() + MOST_SHIFT_S
+        self.measured.time_s.last().copied().unwrap_or_default() + MAX_SHIFT_S
     }
 }
 
-/// A number that is fitted.
+/// A parameter of the machine that is fitted.
 #[derive(Clone, Debug)]
-pub(crate) struct Free {
+pub(crate) struct FreeParameter {
     pub(crate) parameter: MachineParameter,
-    /// Between which values.
+    /// The least and the greatest value.
     pub(crate) range: [f64; 2],
     pub(crate) start: f64,
-    /// The case whose own it is; of all if none.
+    /// The case that has a value of its own; `None` if all cases share the value.
     pub(crate) case: Option<usize>,
 }
 
-impl Free {
-    pub(crate) fn is_of(&self, case: usize) -> bool {
+impl FreeParameter {
+    pub(crate) fn belongs_to(&self, case: usize) -> bool {
         self.case.is_none_or(|own| own == case)
     }
 }
 
-/// The fit's question. Its unknowns are the free numbers, then the shift of each case's clock if
-/// those are wanted. The offsets of signals are no unknowns: means are taken off.
+/// A least-squares problem. Its unknowns are the free parameters, then the shift of each case's
+/// clock, if shifts are fitted. The offsets of signals are no unknowns, because means are
+/// subtracted.
 pub(crate) struct Problem<'a> {
     pub(crate) cases: Vec<FitCase>,
-    pub(crate) free: Vec<Free>,
+    pub(crate) free: Vec<FreeParameter>,
     pub(crate) model: ModelKind,
     pub(crate) with_shift: bool,
     pub(crate) method: Method,
     pub(crate) simd: Simd,
-    /// Ends the work early; what comes then means nothing.
+    /// The cancellation, after which results are meaningless.
     pub(crate) cancel: Cancel<'a>,
 }
 
-/// A machine, its spin, and the shift of the clock that it is seen by (s).
+/// A machine, its spin, and the shift of the measurement's clock (s).
 type CaseRun = (Machine, Spin, f64);
 
-/// A signal against the model.
+/// The comparison of a measured signal with the model.
 #[derive(Clone, Debug)]
-pub(crate) struct Against {
+pub(crate) struct SignalComparison {
     pub(crate) case: usize,
     pub(crate) signal: usize,
-    /// The model at every row, without offset.
+    /// The values of the model at every row, without the offset.
     pub(crate) model: Vec<f64>,
     pub(crate) offset: f64,
-    /// Measured less model and offset, at the samples that there are.
+    /// The difference of measurement and model less the offset, at each sample.
     pub(crate) residual: Vec<f64>,
-    /// The model's derivative by each unknown there, less its mean; empty where there is none.
+    /// The derivatives of the model by each unknown at the samples, less their means; empty for an
+    /// unknown that does not matter to the case.
     pub(crate) slopes: Vec<Vec<f64>>,
 }
 
-/// The cost at a point and its derivatives. Costs are twice a negative log-likelihood, with every
-/// signal's noise as its residual says.
+/// The cost at a point and its normal equations, of Gauss and Newton. The cost is twice the
+/// negative log-likelihood, where the variance of each signal's noise is that of its residual.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Summary {
+pub(crate) struct NormalEquations {
     pub(crate) cost: f64,
-    /// Noise of each signal.
+    /// The standard deviation of each signal's noise.
     pub(crate) sigma: Vec<f64>,
-    /// J' W J
+    /// The normal matrix J' W J, with the Jacobian J and the weights W.
     pub(crate) normal: Vec<Vec<f64>>,
-    /// J' W r
+    /// The right side J' W r, with the residual r.
     pub(crate) pull: Vec<f64>,
 }
 
 impl Problem<'_> {
-    /// Selects the integration method: the grid's where that is one, else the reference's step,
-    /// which depends on the machine at the start alone.
+    /// Selects the integration method: that of the grid if it is a method of fixed steps, or else
+    /// Runge and Kutta's with the step of references, which depends on the machine at the start.
     pub(crate) fn method(cases: &[FitCase]) -> Result<Method, washer_model::NoEquilibrium> {
         if let Some((_, method)) = cases.iter().find_map(|case| direct(&case.plan.integrator)) {
             return Ok(method);
@@ -152,7 +157,7 @@ impl Problem<'_> {
 
     /// Returns the range of an unknown.
     pub(crate) fn range(&self, unknown: usize) -> [f64; 2] {
-        self.free.get(unknown).map_or([-MOST_SHIFT_S, MOST_SHIFT_S], |free| free.range)
+        self.free.get(unknown).map_or([-MAX_SHIFT_S, MAX_SHIFT_S], |free| free.range)
     }
 
     /// Returns the unknowns at the start.
@@ -177,7 +182,7 @@ impl Problem<'_> {
     pub(crate) fn machine(&self, case: usize, x: &[f64]) -> (Machine, Spin) {
         let mut machine = self.cases[case].plan.model.machine.clone();
         let mut spin = self.cases[case].spin().clone();
-        for (free, value) in self.free.iter().zip(x).filter(|(free, _)| free.is_of(case)) {
+        for (free, value) in self.free.iter().zip(x).filter(|(free, _)| free.belongs_to(case)) {
             free.parameter.set(&mut machine, &mut spin, *value);
         }
         (machine, spin)
@@ -187,8 +192,8 @@ impl Problem<'_> {
     pub(crate) fn written(&self) -> WrittenIn {
         let plan = &self.cases[0].plan;
         let mut written = plan.written.clone();
-        for free in self.free.iter().filter(|free| free.is_of(0)) {
-            let files = self.cases.iter().enumerate().filter(|(case, _)| free.is_of(*case));
+        for free in self.free.iter().filter(|free| free.belongs_to(0)) {
+            let files = self.cases.iter().enumerate().filter(|(case, _)| free.belongs_to(*case));
             let files: Vec<&str> = files.map(|(_, case)| &*case.measured.name).collect();
             let from = format!("fit to {}", files.join(", "));
             let parts = free.parameter.single_names(&plan.model.machine).into_iter();
@@ -200,17 +205,17 @@ impl Problem<'_> {
     /// Whether an unknown matters to a case.
     fn matters(&self, unknown: usize, case: usize) -> bool {
         match self.free.get(unknown) {
-            Some(free) => free.is_of(case),
+            Some(free) => free.belongs_to(case),
             None => unknown - self.free.len() == case,
         }
     }
 
-    /// Returns the distance of the neighbour along an unknown, to the inside of its range.
-    fn nudge(&self, unknown: usize, x: &[f64]) -> f64 {
-        let step = self.free.get(unknown).map_or(NEAR_S, |free| {
+    /// Returns the step of the difference quotient by an unknown, which stays within its range.
+    fn difference_step(&self, unknown: usize, x: &[f64]) -> f64 {
+        let step = self.free.get(unknown).map_or(DIFFERENCE_S, |free| {
             let width = free.range[1] - free.range[0];
             let size = x[unknown].abs().max(free.start.abs());
-            NEAR * if width.is_finite() { size.max(0.01 * width) } else { size }
+            DIFFERENCE_RATIO * if width.is_finite() { size.max(0.01 * width) } else { size }
         });
         if x[unknown] + step > self.range(unknown)[1] { -step } else { step }
     }
@@ -221,24 +226,24 @@ impl Problem<'_> {
         (machine, spin, self.shift_s(case, x))
     }
 
-    /// Computes what `of` makes of every signal of a case by each of so many runs; `None` of one
-    /// whose machine is none, or whose trajectory fails, and of all once the work is stopped. In
-    /// lanes, on all threads of the rayon pool it is called in.
-    fn seen<T: Send>(
+    /// Simulates `count` runs of a case and reduces the signals of each. The result is `None` for a
+    /// run without a possible machine or with a failed trajectory, and for all runs after a
+    /// cancellation. The runs share lanes and use all threads of the current rayon pool.
+    fn simulate_signals<T: Send>(
         &self,
         case: usize,
         count: usize,
         run: impl Fn(usize) -> CaseRun + Sync,
-        of: impl Fn(Vec<Vec<f64>>) -> T + Sync,
+        reduce: impl Fn(Vec<Vec<f64>>) -> T + Sync,
     ) -> Vec<Option<T>> {
         let measured = &self.cases[case].measured;
         let end_s = self.cases[case].end_s();
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-        let wanted = Recorders { snapshots: true, ..Recorders::default() };
+        let recorders = Recorders { snapshots: true, ..Recorders::default() };
         let group_values = |group: &[usize]| {
             let runs = group.iter().map(|&k| run(k)).enumerate();
-            let sound = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
-            let (shifts, machines): (Vec<(usize, f64)>, Vec<(Machine, Spin)>) = sound
+            let possible = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
+            let (shifts, machines): (Vec<(usize, f64)>, Vec<(Machine, Spin)>) = possible
                 .map(|(place, (machine, spin, shift_s))| ((place, shift_s), (machine, spin)))
                 .unzip();
             let points: Vec<(usize, Point)> = shifts
@@ -252,9 +257,10 @@ impl Problem<'_> {
                 .collect();
             let all: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
             let model = self.model;
-            let ended = simulate_until(self.simd, model, &self.method, &all, wanted, self.cancel);
+            let ended =
+                simulate_until(self.simd, model, &self.method, &all, recorders, self.cancel);
             let extras = ended.map_or_else(Vec::new, |(_, extras)| extras);
-            let mut found: Vec<Option<T>> = group.iter().map(|_| None).collect();
+            let mut results: Vec<Option<T>> = group.iter().map(|_| None).collect();
             for ((place, point), extra) in points.iter().zip(extras) {
                 let shots = extra.snapshots;
                 if shots.len() < measured.time_s.len() {
@@ -263,9 +269,9 @@ impl Problem<'_> {
                 let values = |signal: &Signal| -> Vec<f64> {
                     shots.iter().map(|shot| self.value(shot, signal, point)).collect()
                 };
-                found[*place] = Some(of(measured.signals.iter().map(values).collect()));
+                results[*place] = Some(reduce(measured.signals.iter().map(values).collect()));
             }
-            found
+            results
         };
         let places: Vec<usize> = (0..count).collect();
         places.par_chunks(self.simd.lanes().max(2)).flat_map_iter(group_values).collect()
@@ -278,55 +284,55 @@ impl Problem<'_> {
         }
     }
 
-    /// Compares every signal with the model. On all threads of the rayon pool it is called in.
-    pub(crate) fn against(&self, x: &[f64]) -> Option<Vec<Against>> {
+    /// Compares every signal with the model. It uses all threads of the current rayon pool.
+    pub(crate) fn compare(&self, x: &[f64]) -> Option<Vec<SignalComparison>> {
         let unknowns = self.unknowns();
-        let nudges: Vec<f64> = (0..unknowns).map(|k| self.nudge(k, x)).collect();
-        // The point, and a neighbour along each unknown that matters to the case.
+        let steps: Vec<f64> = (0..unknowns).map(|k| self.difference_step(k, x)).collect();
+        // A run with each unknown that matters to the case shifted, then the run at the point.
         let in_case = |case: usize| {
-            let near: Vec<usize> = (0..unknowns).filter(|&k| self.matters(k, case)).collect();
+            let varied: Vec<usize> = (0..unknowns).filter(|&k| self.matters(k, case)).collect();
             let run = |place: usize| {
                 let mut x = x.to_vec();
-                if let Some(&k) = near.get(place) {
-                    x[k] += nudges[k];
+                if let Some(&k) = varied.get(place) {
+                    x[k] += steps[k];
                 }
                 self.run(case, &x)
             };
-            let mut seen = self.seen(case, near.len() + 1, run, |values| values);
-            let here = seen.pop()??;
-            let mut beside = vec![None; unknowns];
-            for (&k, values) in near.iter().zip(seen) {
-                beside[k] = Some(values?);
+            let mut simulated = self.simulate_signals(case, varied.len() + 1, run, |values| values);
+            let signals = simulated.pop()??;
+            let mut shifted = vec![None; unknowns];
+            for (&k, values) in varied.iter().zip(simulated) {
+                shifted[k] = Some(values?);
             }
-            Some((here, beside))
+            Some((signals, shifted))
         };
-        let seen = (0..self.cases.len()).into_par_iter().map(in_case);
-        let seen: Vec<_> = seen.collect::<Option<_>>()?;
-        let of = |(case, s, signal): (usize, usize, &Signal)| {
-            let (here, beside) = &seen[case];
-            let model = here[s].clone();
-            let slope = |near: &Option<Vec<Vec<f64>>>, nudge: f64| -> Vec<f64> {
-                let Some(near) = near else { return Vec::new() };
-                let by = |(row, _)| (near[s][row] - model[row]) / nudge;
+        let simulated = (0..self.cases.len()).into_par_iter().map(in_case);
+        let simulated: Vec<_> = simulated.collect::<Option<_>>()?;
+        let compare_signal = |(case, s, signal): (usize, usize, &Signal)| {
+            let (signals, shifted) = &simulated[case];
+            let model = signals[s].clone();
+            let slope = |shifted: &Option<Vec<Vec<f64>>>, step: f64| -> Vec<f64> {
+                let Some(shifted) = shifted else { return Vec::new() };
+                let by = |(row, _)| (shifted[s][row] - model[row]) / step;
                 centred(signal.samples().map(by).collect()).0
             };
-            let slopes = beside.iter().zip(&nudges).map(|(near, nudge)| slope(near, *nudge));
+            let slopes = shifted.iter().zip(&steps).map(|(shifted, step)| slope(shifted, *step));
             let slopes = slopes.collect();
-            let apart = signal.samples().map(|(row, measured)| measured - model[row]).collect();
-            let (residual, offset) = centred(apart);
-            Against { case, signal: s, model, offset, residual, slopes }
+            let difference = signal.samples().map(|(row, measured)| measured - model[row]);
+            let (residual, offset) = centred(difference.collect());
+            SignalComparison { case, signal: s, model, offset, residual, slopes }
         };
-        Some(self.signals().map(of).collect())
+        Some(self.signals().map(compare_signal).collect())
     }
 
-    /// Computes for each of so many changes of a case's machine and spin `reduce` of what it does
-    /// to the case's signals at their samples; none where the changed run fails. `against` is the
-    /// comparison without a change.
+    /// Computes the differences that each of `count` changes of a case's machine and spin makes to
+    /// its signals at their samples, and reduces them; `None` for a run that fails. `against` is
+    /// the comparison without a change.
     pub(crate) fn changes<T: Send>(
         &self,
         case: usize,
         x: &[f64],
-        against: &[Against],
+        against: &[SignalComparison],
         (count, change): (usize, impl Fn(usize, &mut Machine, &mut Spin) + Sync),
         reduce: impl Fn(Vec<Vec<f64>>) -> T + Sync,
     ) -> Vec<Option<T>> {
@@ -335,29 +341,29 @@ impl Problem<'_> {
             change(k, &mut machine, &mut spin);
             (machine, spin, shift_s)
         };
-        let own: Vec<&Against> = against.iter().filter(|one| one.case == case).collect();
+        let own: Vec<&SignalComparison> = against.iter().filter(|one| one.case == case).collect();
         let reduced = |values: Vec<Vec<f64>>| {
-            let change = |(values, one): (&Vec<f64>, &&Against)| -> Vec<f64> {
+            let change = |(values, one): (&Vec<f64>, &&SignalComparison)| -> Vec<f64> {
                 let signal = &self.cases[case].measured.signals[one.signal];
                 signal.samples().map(|(row, _)| values[row] - one.model[row]).collect()
             };
             reduce(values.iter().zip(&own).map(change).collect())
         };
-        self.seen(case, count, run, reduced)
+        self.simulate_signals(case, count, run, reduced)
     }
 
-    /// Computes for each of so many changes of a case's machine and spin the pull at the unknowns
-    /// of what it does to the signals; none where the changed run fails. `against` is the
-    /// comparison without a change, with the noise of each signal.
+    /// Computes for each of `count` changes of a case's machine and spin the change of the normal
+    /// equations' right side; `None` for a run that fails. `against` is the comparison without a
+    /// change, and `sigma` the noise of each signal.
     pub(crate) fn pulls(
         &self,
         case: usize,
         x: &[f64],
-        (against, sigma): (&[Against], &[f64]),
+        (against, sigma): (&[SignalComparison], &[f64]),
         count: usize,
         change: impl Fn(usize, &mut Machine, &mut Spin) + Sync,
     ) -> Vec<Option<Vec<f64>>> {
-        let own: Vec<(&Against, f64)> = against
+        let own: Vec<(&SignalComparison, f64)> = against
             .iter()
             .zip(sigma)
             .filter(|(one, _)| one.case == case)
@@ -375,20 +381,20 @@ impl Problem<'_> {
         self.changes(case, x, against, (count, change), pull)
     }
 
-    /// Computes the costs of many sets of unknowns, without derivatives; infinite where there is no
-    /// answer.
+    /// Computes the costs of many sets of unknowns, without derivatives. The cost of a run that
+    /// fails is infinite.
     pub(crate) fn costs(&self, sets: &[Vec<f64>]) -> Vec<f64> {
         let in_case = |case: usize| {
             let cost = |models: Vec<Vec<f64>>| -> f64 {
                 let signals = self.cases[case].measured.signals.iter().zip(models);
-                let of = |(signal, model): (&Signal, Vec<f64>)| {
-                    let apart = signal.samples().map(|(row, value)| value - model[row]);
-                    let (residual, _) = centred(apart.collect());
+                let signal_cost = |(signal, model): (&Signal, Vec<f64>)| {
+                    let difference = signal.samples().map(|(row, value)| value - model[row]);
+                    let (residual, _) = centred(difference.collect());
                     likelihood(&residual, signal).0
                 };
-                signals.map(of).sum()
+                signals.map(signal_cost).sum()
             };
-            self.seen(case, sets.len(), |k| self.run(case, &sets[k]), cost)
+            self.simulate_signals(case, sets.len(), |k| self.run(case, &sets[k]), cost)
         };
         let parts: Vec<_> = (0..self.cases.len()).into_par_iter().map(in_case).collect();
         let mut costs = vec![0.0; sets.len()];
@@ -400,10 +406,10 @@ impl Problem<'_> {
         costs
     }
 
-    /// Summarises a comparison.
-    pub(crate) fn summary(&self, against: &[Against]) -> Summary {
+    /// Computes the cost and the normal equations of a comparison.
+    pub(crate) fn normal_equations(&self, against: &[SignalComparison]) -> NormalEquations {
         let n = self.unknowns();
-        let mut summary = Summary {
+        let mut summary = NormalEquations {
             cost: 0.0,
             sigma: Vec::new(),
             normal: vec![vec![0.0; n]; n],
@@ -429,12 +435,12 @@ impl Problem<'_> {
     }
 }
 
-/// Returns a signal's part of the cost and its noise: the residual's, and for an exact signal a
-/// millionth of the signal.
+/// Returns the part of the cost of a signal, and the standard deviation of its noise, which is that
+/// of the residual, and at least a millionth of the signal's.
 fn likelihood(residual: &[f64], signal: &Signal) -> (f64, f64) {
     let swing = signal.swing();
     let count = residual.len() as f64;
-    let least = 1e-12 * dot(&swing, &swing) + f64::MIN_POSITIVE;
-    let mean_square = (dot(residual, residual) + least) / count;
+    let least_square = 1e-12 * dot(&swing, &swing) + f64::MIN_POSITIVE;
+    let mean_square = (dot(residual, residual) + least_square) / count;
     (count * libm::log(mean_square), mean_square.sqrt())
 }

@@ -1,74 +1,196 @@
-//! The spin from a tachometer by pulses, such as a mark of the drum that passes a sensor.
+//! The spin from a tachometer by pulses, such as a mark of the drum that passes a sensor: from the
+//! sensor's signal, or from a counter of its pulses.
 
 use washer_model::Spin;
 
-use super::speed::{Smoothed, smoothed};
+use super::speed::{SmoothedSpin, smoothed};
 
-/// The least number of pulses. Basis: two speeds between them, which a course needs. Doubling it
-/// refuses records of a few turns.
-const FEWEST_PULSES: usize = 3;
+/// The least number of pulses, or of readings of a counter, that give a course of the speed. Basis:
+/// three give two speeds. Doubling it refuses records of a few turns.
+const MIN_EDGES: usize = 3;
 /// The least number of rows from a pulse to the next. Basis: pulses at half of the sampling rate
 /// are two rows apart, and faster ones look slower than they are. Doubling it refuses signals that
 /// are clear.
-const FEWEST_ROWS: usize = 3;
+const MIN_ROWS_PER_PULSE: usize = 3;
+/// The greatest standard error of a speed from a count, as a part of the speed. Basis: one pulse in
+/// a hundred, as a tachometer shows it. Doubling it doubles the noise of the speeds, and the number
+/// of speeds in a second.
+const COUNTED_SPEED_ERROR: f64 = 0.01;
+/// The number of values of counters that start again at 0, by their number of bits: 16 and 32.
+const COUNTER_RANGES: [f64; 2] = [65_536.0, 4_294_967_296.0];
+/// The greatest increment of a counter that starts again at 0, in units of the greatest increment
+/// of the other rows. Basis: a row may come late by its length. Doubling it takes more resets of a
+/// counter for an overflow.
+const MAX_OVERFLOW_INCREMENT: f64 = 2.0;
+
+/// The kind of signal that a tachometer by pulses gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PulseSignal {
+    /// A voltage that rises once a pulse.
+    Voltage,
+    /// The number of pulses since any earlier time.
+    Count,
+    /// The number of pulses since the previous row.
+    CountPerRow,
+}
+
+impl PulseSignal {
+    /// Returns the signal of a column, and the number of pulses of a turn, which is 1 unless the
+    /// name gives it: `tacho_pulses`, `tacho_60_count`.
+    pub(super) fn from_name(name: &str) -> Option<(Self, u32)> {
+        let name = name.strip_prefix("tacho_")?;
+        let first_letter = name.find(|letter: char| !letter.is_ascii_digit())?;
+        let (digits, name) = name.split_at(first_letter);
+        let (per_turn, name) = match digits {
+            "" => (1, name),
+            _ => (digits.parse().ok().filter(|count| *count > 0)?, name.strip_prefix('_')?),
+        };
+        let signal = match name {
+            "pulses" => Self::Voltage,
+            "count" => Self::Count,
+            "count_per_row" => Self::CountPerRow,
+            _ => return None,
+        };
+        Some((signal, per_turn))
+    }
+}
 
 /// The reason why a signal cannot be read as pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PulseError {
     /// Too few pulses: this number.
-    Few(usize),
+    FewPulses(usize),
+    /// Too few times at which the number of turns is known: this number.
+    FewReadings(usize),
     /// A pulse in this row that follows the previous one too soon.
     Fast(usize),
+    /// A count that falls in this row.
+    Falling(usize),
+    /// A missing number of pulses in this row.
+    Missing(usize),
 }
 
 /// The pulses of a tachometer.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Pulses {
-    /// The times of the rising edges (s), which rise.
+    /// The times of pulses (s), which rise.
     pub(super) edges_s: Vec<f64>,
-    /// The number of pulses of a turn.
-    pub(super) per_turn: f64,
+    /// The number of turns at these times, from an arbitrary one on.
+    turns: Vec<f64>,
 }
 
 impl Pulses {
-    /// Finds the edges at which a signal rises through half of its range; before the next, it has
-    /// to fall below a quarter. NaN is a missing sample.
-    pub(super) fn read(time_s: &[f64], signal: &[f64], per_turn: u32) -> Result<Self, PulseError> {
+    /// Finds the pulses of a signal with a number of them in each turn.
+    pub(super) fn read(
+        time_s: &[f64],
+        signal: &[f64],
+        (kind, per_turn): (PulseSignal, u32),
+    ) -> Result<Self, PulseError> {
+        match kind {
+            PulseSignal::Voltage => Self::from_voltage(time_s, signal, per_turn),
+            PulseSignal::Count => Self::from_count(time_s, signal, per_turn),
+            PulseSignal::CountPerRow => {
+                if let Some(row) = signal.iter().position(|pulses| pulses.is_nan()) {
+                    return Err(PulseError::Missing(row));
+                }
+                if let Some(row) = signal.iter().position(|pulses| *pulses < 0.0) {
+                    return Err(PulseError::Falling(row));
+                }
+                let add = |sum: &mut f64, pulses: &f64| {
+                    *sum += pulses;
+                    Some(*sum)
+                };
+                let count: Vec<f64> = signal.iter().scan(0.0, add).collect();
+                Self::from_count(time_s, &count, per_turn)
+            }
+        }
+    }
+
+    /// Finds the edges at which a voltage rises through half of its range; before the next, the
+    /// voltage has to fall below a quarter. NaN is a missing sample.
+    fn from_voltage(time_s: &[f64], voltage: &[f64], per_turn: u32) -> Result<Self, PulseError> {
         let samples: Vec<(usize, f64)> =
-            signal.iter().copied().enumerate().filter(|(_, value)| !value.is_nan()).collect();
-        let least = samples.iter().fold(f64::INFINITY, |least, (_, value)| least.min(*value));
-        let most = samples.iter().fold(f64::NEG_INFINITY, |most, (_, value)| most.max(*value));
-        let [quarter, half] = [0.25, 0.5].map(|part| least + part * (most - least));
+            voltage.iter().copied().enumerate().filter(|(_, value)| !value.is_nan()).collect();
+        let lowest = samples.iter().fold(f64::INFINITY, |low, (_, value)| low.min(*value));
+        let highest = samples.iter().fold(f64::NEG_INFINITY, |high, (_, value)| high.max(*value));
+        let [quarter, half] = [0.25, 0.5].map(|part| lowest + part * (highest - lowest));
         let mut edges_s = Vec::new();
-        let mut last_place = None;
+        let mut last_sample = None;
         let mut is_low = false;
-        for (place, pair) in samples.windows(2).enumerate() {
-            let [(row, value), (next_row, next_value)] = [pair[0], pair[1]];
+        for (sample, pair) in samples.windows(2).enumerate() {
+            let (row, value) = pair[0];
+            let (next_row, next_value) = pair[1];
             is_low |= value <= quarter;
             if !is_low || value >= half || next_value < half {
                 continue;
             }
-            if last_place.is_some_and(|last| place - last < FEWEST_ROWS) {
+            if last_sample.is_some_and(|last| sample - last < MIN_ROWS_PER_PULSE) {
                 return Err(PulseError::Fast(next_row));
             }
             let part = (half - value) / (next_value - value);
             edges_s.push(time_s[row] + part * (time_s[next_row] - time_s[row]));
-            last_place = Some(place);
+            last_sample = Some(sample);
             is_low = false;
         }
-        if edges_s.len() < FEWEST_PULSES {
-            return Err(PulseError::Few(edges_s.len()));
+        if edges_s.len() < MIN_EDGES {
+            return Err(PulseError::FewPulses(edges_s.len()));
         }
-        Ok(Self { edges_s, per_turn: f64::from(per_turn) })
+        let turns = (0..edges_s.len()).map(|edge| edge as f64 / f64::from(per_turn)).collect();
+        Ok(Self { edges_s, turns })
+    }
+
+    /// Reads the count at rows that are so far apart that the speed between them is known to
+    /// [`COUNTED_SPEED_ERROR`]. The last of `n` pulses between two rows is taken to come half of an
+    /// `n`th of their distance before the later row. NaN is a missing sample.
+    fn from_count(time_s: &[f64], count: &[f64], per_turn: u32) -> Result<Self, PulseError> {
+        let samples: Vec<(usize, f64)> =
+            count.iter().copied().enumerate().filter(|(_, value)| !value.is_nan()).collect();
+        let greatest_count = samples.iter().fold(0.0_f64, |most, (_, value)| most.max(*value));
+        let greatest_increment =
+            samples.windows(2).fold(1.0_f64, |most, pair| most.max(pair[1].1 - pair[0].1));
+        let range = COUNTER_RANGES.into_iter().find(|range| *range > greatest_count);
+        let mut pulses = 0.0;
+        let mut edges_s: Vec<f64> = Vec::new();
+        let mut turns = Vec::new();
+        for pair in samples.windows(2) {
+            let (row, value) = pair[0];
+            let (next_row, next_value) = pair[1];
+            let mut increment = next_value - value;
+            if increment < 0.0 {
+                increment += range.unwrap_or(0.0);
+                let limit = MAX_OVERFLOW_INCREMENT * greatest_increment;
+                if !(0.0..=limit).contains(&increment) {
+                    return Err(PulseError::Falling(next_row));
+                }
+            }
+            if increment == 0.0 {
+                continue;
+            }
+            pulses += increment;
+            let spacing_s = (time_s[next_row] - time_s[row]) / increment.max(1.0);
+            let edge_s = time_s[next_row] - 0.5 * spacing_s;
+            // The difference of two times, each distributed evenly over the spacing.
+            let error_s = spacing_s / 6.0_f64.sqrt();
+            let is_known = |last_s: &f64| error_s <= COUNTED_SPEED_ERROR * (edge_s - last_s);
+            if edges_s.last().is_none_or(is_known) {
+                edges_s.push(edge_s);
+                turns.push(pulses / f64::from(per_turn));
+            }
+        }
+        if edges_s.len() < MIN_EDGES {
+            return Err(PulseError::FewReadings(edges_s.len()));
+        }
+        Ok(Self { edges_s, turns })
     }
 
     /// Returns the mean speeds between pulses (rpm), at the times in the middle between them (s).
     fn speeds(&self) -> (Vec<f64>, Vec<f64>) {
-        let speed = |pair: &[f64]| {
-            let speed_rpm = 60.0 / (self.per_turn * (pair[1] - pair[0]));
-            (0.5 * (pair[0] + pair[1]), speed_rpm)
+        let spans = self.edges_s.windows(2).zip(self.turns.windows(2));
+        let speed = |(edges_s, turns): (&[f64], &[f64])| {
+            let speed_rpm = 60.0 * (turns[1] - turns[0]) / (edges_s[1] - edges_s[0]);
+            (0.5 * (edges_s[0] + edges_s[1]), speed_rpm)
         };
-        self.edges_s.windows(2).map(speed).unzip()
+        spans.map(speed).unzip()
     }
 
     /// Returns the speed at a time before the pulses (rpm), on the line through the first two
@@ -82,12 +204,12 @@ impl Pulses {
 
     /// Fits the spin. Before the first speed and after the last one it continues down to a
     /// standstill.
-    pub(super) fn smoothed(&self) -> Option<Smoothed> {
+    pub(super) fn smoothed(&self) -> Option<SmoothedSpin> {
         let (times_s, speeds) = self.speeds();
-        let mut found = smoothed(&times_s, &speeds)?;
-        continue_to_rest(&mut found.spin);
-        found.drawn.iter_mut().for_each(continue_to_rest);
-        Some(found)
+        let mut smoothed = smoothed(&times_s, &speeds)?;
+        continue_to_rest(&mut smoothed.spin);
+        smoothed.drawn.iter_mut().for_each(continue_to_rest);
+        Some(smoothed)
     }
 }
 
@@ -135,7 +257,8 @@ mod tests {
         };
         for (per_turn, signal) in [(1, &mark as &dyn Fn(f64) -> f64), (12, &teeth)] {
             let signal: Vec<f64> = time_s.iter().map(|t| signal(*t)).collect();
-            let pulses = Pulses::read(&time_s, &signal, per_turn).unwrap();
+            let signal_kind = (PulseSignal::Voltage, per_turn);
+            let pulses = Pulses::read(&time_s, &signal, signal_kind).unwrap();
             let [first_rpm, greatest_rpm] = pulses.first_and_greatest_rpm(0.0);
             assert!(first_rpm < 5.0 && (greatest_rpm - 350.0).abs() < 7.0, "{pulses:?}");
             let found = pulses.smoothed().unwrap();
@@ -155,14 +278,75 @@ mod tests {
         let signal = |period: usize, rows: usize| -> Vec<f64> {
             (0..40).map(|k| if k < rows && k % period == period - 1 { 1.0 } else { 0.0 }).collect()
         };
-        let read = |signal: &[f64]| Pulses::read(&time_s, signal, 1);
-        assert_eq!(read(&signal(4, 8)), Err(PulseError::Few(2)));
-        assert_eq!(read(&[1.0; 40]), Err(PulseError::Few(0)));
+        let read = |signal: &[f64]| Pulses::read(&time_s, signal, (PulseSignal::Voltage, 1));
+        assert_eq!(read(&signal(4, 8)), Err(PulseError::FewPulses(2)));
+        assert_eq!(read(&[1.0; 40]), Err(PulseError::FewPulses(0)));
         let count: Vec<f64> = (0..40).map(f64::from).collect();
-        assert_eq!(read(&count), Err(PulseError::Few(1)));
+        assert_eq!(read(&count), Err(PulseError::FewPulses(1)));
         assert_eq!(read(&signal(2, 40)), Err(PulseError::Fast(3)));
         let pulses = read(&signal(4, 40)).unwrap();
         assert!((pulses.edges_s[0] - 0.025).abs() < 1e-12, "{pulses:?}");
         assert!(pulses.speeds().1.iter().all(|speed| (speed - 1500.0).abs() < 1e-6), "{pulses:?}");
+    }
+
+    /// Returns the greatest difference between the angle of the spin by a signal and the drum's
+    /// (turns).
+    fn angle_error(time_s: &[f64], signal: &[f64], kind: (PulseSignal, u32)) -> f64 {
+        let spin = Pulses::read(time_s, signal, kind).unwrap().smoothed().unwrap().spin;
+        let mut angle = 0.0;
+        let mut last_s = 0.0;
+        let mut greatest_error = 0.0_f64;
+        for k in 0..25_000 {
+            let t = 0.001 * f64::from(k);
+            let middle_s = 0.5 * (last_s + t);
+            angle += spin.speeds_rpm([middle_s]).next().unwrap() / 60.0 * (t - last_s);
+            last_s = t;
+            greatest_error = greatest_error.max((angle - turns(t)).abs());
+        }
+        greatest_error
+    }
+
+    #[test]
+    fn the_spin_by_a_count_keeps_the_drums_angle() {
+        for (step_s, per_turn) in [(0.001, 1), (0.001, 60), (0.01, 60), (0.05, 60), (0.01, 1024)] {
+            let rows = (26.0 / step_s) as u32;
+            let time_s: Vec<f64> = (0..rows).map(|k| step_s * f64::from(k)).collect();
+            let pulses = |t: &f64| (f64::from(per_turn) * (turns(*t) + 0.7)).floor();
+            let count: Vec<f64> = time_s.iter().map(pulses).collect();
+            let error = angle_error(&time_s, &count, (PulseSignal::Count, per_turn));
+            assert!(error < 0.1, "{step_s} {per_turn}: {error}");
+            // A counter of 16 bits overflows, and misses a row.
+            let mut wrapped: Vec<f64> =
+                count.iter().map(|count| (count + 64_000.0) % 65_536.0).collect();
+            wrapped[7] = f64::NAN;
+            let wrapped_error = angle_error(&time_s, &wrapped, (PulseSignal::Count, per_turn));
+            assert!(wrapped_error < 0.1, "{step_s} {per_turn}: {wrapped_error}");
+            let per_row: Vec<f64> =
+                (0..count.len()).map(|k| count[k] - count[k.saturating_sub(1)]).collect();
+            let [by_count, by_rows] =
+                [(PulseSignal::Count, &count), (PulseSignal::CountPerRow, &per_row)]
+                    .map(|(kind, signal)| Pulses::read(&time_s, signal, (kind, per_turn)).unwrap());
+            assert_eq!(by_count.speeds(), by_rows.speeds());
+        }
+    }
+
+    #[test]
+    fn counts_that_fall_or_are_few_are_refused() {
+        let time_s: Vec<f64> = (0..40).map(|k| 0.01 * f64::from(k)).collect();
+        let read = |kind: PulseSignal, signal: &dyn Fn(u32) -> f64| {
+            let signal: Vec<f64> = (0..40).map(signal).collect();
+            Pulses::read(&time_s, &signal, (kind, 1))
+        };
+        let sawtooth = |k: u32| f64::from(k % 10);
+        assert_eq!(read(PulseSignal::Count, &sawtooth), Err(PulseError::Falling(10)));
+        // A reset, which no overflow explains.
+        let reset = |k: u32| if k < 20 { 40_000.0 + f64::from(k) } else { f64::from(k) };
+        assert_eq!(read(PulseSignal::Count, &reset), Err(PulseError::Falling(20)));
+        let step = |k: u32| if k < 20 { 0.0 } else { 1.0 };
+        assert_eq!(read(PulseSignal::Count, &step), Err(PulseError::FewReadings(1)));
+        let negative = |k: u32| if k == 3 { -1.0 } else { 1.0 };
+        assert_eq!(read(PulseSignal::CountPerRow, &negative), Err(PulseError::Falling(3)));
+        let missing = |k: u32| if k == 3 { f64::NAN } else { 1.0 };
+        assert_eq!(read(PulseSignal::CountPerRow, &missing), Err(PulseError::Missing(3)));
     }
 }

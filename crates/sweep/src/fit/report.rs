@@ -7,17 +7,19 @@ use serde_json::Value;
 use washer_model::Method;
 
 use super::algebra::{centred, dot, middle_95};
-use super::model::{Against, Problem};
+use super::model::{Problem, SignalComparison};
 use super::search::Descent;
-use super::speed::Smoothed;
+use super::speed::SmoothedSpin;
 use super::statistics::{Statistics, Z_975};
-use super::verdict::{FittedVerdict, OnMap};
+use super::verdict::{FittedVerdict, MapRow};
 use crate::config;
 use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, format_range, format_table};
 use sweep_engine::config::section::counted;
 
-/// Between which share of two units a signal is taken for one in the other.
+/// The greatest ratio of a signal's size to that in another unit with which it is taken for one in
+/// that unit. Basis: models of the test data differ from their records by less. Doubling it names
+/// wrong units of more records.
 const UNIT_SLACK: f64 = 1.5;
 /// The part of a fixed number's tolerance below which the record limits its error. Basis: less of a
 /// limit does not show in two digits of an interval. Doubling it says so of every number.
@@ -37,37 +39,39 @@ pub(crate) struct FitReport {
     pub(crate) follows: bool,
     /// The reason why the model is not known to follow the measurement.
     pub(crate) objection: Option<String>,
-    pub(crate) parameters: Vec<Fit>,
-    /// Row by row in the order of the parameters.
+    pub(crate) parameters: Vec<FittedNumber>,
+    /// The rows of the correlation matrix, in the order of the parameters.
     pub(crate) correlations: Vec<Vec<f64>>,
-    /// Statements of what the data cannot tell.
+    /// Statements on combinations of numbers that the data do not determine.
     pub(crate) untold: Vec<String>,
     /// The number of fixed numbers that have a tolerance.
     pub(crate) fixed_numbers: usize,
     /// The first file's entries, as in `files`.
     #[serde(flatten)]
-    pub(crate) first: OfFile,
-    pub(crate) files: Vec<OfFile>,
-    /// Every minimum that was found, the least first.
+    pub(crate) first: FileReport,
+    pub(crate) files: Vec<FileReport>,
+    /// All minima, the least first.
     pub(crate) minima: Vec<Minimum>,
     /// Whether the search came to its end.
     pub(crate) settled: bool,
-    /// Points at which the model and its derivatives were found.
+    /// The number of points at which the model and its derivatives were computed.
     pub(crate) evaluations: usize,
     /// The integration's step (s), if it is fixed.
     pub(crate) step_s: Option<f64>,
     /// The number of standard errors by which half the step moves the number that it moves most.
     pub(crate) step_effect: Option<f64>,
+    /// The columns of speeds and times that seem to be in another unit, a clause each.
+    pub(crate) suspected_units: Vec<String>,
     /// Notes on units, clocks and gaps.
     pub(crate) notes: Vec<String>,
 }
 
 /// A fitted number.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Fit {
+pub(crate) struct FittedNumber {
     pub(crate) name: String,
     pub(crate) unit: String,
-    /// The file whose own it is; of all if none.
+    /// The file that has a value of its own; `None` if all files share the value.
     pub(crate) file: Option<String>,
     pub(crate) start: f64,
     pub(crate) value: f64,
@@ -76,11 +80,11 @@ pub(crate) struct Fit {
     pub(crate) noise_error: Option<f64>,
     /// The fixed number whose tolerance moves it most.
     pub(crate) depends_on: Option<Dependence>,
-    /// No farther than its range.
+    /// The 95 % interval within the range of the number.
     pub(crate) interval_95: Option<[f64; 2]>,
     /// The interval by fits of resampled residuals, if they were asked for.
     pub(crate) bootstrap_95: Option<[f64; 2]>,
-    /// Whether it is at an end of its range.
+    /// Whether the value is at an end of its range.
     pub(crate) at_bound: bool,
 }
 
@@ -97,8 +101,8 @@ pub(crate) struct Dependence {
     pub(crate) moves_by: f64,
 }
 
-impl Fit {
-    /// Returns the name, with the file of a file's own.
+impl FittedNumber {
+    /// Returns the name, and the file if it has a value of its own.
     fn label(&self) -> String {
         let file = self.file.iter().map(|file| format!(" ({file})"));
         std::iter::once(self.name.clone()).chain(file).collect()
@@ -107,10 +111,10 @@ impl Fit {
 
 /// The report of a measurement.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct OfFile {
+pub(crate) struct FileReport {
     pub(crate) file: String,
     pub(crate) samples: usize,
-    /// Standard deviation of the part of the residual that is noise.
+    /// The standard deviation of the part of the residual that is noise.
     pub(crate) noise: ByColumn<f64>,
     pub(crate) offset: ByColumn<f64>,
     /// The time (s) by which the model's clock is ahead.
@@ -118,12 +122,12 @@ pub(crate) struct OfFile {
     pub(crate) residual_rms: ByColumn<f64>,
     /// The part of the variance that the model explains.
     pub(crate) explained: ByColumn<f64>,
-    /// Correlation of neighbouring residuals.
+    /// The correlation of neighbouring residuals.
     pub(crate) autocorrelation: ByColumn<f64>,
-    /// The factor by which that widens variances.
+    /// The factor by which this correlation widens variances.
     pub(crate) widening: ByColumn<f64>,
-    /// Noise (rpm) and knots of the measured spin.
-    pub(crate) spin: Option<Smoothed>,
+    /// The noise (rpm) and the knots of the measured spin.
+    pub(crate) spin: Option<SmoothedSpin>,
     pub(crate) gaps_s: Vec<[f64; 2]>,
     /// The fitted machine, as a machine file has it.
     pub(crate) machine: Value,
@@ -134,23 +138,23 @@ pub(crate) struct OfFile {
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Minimum {
     pub(crate) values: ByColumn<f64>,
-    /// Twice the log of how much less likely than the first.
+    /// Twice the logarithm of the likelihood ratio to the first minimum.
     pub(crate) cost_above: f64,
     pub(crate) evaluations: usize,
 }
 
-/// The data that a report is made of.
+/// The data of a report.
 pub(super) struct ReportData<'a> {
     pub(super) problem: &'a Problem<'a>,
     /// The clause of each case that its speed or time seems to be in another unit, if it does.
     pub(super) suspicions: &'a [Option<String>],
     pub(super) minima: &'a [Descent],
-    pub(super) against: &'a [Against],
-    pub(super) at_start: &'a [Against],
+    pub(super) against: &'a [SignalComparison],
+    pub(super) at_start: &'a [SignalComparison],
     pub(super) statistics: &'a Statistics,
     pub(super) evaluations: usize,
     pub(super) step_effect: Option<f64>,
-    pub(super) repeated: Option<&'a [Vec<f64>]>,
+    pub(super) resampled: Option<&'a [Vec<f64>]>,
     /// Rows of the map over the fitted distribution.
     pub(super) draws: u64,
 }
@@ -160,11 +164,11 @@ impl ReportData<'_> {
     pub(super) fn report(&self) -> Result<FitReport, Error> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
-        let unsettled = (!best.is_settled).then(|| UNSETTLED.to_owned());
-        let objection = unsettled.or_else(|| statistics.objection(problem)).map(|reason| {
-            let clauses = std::iter::once(&reason).chain(self.suspicions.iter().flatten());
-            clauses.map(String::as_str).collect::<Vec<_>>().join("; ")
-        });
+        let suspected_units: Vec<String> = self.suspicions.iter().flatten().cloned().collect();
+        // The search of a record in another unit ends early.
+        let is_unfinished = !best.is_settled && suspected_units.is_empty();
+        let unsettled = is_unfinished.then(|| UNSETTLED.to_owned());
+        let objection = unsettled.or_else(|| statistics.objection(problem));
         let follows = objection.is_none();
         let covariance = statistics.free_covariance(problem);
         let by_noise = statistics.by_noise(problem);
@@ -178,11 +182,15 @@ impl ReportData<'_> {
         };
         let correlations = |i: usize| (0..free).map(|j| correlation(i, j)).collect();
         let files = (0..problem.cases.len()).map(|case| self.file_report(case, follows));
-        let files = files.collect::<Result<Vec<OfFile>, Error>>()?;
-        let parameters: Vec<Fit> =
+        let files = files.collect::<Result<Vec<FileReport>, Error>>()?;
+        let parameters: Vec<FittedNumber> =
             (0..free).map(|k| self.parameter(k, [error(k), noise_error(k)], follows)).collect();
         let minimum = |descent: &Descent| Minimum {
-            values: parameters.iter().map(Fit::label).zip(descent.x.iter().copied()).collect(),
+            values: parameters
+                .iter()
+                .map(FittedNumber::label)
+                .zip(descent.x.iter().copied())
+                .collect(),
             cost_above: descent.summary.cost - best.summary.cost,
             evaluations: descent.evaluations,
         };
@@ -203,11 +211,12 @@ impl ReportData<'_> {
                 _ => None,
             },
             step_effect: self.step_effect,
+            suspected_units,
             notes: self.notes(),
         })
     }
 
-    fn parameter(&self, k: usize, [error, noise_error]: [f64; 2], follows: bool) -> Fit {
+    fn parameter(&self, k: usize, [error, noise_error]: [f64; 2], follows: bool) -> FittedNumber {
         let free = &self.problem.free[k];
         let value = self.minima[0].x[k];
         let at_bound = free.range.contains(&value);
@@ -215,9 +224,9 @@ impl ReportData<'_> {
         let [least, most] = self.problem.range(k);
         let by_noise = self.statistics.quantiles[k] * noise_error;
         let by_fixed = Z_975 * Z_975 * (error * error - noise_error * noise_error).max(0.0);
-        let reach = (by_noise * by_noise + by_fixed).sqrt();
-        let reached = [(value - reach).max(least), (value + reach).min(most)];
-        Fit {
+        let half_width = (by_noise * by_noise + by_fixed).sqrt();
+        let interval = [(value - half_width).max(least), (value + half_width).min(most)];
+        FittedNumber {
             name: free.parameter.name().to_owned(),
             unit: free.parameter.unit().to_owned(),
             file: free.case.map(|case| self.problem.cases[case].measured.name.clone()),
@@ -226,8 +235,8 @@ impl ReportData<'_> {
             standard_error: known.then_some(error),
             noise_error: known.then_some(noise_error),
             depends_on: known.then(|| self.dependence(k)).flatten(),
-            interval_95: known.then_some(reached),
-            bootstrap_95: self.repeated.and_then(|sets| middle_95(sets.iter().map(|x| x[k]))),
+            interval_95: known.then_some(interval),
+            bootstrap_95: self.resampled.and_then(|sets| middle_95(sets.iter().map(|x| x[k]))),
             at_bound,
         }
     }
@@ -245,20 +254,24 @@ impl ReportData<'_> {
         })
     }
 
-    fn file_report(&self, case: usize, follows: bool) -> Result<OfFile, Error> {
+    fn file_report(&self, case: usize, follows: bool) -> Result<FileReport, Error> {
         let problem = self.problem;
         let x = &self.minima[0].x;
         let measured = &problem.cases[case].measured;
-        let on_map = OnMap { problem, x, statistics: self.statistics, draws: self.draws };
-        let own = || {
-            problem.signals().zip(self.against).enumerate().filter(move |(_, (at, _))| at.0 == case)
+        let map_row = MapRow { problem, x, statistics: self.statistics, draws: self.draws };
+        let comparisons = || {
+            let all = problem.signals().zip(self.against).enumerate();
+            all.filter(move |(_, ((signal_case, ..), _))| *signal_case == case)
         };
-        let by = |of: &dyn Fn(usize, &Against) -> f64| -> ByColumn<f64> {
-            own().map(|(k, ((.., it), one))| (it.quantity.column(), of(k, one))).collect()
+        let by = |value: &dyn Fn(usize, &SignalComparison) -> f64| -> ByColumn<f64> {
+            comparisons()
+                .map(|(k, ((.., signal), one))| (signal.quantity.column(), value(k, one)))
+                .collect()
         };
-        let rms =
-            |one: &Against| (dot(&one.residual, &one.residual) / one.residual.len() as f64).sqrt();
-        Ok(OfFile {
+        let rms = |one: &SignalComparison| {
+            (dot(&one.residual, &one.residual) / one.residual.len() as f64).sqrt()
+        };
+        Ok(FileReport {
             file: measured.name.clone(),
             samples: measured.count(),
             noise: by(&|k, one| rms(one) * (1.0 - self.statistics.motion[k][0]).sqrt()),
@@ -271,15 +284,15 @@ impl ReportData<'_> {
             spin: problem.cases[case].smoothed.clone(),
             gaps_s: measured.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
-            verdict: (self.draws > 0).then(|| on_map.verdict(case, follows)).transpose()?,
+            verdict: (self.draws > 0).then(|| map_row.verdict(case, follows)).transpose()?,
         })
     }
 
     /// Returns notes on units, clocks and gaps.
     fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        // The start may be wrong by as much as a unit. Where channels of several units follow, it
-        // was: no number of the machine makes up for the unit of some.
+        // The start may be wrong by the factor of a unit. It is if channels of several units
+        // follow, because no number of the machine compensates for the unit of one of them.
         let units = || self.problem.signals().map(|(.., signal)| signal.quantity.units().1);
         let is_one = units().all(|unit| Some(unit) == units().next());
         let by_start = is_one || self.statistics.objection(self.problem).is_some();
@@ -292,7 +305,7 @@ impl ReportData<'_> {
             let (unit, mistaken) = signal.quantity.units();
             let Some((other, factor)) = mistaken else { continue };
             let swing = signal.swing();
-            let size = |one: &Against| {
+            let size = |one: &SignalComparison| {
                 let moves = signal.samples().map(|(row, _)| one.model[row]);
                 let (moves, _) = centred(moves.collect());
                 (dot(&swing, &swing) / dot(&moves, &moves)).sqrt()
@@ -353,7 +366,7 @@ impl FitReport {
             }
         };
         let interval = |ends| format_range(ends, short);
-        let row = |fit: &Fit| {
+        let row = |fit: &FittedNumber| {
             let unknown = if fit.at_bound { "at its bound" } else { "not known" };
             let known = fit.interval_95.map_or_else(|| unknown.to_owned(), interval);
             let error = fit.standard_error.map_or_else(|| "-".to_owned(), short);
@@ -370,10 +383,13 @@ impl FitReport {
         let mut text = String::new();
         let model = match &self.objection {
             None => "follows the measurement within its noise".to_owned(),
-            Some(reason) if self.settled => format!("does not follow: {reason}; so no intervals"),
-            Some(reason) => reason.clone(),
+            Some(reason) if reason == UNSETTLED => reason.clone(),
+            Some(reason) => {
+                format!("does not follow the measurement: {reason}; so no intervals")
+            }
         };
         text.line("model", model);
+        self.suspected_units.iter().for_each(|clause| text.line("unit", clause));
         // Without a free number the model is compared alone.
         if !rows.is_empty() {
             text.push_str(&format_table(&headings, &rows, ""));
@@ -414,8 +430,8 @@ impl FitReport {
             say("file", &format!("{}: {} samples", file.file, file.samples));
             say("noise", &format!("{} (residual over signal)", columns.join(", ")));
             if let Some(shift_s) = file.shift_s {
-                let way = if shift_s < 0.0 { "late" } else { "early" };
-                say("clock", &format!("{:.6} s {way}", shift_s.abs()));
+                let direction = if shift_s < 0.0 { "late" } else { "early" };
+                say("clock", &format!("{:.6} s {direction}", shift_s.abs()));
             }
             if let Some(spin) = &file.spin {
                 let noise = short(spin.noise_rpm);
@@ -438,9 +454,11 @@ impl FitReport {
                     ),
                     _ => "; no probability, because the intervals are not known".to_owned(),
                 };
-                say("verdict", &format!("{what}{ratio}{chance}"));
+                // A machine that does not follow says nothing of the measured one.
+                let of = if self.follows { "" } else { "of the numbers above alone: " };
+                say("verdict", &format!("{of}{what}{ratio}{chance}"));
                 if let Some(margin) = verdict.margin(&short) {
-                    say("margin", &margin);
+                    say("margin", &format!("{of}{margin}"));
                 }
             }
         }

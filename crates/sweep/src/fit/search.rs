@@ -1,20 +1,24 @@
-//! The least cost: Levenberg and Marquardt's descent, from one or several starts.
+//! The search for the least cost by the method of Levenberg and Marquardt.
 //!
 //! D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, Journal of
 //! the Society for Industrial and Applied Mathematics 11 (1963), 431-441.
 
 use super::algebra::{Symmetric, dot, scaled};
-use super::model::Summary;
+use super::model::NormalEquations;
 use sweep_engine::Error;
 
-/// A descent ends where a step would lower the cost by less: some hundredth of a standard error.
-const WORTH: f64 = 2e-4;
-/// The fall of the cost that may be left where no step gains it.
-const ROUGH: f64 = 0.1;
-/// No step changes a number by more than this share of it, or of a tenth of its range.
-const LONGEST: f64 = 0.5;
-/// The least damping: that after some six steps that all went well.
-const LEAST: f64 = 1e-9;
+/// The least predicted decrease of the cost for which a descent goes on. Basis: a hundredth of a
+/// standard error. Doubling it ends descents a little earlier.
+const MIN_DECREASE: f64 = 2e-4;
+/// The greatest predicted decrease of the cost at the end of a descent in which no step achieves
+/// it. Basis: a third of a standard error. Doubling it calls rougher ends settled.
+const MAX_UNACHIEVED_DECREASE: f64 = 0.1;
+/// The greatest step of a number, as a part of the number or of a tenth of its range. Basis: the
+/// linearisation does not hold for longer steps. Doubling it makes descents shorter, and more of
+/// their steps fail.
+const MAX_STEP_RATIO: f64 = 0.5;
+/// The least damping. Basis: that after six successful steps. Doubling it hardly changes a step.
+const MIN_DAMPING: f64 = 1e-9;
 /// The greatest number of evaluations of a whole descent. Basis: fits of the tests end in 6 to 70.
 /// Doubling it makes searches without an end twice as long.
 pub(super) const MAX_EVALUATIONS: usize = 200;
@@ -23,20 +27,19 @@ pub(super) const MAX_EVALUATIONS: usize = 200;
 #[derive(Clone, Debug)]
 pub(crate) struct Descent {
     pub(crate) x: Vec<f64>,
-    pub(crate) summary: Summary,
-    /// Points at which model and derivatives were found.
+    pub(crate) summary: NormalEquations,
+    /// The number of points at which the model and its derivatives were computed.
     pub(crate) evaluations: usize,
-    /// Whether no step lowers the cost any more.
+    /// Whether no step decreases the cost further.
     pub(crate) is_settled: bool,
 }
 
-/// Descends from a start within ranges; `None` if there is no answer at the start, or if one is
-/// refused because the work was stopped.
+/// Descends from a start within ranges; `None` if the model fails at the start.
 pub(crate) fn descend(
     start: &[f64],
     ranges: &[[f64; 2]],
     max_evaluations: usize,
-    evaluate: &dyn Fn(&[f64]) -> Result<Option<Summary>, DescentEnd>,
+    evaluate: &dyn Fn(&[f64]) -> Result<Option<NormalEquations>, DescentEnd>,
 ) -> Result<Option<Descent>, DescentEnd> {
     let Some(mut now) = evaluate(start)? else { return Ok(None) };
     let mut x = start.to_vec();
@@ -47,7 +50,7 @@ pub(crate) fn descend(
         Ok(Some(Descent { x, summary, evaluations, is_settled }))
     };
     loop {
-        // A number that is at an end of its range and pulled outwards stays there.
+        // A number at an end of its range stays if the step would leave the range.
         let moving: Vec<usize> = (0..x.len())
             .filter(|&k| {
                 let [from, to] = ranges[k];
@@ -58,12 +61,12 @@ pub(crate) fn descend(
         let part: Vec<Vec<f64>> =
             moving.iter().map(|&i| moving.iter().map(|&j| now.normal[i][j]).collect()).collect();
         let (unit, scale) = scaled(&part);
-        let eigen = Symmetric::of(&unit);
+        let eigen = Symmetric::from_matrix(&unit);
         let pull: Vec<f64> = moving.iter().zip(&scale).map(|(&k, s)| now.pull[k] / s).collect();
         let solved = |damping: f64| eigen.apply(&pull, |value| 1.0 / (value.max(0.0) + damping));
-        // The fall of the cost if it were quadratic.
-        let left = dot(&solved(LEAST), &pull);
-        if left < WORTH {
+        // The decrease of the cost, as predicted by the quadratic model.
+        let decrease = dot(&solved(MIN_DAMPING), &pull);
+        if decrease < MIN_DECREASE {
             return done(x, now, evaluations, true);
         }
         loop {
@@ -73,27 +76,31 @@ pub(crate) fn descend(
                 let width = ranges[k][1] - ranges[k][0];
                 let width = if width.is_finite() { 0.1 * width } else { 0.0 };
                 let size = x[k].abs().max(start[k].abs()).max(width);
-                share.min(LONGEST * size / step.abs())
+                share.min(MAX_STEP_RATIO * size / step.abs())
             });
             let mut trial = x.clone();
             for (&k, step) in moving.iter().zip(&step) {
                 trial[k] = (trial[k] + length * step).clamp(ranges[k][0], ranges[k][1]);
             }
-            // Rounding may hide what is left to gain, as corners of friction do: that is an end
-            // too.
+            // Rounding errors and corners of friction may hide a small decrease.
             if evaluations >= max_evaluations || damping > 1e4 {
-                return done(x, now, evaluations, damping > 1e4 && left < ROUGH);
+                return done(
+                    x,
+                    now,
+                    evaluations,
+                    damping > 1e4 && decrease < MAX_UNACHIEVED_DECREASE,
+                );
             }
             evaluations += 1;
             match evaluate(&trial)? {
                 Some(found) if found.cost < now.cost => {
-                    // If steps go well and still come to no end, a large residual's curvature makes
-                    // them too short: the next is as long as this step's gain asks for.
+                    // A large residual makes successful steps too short. The next one is longer by
+                    // the ratio of this step's actual and predicted decrease.
                     let gain = (now.cost - found.cost) / (length * dot(&solution, &pull));
                     let longer = (length / (2.0 - gain).max(0.25)).max(1.0);
-                    stretch = if damping > LEAST { 1.0 } else { longer };
+                    stretch = if damping > MIN_DAMPING { 1.0 } else { longer };
                     (x, now) = (trial, found);
-                    damping = (damping * 0.1).max(LEAST);
+                    damping = (damping * 0.1).max(MIN_DAMPING);
                     break;
                 }
                 _ if stretch > 1.0 => stretch = 1.0,
@@ -103,10 +110,10 @@ pub(crate) fn descend(
     }
 }
 
-/// Why a search came to no end.
+/// The reason why a search has no result.
 #[derive(Debug)]
 pub(crate) enum DescentEnd {
-    /// The work was stopped.
+    /// The work was cancelled.
     Stopped,
     /// A request that cannot be answered.
     Refused(Error),
@@ -123,24 +130,34 @@ mod tests {
     use super::*;
 
     /// Rosenbrock's valley as residuals 10 (b - a^2) and 1 - a of noise 1.
-    fn valley(x: &[f64]) -> Result<Option<Summary>, DescentEnd> {
+    fn valley(x: &[f64]) -> Result<Option<NormalEquations>, DescentEnd> {
         let residual = [-10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let slopes = [[-20.0 * x[0], 1.0], [10.0, 0.0]];
         let normal = slopes.map(|a| slopes.map(|b| dot(&a, &b)).to_vec()).to_vec();
         let pull = slopes.map(|a| dot(&a, &residual)).to_vec();
-        Ok(Some(Summary { cost: dot(&residual, &residual), sigma: vec![1.0; 2], normal, pull }))
+        Ok(Some(NormalEquations {
+            cost: dot(&residual, &residual),
+            sigma: vec![1.0; 2],
+            normal,
+            pull,
+        }))
     }
 
     #[test]
     fn steps_grow_where_a_large_residual_makes_them_short() {
         // Residuals x + 1 and bend x^2 + x - 1: Gauss and Newton's steps leave `bend` of the way.
         let bend = 0.97;
-        let evaluate = |x: &[f64]| -> Result<Option<Summary>, DescentEnd> {
+        let evaluate = |x: &[f64]| -> Result<Option<NormalEquations>, DescentEnd> {
             let residual = [x[0] + 1.0, bend * x[0] * x[0] + x[0] - 1.0].map(|r| 100.0 * r);
             let slopes = [-100.0, -100.0 * (2.0 * bend * x[0] + 1.0)];
             let normal = vec![vec![dot(&slopes, &slopes)]];
             let pull = vec![dot(&slopes, &residual)];
-            Ok(Some(Summary { cost: dot(&residual, &residual), sigma: vec![1.0; 2], normal, pull }))
+            Ok(Some(NormalEquations {
+                cost: dot(&residual, &residual),
+                sigma: vec![1.0; 2],
+                normal,
+                pull,
+            }))
         };
         let free = [[f64::NEG_INFINITY, f64::INFINITY]];
         let found = descend(&[1.0], &free, MAX_EVALUATIONS, &evaluate).unwrap().unwrap();

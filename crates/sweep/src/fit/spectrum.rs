@@ -1,4 +1,4 @@
-//! The spectrum of what is left over: a motion that the model does not have stands above the noise.
+//! The spectrum of a residual, in which a motion without a model is a peak above the noise.
 //!
 //! P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
 
@@ -6,12 +6,14 @@ use std::f64::consts::TAU;
 
 use super::algebra::dot;
 
-/// Length of the segments whose powers are averaged; they overlap by half (s).
+/// The length (s) of the segments whose powers are averaged; they overlap by half. Basis: it
+/// resolves half a hertz. Doubling it resolves finer lines in more noise.
 const SEGMENT_S: f64 = 4.0;
-/// Beyond it no suspension moves (Hz).
+/// The greatest frequency (Hz). Basis: no suspension moves faster. Doubling it doubles the size of
+/// the spectrum.
 const HIGHEST_HZ: f64 = 50.0;
 
-/// Frequencies (Hz) and the root of the power density there, of values that are evenly apart.
+/// Computes the frequencies (Hz) and the square root of the power density of equally spaced values.
 pub(crate) fn spectrum(values: &[f64], step_s: f64) -> (Vec<f64>, Vec<f64>) {
     let length = ((SEGMENT_S / step_s).round() as usize).clamp(2, values.len().max(2));
     let turn = |k: usize| TAU * k as f64 / length as f64;

@@ -4,35 +4,39 @@ use serde::Serialize;
 use washer_model::Spin;
 
 use super::algebra::quantile;
-use super::evenly;
+use super::normal_draws;
 
-/// Noise of a tachometer at least, as a share of its greatest speed: rounded digits are no noise.
-const LEAST_NOISE: f64 = 1e-5;
-/// Places of a span at which a further knot is tried.
-const TRIED: usize = 31;
-/// Draws of the spline: standard errors are theirs to a sixth.
-const DRAWN: u64 = 16;
-/// Most knots.
-const MOST_KNOTS: usize = 1000;
+/// The least noise of a tachometer, as a part of its greatest speed. Basis: rounding to five
+/// digits. Doubling it gives exact speeds fewer knots.
+const MIN_NOISE_RATIO: f64 = 1e-5;
+/// The number of positions in a span at which a further knot is tried. Basis: a knot between two of
+/// them is followed by further ones beside it. Doubling it doubles the time.
+const TRIED_POSITIONS: usize = 31;
+/// The number of random splines. Basis: a standard deviation of so many draws is known to a sixth.
+/// Doubling it doubles the time of their part of the covariance.
+const RANDOM_SPLINES: u64 = 16;
+/// The greatest number of knots. Basis: an hour of spin cycles has some hundred corners. Doubling
+/// it doubles the longest time.
+const MAX_KNOTS: usize = 1000;
 
 /// A smoothed measurement of the spin.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Smoothed {
+pub(crate) struct SmoothedSpin {
     #[serde(skip)]
     pub(crate) spin: Spin,
     /// The noise, from second differences (rpm).
     pub(crate) noise_rpm: f64,
     /// The number of the spline's knots.
     pub(crate) knots: usize,
-    /// Splines that noise might have made as well.
+    /// Random splines, distributed by the noise about the fitted one.
     #[serde(skip)]
     pub(crate) drawn: Vec<Spin>,
 }
 
-/// Fits the least-squares spline of first degree, with a knot wherever one more explains what noise
-/// does not. Its angle keeps to the measured one: over any span the residuals add up to nearly
-/// nothing.
-pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
+/// Fits the least-squares spline of first degree, with as many knots as the noise justifies. Its
+/// integral, the angle, stays near the measured one, because the residuals of each span have a mean
+/// near zero.
+pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedSpin> {
     let samples: Vec<[f64; 2]> = time_s
         .iter()
         .zip(speed_rpm)
@@ -41,15 +45,15 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
         .collect();
     let [first, _] = samples.first()?;
     let [last, _] = samples.last()?;
-    let greatest = samples.iter().fold(0.0_f64, |most, [_, speed]| most.max(speed.abs()));
+    let greatest_rpm = samples.iter().fold(0.0_f64, |most, [_, speed]| most.max(speed.abs()));
     let (rounding_rpm, held) = stairs(&samples).unwrap_or((0.0, 0.0));
-    let noise_rpm = noise(&samples).max(LEAST_NOISE * greatest).max(rounding_rpm);
-    // The weight of a knot by the Bayesian information criterion, where its position counts too. A
-    // stair of the tachometer's digits is worth no knot.
+    let noise_rpm = noise(&samples).max(MIN_NOISE_RATIO * greatest_rpm).max(rounding_rpm);
+    // The least gain of a knot by the Bayesian information criterion, with its position as a
+    // parameter. A step of the tachometer's digits is no reason for a knot.
     let worth = (3.0 * libm::log(samples.len() as f64)).max(2.0 * held) * noise_rpm * noise_rpm;
     let mut knots = vec![*first, *last];
     let mut speeds = fitted(&samples, &knots)?;
-    while knots.len() < MOST_KNOTS {
+    while knots.len() < MAX_KNOTS {
         let further = further(&samples, &knots, &speeds, worth);
         if further.is_empty() {
             break;
@@ -61,7 +65,8 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
     let spin = |mut speeds: Vec<f64>| {
         let mut times = knots.clone();
         if *first > 0.0 {
-            // Back to the start of the run, along the first span but not through zero.
+            // The spline continues to the start of the run on the line of its first span, which
+            // ends at zero.
             let slope = (speeds[1] - speeds[0]) / (knots[1] - knots[0]);
             let start = speeds[0] - slope * first;
             let [low, high] = [speeds[0].min(0.0), speeds[0].max(0.0)];
@@ -70,25 +75,25 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
         }
         Spin::Table { time_s: times, speed_rpm: speeds }
     };
-    let (normal, _) = Normal::of(&samples, &knots);
-    let usual = evenly(DRAWN);
+    let (normal, _) = SplineEquations::from_samples(&samples, &knots);
+    let usual = normal_draws(RANDOM_SPLINES);
     let draw = |point: u64| {
         let even: Vec<f64> = (0..knots.len()).map(|k| usual(point, k)).collect();
         let moved = normal.drawn(&even);
         spin(speeds.iter().zip(&moved).map(|(speed, moved)| speed + noise_rpm * moved).collect())
     };
-    let drawn = (0..DRAWN).map(draw).collect();
-    Some(Smoothed { spin: spin(speeds), noise_rpm, knots: knots.len(), drawn })
+    let drawn = (0..RANDOM_SPLINES).map(draw).collect();
+    Some(SmoothedSpin { spin: spin(speeds), noise_rpm, knots: knots.len(), drawn })
 }
 
-/// Estimates the standard deviation of white noise about a smooth course, from the distance of
-/// every sample to the line through its neighbours; the median, which jumps do not move.
+/// Estimates the standard deviation of white noise about a smooth curve, from the median of the
+/// distances of samples to the line through their neighbours. Jumps do not change the median.
 fn noise(samples: &[[f64; 2]]) -> f64 {
     let distances = samples.windows(3).map(|three| {
         let share = (three[1][0] - three[0][0]) / (three[2][0] - three[0][0]);
         let [before, after] = [1.0 - share, share];
-        let apart = three[1][1] - before * three[0][1] - after * three[2][1];
-        apart.abs() / (1.0 + before * before + after * after).sqrt()
+        let distance = three[1][1] - before * three[0][1] - after * three[2][1];
+        distance.abs() / (1.0 + before * before + after * after).sqrt()
     });
     // The median of |x| of a normal distribution.
     quantile(distances, 0.5).map_or(0.0, |median| median / 0.674_489_75)
@@ -105,22 +110,21 @@ fn stairs(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
     Some((step / 12.0_f64.sqrt(), samples.len() as f64 / count as f64))
 }
 
-/// Returns the knots between which a time lies, and its share of the way.
+/// Returns the index of the span in which a time lies, and the part of the span before it.
 fn place(knots: &[f64], time_s: f64) -> (usize, f64) {
     let span = knots.partition_point(|&knot| knot <= time_s).clamp(1, knots.len() - 1) - 1;
     (span, (time_s - knots[span]) / (knots[span + 1] - knots[span]))
 }
 
-/// A spline's normal equations, a tridiagonal matrix, eliminated: the diagonal, and each row's
-/// factor of the next.
-struct Normal {
+/// The normal equations of a spline after elimination. Their matrix is tridiagonal.
+struct SplineEquations {
     diagonal: Vec<f64>,
     factors: Vec<f64>,
 }
 
-impl Normal {
+impl SplineEquations {
     /// Computes the normal equations of splines with these knots, and their right side.
-    fn of(samples: &[[f64; 2]], knots: &[f64]) -> (Self, Vec<f64>) {
+    fn from_samples(samples: &[[f64; 2]], knots: &[f64]) -> (Self, Vec<f64>) {
         let mut diagonal = vec![0.0; knots.len()];
         let mut beside = vec![0.0; knots.len()];
         let mut right = vec![0.0; knots.len()];
@@ -150,7 +154,8 @@ impl Normal {
         right
     }
 
-    /// Returns independent numbers of one variance as numbers whose covariance is the inverse's.
+    /// Transforms independent numbers of variance 1 to numbers whose covariance is the inverse of
+    /// the normal matrix.
     fn drawn(&self, even: &[f64]) -> Vec<f64> {
         self.back(even.iter().zip(&self.diagonal).map(|(even, size)| even / size.sqrt()).collect())
     }
@@ -158,12 +163,12 @@ impl Normal {
 
 /// Fits the spline's values at its knots, by least squares. `None` if they are not all determined.
 fn fitted(samples: &[[f64; 2]], knots: &[f64]) -> Option<Vec<f64>> {
-    let (normal, right) = Normal::of(samples, knots);
+    let (normal, right) = SplineEquations::from_samples(samples, knots);
     let speeds = normal.back(right);
     speeds.iter().all(|speed| speed.is_finite()).then_some(speeds)
 }
 
-/// Finds the best further knot of each span that is worth one.
+/// Finds the best further knot of each span in which it gains more than `worth`.
 fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> Vec<f64> {
     let mut found = Vec::new();
     for (span, ends) in knots.windows(2).enumerate() {
@@ -171,9 +176,9 @@ fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> V
         let to = samples.partition_point(|[time, _]| *time <= ends[1]);
         let inside = &samples[from..to];
         let mut best = (worth, None);
-        for tried in 1..=TRIED {
-            let place = tried * inside.len() / (TRIED + 1);
-            // Each span keeps a few samples.
+        for tried in 1..=TRIED_POSITIONS {
+            let place = tried * inside.len() / (TRIED_POSITIONS + 1);
+            // Each span keeps at least a few samples.
             if place < 3 || place + 4 > inside.len() {
                 continue;
             }

@@ -1,28 +1,28 @@
-//! Errors of fitted numbers, and whether the model follows the data at all.
+//! Errors of fitted numbers, and tests of the model against the data.
 
 use super::algebra::{Symmetric, centred, dot, inverse, scaled};
 use super::known::{FixedInfluence, FixedInfluences};
 use super::measured::Signal;
-use super::model::{Against, Problem, Summary};
+use super::model::{NormalEquations, Problem, SignalComparison};
 
 /// The greatest lag of a residual's autocorrelation. Basis: a second at some hundred samples a
 /// second. Doubling it sees slower noise, and doubles the time.
-const MOST_LAGS: usize = 400;
+const MAX_LAGS: usize = 400;
 /// The shortest time of a motion of a suspension, as a share of the drum's fastest turn. Basis:
 /// four times the fastest turn is above every mode. Doubling it leaves out faster motions.
-const FASTEST: f64 = 0.25;
+const FASTEST_MOTION_TURNS: f64 = 0.25;
 /// The time within which every motion of a suspension swings back (s). Basis: modes of a suspension
 /// are faster than 1 Hz. Doubling it takes slower noise for a motion.
 const SLOWEST_S: f64 = 1.0;
 /// The number of standard deviations of a correlation that chance makes. Basis: in some ten
 /// thousand correlations none is larger. Doubling it sees motions of twice the size only.
-const CHANCE: f64 = 4.0;
+const CHANCE_DEVIATIONS: f64 = 4.0;
 /// The number of parts that each record is cut into. Basis: a part of the tests is a second, which
 /// a disturbance fills. Doubling it halves the shortest disturbance that is seen.
-const PARTS: usize = 24;
+const RECORD_PARTS: usize = 24;
 /// The factor by which the variance of the parts' disagreement may exceed that by noise before the
 /// model does not follow. Basis: twice the noise's deviation. Doubling it lets worse models pass.
-const DISAGREEMENT: f64 = 4.0;
+const MAX_DISAGREEMENT: f64 = 4.0;
 /// The least part of a signal's variance that a model explains which follows it. Basis: a motion of
 /// the right size that lags by an angle explains the square of the angle's cosine at best. A half
 /// is an eighth of a turn; a model farther off is nearer to none, which is a quarter. Of the test
@@ -35,10 +35,10 @@ pub(super) const EXPLAINED_RATIO: f64 = 0.5;
 const WHITE_LAGS: usize = 20;
 /// The greatest motion that may be left over, as a share of the signal. Basis: a tenth is seen in a
 /// figure. Doubling it lets worse models pass.
-const MOTION: f64 = 0.1;
+const MAX_MOTION_RATIO: f64 = 0.1;
 /// The number of standard errors by which the nonlinear model may move a number of the linear one.
 /// Basis: beyond it intervals would be wrong. Doubling it lets worse models pass.
-const BIAS: f64 = 1.0;
+const MAX_BIAS: f64 = 1.0;
 /// The least part of a sample's freedom that is left beside its leverage. Basis: a sample that
 /// alone determines a number has none, and its residual says nothing of its noise. Doubling it
 /// halves how much such a sample can widen intervals.
@@ -47,17 +47,20 @@ const LEAST_FREEDOM: f64 = 0.1;
 /// rows at rest would be exact, and their noise called a disagreement. Doubling it doubles the
 /// noise that a record of a resting machine may have.
 const STEADY_RATIO: f64 = 0.1;
-/// A direction is unknown along which numbers may move by more than this share (95 %).
-const UNKNOWN: f64 = 0.5;
-/// Numbers with a correlation beyond this are known together rather than each.
-const TOGETHER: f64 = 0.95;
+/// The relative half-width of a 95 % interval from which on a combination of numbers is
+/// undetermined. Basis: a number that is known to half of its size is hardly known. Doubling it
+/// reports fewer combinations.
+const UNDETERMINED_RATIO: f64 = 0.5;
+/// The correlation from which on two numbers are reported together. Basis: their ratio is known
+/// three times better than each. Doubling it reports none.
+const HIGH_CORRELATION: f64 = 0.95;
 
 /// Standard errors to either end of a 95 % interval: the normal distribution's quantile of 0.975.
 pub(super) const Z_975: f64 = 1.959_964;
 
 /// Statistics of the residuals at a fit.
 pub(crate) struct Statistics {
-    /// Covariance of the unknowns, by the residuals' own correlation in time.
+    /// The covariance of the unknowns, by the residuals' own correlation in time.
     pub(crate) covariance: Vec<Vec<f64>>,
     /// The quantile of 0.975 of each unknown's error over its standard error: Student's, by the
     /// degrees of freedom of its variance.
@@ -78,7 +81,7 @@ pub(crate) struct Statistics {
     /// The residual of each signal that is a motion, as a share of the residual and of the signal,
     /// mean squares.
     pub(crate) motion: Vec<[f64; 2]>,
-    /// The signal that is worst off, and the times (s) between which it is.
+    /// The signal with the greatest residual in units of its noise, and the part of the record (s).
     pub(crate) worst: (usize, [f64; 2]),
     /// The number of standard errors by which the nonlinear model would move each unknown of the
     /// linear one.
@@ -87,7 +90,11 @@ pub(crate) struct Statistics {
 
 impl Statistics {
     /// Computes the statistics at the end of a descent.
-    pub(crate) fn of(problem: &Problem<'_>, against: &[Against], summary: &Summary) -> Self {
+    pub(crate) fn at_end(
+        problem: &Problem<'_>,
+        against: &[SignalComparison],
+        summary: &NormalEquations,
+    ) -> Self {
         let n = problem.unknowns();
         let bread = inverse(&summary.normal);
         let mut meat = vec![vec![0.0; n]; n];
@@ -126,7 +133,8 @@ impl Statistics {
             let square = dot(&one.residual, &one.residual);
             let swing = signal.swing();
             let case = &problem.cases[one.case];
-            // Noise that grows is made even: its few greatest values swing by chance.
+            // Noise that grows with the motion is scaled, because few of its values are great and
+            // their correlations are accidental.
             let even: Vec<f64> = one.residual.iter().zip(&noise).map(|(r, s)| r / s).collect();
             let share = swinging(&even, case.rate_hz(signal), 60.0 / case.greatest_rpm());
             motion.push([share, share * square / dot(&swing, &swing)]);
@@ -136,8 +144,8 @@ impl Statistics {
             widening.push(wider);
             // Each part of the record pulls at the unknowns on its own.
             let count = one.residual.len();
-            for part in 0..PARTS {
-                let range = part * count / PARTS..(part + 1) * count / PARTS;
+            for part in 0..RECORD_PARTS {
+                let range = part * count / RECORD_PARTS..(part + 1) * count / RECORD_PARTS;
                 let Some(rows) = one.residual.get(range.clone()) else { continue };
                 let slopes: Vec<&[f64]> = one
                     .slopes
@@ -151,7 +159,7 @@ impl Statistics {
                     .collect();
                 let information = correlated(&noisy, &[1.0], wider / (sigma * sigma));
                 let (unit, scale) = scaled(&information);
-                let eigen = Symmetric::of(&unit);
+                let eigen = Symmetric::from_matrix(&unit);
                 let pull: Vec<f64> = slopes
                     .iter()
                     .zip(&scale)
@@ -167,8 +175,8 @@ impl Statistics {
                 if energy > worst.2 {
                     let times = &problem.cases[one.case].measured.time_s;
                     let rows: Vec<usize> = signal.samples().map(|(row, _)| row).collect();
-                    let at = |place: usize| times[rows[place.min(rows.len() - 1)]];
-                    worst = (k, [at(range.start), at(range.end)], energy);
+                    let sample_s = |sample: usize| times[rows[sample.min(rows.len() - 1)]];
+                    worst = (k, [sample_s(range.start), sample_s(range.end)], energy);
                 }
             }
         }
@@ -220,13 +228,13 @@ impl Statistics {
         }
         let shares = self.motion.iter().map(|[_, by_lags]| by_lags.sqrt()).enumerate();
         if let Some((k, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1))
-            && share > MOTION
+            && share > MAX_MOTION_RATIO
         {
             let percent = 100.0 * share;
             let of = named(k);
             reasons.push(format!("{percent:.0} % of {of} are left over as a motion, not as noise"));
         }
-        if self.disagreement > DISAGREEMENT {
+        if self.disagreement > MAX_DISAGREEMENT {
             reasons.push(format!(
                 "parts of the record ask for values {:.1} times as far apart as noise makes them",
                 self.disagreement.sqrt()
@@ -234,7 +242,7 @@ impl Statistics {
         }
         let bias = self.bias.iter().flatten().zip(&problem.free);
         if let Some((bias, free)) = bias.max_by(|a, b| a.0.total_cmp(b.0))
-            && *bias > BIAS
+            && *bias > MAX_BIAS
         {
             let name = free.parameter.name();
             reasons.push(format!(
@@ -255,7 +263,7 @@ impl Statistics {
     }
 
     /// Returns the variance of each signal's noise over its independent samples.
-    pub(super) fn variances(&self, summary: &Summary) -> Vec<f64> {
+    pub(super) fn variances(&self, summary: &NormalEquations) -> Vec<f64> {
         let disagreement = self.disagreement.max(1.0);
         let signals = summary.sigma.iter().zip(&self.widening);
         signals.map(|(sigma, widening)| sigma * sigma * widening * disagreement).collect()
@@ -275,37 +283,37 @@ impl Statistics {
         self.covariance[..free].iter().map(|row| row[..free].to_vec()).collect()
     }
 
-    /// Returns what the data cannot tell, in words.
+    /// Describes the combinations of numbers that the data do not determine.
     pub(crate) fn untold(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<String> {
         let covariance = self.by_noise(problem);
         let names: Vec<&str> = problem.free.iter().map(|free| free.parameter.name()).collect();
-        // Nothing is relative to a number that is 0.
-        let greater = problem.free.iter().zip(x).map(|(free, x)| x.abs().max(free.start.abs()));
-        let sizes: Vec<f64> = greater.map(|size| if size > 0.0 { size } else { 1.0 }).collect();
+        // The change of a number that is 0 is relative to its start.
+        let magnitudes = problem.free.iter().zip(x).map(|(free, x)| x.abs().max(free.start.abs()));
+        let sizes: Vec<f64> = magnitudes.map(|size| if size > 0.0 { size } else { 1.0 }).collect();
         let row = |(i, row): (usize, &Vec<f64>)| -> Vec<f64> {
             row.iter().zip(&sizes).map(|(c, size)| c / (sizes[i] * size)).collect()
         };
         let relative: Vec<Vec<f64>> = covariance.iter().enumerate().map(row).collect();
-        let mut said = Vec::new();
-        let eigen = Symmetric::of(&relative);
+        let mut descriptions = Vec::new();
+        let eigen = Symmetric::from_matrix(&relative);
         for (value, vector) in eigen.values.iter().zip(&eigen.vectors).rev() {
-            let reach = 1.96 * value.max(0.0).sqrt();
-            if reach < UNKNOWN {
+            let half_width = Z_975 * value.max(0.0).sqrt();
+            if half_width < UNDETERMINED_RATIO {
                 continue;
             }
-            let most = vector.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-            let sign = vector.iter().find(|v| v.abs() == most).map_or(1.0, |v| v.signum());
+            let largest = vector.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+            let sign = vector.iter().find(|v| v.abs() == largest).map_or(1.0, |v| v.signum());
             let moves: Vec<String> = vector
                 .iter()
                 .zip(&names)
-                .filter(|(v, _)| v.abs() > 0.1 * most)
+                .filter(|(v, _)| v.abs() > 0.1 * largest)
                 .map(|(v, name)| {
-                    let percent = 100.0 * reach.min(9.99) * v * sign;
-                    let way = if percent > 0.0 { "up" } else { "down" };
-                    format!("{name} {way} by {:.0} %", percent.abs())
+                    let percent = 100.0 * half_width.min(9.99) * v * sign;
+                    let direction = if percent > 0.0 { "up" } else { "down" };
+                    format!("{name} {direction} by {:.0} %", percent.abs())
                 })
                 .collect();
-            said.push(format!(
+            descriptions.push(format!(
                 "{}: that hardly changes the residual, so the data cannot tell",
                 moves.join(" with ")
             ));
@@ -314,28 +322,29 @@ impl Statistics {
             for j in 0..i {
                 let size = (covariance[i][i] * covariance[j][j]).sqrt();
                 let correlation = covariance[i][j] / size;
-                if size > 0.0 && correlation.abs() > TOGETHER {
-                    let way = if correlation < 0.0 { "for" } else { "with" };
-                    said.push(format!(
-                        "{} goes {way} {} (correlation {correlation:.3}): they are known together \
-                         better than each alone",
+                if size > 0.0 && correlation.abs() > HIGH_CORRELATION {
+                    let relation = if correlation < 0.0 { "for" } else { "with" };
+                    descriptions.push(format!(
+                        "{} goes {relation} {} (correlation {correlation:.3}): they are known \
+                         together better than each alone",
                         names[j], names[i]
                     ));
                 }
             }
         }
-        said
+        descriptions
     }
 }
 
+/// Adds a matrix times a factor.
 pub(super) fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
     for (sum, part) in sum.iter_mut().zip(part) {
         sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += factor * part);
     }
 }
 
-/// Returns the covariance with every variance that is smaller than another estimate's raised to it,
-/// and the correlations kept.
+/// Returns a covariance whose variances are at least those of another estimate, with the same
+/// correlations.
 fn widened(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let ratio = |k: usize| {
         let variance = covariance[k][k];
@@ -352,15 +361,15 @@ fn widened(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// with the residual that the sample would have in a fit without it.
 ///
 /// J. G. MacKinnon, H. White, Journal of Econometrics 29 (1985), 305-325: HC3.
-fn scores(one: &Against, bread: &[Vec<f64>], sigma: f64) -> Vec<Vec<f64>> {
+fn scores(one: &SignalComparison, bread: &[Vec<f64>], sigma: f64) -> Vec<Vec<f64>> {
     let variance = sigma * sigma;
     let known = || one.slopes.iter().zip(bread).filter(|(slope, _)| !slope.is_empty());
     let predicted: Vec<f64> = (0..one.residual.len())
         .map(|sample| {
-            let along = |row: &[f64]| -> f64 {
+            let projected = |row: &[f64]| -> f64 {
                 one.slopes.iter().zip(row).filter_map(|(g, b)| Some(g.get(sample)? * b)).sum()
             };
-            let leverage: f64 = known().map(|(slope, row)| slope[sample] * along(row)).sum();
+            let leverage: f64 = known().map(|(slope, row)| slope[sample] * projected(row)).sum();
             one.residual[sample] / (1.0 - leverage / variance).max(LEAST_FREEDOM) / variance
         })
         .collect();
@@ -381,20 +390,28 @@ struct VarianceEstimate {
 impl VarianceEstimate {
     /// Adds a signal, by the row of the inverse of the normal matrix for the unknown, the noise of
     /// each sample over its mean, the weight of a sample, and the window of its correlations.
-    fn add(&mut self, one: &Against, row: &[f64], noise: &[f64], weight: f64, window: &[f64]) {
-        let shares = noise.iter().enumerate().map(|(sample, noise)| {
-            let along = one.slopes.iter().zip(row);
-            let along: f64 = along.filter_map(|(slope, b)| Some(slope.get(sample)? * b)).sum();
-            weight * (along * noise).powi(2)
+    fn add(
+        &mut self,
+        one: &SignalComparison,
+        row: &[f64],
+        noise: &[f64],
+        weight: f64,
+        window: &[f64],
+    ) {
+        let parts = noise.iter().enumerate().map(|(sample, noise)| {
+            let products = one.slopes.iter().zip(row);
+            let influence: f64 =
+                products.filter_map(|(slope, b)| Some(slope.get(sample)? * b)).sum();
+            weight * (influence * noise).powi(2)
         });
         let mut sum = 0.0;
         let mut squares = 0.0;
-        for share in shares {
-            sum += share;
-            squares += share * share;
+        for part in parts {
+            sum += part;
+            squares += part * part;
         }
-        // Correlations that are estimated beside the variance add their own errors: at a motion's
-        // frequency half as much as at none.
+        // The estimated correlations add their own errors, twice as much at low frequencies as at
+        // that of a motion.
         let lags = dot(window, window);
         self.variance += sum;
         self.half_variance += squares * lags;
@@ -422,14 +439,14 @@ fn student_975(freedom: f64) -> f64 {
 /// Estimates the standard deviation of a residual's noise at every sample, over its mean: its
 /// variance as a constant and a part that grows with the square of the model's motion, by least
 /// squares.
-fn noise_scale(one: &Against, signal: &Signal) -> Vec<f64> {
+fn noise_scale(one: &SignalComparison, signal: &Signal) -> Vec<f64> {
     let motion = centred(signal.samples().map(|(row, _)| one.model[row]).collect()).0;
     let (energy, mean_energy) = centred(motion.iter().map(|m| m * m).collect());
     let (square, mean_square) = centred(one.residual.iter().map(|r| r * r).collect());
     let growth = dot(&energy, &square) / dot(&energy, &energy).max(f64::MIN_POSITIVE);
-    let most = (1.0 - STEADY_RATIO) * mean_square / mean_energy.max(f64::MIN_POSITIVE);
-    // Not by `clamp`, which panics where squares of what was measured overflow.
-    let growth = growth.min(most).max(0.0);
+    let max_growth = (1.0 - STEADY_RATIO) * mean_square / mean_energy.max(f64::MIN_POSITIVE);
+    // `clamp` would panic where squares of the measurement overflow.
+    let growth = growth.min(max_growth).max(0.0);
     if mean_square == 0.0 {
         return vec![1.0; energy.len()];
     }
@@ -437,8 +454,8 @@ fn noise_scale(one: &Against, signal: &Signal) -> Vec<f64> {
     energy.iter().map(|energy| variance(energy).sqrt()).collect()
 }
 
+/// Returns the product of a matrix and a symmetric one.
 fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    // The second is symmetric.
     a.iter().map(|row| b.iter().map(|column| dot(row, column)).collect()).collect()
 }
 
@@ -462,13 +479,13 @@ fn correlated(slopes: &[Vec<f64>], rho: &[f64], weight: f64) -> Vec<Vec<f64>> {
     sum
 }
 
-/// Returns the correlation of values with those so many places later; as if they were even in time,
-/// which gaps only interrupt.
+/// Returns the correlation of values with those `lag` samples later, without regard to gaps in
+/// time.
 fn correlation(values: &[f64], lag: usize) -> f64 {
     dot(values, &values[lag..]) / dot(values, values).max(f64::MIN_POSITIVE)
 }
 
-/// Whether a residual's correlations are no greater than chance makes those of white noise.
+/// Whether the correlations of a residual are within the random errors of those of white noise.
 ///
 /// G. E. P. Box, D. A. Pierce, Journal of the American Statistical Association 65 (1970),
 /// 1509-1526.
@@ -476,11 +493,11 @@ fn is_white_noise(residual: &[f64]) -> bool {
     let lags = WHITE_LAGS.min(residual.len() / 4);
     let squares: f64 = (1..=lags).map(|lag| correlation(residual, lag).powi(2)).sum();
     let expected = lags as f64;
-    residual.len() as f64 * squares <= expected + CHANCE * (2.0 * expected).sqrt()
+    residual.len() as f64 * squares <= expected + CHANCE_DEVIATIONS * (2.0 * expected).sqrt()
 }
 
-/// Returns the autocorrelation by lag, tapered to nothing where it is no more than chance. The
-/// taper's flat top keeps what slow noise has: Bartlett's would take a third.
+/// Returns the autocorrelation by lag, tapered to zero where it is within its random errors. The
+/// taper has a flat top, because Bartlett's would reduce the correlation of slow noise by a third.
 ///
 /// D. N. Politis, J. P. Romano, Journal of Time Series Analysis 16 (1995), 67-103.
 fn autocorrelation(residual: &[f64]) -> Vec<f64> {
@@ -488,41 +505,41 @@ fn autocorrelation(residual: &[f64]) -> Vec<f64> {
     window.iter().enumerate().map(|(lag, taper)| taper * correlation(residual, lag)).collect()
 }
 
-/// Returns the weights of the autocorrelation by lag: 1 as far as it is more than chance, and down
-/// to nothing over as many lags again.
+/// Returns the weights of the autocorrelation by lag: 1 up to the last lag with a correlation above
+/// its random error, and linearly to zero at twice this lag.
 fn lag_window(residual: &[f64]) -> Vec<f64> {
     let squares: Vec<f64> = residual.iter().map(|value| value * value).collect();
     let total = squares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    // White's variance of a correlation: of noise that is greater at times fewer values count.
+    // The variance of a correlation by White, which holds for noise of varying size.
     let chance = |lag: usize| 2.0 * dot(&squares, &squares[lag..]).sqrt() / total;
-    let most = MOST_LAGS.min(residual.len() / 4);
+    let max_lag = MAX_LAGS.min(residual.len() / 4);
     let mut last = 0;
     let mut lag = 1;
-    while lag < most && lag <= last + 5 {
+    while lag < max_lag && lag <= last + 5 {
         if correlation(residual, lag).abs() > chance(lag) {
             last = lag;
         }
         lag += 1;
     }
     let taper = |lag: usize| (2.0 - lag as f64 / last as f64).min(1.0);
-    std::iter::once(1.0).chain((1..most.min(2 * last)).map(taper)).collect()
+    std::iter::once(1.0).chain((1..max_lag.min(2 * last)).map(taper)).collect()
 }
 
-/// Returns the share of a residual's mean square that is a motion: as much as it swings back, if
-/// that is more than chance. Noise may be slow, but does not swing; and hum is faster than a
-/// suspension.
+/// Returns the part of a residual's mean square that is a motion: the greatest negative
+/// autocorrelation, if it is above its random error. Slow noise has no negative autocorrelation,
+/// and hum is faster than a suspension.
 fn swinging(residual: &[f64], rate_hz: f64, turn_s: f64) -> f64 {
-    let block = ((FASTEST * turn_s * rate_hz) as usize).clamp(1, residual.len());
-    let mean = |some: &[f64]| some.iter().sum::<f64>() / block as f64;
+    let block = ((FASTEST_MOTION_TURNS * turn_s * rate_hz) as usize).clamp(1, residual.len());
+    let mean = |samples: &[f64]| samples.iter().sum::<f64>() / block as f64;
     let (means, _) = centred(residual.chunks_exact(block).map(mean).collect());
-    let most = ((SLOWEST_S * rate_hz) as usize / block).min(means.len() / 4);
-    let rho: Vec<f64> = (1..most).map(|lag| correlation(&means, lag)).collect();
-    let least = rho.iter().copied().fold(0.0, f64::min);
-    // Bartlett's variance of a correlation, for noise that is as slow as this.
+    let max_lag = ((SLOWEST_S * rate_hz) as usize / block).min(means.len() / 4);
+    let rho: Vec<f64> = (1..max_lag).map(|lag| correlation(&means, lag)).collect();
+    let lowest = rho.iter().copied().fold(0.0, f64::min);
+    // The variance of a correlation by Bartlett, for noise with these positive correlations.
     let slow: f64 = rho.iter().take_while(|rho| **rho > 0.0).map(|rho| rho * rho).sum();
-    let chance = CHANCE * ((1.0 + 2.0 * slow) / means.len() as f64).sqrt();
+    let chance = CHANCE_DEVIATIONS * ((1.0 + 2.0 * slow) / means.len() as f64).sqrt();
     let share = block as f64 * dot(&means, &means) / dot(residual, residual).max(f64::MIN_POSITIVE);
-    if -least > chance { -least * share } else { 0.0 }
+    if -lowest > chance { -lowest * share } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use lane_ode::Cancel;
 use sweep_engine::design::{Design, DesignRule};
 use sweep_files::ParquetFile;
 
-/// The reference's spin; of a run shorter than it, less.
+/// The spin of the reference data; a shorter run has its beginning.
 const GRID: &str = "spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 12 }\n\
                     time = { end_s = 24 }\n";
 /// The noise of the noisy files (m/s^2, rad). Basis: their `.json`. Doubling it contradicts them.
@@ -28,7 +28,7 @@ const FRICTION: [(&str, f64); 5] = [
     ("friction_speed_m_per_s", 0.01),
 ];
 
-/// A reference file up to a time.
+/// Returns a reference file up to a time.
 fn reference(name: &str, end_s: f64) -> Measurement {
     let path = format!("{}/testdata/fit/{name}.csv", env!("CARGO_MANIFEST_DIR"));
     let mut measured = Measurement::read(Path::new(&path), &[]).unwrap();
@@ -59,7 +59,7 @@ fn options(free: &[&str]) -> FitOptions {
 }
 
 /// Returns the problem of fitting the nonlinear model by the method that commands choose.
-fn problem(cases: Vec<FitCase>, free: Vec<Free>, with_shift: bool) -> Problem<'static> {
+fn problem(cases: Vec<FitCase>, free: Vec<FreeParameter>, with_shift: bool) -> Problem<'static> {
     let method = Problem::method(&cases).unwrap();
     let simd = simd_from_environment().unwrap();
     let model = ModelKind::Nonlinear;
@@ -67,20 +67,21 @@ fn problem(cases: Vec<FitCase>, free: Vec<Free>, with_shift: bool) -> Problem<'s
 }
 
 fn fitted(cases: Vec<FitCase>, options: &FitOptions) -> FitReport {
-    let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
+    let work =
+        FitWork { cancel: Cancel::Never, count_evaluations: &|_| {}, output: None, fresh: false };
     fit(cases, options, &work).unwrap().unwrap().report
 }
 
-/// Returns by how many standard errors each number is from the truth.
+/// Returns the errors of the fitted numbers in standard errors.
 fn off(report: &FitReport, truth: &[(&str, f64)]) -> Vec<f64> {
-    let off = |fit: &report::Fit| {
+    let off = |fit: &report::FittedNumber| {
         let (_, truth) = truth.iter().find(|(name, _)| *name == fit.name).unwrap();
         (fit.value - truth) / fit.standard_error.unwrap()
     };
     report.parameters.iter().map(off).collect()
 }
 
-/// Noise of standard deviation 1 in which neighbours correlate by so much.
+/// Returns noise of standard deviation 1 with a correlation of neighbours.
 pub(super) fn noise(seed: u64, signal: usize, count: usize, correlation: f64) -> Vec<f64> {
     const SETTLED: usize = 200;
     let normal = Distribution {
@@ -103,7 +104,7 @@ fn the_model_at_the_truth_is_the_exact_record() {
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let cases = vec![case_at(truth, 1.0, reference(name, 8.0))];
         let problem = problem(cases, Vec::new(), false);
-        for one in problem.against(&[]).unwrap() {
+        for one in problem.compare(&[]).unwrap() {
             let values = &problem.cases[0].measured.signals[one.signal].values;
             let largest =
                 |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -128,7 +129,7 @@ fn reference_data_lead_to_the_truth() {
             assert!((noise / known - 1.0).abs() < 0.2, "{}", report.text());
         }
         assert!(report.first.shift_s.unwrap().abs() < 1e-3);
-        // Noise is a third of the least column, and less of the others.
+        // The noise is a third of the smallest column.
         assert!(report.first.explained.values().all(|share| *share > 0.88), "{}", report.text());
         let said = "tub_front_y_m_per_s2 0.291315 (32.3 %)";
         assert!(report.text().contains(said), "{}", report.text());
@@ -149,10 +150,10 @@ fn a_model_without_the_friction_says_that_it_does_not_follow() {
 
 #[test]
 fn an_interval_goes_no_farther_than_its_range() {
-    // So early a record cannot tell friction from damping.
+    // A record of a few seconds does not tell friction from damping.
     let cases = vec![case_at(&FRICTION, 1.1, reference("friction", 4.0))];
     let report = fitted(cases, &options(&["damping_n_s_per_m", "friction_n"]));
-    let from = |fit: &report::Fit| fit.interval_95.map(|[from, _]| from);
+    let from = |fit: &report::FittedNumber| fit.interval_95.map(|[from, _]| from);
     let least = report.parameters.iter().filter_map(from).reduce(f64::min);
     assert_eq!(least, Some(0.0), "{}", report.text());
 }
@@ -160,12 +161,12 @@ fn an_interval_goes_no_farther_than_its_range() {
 #[test]
 fn a_search_that_came_to_no_end_gives_no_intervals() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
-    let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
+    let free = free_parameters(&options(&["damping_n_s_per_m"]), &cases).unwrap();
     let problem = problem(cases, free, false);
     let x = problem.start();
-    let against = problem.against(&x).unwrap();
-    let summary = problem.summary(&against);
-    let statistics = Statistics::of(&problem, &against, &summary);
+    let against = problem.compare(&x).unwrap();
+    let summary = problem.normal_equations(&against);
+    let statistics = Statistics::at_end(&problem, &against, &summary);
     for is_settled in [true, false] {
         let x = x.clone();
         let summary = summary.clone();
@@ -178,7 +179,7 @@ fn a_search_that_came_to_no_end_gives_no_intervals() {
             statistics: &statistics,
             evaluations: 1,
             step_effect: None,
-            repeated: None,
+            resampled: None,
             draws: 0,
         };
         let report = found.report().unwrap();
@@ -196,7 +197,7 @@ fn a_search_that_came_to_no_end_gives_no_intervals() {
 fn a_fitted_machine_file_says_where_its_numbers_are_from() {
     let start = [VISCOUS[0], VISCOUS[1], ("friction_n", 5.0)];
     let cases = vec![case_at(&start, 1.0, reference("viscous", 1.0))];
-    let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
+    let free = free_parameters(&options(&["damping_n_s_per_m"]), &cases).unwrap();
     let problem = problem(cases, free, false);
     let (machine, _) = problem.machine(0, &problem.start());
     let text = crate::config::machine_file(&machine, &problem.written());
@@ -245,7 +246,7 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     assert!(held.iter().all(|held| *held >= 43), "{held:?}");
 }
 
-/// A seed of draws: that of the environment, or this.
+/// Returns the seed of draws that the environment gives, or a default.
 fn seed() -> u64 {
     std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(0)
 }
@@ -256,10 +257,10 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let names: Vec<&str> = truth.iter().map(|(name, _)| *name).collect();
         let cases = vec![case_at(truth, 1.0, reference(name, 24.0))];
-        let free = free(&options(&names), &cases).unwrap();
+        let free = free_parameters(&options(&names), &cases).unwrap();
         let problem = problem(cases, free, true);
-        let exact = problem.against(&problem.start()).unwrap();
-        // Growth is by the motion itself, or by its envelope over half a second.
+        let exact = problem.compare(&problem.start()).unwrap();
+        // The noise grows with the motion itself, or with its envelope over half a second.
         for (correlation, growth, by_envelope) in [
             (0.0, 0.0, false),
             (0.6, 0.0, false),
@@ -292,18 +293,19 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                     });
                     one.residual = algebra::centred(noise.collect()).0;
                 }
-                // So close to the truth the model is straight: one step of Gauss and Newton's.
-                let summary = problem.summary(&against);
+                // Near the truth the model is linear, so that one step of Gauss and Newton
+                // suffices.
+                let summary = problem.normal_equations(&against);
                 let bread = algebra::inverse(&summary.normal);
                 let moved: Vec<f64> =
                     bread.iter().map(|row| algebra::dot(row, &summary.pull)).collect();
-                for Against { residual, slopes, .. } in &mut against {
+                for SignalComparison { residual, slopes, .. } in &mut against {
                     for (slope, moved) in slopes.iter().zip(&moved) {
                         residual.iter_mut().zip(slope).for_each(|(left, s)| *left -= moved * s);
                     }
                 }
-                let summary = problem.summary(&against);
-                let statistics = Statistics::of(&problem, &against, &summary);
+                let summary = problem.normal_equations(&against);
+                let statistics = Statistics::at_end(&problem, &against, &summary);
                 if let Some(objection) = statistics.objection(&problem) {
                     if objections == 0 {
                         println!("{objection}");
@@ -345,7 +347,12 @@ fn a_linear_model_says_what_the_nonlinear_one_would_have() {
 #[test]
 fn what_cannot_be_fitted_is_said() {
     let wrong = |free: &[&str], measured: Measurement| {
-        let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
+        let work = FitWork {
+            cancel: Cancel::Never,
+            count_evaluations: &|_| {},
+            output: None,
+            fresh: false,
+        };
         let cases = vec![case_at(&VISCOUS, 1.0, measured)];
         match fit(cases, &options(free), &work) {
             Err(error) => error.to_string(),
@@ -406,7 +413,7 @@ fn records_in_g_are_seen_where_the_search_starts() {
     const G: f64 = 9.806_65;
     for (factor, known) in [(1.0 / G, "seems to be in g"), (G, "from g once too often")] {
         let mut measured = reference("viscous_exact", 8.0);
-        // Without angles nothing keeps the damping from growing until the model is as small.
+        // Without angles a great damping makes the model as small as the record in degrees.
         measured.signals.truncate(2);
         for signal in &mut measured.signals {
             signal.values.iter_mut().for_each(|value| *value *= factor);
@@ -420,11 +427,12 @@ fn records_in_g_are_seen_where_the_search_starts() {
 
 #[test]
 fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
-    // Without friction, its speed says nothing.
+    // Without friction the record does not depend on the friction's speed.
     let start = [("friction_n", 0.0), FRICTION[0], FRICTION[1], FRICTION[2]];
     let cases = || vec![case_at(&start, 1.0, reference("friction", 8.0))];
     let mut options = options(&["friction_n=0:60", "friction_speed_m_per_s=0.005:0.02"]);
-    let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
+    let work =
+        FitWork { cancel: Cancel::Never, count_evaluations: &|_| {}, output: None, fresh: false };
     let error = fit(cases(), &options, &work).err().unwrap().to_string();
     assert!(error.contains("does not depend on friction_speed_m_per_s"), "{error}");
     options.starts = 6;
@@ -454,10 +462,16 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
     ] {
         let cases = vec![case_at(&start, 1.0, record(speed_factor, time_factor))];
         let report = fitted(cases, &free);
-        let objection = report.objection.clone().unwrap_or_default();
-        println!("{} {said}: {:?} {objection}", report.evaluations, report.first.explained);
-        assert!(!report.follows && objection.contains(said), "{said}: {}", report.text());
-        assert!(objection.contains("converted, a short fit explains"), "{objection}");
+        let text = report.text();
+        println!("{} {said}: {:?} {text}", report.evaluations, report.first.explained);
+        assert!(!report.follows && text.contains(&format!("      unit  {said}")), "{said}: {text}");
+        assert!(text.contains("converted, a short fit explains"), "{text}");
+        assert!(
+            text.starts_with("     model  does not follow the measurement: the model "),
+            "{text}"
+        );
+        // The search does not go on in wrong units: an evaluation at the start and eight others.
+        assert!(report.evaluations < 10, "{said}: {} evaluations", report.evaluations);
         assert!(report.first.explained.values().all(|ratio| *ratio < 0.25), "{report:?}");
         let is_of_unit = |note: &String| note.contains("it seems to");
         assert!(!report.notes.iter().any(is_of_unit), "{said}: {:?}", report.notes);
@@ -465,23 +479,23 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
     let report = fitted(vec![case_at(&start, 1.0, record(1.0, 1.0))], &free);
     println!("right units: {:?}", report.first.explained);
     assert!(report.first.explained.values().all(|ratio| *ratio > 0.75), "{report:?}");
-    // Another machine in the right units: none is named.
+    // No unit is named for another machine in the right units.
     let report = fitted(vec![case_at(&VISCOUS, 0.8, record(1.0, 1.0))], &options(&[start[0].0]));
-    let objection = report.objection.unwrap_or_default();
-    assert!(objection.contains("the model explains") && !objection.contains("seems to be"));
+    assert!(report.objection.unwrap_or_default().contains("the model explains"));
+    assert!(report.suspected_units.is_empty());
 }
 
-/// A model at wrong speeds may be as much smaller than a channel as another unit makes it.
+/// A model at wrong speeds may differ from a channel by the factor of another unit.
 #[test]
 fn a_wrong_unit_of_speed_is_no_wrong_unit_of_a_channel() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
     let problem = problem(cases, Vec::new(), false);
-    let mut against = problem.against(&[]).unwrap();
+    let mut against = problem.compare(&[]).unwrap();
     let yaw = &mut against[2];
     let column = problem.cases[0].measured.signals[2].quantity.column();
     yaw.model.iter_mut().for_each(|value| *value = value.to_radians());
-    let summary = problem.summary(&against);
-    let statistics = Statistics::of(&problem, &against, &summary);
+    let summary = problem.normal_equations(&against);
+    let statistics = Statistics::at_end(&problem, &against, &summary);
     let is_settled = true;
     let minima = [Descent { x: Vec::new(), summary, evaluations: 1, is_settled }];
     let notes = |suspicions: &[Option<String>]| {
@@ -494,7 +508,7 @@ fn a_wrong_unit_of_speed_is_no_wrong_unit_of_a_channel() {
             statistics: &statistics,
             evaluations: 1,
             step_effect: None,
-            repeated: None,
+            resampled: None,
             draws: 0,
         };
         found.report().unwrap().notes
@@ -542,20 +556,24 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
         made.fetch_add(1, Ordering::Relaxed);
     };
     let stop = || made.load(Ordering::Relaxed) >= 3;
-    let work =
-        FitWork { cancel: Cancel::When(&stop), seen: &seen, output: Some(&output), fresh: false };
+    let work = FitWork {
+        cancel: Cancel::When(&stop),
+        count_evaluations: &seen,
+        output: Some(&output),
+        fresh: false,
+    };
     assert!(fit(cases(), &options, &work).unwrap().is_none());
     let part = ParquetFile::open(&partial.join("part-00000000.parquet")).unwrap();
-    // The start is evaluated once, though a descent asks for it again.
+    // The start is evaluated once, although each descent begins with it.
     assert_eq!(part.rows(), 2);
     let fields = part.schema().fields().iter().take(4).map(|field| field.name().as_str());
     let expected = ["damping_n_s_per_m", "unbalance_mass_kg", "file_1_shift_s", "cost"];
     assert_eq!(fields.collect::<Vec<_>>(), expected);
 
-    // Another fit leaves them alone, and so does a second process.
+    // Another fit does not change stored evaluations, nor does a second process.
     let work = FitWork {
         cancel: Cancel::When(&|| true),
-        seen: &|_| {},
+        count_evaluations: &|_| {},
         output: Some(&output),
         fresh: false,
     };
@@ -567,7 +585,12 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let seen = |_| {
         made.fetch_add(1, Ordering::Relaxed);
     };
-    let work = FitWork { cancel: Cancel::Never, seen: &seen, output: Some(&output), fresh: false };
+    let work = FitWork {
+        cancel: Cancel::Never,
+        count_evaluations: &seen,
+        output: Some(&output),
+        fresh: false,
+    };
     let resumed = fit(cases(), &options, &work).unwrap().unwrap();
     assert_eq!(serde_json::json!(resumed.report), serde_json::json!(whole));
     let busy = fit(cases(), &options, &work).err().unwrap().to_string();
@@ -585,8 +608,12 @@ fn a_damaged_part_of_a_fit_costs_its_evaluations() {
     let options = options(&["damping_n_s_per_m"]);
     let whole = fitted(cases(), &options);
     let fit = || {
-        let work =
-            FitWork { cancel: Cancel::Never, seen: &|_| {}, output: Some(&output), fresh: false };
+        let work = FitWork {
+            cancel: Cancel::Never,
+            count_evaluations: &|_| {},
+            output: Some(&output),
+            fresh: false,
+        };
         fit(cases(), &options, &work).unwrap().unwrap()
     };
     drop(fit());

@@ -1,14 +1,15 @@
-//! Wrong units of speed and time, tried where the model follows nothing.
+//! Wrong units of speed and time, which are found before a search.
 //!
 //! An unbalance shakes the tub once a turn. So a record turns with the drum's angle in the right
-//! units, whatever the machine's numbers are; in wrong ones it turns with another. Units in which
-//! the record turns with the drum are tried by a short fit each, and the best is named.
+//! units, whatever the machine's numbers are; in wrong units it does not. Units in which the record
+//! turns with the drum are tried by a short fit each, and the best is named. In the right units no
+//! other unit is tried, so that this costs no trajectory.
 
 use std::f64::consts::TAU;
 
 use super::algebra::{Symmetric, centred, dot, scaled};
 use super::measured::{LONGEST_RUN_S, SLOWEST_S, Signal, usual_step};
-use super::model::{FitCase, Free, Problem};
+use super::model::{FitCase, FreeParameter, Problem};
 use super::search::{Descent, DescentEnd, descend};
 use super::statistics::EXPLAINED_RATIO;
 
@@ -32,7 +33,7 @@ const TURNING_RATIO: f64 = 0.1;
 const TURNING_GAIN: f64 = 2.0;
 /// The greatest number of evaluations of a short fit. Basis: test
 /// `a_wrong_unit_of_speed_or_time_is_named`. Doubling it makes a trial as long as a fit.
-const TRIAL_EVALUATIONS: usize = 8;
+pub(super) const TRIAL_EVALUATIONS: usize = 8;
 /// The number of free parameters of a short fit: those that the record depends on most.
 const TRIAL_PARAMETERS: usize = 2;
 
@@ -189,7 +190,7 @@ fn block_square(block: &[[f64; 2]]) -> f64 {
         waves.iter().zip(&scale).map(|(wave, scale)| dot(wave, &values) / scale).collect();
     // A block of a hundredth of a turn has a parabola, but no wave.
     let inverse = |value: f64| if value > 1e-3 { 1.0 / value } else { 0.0 };
-    let explained = dot(&Symmetric::of(&unit).apply(&pull, inverse), &pull);
+    let explained = dot(&Symmetric::from_matrix(&unit).apply(&pull, inverse), &pull);
     let noise = (dot(&values, &values) - explained) / (block.len() as f64 - 3.0);
     explained - 2.0 * noise
 }
@@ -204,16 +205,16 @@ fn explained_by_short_fit(
 ) -> Result<f64, DescentEnd> {
     let cases = vec![converted];
     let Ok(method) = Problem::method(&cases) else { return Ok(0.0) };
-    let own = problem.free.iter().filter(|free| free.is_of(case));
-    let free = own.map(|free| Free { case: None, ..free.clone() }).collect();
+    let own = problem.free.iter().filter(|free| free.belongs_to(case));
+    let free = own.map(|free| FreeParameter { case: None, ..free.clone() }).collect();
     let trial = Problem { cases, free, with_shift: false, method, ..*problem };
     let start = trial.start();
     let evaluate = |x: &[f64]| {
-        let against = trial.against(x);
+        let against = trial.compare(x);
         if trial.cancel.is_requested() {
             return Err(DescentEnd::Stopped);
         }
-        Ok(against.map(|against| trial.summary(&against)))
+        Ok(against.map(|against| trial.normal_equations(&against)))
     };
     let Some(summary) = evaluate(&start)? else { return Ok(0.0) };
     let influence = |k: usize| summary.normal[k][k] * start[k] * start[k];
@@ -227,6 +228,13 @@ fn explained_by_short_fit(
     Ok(found.map_or(0.0, |found| mean_explained_ratio(&trial, &found)))
 }
 
+/// Returns whether the model explains most of the record at the end of a descent.
+pub(super) fn is_explained(problem: &Problem<'_>, end: &Descent) -> bool {
+    mean_explained_ratio(problem, end) > EXPLAINED_RATIO
+}
+
+/// Computes the part of the record's variance that the model explains at the end of a descent, the
+/// mean of its signals.
 fn mean_explained_ratio(problem: &Problem<'_>, found: &Descent) -> f64 {
     let signals = problem.signals().zip(&found.summary.sigma);
     let ratio = |((.., signal), sigma): ((usize, usize, &Signal), &f64)| {

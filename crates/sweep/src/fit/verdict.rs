@@ -15,7 +15,9 @@ use crate::plan::{Axis, AxisValues, Plan, axis_between, prepare_point, timing};
 use sweep_engine::Error;
 use sweep_engine::commands::cells::format_range;
 
-/// Speeds at which the fitted machine's stability is looked at.
+/// The number of speeds at which the stability of the fitted machine is computed. Basis: bands of
+/// instability of the paper's machine are several times wider than their distance. Doubling it
+/// doubles the time.
 const SPEEDS: u32 = 120;
 
 /// The number of directions of fixed numbers' errors that count in a margin, those that move the
@@ -29,14 +31,14 @@ pub(crate) struct FittedVerdict {
     pub(crate) reliable: Option<bool>,
     pub(crate) ratio_max: Option<f64>,
     pub(crate) ratio_limit: f64,
-    /// Share of rows over the fitted distribution that are reliable.
+    /// The part of the rows over the fitted distribution that are reliable.
     pub(crate) probability_reliable: Option<f64>,
-    /// Between which the greatest ratio lies in 95 % of them.
+    /// The interval in which the greatest ratio of 95 % of these rows lies.
     pub(crate) ratio_max_95: Option<[f64; 2]>,
     /// The number of these rows.
     pub(crate) draws: usize,
-    /// The fastest growing disturbance of the periodic responses up to the fastest speed: below
-    /// zero, the machine is outside every band of instability, by so much.
+    /// The growth of the fastest growing disturbance of the periodic responses up to the greatest
+    /// speed. If it is negative, the machine is outside every band of instability.
     pub(crate) growth_per_s: Option<f64>,
     pub(crate) growth_at_rpm: Option<f64>,
     /// The 95 % interval of that growth, by the fitted numbers' errors and the speeds' distance.
@@ -46,8 +48,8 @@ pub(crate) struct FittedVerdict {
 }
 
 impl FittedVerdict {
-    /// Says on which side of a band of instability the machine is, if its growth is known; at the
-    /// edge, if the interval of its growth holds 0.
+    /// Formats the side of a band of instability on which the machine is, if its growth is known;
+    /// the machine is at the edge if the interval of its growth contains 0.
     pub(super) fn margin(&self, short: &dyn Fn(f64) -> String) -> Option<String> {
         let growth = self.growth_per_s?;
         let speed = self.growth_at_rpm?;
@@ -59,7 +61,7 @@ impl FittedVerdict {
             _ if is_growing => "inside a band of instability",
             _ => "outside every band of instability",
         };
-        let way = if is_growing { "grow" } else { "die away" };
+        let verb = if is_growing { "grow" } else { "die away" };
         let interval = self.growth_95.map_or_else(String::new, |ends| {
             let [from, to] = if is_growing { ends } else { [-ends[1], -ends[0]] };
             format!(" ({} in 95 %)", format_range([from, to], short))
@@ -72,36 +74,36 @@ impl FittedVerdict {
             _ => "",
         };
         let rate = short(growth.abs());
-        Some(format!("{side}: disturbances {way} by {rate} /s{interval} at {speed:.0} rpm{off}"))
+        Some(format!("{side}: disturbances {verb} by {rate} /s{interval} at {speed:.0} rpm{off}"))
     }
 }
 
-/// A fit whose machine is put on the map.
-pub(super) struct OnMap<'a> {
+/// The computation of rows of the map for a fitted machine.
+pub(super) struct MapRow<'a> {
     pub(super) problem: &'a Problem<'a>,
     /// The unknowns.
     pub(super) x: &'a [f64],
     pub(super) statistics: &'a Statistics,
-    /// Rows of the map over the fitted distribution.
+    /// The number of rows of the map over the fitted distribution.
     pub(super) draws: u64,
 }
 
-impl OnMap<'_> {
+impl MapRow<'_> {
     /// Computes the row of a case's map at its fitted machine, and over the fitted distribution.
     pub(super) fn verdict(&self, case: usize, follows: bool) -> Result<FittedVerdict, Error> {
         let problem = self.problem;
         let x = self.x;
-        // The map's spin is the grid's, of which a measured one has no numbers.
+        // The map has the spin of the grid, because a measured spin has no parameters.
         let mut plan = Plan { axes: Vec::new(), design: None, ..problem.cases[case].plan.clone() };
-        let own: Vec<usize> =
-            (0..problem.free.len()).filter(|&k| problem.free[k].is_of(case)).collect();
-        // Free numbers make up for errors of the fixed ones, so those errors would count twice.
+        let case_parameters: Vec<usize> =
+            (0..problem.free.len()).filter(|&k| problem.free[k].belongs_to(case)).collect();
+        // Free numbers compensate for errors of the fixed ones, which would count twice.
         let covariance = self.statistics.by_noise(problem);
         let mut sets = vec![x.to_vec()];
         if follows {
             sets.extend(draws(problem, x, &covariance, self.draws));
         }
-        for &k in &own {
+        for &k in &case_parameters {
             let values = || sets.iter().map(|set| set[k]);
             let from = values().fold(f64::INFINITY, f64::min);
             let to = values().fold(f64::NEG_INFINITY, f64::max);
@@ -112,7 +114,7 @@ impl OnMap<'_> {
             });
         }
         let points: Vec<Vec<f64>> =
-            sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
+            sets.iter().map(|set| case_parameters.iter().map(|&k| set[k]).collect()).collect();
         let engine = ModelEngine::new(&plan)?;
         let outcomes =
             if problem.cancel.is_requested() { Vec::new() } else { engine.evaluate_at(&points) };
@@ -122,7 +124,7 @@ impl OnMap<'_> {
         let verdicts: Vec<RowVerdict> = outcomes.iter().map(verdict).collect();
         let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
         let drawn = verdicts.get(1..).unwrap_or_default();
-        let reliable = drawn.iter().filter(|it| it.reliable == Some(true)).count();
+        let reliable = drawn.iter().filter(|verdict| verdict.reliable == Some(true)).count();
         let errors = follows.then_some(&covariance[..]);
         let (growth, growth_95) = match self.growth(case, &plan, errors) {
             Some((growth, interval)) => (Some(growth), interval),
@@ -142,9 +144,8 @@ impl OnMap<'_> {
         })
     }
 
-    /// Returns the fastest growing disturbance of the fitted machine at speeds up to its fastest,
-    /// and the 95 % interval of its growth by the covariance of the free numbers, where that is
-    /// known.
+    /// Returns the fastest growing disturbance of the fitted machine at speeds up to its greatest,
+    /// and the 95 % interval of its growth if the covariance of the free numbers is given.
     fn growth(
         &self,
         case: usize,
@@ -187,10 +188,10 @@ impl OnMap<'_> {
         Some(find_responses(&dwells, self.problem.cancel))
     }
 
-    /// Computes the 95 % interval of the growth at the speed where it is greatest: to first order
-    /// in the free numbers' noise, in errors of the fixed numbers that move them most, together
-    /// with what the free numbers make up for; and by how much it may be greater between two
-    /// speeds. None where a machine beside the fitted one has no response.
+    /// Computes the 95 % interval of the greatest growth. Its variance is that of the free numbers'
+    /// noise and of the fixed numbers' errors, with the compensation by the free numbers, to first
+    /// order. The upper end includes growth between two speeds. The result is `None` if a varied
+    /// machine has no response.
     fn growth_95(
         &self,
         case: usize,
@@ -202,49 +203,53 @@ impl OnMap<'_> {
         let middle_rpm = growth.fastest.speed_rpm;
         let speeds = [middle_rpm - step_rpm, middle_rpm, middle_rpm + step_rpm];
         let growths = |x: &[f64], fixed: &[(MachineParameter, f64)]| -> Option<Vec<f64>> {
-            let found = self.responses_at(case, plan, (x, fixed), &speeds)?;
-            found.iter().map(|found| Some(found.as_ref().ok()?.first()?.growth_per_s())).collect()
+            let responses = self.responses_at(case, plan, (x, fixed), &speeds)?;
+            responses
+                .iter()
+                .map(|found| Some(found.as_ref().ok()?.first()?.growth_per_s()))
+                .collect()
         };
-        let greatest = |growths: &[f64]| growths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let here = growths(x, &[])?;
+        let greatest_growth =
+            |growths: &[f64]| growths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let fitted = growths(x, &[])?;
         let mut slopes = vec![0.0; covariance.len()];
         for (k, free) in self.problem.free.iter().enumerate() {
             let error = covariance[k][k].max(0.0).sqrt();
-            if !free.is_of(case) || error == 0.0 {
+            if !free.belongs_to(case) || error == 0.0 {
                 continue;
             }
-            let mut beside = x.to_vec();
+            let mut varied = x.to_vec();
             let step = if x[k] + error > free.range[1] { -error } else { error };
-            beside[k] = (x[k] + step).max(free.range[0]);
-            let change = greatest(&growths(&beside, &[])?) - greatest(&here);
-            if beside[k] != x[k] {
-                slopes[k] = change / (beside[k] - x[k]);
+            varied[k] = (x[k] + step).max(free.range[0]);
+            let change = greatest_growth(&growths(&varied, &[])?) - greatest_growth(&fitted);
+            if varied[k] != x[k] {
+                slopes[k] = change / (varied[k] - x[k]);
             }
         }
         let mut variance: f64 =
             covariance.iter().zip(&slopes).map(|(row, slope)| slope * dot(row, &slopes)).sum();
         for direction in self.statistics.influences.directions.iter().take(MARGIN_DIRECTIONS) {
-            // A number at an end of its range can change one way only.
-            let found = [1.0, -1.0].into_iter().find_map(|sign| {
+            // A number at an end of its range can change in one direction only.
+            let growths = [1.0, -1.0].into_iter().find_map(|sign| {
                 let moved = |(k, (x, by)): (usize, (&f64, &f64))| {
                     let [from, to] = self.problem.range(k);
                     (x - sign * by).clamp(from, to)
                 };
                 let moves = x.iter().zip(&direction.moves).enumerate();
-                let beside: Vec<f64> = moves.map(moved).collect();
+                let varied: Vec<f64> = moves.map(moved).collect();
                 let changes = direction.changes.iter();
                 let changes: Vec<(MachineParameter, f64)> =
                     changes.map(|(parameter, by)| (parameter.clone(), sign * by)).collect();
-                growths(&beside, &changes)
+                growths(&varied, &changes)
             });
-            let change = greatest(&found?) - greatest(&here);
+            let change = greatest_growth(&growths?) - greatest_growth(&fitted);
             variance += change * change;
         }
-        let reach = Z_975 * variance.max(0.0).sqrt();
+        let half_width = Z_975 * variance.max(0.0).sqrt();
         // The vertex of the parabola through three neighbours is at most this far above the middle.
-        let bend = (2.0 * here[1] - here[0] - here[2]).max(0.0) / 8.0;
+        let rise = (2.0 * fitted[1] - fitted[0] - fitted[2]).max(0.0) / 8.0;
         let value = growth.fastest.growth_per_s();
-        Some([value - reach, value + reach + bend])
+        Some([value - half_width, value + half_width + rise])
     }
 }
 

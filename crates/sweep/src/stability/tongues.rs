@@ -119,9 +119,9 @@ impl StabilitySummary {
         let mut lines = vec![(
             "stable",
             format!(
-                "{} of {} rows, {} not, {} without a response; {}",
+                "{} of {}, {} not, {} without a response; {}",
                 self.rows - self.unstable - self.without_response - self.beyond,
-                self.rows,
+                counted(self.rows as usize, "row"),
                 self.unstable,
                 self.without_response,
                 counted(self.points as usize, "point")
@@ -133,17 +133,20 @@ impl StabilitySummary {
             lines[0].1.push_str(&format!("; {} {words}", self.above_tongue));
         }
         if self.beyond > 0 {
-            let words = "rows exceed the machine's geometry (column beyond), and count as neither";
-            lines.push(("beyond", format!("{} {words}", self.beyond)));
+            let rows = counted(self.beyond as usize, "row");
+            let words = "beyond the machine's geometry (column beyond), counted as neither";
+            lines.push(("beyond", format!("{rows} {words}")));
         }
         if self.off_curve > 0 {
-            let words = "of these rows are off the curve (column on_curve): a machine that runs up \
-                         may be in another motion there (`sweep dwell`)";
-            lines.push(("off curve", format!("{} {words}", self.off_curve)));
+            let rows = counted(self.off_curve as usize, "row");
+            let words = "off the curve (column on_curve): a machine that runs up may be in another \
+                         motion at these speeds (`sweep dwell`)";
+            lines.push(("off curve", format!("{rows} {words}")));
         }
         if self.coexisting > 0 {
-            let words = "further rows: other responses at the same speeds (column branch)";
-            lines.push(("others", format!("{} {words}", self.coexisting)));
+            let rows = counted(self.coexisting as usize, "further row");
+            let words = "other responses at the same speeds (column branch)";
+            lines.push(("others", format!("{rows}: {words}")));
         }
         for row in &self.jumps {
             let point_prefix = self.point_prefix(row);
@@ -278,11 +281,10 @@ mod tests {
             [([2.0, 3.0], 3.0), ([4.0, 4.0], 4.0), ([1.0, 1.0], 1.0), ([3.0, 3.0], 3.0)]
         );
         let lines = summary.lines();
-        let counts =
-            "2 of 8 rows, 5 not, 1 without a response; 2 points; 1 above an unstable speed: ";
-        assert!(lines[0].1.starts_with(counts), "{lines:?}");
-        assert!(lines[1].1.starts_with("2 of these rows are off the curve"));
-        assert!(lines[2].1.starts_with("1 further rows"));
+        let all = "2 of 8 rows, 5 not, 1 without a response; 2 points; 1 above an unstable speed: ";
+        assert!(lines[0].1.starts_with(all), "{lines:?}");
+        assert!(lines[1].1.starts_with("2 rows off the curve"));
+        assert!(lines[2].1.starts_with("1 further row: other responses"));
         assert!(lines[3].1.starts_with(
             "unbalance_mass_kg 0.1: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3"
         ));
@@ -290,7 +292,21 @@ mod tests {
     }
 
     #[test]
-    fn jumps_are_at_folds_of_the_curve_up_to_the_greatest_speed() {
+    fn one_row_is_in_the_singular() {
+        let mut summary = StabilitySummary::default();
+        summary.add(StabilityRow {
+            speed_rpm: 250.0,
+            growth_per_s: -0.1,
+            is_off_curve: true,
+            ..StabilityRow::default()
+        });
+        let lines = summary.lines();
+        assert!(lines[0].1.starts_with("1 of 1 row, 0 not, 0 without a response; 1 point"));
+        assert!(lines.iter().any(|(_, line)| line.starts_with("1 row off the curve")), "{lines:?}");
+    }
+
+    #[test]
+    fn jumps_are_at_folds_of_the_curve_within_the_speeds() {
         let mut summary = StabilitySummary::default();
         for (speed_rpm, fold_rpm, is_off_curve) in
             [(240.0, 245.0, false), (245.0, 248.0, true), (250.0, 260.0, false)]

@@ -48,7 +48,11 @@ fn growth_of_one_point_is_shaded_between_its_marked_edges() {
         chart["marks"].as_array().unwrap().iter().map(|mark| mark[1].as_str().unwrap()).collect();
     assert_eq!(marks, ["230 rpm", "250 rpm"]);
     let figure = draw_svg(stability(&[0.4]), &default_options());
-    for text in ["dwell · unbalance mass 0.4 kg", "a dwell at this speed is unstable", "230 rpm"] {
+    for text in [
+        "dwell · unbalance mass 0.4 kg",
+        "speeds at which the periodic response is unstable",
+        "230 rpm",
+    ] {
         assert!(figure.contains(text), "{text}");
     }
 }

@@ -23,6 +23,33 @@ pub(super) fn seconds(cell: &str) -> Option<f64> {
     is_time.then_some(days * DAY_S + hours * 3600.0 + minutes * 60.0 + seconds)
 }
 
+/// Returns the clock time of the seconds since 1970, with its date, or of the seconds since
+/// midnight, to a millisecond.
+pub(super) fn text(seconds: f64) -> String {
+    let milliseconds = (1e3 * seconds).round() as i64;
+    let day = milliseconds.div_euclid(86_400_000);
+    let time = milliseconds.rem_euclid(86_400_000);
+    let [hours, minutes] = [time / 3_600_000, time / 60_000 % 60];
+    let time = format!("{hours:02}:{minutes:02}:{:06.3}", (time % 60_000) as f64 / 1e3);
+    if day == 0 { time } else { format!("{} {time}", date(day)) }
+}
+
+/// Returns the date of a day since 1970 as year, month and day.
+fn date(day: i64) -> String {
+    // Years begin in March, and 400 of them have 146,097 days.
+    let day = day + DAYS_BEFORE_1970 as i64 - 1;
+    let cycle = day.div_euclid(146_097);
+    let day = day.rem_euclid(146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let day = day - (153 * month + 2) / 5 + 1;
+    let is_early = month >= 10;
+    let year = 400 * cycle + year + i64::from(is_early);
+    let month = if is_early { month - 9 } else { month + 3 };
+    format!("{year:04}-{month:02}-{day:02}")
+}
+
 /// Returns a whole number of at most four digits, if it is no greater than `max`.
 fn parse_whole(text: &str, max: u32) -> Option<f64> {
     let is_plain = (1..=4).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
@@ -68,6 +95,23 @@ mod tests {
             ("2026/11/29 10:30:45.125", 1_795_948_245.125),
         ] {
             assert_eq!(seconds(cell), Some(expected), "{cell}");
+        }
+    }
+
+    #[test]
+    fn the_text_of_a_time_is_read_as_that_time() {
+        for expected in [
+            "12:34:56.500",
+            "1970-01-02 00:00:00.000",
+            "2000-02-29 12:00:00.001",
+            "1999-12-31 23:59:59.999",
+            "2100-03-01 07:05:00.250",
+            "1969-12-31 23:00:00.000",
+        ] {
+            assert_eq!(seconds(expected).map(text).as_deref(), Some(expected));
+        }
+        for day in (-200_000..200_000).step_by(7) {
+            assert_eq!(days(&date(day)), Some(day as f64), "{}", date(day));
         }
     }
 

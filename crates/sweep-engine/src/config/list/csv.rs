@@ -10,7 +10,7 @@ use super::layout::{TableLayout, TextLine, lines, separator_words};
 use super::names::Names;
 use super::notation::{Evidence, Notation, NotationEvidence, Unclear};
 use super::units::UnitScale;
-use super::{ID_COLUMN, ListColumn, ListError, check_size, is_index};
+use super::{ID_COLUMN, ListColumn, ListError, TIME_COLUMN, check_size, is_index};
 
 /// A table that is read from text.
 #[derive(Default)]
@@ -24,9 +24,6 @@ pub(super) struct TextTable {
     /// The number of lines before the line of names.
     pub(super) preamble: usize,
 }
-
-/// The name of a column of times (s), whose cells may be times of day.
-const TIME_COLUMN: &str = "time_s";
 
 /// Texts of cells without a value, in lower case.
 const MISSING_VALUES: [&str; 9] = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
@@ -149,6 +146,7 @@ fn column(
         place,
         is_known,
         values: Vec::new(),
+        is_clock: false,
     };
     if header == ID_COLUMN {
         return (named_column(header.to_owned(), true), None);

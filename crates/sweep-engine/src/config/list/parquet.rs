@@ -14,7 +14,7 @@ use sweep_files::{cells, footer, panics};
 use super::super::section::short;
 use super::names::{KnownName, Names};
 use super::units::UnitScale;
-use super::{ListError, check_size, is_index};
+use super::{ListError, TIME_COLUMN, check_size, is_index};
 
 /// The compressions that are read, for a message.
 const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
@@ -28,6 +28,8 @@ pub(super) struct ParquetColumn {
     pub(super) header: String,
     /// The numbers, if the column is known.
     pub(super) values: Option<Vec<f64>>,
+    /// Whether the numbers are times of a clock (s).
+    pub(super) is_clock: bool,
 }
 
 /// Returns the columns of a file without its index. If `allows_missing` is true, a null is NaN.
@@ -46,7 +48,7 @@ fn read(
     names: &Names<'_>,
 ) -> Result<Vec<ParquetColumn>, ListError> {
     let metadata = footer::metadata(&bytes).map_err(damaged)?;
-    let schema = batches::schema(&metadata);
+    let schema = batches::schema_with_clocks(&metadata);
     let fields = schema.fields();
     check_size(0, fields.len())?;
     let mut columns: Vec<ParquetColumn> = Vec::new();
@@ -56,14 +58,19 @@ fn read(
         let known_name = names.find(&header, None);
         match known_name.map_err(|[title, expected]| format!("{title}: {expected}"))? {
             Some(KnownName { name, scale }) => {
-                if !cells::is_number(field.data_type()) {
+                let is_clock = name == TIME_COLUMN && cells::is_clock(field.data_type());
+                if !cells::is_number(field.data_type()) && !is_clock {
                     return Err(no_numbers(&header, field.data_type()));
                 }
+                let scale = if is_clock { UnitScale::ONE } else { scale };
                 known_columns.push((columns.len(), column_index, scale));
-                columns.push(ParquetColumn { name, header, values: Some(Vec::new()) });
+                columns.push(ParquetColumn { name, header, values: Some(Vec::new()), is_clock });
             }
             None if is_index(&header) => {}
-            None => columns.push(ParquetColumn { name: header.clone(), header, values: None }),
+            None => {
+                let name = header.clone();
+                columns.push(ParquetColumn { name, header, values: None, is_clock: false });
+            }
         }
     }
     check_row_groups(&metadata, fields.len())?;
@@ -74,10 +81,14 @@ fn read(
     while let Some(batch) = reader.batch().map_err(damaged)? {
         check_size((rows + batch.num_rows()) as u64, known_columns.len())?;
         for ((column, _, scale), array) in known_columns.iter().zip(batch.columns()) {
-            let ParquetColumn { header, values: Some(values), .. } = &mut columns[*column] else {
+            let ParquetColumn { header, values: Some(values), is_clock, .. } =
+                &mut columns[*column]
+            else {
                 continue;
             };
-            let numbers = cells::numbers(array).map_err(|error| error.to_string())?;
+            let numbers =
+                if *is_clock { cells::clock_seconds(array) } else { cells::numbers(array) };
+            let numbers = numbers.map_err(|error| error.to_string())?;
             for (k, value) in numbers.into_iter().enumerate() {
                 let row = rows + k + 1;
                 let no_value =

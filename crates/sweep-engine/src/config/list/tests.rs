@@ -360,3 +360,58 @@ fn parquet_decimals_are_numbers() {
         read_parquet(bytes).unwrap().into_iter().map(|(_, values)| values).collect();
     assert_eq!(values_by_column, [vec![120.5, -0.5], vec![0.3, 12.345], vec![2.56, -1.0]]);
 }
+
+#[test]
+fn instants_and_times_of_day_of_parquet_files_are_seconds() {
+    use ::parquet::data_type::Int64Type;
+    use ::parquet::file::writer::SerializedFileWriter;
+    use ::parquet::schema::parser::parse_message_type;
+    let known = |name: &str| {
+        let quantity = match name {
+            "time" => ["time_s", "s"],
+            NAME => [NAME, "kg"],
+            _ => return None,
+        };
+        Some(quantity.map(str::to_owned).into())
+    };
+    let names = Names { known: &known, renamed: &[] };
+    let read = |name: &str, kind: &str, cells: &[i64]| {
+        let schema = format!(
+            "message m {{ required int64 {name} {kind}; \
+             required int64 logged_at (TIMESTAMP(NANOS,true)); }}"
+        );
+        let schema = Arc::new(parse_message_type(&schema).unwrap());
+        let mut bytes = Vec::new();
+        let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::default()).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        for _ in 0..2 {
+            let mut column = group.next_column().unwrap().unwrap();
+            column.typed::<Int64Type>().write_batch(cells, None, None).unwrap();
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+        writer.close().unwrap();
+        parquet::columns(bytes, true, &names)
+    };
+    // 2026-03-01 12:34:56.789
+    let instant_ns = 1_772_368_496_789_000_000;
+    let instant_s = 1_772_368_496.789;
+    let day_time_ns = instant_ns % 86_400_000_000_000;
+    for (kind, cell, seconds) in [
+        ("(TIMESTAMP(NANOS,false))", instant_ns, instant_s),
+        ("(TIMESTAMP(MICROS,true))", instant_ns / 1000, instant_s),
+        ("(TIMESTAMP_MILLIS)", instant_ns / 1_000_000, instant_s),
+        ("(TIMESTAMP_MICROS)", instant_ns / 1000, instant_s),
+        ("(TIME(MICROS,false))", day_time_ns / 1000, 45_296.789),
+        ("(TIME(NANOS,false))", day_time_ns, 45_296.789),
+        ("", 5, 5.0),
+    ] {
+        let columns = read("time", kind, &[cell]).unwrap();
+        let [time, logged_at] = columns.as_slice() else { panic!("{columns:?}") };
+        assert_eq!(time.values.as_deref(), Some(&[seconds][..]), "{kind}");
+        assert_eq!((time.is_clock, &logged_at.values), (!kind.is_empty(), &None), "{kind}");
+    }
+    // Other quantities are no instants.
+    let refused = read(NAME, "(TIMESTAMP(NANOS,false))", &[instant_ns]).unwrap_err();
+    assert!(refused.contains("holds no numbers but dates, times"), "{refused}");
+}

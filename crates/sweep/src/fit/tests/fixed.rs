@@ -45,21 +45,23 @@ fn tolerances_are_the_prior_of_an_unknown() {
     let radius_m = case.plan.model.machine.unbalance.radius_m;
     let mut names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
     let cases = vec![case];
-    let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
+    let work =
+        FitWork { cancel: Cancel::Never, count_evaluations: &|_| {}, output: None, fresh: false };
     let fitted = fit(cases.clone(), &options(&names), &work).unwrap().unwrap();
     let Fitted { problem, mut x, against, .. } = fitted;
-    let summary = problem.summary(&against);
+    let summary = problem.normal_equations(&against);
     let variances: Vec<f64> = summary.sigma.iter().map(|sigma| sigma * sigma).collect();
     let known = ["none", "unbalance_radius_m=5%"].map(str::to_owned);
-    let known = Known::read(&known, &cases[0], &problem.free).unwrap();
+    let known = FixedNumbers::read(&known, &cases[0], &problem.free).unwrap();
     let found = known.influences(&problem, &x, &against, &summary, &variances);
     let radius = names.len();
     names.push("unbalance_radius_m");
     x.insert(radius, radius_m);
-    let free = free(&options(&names), &cases).unwrap();
+    let free = free_parameters(&options(&names), &cases).unwrap();
     let Problem { model, with_shift, method, simd, cancel, .. } = problem;
     let joint = Problem { cases, free, model, with_shift, method, simd, cancel };
-    let Summary { mut normal, pull, .. } = joint.summary(&joint.against(&x).unwrap());
+    let NormalEquations { mut normal, pull, .. } =
+        joint.normal_equations(&joint.compare(&x).unwrap());
     normal[radius][radius] += 1.0 / (0.05 * radius_m).powi(2);
     let covariance = algebra::inverse(&normal);
     let moved: Vec<f64> = covariance.iter().map(|row| algebra::dot(row, &pull)).collect();
@@ -115,8 +117,8 @@ fn a_gain_moves_the_estimates_that_it_scales() {
 #[test]
 fn tolerances_that_mean_nothing_are_refused_with_their_place() {
     let cases = [case_at(&VISCOUS, 1.0, reference("viscous", 1.0))];
-    let free = free(&options(&["spring_stiffness_n_per_m"]), &cases).unwrap();
-    let read = |text: &str| Known::read(&[text.to_owned()], &cases[0], &free);
+    let free = free_parameters(&options(&["spring_stiffness_n_per_m"]), &cases).unwrap();
+    let read = |text: &str| FixedNumbers::read(&[text.to_owned()], &cases[0], &free);
     for (text, said) in [
         ("tub_mass_kg", "has no tolerance"),
         ("tub_mass_kg=much", "is no tolerance"),
