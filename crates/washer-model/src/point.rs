@@ -14,7 +14,7 @@ use crate::machine::spin::{SpinSegment, SpinState, segment_index};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates};
-use crate::point::ringing::{Ringing, jump_sum_rad_per_s2};
+use crate::point::ringing::{Jumps, Ringing};
 use crate::{
     COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing, UnresolvedModes,
 };
@@ -289,7 +289,7 @@ impl Kernel for PreparationKernel<'_> {
                     linear.matrices(&coefficients.bodies, &spin)
                 };
                 prepared.push(Ok(Point {
-                    ringing: Ringing::new(machine, planned_spin.jump_sum_rad_per_s2, matrices_at),
+                    ringing: Ringing::new(machine, planned_spin.jumps, matrices_at),
                     perturbation: 0.0,
                     instants_s: [].into(),
                     machine: coefficients,
@@ -339,8 +339,7 @@ fn steepest_tangents<T: Lane>(
 struct PlannedSpin {
     spin_segments: Arc<[SpinSegment]>,
     segments: Arc<[PlannedSegment]>,
-    /// The sum of all jumps of the drum's acceleration.
-    jump_sum_rad_per_s2: f64,
+    jumps: Arc<Jumps>,
 }
 
 /// Plans the spin of each point. Consecutive points with the same spin share a plan, because a
@@ -352,9 +351,9 @@ fn plan_spins(points: &[(Machine, Spin)], timing: &Timing) -> Vec<PlannedSpin> {
             if k > 0 && points[k - 1].1 == *spin { planned_spins.last().cloned() } else { None };
         planned_spins.push(same_spin.unwrap_or_else(|| {
             let spin_segments = spin.segments();
-            let jump_sum_rad_per_s2 = jump_sum_rad_per_s2(&spin_segments, timing.end_s);
+            let jumps = Jumps::new(&spin_segments, timing).into();
             let segments = segments(&spin_segments, timing).into();
-            PlannedSpin { segments, jump_sum_rad_per_s2, spin_segments: spin_segments.into() }
+            PlannedSpin { segments, jumps, spin_segments: spin_segments.into() }
         }));
     }
     planned_spins

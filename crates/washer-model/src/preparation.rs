@@ -9,7 +9,8 @@
 //! Friction at speeds below 4 v_s / pi is viscous by its force law, with the damping F / v_s. This
 //! speed is the least amplitude; a damper that sticks has it.
 
-use crate::modes::highest_rigid_frequency_rad_per_s;
+use crate::coordinates::TUB;
+use crate::modes::{highest_rigid_frequency_rad_per_s, modes};
 use crate::point::{self, segments};
 use crate::steps::round_down_to_bits;
 use crate::{
@@ -54,6 +55,10 @@ const CAP_STABILITY_SHARE: f64 = 0.9;
 /// The number of binary digits of a step after the first. Basis: the last digits of an eigenvalue
 /// depend on the processor. Doubling it would keep more of them.
 const STEP_BITS: u32 = 8;
+
+/// The number of binary digits of a decay after the first. Basis: the last digits of an eigenvalue
+/// depend on the processor. Doubling it would keep such digits.
+const DECAY_BITS: u32 = 20;
 
 /// A search for the speed amplitudes of a point.
 pub(crate) struct SpeedAmplitudeSearch {
@@ -279,7 +284,23 @@ pub fn prepare(
             *point = point.with_motion_friction_speeds(&search.speeds_m_per_s());
         }
     }
+    for point in prepared.iter_mut().flatten() {
+        if point.ringing.depends_on_decay() && !point.machine.elements.has_nonsmooth_force() {
+            let decay_per_s = ringing_decay_per_s(point);
+            point.ringing.set_decay(decay_per_s);
+        }
+    }
     prepared
+}
+
+/// Returns the rate at which the swing of hinge and bearings decays while the drum stands (1/s),
+/// that of their slowest mode; zero if the modes are unknown.
+fn ringing_decay_per_s(point: &Point) -> f64 {
+    let Ok(modes) = modes(point, 0.0, 0.0) else { return 0.0 };
+    let decays = modes.modes[TUB.len()..].iter().map(|mode| -mode.re_per_s);
+    let slowest_per_s = decays.fold(f64::INFINITY, f64::min);
+    // The last digits of an eigenvalue depend on the processor.
+    round_down_to_bits(slowest_per_s.max(0.0), DECAY_BITS)
 }
 
 impl PointSearch {

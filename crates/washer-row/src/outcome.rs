@@ -1,6 +1,9 @@
 //! The outcome of a grid point: one row of the result file.
 
-use washer_model::{Attractors, Channel, Disturbance, GeometryLimit, Response, ResponseError};
+use washer_model::{
+    Attractor, AttractorStatus, Attractors, Channel, Disturbance, GeometryLimit, Response,
+    ResponseError,
+};
 
 use crate::Level;
 
@@ -140,14 +143,19 @@ pub struct DwellPeaks {
 impl DwellPeaks {
     /// Computes the largest deviations of the attractors found at speeds (rpm); `None` if there are
     /// no attractors. Among attractors with equal rotation, the first one determines speed and
-    /// kind.
+    /// kind. Transients are left out, because they end in other motions, which are among the
+    /// attractors.
     pub fn from_attractors<E>(
         speeds_rpm: &[f64],
         results: &[Result<Attractors, E>],
     ) -> Option<Self> {
+        let is_transient =
+            |motion: &Attractor| matches!(motion.status, AttractorStatus::Transient { .. });
         let attractors = speeds_rpm.iter().zip(results).flat_map(|(&speed_rpm, result)| {
             let attractors = result.iter().flat_map(|found| &found.attractors);
-            attractors.map(move |motion| (speed_rpm, motion))
+            attractors
+                .filter(move |motion| !is_transient(motion))
+                .map(move |motion| (speed_rpm, motion))
         });
         let mut max_rotation_rad = 0.0;
         attractors.fold(None, |peaks: Option<Self>, (speed_rpm, motion)| {
@@ -217,5 +225,48 @@ impl Outcome {
     pub fn into_rows(mut self) -> impl Iterator<Item = Self> {
         let coexisting = core::mem::take(&mut self.coexisting);
         core::iter::once(self).chain(coexisting)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use washer_model::{MotionKind, Reading};
+
+    use super::*;
+
+    fn attractor(status: AttractorStatus, yaw_rad: f64) -> Attractor {
+        let motion_kind = match status {
+            AttractorStatus::Ok => Some(MotionKind::Periodic { turns: 1 }),
+            _ => None,
+        };
+        let mut peaks = [0.0; Channel::ALL.len()];
+        peaks[Channel::TubYaw.index()] = yaw_rad;
+        Attractor {
+            status,
+            motion_kind,
+            starts: 1,
+            least_kick_rad_per_s: None,
+            peaks,
+            min_gap_m: 0.01,
+            exponent: None,
+            time_s: 60.0,
+            end: [0.0; washer_model::STATE_LEN],
+            sections: Vec::new(),
+            extra: Reading::default(),
+        }
+    }
+
+    #[test]
+    fn dwell_peaks_are_those_of_motions_that_last() {
+        let attractors = vec![
+            attractor(AttractorStatus::Ok, 0.02),
+            attractor(AttractorStatus::Transient { life_s: 9.0 }, 0.06),
+            attractor(AttractorStatus::Ok, 0.03),
+        ];
+        let found =
+            Attractors { responses: Vec::new(), attractors, starts: 3, threshold_rad_per_s: None };
+        let peaks = DwellPeaks::from_attractors(&[250.0], &[Ok::<_, ()>(found)]).unwrap();
+        assert_eq!(peaks.deviations[Channel::TubYaw.index()], 0.03);
+        assert_eq!(Attractor::KIND_NAMES[peaks.kind], "periodic");
     }
 }

@@ -5,7 +5,7 @@ use washer_model::{Level, ModelKind, Point, UnresolvedModes};
 
 use crate::error_control::{amplification, contraction, error_of_chaos, error_of_level};
 use crate::levels::{FamilyStart, RefinementLevels};
-use crate::measures::TURN_FLOOR;
+use crate::measures::{REST_SHARE, TURN_FLOOR};
 use crate::metrics::Metric;
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::run::{LevelRun, RowRule};
@@ -54,15 +54,18 @@ struct ModelRule<'a> {
 impl ModelRule<'_> {
     /// Returns the greatest ratio of unresolved ringing to a row's number: the vibration of
     /// bearings and hinge that a level's steps do not resolve, relative to the amplitudes and to
-    /// the clearance, times the amplification of the motion.
+    /// the clearance, times the amplification of the motion. Ringing about a standstill counts only
+    /// if it exceeds the least amplitude of a moving machine, below which the verdict knows no
+    /// motion.
     fn relative_ringing(&self, level: usize, refinement: &ModelRefinement) -> f64 {
         let Some(run) = &refinement.run else { return 0.0 };
         let Some(unresolved) = self.levels.unresolved_modes(level) else { return 0.0 };
         let amplitude_bounds = self.point.ringing(unresolved);
+        let at_rest_m = REST_SHARE * self.point.clearance_m();
         let mut greatest_ringing = amplitude_bounds.gap_m / self.point.clearance_m();
         for (channel, amplitude) in self.rule.channels.iter().zip(&run.trajectory.amplitudes) {
             let bound = amplitude_bounds.channels[channel.index()];
-            if bound > 0.0 {
+            if bound > at_rest_m || *amplitude > 0.0 && bound > 0.0 {
                 greatest_ringing = greatest_ringing.max(bound / amplitude);
             }
         }

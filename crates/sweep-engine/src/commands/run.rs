@@ -223,7 +223,7 @@ fn describe_work(session: &Session) -> String {
     format!("{points} in {wall}, {rate} on {threads} ({simd})")
 }
 
-/// Formats the counts of a result in at most six lines: verdicts, failures, extremes.
+/// Formats the counts of a result: verdicts, failures, extremes.
 pub fn count_lines(tally: &Tally, job: &Job<'_>) -> String {
     count_lines_at(tally, job.limits, &|point| format_axis_values(point, job))
 }
@@ -293,6 +293,7 @@ pub fn count_lines_at(
     let uncounted = if *undefined > 0 { ", which the share leaves out" } else { "" };
     let others = format!("{unreliable} not, {undefined} undefined{uncounted}");
     text.line("reliable", format!("{reliable} ({share:.1} %) {range}, {others}"));
+    text.push_str(&motionless_line(tally, axis_values));
     if *over_estimated > 0 {
         let share = percent(*over_estimated);
         let below = format_number(limits.over_estimate());
@@ -346,6 +347,20 @@ pub fn count_lines_at(
     text
 }
 
+/// Formats the reason why rows without a failure have no verdict; empty if there are none.
+fn motionless_line(tally: &Tally, at: &dyn Fn(u64) -> String) -> String {
+    let mut text = String::new();
+    let Some(first) = tally.first_motionless else { return text };
+    let rows = counted(tally.motionless as usize, "row");
+    let place = match at(first) {
+        place if place.is_empty() => place,
+        place => format!(", the first at {place}"),
+    };
+    let reason = "the linear model does not move in the window, so that no ratio is defined";
+    text.line("undefined", format!("{rows} without a failure{place}: {reason}"));
+    text
+}
+
 /// Returns the number of failed rows of each status, in words; `None` if there are none.
 pub(super) fn describe_failures(by_status: &NameCounts) -> Option<String> {
     let failed = failure_counts(by_status).map(|(status, count)| format!("{count} {status}"));
@@ -385,6 +400,19 @@ mod tests {
         let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
         let summary = count_lines_at(&tally, 2.0.into(), &|_| String::new());
         assert!(summary.contains("error  rows by method: 1 capped_1"), "{summary}");
+    }
+
+    #[test]
+    fn rows_without_motion_are_explained() {
+        let said = |motionless, first_motionless| {
+            let tally =
+                Tally { points: 3, undefined: 3, motionless, first_motionless, ..Tally::default() };
+            count_lines_at(&tally, 2.0.into(), &|point| format!("mass_kg {point}"))
+        };
+        let sentence = " undefined  2 rows without a failure, the first at mass_kg 1: the linear \
+                        model does not move in the window, so that no ratio is defined\n";
+        assert!(said(2, Some(1)).contains(sentence), "{}", said(2, Some(1)));
+        assert!(!said(0, None).contains("does not move"), "{}", said(0, None));
     }
 
     #[test]

@@ -108,6 +108,10 @@ pub struct Tally {
     pub unreliable: u64,
     /// The number of rows without a verdict, because a model failed or nothing moves.
     pub undefined: u64,
+    /// The number of rows without a verdict in which no model failed.
+    pub motionless: u64,
+    /// The first point without a verdict at which no model failed.
+    pub first_motionless: Option<u64>,
     /// The number of rows in which the linear model over-estimates: a ratio is below `ratio_min`
     /// or, if that is not given, below 1 / `ratio_limit`.
     pub over_estimated: u64,
@@ -207,6 +211,10 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
             Some(true) => tally.reliable += 1,
             Some(false) => tally.unreliable += 1,
             None => tally.undefined += 1,
+        }
+        if reliable.is_none() && row.word(status_column) == Some("ok") {
+            tally.motionless += 1;
+            tally.first_motionless.get_or_insert(point);
         }
         tally.over_estimated += u64::from(least < over_estimate_limit);
         tally.over_estimated_reliable +=

@@ -24,8 +24,7 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     let mut point_count = 0_u64;
     // The points and speeds with several motions, and their number of motions.
     let mut multiple: Vec<(Vec<f64>, u64)> = Vec::new();
-    // The greatest amplitude of each channel, with the kind of the motion, and the point and speed.
-    let mut greatest: [Option<(f64, String, Vec<f64>)>; CHANNELS.len()] = [None, None];
+    let mut farthest = FarthestByClass::default();
     let has_turns = file.schema().index_of("turn").is_ok();
     let channels = CHANNELS.map(|name| format!("nonlinear_{name}"));
     let has_kicks = file.schema().index_of("least_kick_rad_per_s").is_ok();
@@ -61,12 +60,9 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
             1.0 => multiple.push((point_and_speed(), 2)),
             _ => multiple.iter_mut().last().into_iter().for_each(|(_, count)| *count += 1),
         }
-        for (column, greatest) in (first_channel..).zip(&mut greatest) {
-            let value = row.value(column);
-            if value > greatest.as_ref().map_or(f64::NEG_INFINITY, |(known, ..)| *known) {
-                *greatest = Some((value, kind_text.to_owned(), point_and_speed()));
-            }
-        }
+        let status = row.word(1).unwrap_or_default();
+        let deviations = [0, 1].map(|k| row.value(first_channel + k));
+        farthest.add(status, deviations, kind_text, &point_and_speed);
         Ok::<(), FileError>(())
     })?;
     let kind_counts: Vec<String> =
@@ -81,14 +77,7 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         lines.extend(listed.iter().map(|motion| ("motion", motion.sentence(&axes))));
         lines.extend(kick_sentences(file, &axes, &listed).into_iter().map(|line| ("push", line)));
     }
-    for (name, greatest) in CHANNELS.iter().zip(&greatest) {
-        if let Some((value, kind, values)) = greatest {
-            let name = name.replace('_', " ");
-            let kind = kind.replace('_', " ");
-            let point = places::point_text(&axes, values);
-            lines.push(("farthest", format!("{name} {:.1} mrad, {kind}, at {point}", 1e3 * value)));
-        }
-    }
+    lines.extend(farthest.lines(&axes));
     for (values, motions) in &multiple {
         lines.push((
             "several",
@@ -96,6 +85,76 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         ));
     }
     Ok(lines)
+}
+
+/// A class of motions among which the farthest one is named.
+struct MotionClass {
+    /// The status of the motions' rows.
+    status: &'static str,
+    /// The name of the lines.
+    line: &'static str,
+    /// The words after the place of a motion, which begin with a comma, or are empty.
+    remark: &'static str,
+}
+
+/// The classes of motions. Only confirmed endings, which have the status `ok`, may be named as the
+/// farthest motion that a machine stays in.
+const MOTION_CLASSES: [MotionClass; 3] = [
+    MotionClass { status: "ok", line: "farthest", remark: "" },
+    MotionClass { status: "transient", line: "transient", remark: ", which ends elsewhere" },
+    MotionClass { status: "not_settled", line: "unsettled", remark: ", with an unknown end" },
+];
+
+/// A motion with the greatest amplitude of a channel.
+struct FarthestMotion {
+    /// The amplitude (rad).
+    deviation: f64,
+    kind_text: String,
+    /// The point and the speed.
+    at: Vec<f64>,
+}
+
+/// The motions with the greatest amplitudes, by the classes in [`MOTION_CLASSES`] and by channel.
+#[derive(Default)]
+struct FarthestByClass([[Option<FarthestMotion>; CHANNELS.len()]; MOTION_CLASSES.len()]);
+
+impl FarthestByClass {
+    /// Adds a motion by its status, with its amplitudes (rad) and its point and speed. A motion of
+    /// no class, or without amplitudes, is left out.
+    fn add(
+        &mut self,
+        status: &str,
+        deviations: [f64; CHANNELS.len()],
+        kind_text: &str,
+        place: &dyn Fn() -> Vec<f64>,
+    ) {
+        let Some(class) = MOTION_CLASSES.iter().position(|class| class.status == status) else {
+            return;
+        };
+        for (deviation, farthest) in deviations.into_iter().zip(&mut self.0[class]) {
+            let known = farthest.as_ref().map_or(f64::NEG_INFINITY, |motion| motion.deviation);
+            if deviation > known {
+                let kind_text = kind_text.replace('_', " ");
+                *farthest = Some(FarthestMotion { deviation, kind_text, at: place() });
+            }
+        }
+    }
+
+    /// Returns a line for each class and channel with a motion.
+    fn lines(&self, axes: &[String]) -> Vec<(&'static str, String)> {
+        let mut lines = Vec::new();
+        for (class, motions) in MOTION_CLASSES.iter().zip(&self.0) {
+            for (name, motion) in CHANNELS.iter().zip(motions) {
+                let Some(FarthestMotion { deviation, kind_text, at }) = motion else { continue };
+                let name = name.replace('_', " ");
+                let at = places::point_text(axes, at);
+                let mrad = 1e3 * deviation;
+                let sentence = format!("{name} {mrad:.1} mrad, {kind_text}, at {at}");
+                lines.push((class.line, sentence + class.remark));
+            }
+        }
+        lines
+    }
 }
 
 /// A motion with a line in the summary.
@@ -165,4 +224,30 @@ fn kick_sentences(file: &ParquetFile, axes: &[String], listed: &[MotionLine]) ->
         });
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transient_is_never_the_farthest_motion() {
+        let mut farthest = FarthestByClass::default();
+        for (status, yaw_rad, kind, speed_rpm) in [
+            ("ok", 0.020, "periodic", 250.0),
+            ("transient", 0.061, "transient", 260.0),
+            ("ok", 0.035, "periodic_2", 270.0),
+            ("not_settled", 0.052, "not_settled", 280.0),
+            ("left_range", f64::NAN, "left_range", 290.0),
+        ] {
+            farthest.add(status, [yaw_rad, f64::NAN], kind, &|| vec![speed_rpm]);
+        }
+        let lines = farthest.lines(&["speed_rpm".to_owned()]);
+        let expected = [
+            ("farthest", "tub yaw 35.0 mrad, periodic 2, at 270 rpm"),
+            ("transient", "tub yaw 61.0 mrad, transient, at 260 rpm, which ends elsewhere"),
+            ("unsettled", "tub yaw 52.0 mrad, not settled, at 280 rpm, with an unknown end"),
+        ];
+        assert_eq!(lines, expected.map(|(line, text)| (line, text.to_owned())));
+    }
 }

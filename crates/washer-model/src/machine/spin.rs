@@ -104,6 +104,11 @@ impl SpinSegment {
         self.at(N(t_s)).acceleration.0
     }
 
+    /// Whether the drum stands throughout the segment.
+    pub(crate) fn is_standing(&self) -> bool {
+        self.turns_per_s.0 == 0.0 && self.turns_per_s2.0 == 0.0 && self.wave_turns.0 == 0.0
+    }
+
     /// Returns the speed at a time within the segment.
     pub(crate) fn speed_rad_per_s(&self, t_s: f64) -> f64 {
         self.at(N(t_s)).speed.0

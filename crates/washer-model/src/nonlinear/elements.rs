@@ -116,6 +116,21 @@ impl<T: Lane> Elements<T> {
 }
 
 impl<T: Lane> Elements<T> {
+    /// Widens the corners of stops and free strokes to a width (m), if they are narrower, in one
+    /// lane.
+    pub(crate) fn widen_corners(&mut self, lane: usize, width_m: f64) {
+        let widen = |softness_squared: &mut N<T>| {
+            let widened = softness_squared.0.get(lane).max(width_m * width_m);
+            softness_squared.0.set(lane, widened);
+        };
+        self.stops.iter_mut().for_each(|stop| widen(&mut stop.softness_squared));
+        let has_stroke =
+            |damper: &&mut DamperCoefficients<T>| damper.half_inverse_stroke.0.get(lane) != 0.0;
+        for damper in self.dampers.iter_mut().filter(has_stroke) {
+            widen(&mut damper.softness_squared);
+        }
+    }
+
     /// Computes the depth (m) of a stop's tub point, which is negative while the stop is open, and
     /// the stop's force (N).
     #[inline(always)]

@@ -9,10 +9,14 @@
 //! The static deflection under the jump bounds the swing, without eigenvalues. The suspension is
 //! slow, so that the machine is taken as free: the load is that of the linear model (Eq. 41) less
 //! the part that accelerates the machine as a rigid body (inertia relief).
+//!
+//! While the drum stands, the machine has constant coefficients, and the swing decays at least as
+//! fast as its slowest mode.
 
 use core::f64::consts::PI;
 
 use lane_ode::{Lu, N};
+use std::sync::Arc;
 
 use crate::channel::{CHANNELS, ChannelKind};
 use crate::coordinates::{
@@ -20,7 +24,7 @@ use crate::coordinates::{
     TUB_Z,
 };
 use crate::machine::spin::SpinSegment;
-use crate::{COORDINATES, Channel, Machine, Matrices};
+use crate::{COORDINATES, Channel, Machine, Matrices, Timing};
 
 /// The greatest swing of an undamped body after a jump of its load, as a multiple of the static
 /// deflection.
@@ -33,6 +37,10 @@ const RIGID_PAIRS: [[usize; 2]; 4] =
 /// The coordinates that deflect bearings and hinge while the tub stands still.
 const ELASTIC_COORDINATES: [usize; 6] =
     [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
+
+/// The jump of the drum's acceleration (rad/s^2) for which deflections are computed. They are
+/// proportional to it, because loads and model are linear.
+const UNIT_JUMP_RAD_PER_S2: f64 = 1.0;
 
 /// The angles (rad) of the unbalance at which loads are computed. A load turns with the drum or is
 /// fixed in direction, so that four angles include its greatest components along both axes.
@@ -58,28 +66,89 @@ impl FrontDeflection {
     }
 }
 
-/// The greatest deflections under all jumps of the drum's acceleration.
+/// The jumps of the drum's acceleration in a run.
+#[derive(Clone, Debug)]
+pub(crate) struct Jumps {
+    /// The jumps before the end of the window, by the time for which the drum stands after them.
+    before_window_end: Vec<JumpGroup>,
+    /// The sum of all jumps of the run (rad/s^2).
+    sum_rad_per_s2: f64,
+}
+
+/// Jumps after which the drum stands equally long until the window begins.
 #[derive(Clone, Copy, Debug)]
+struct JumpGroup {
+    sum_rad_per_s2: f64,
+    standing_s: f64,
+}
+
+impl Jumps {
+    /// Finds the jumps of a spin in a run.
+    pub(crate) fn new(spin_segments: &[SpinSegment], timing: &Timing) -> Self {
+        let [window_start_s, window_end_s] = timing.window_s;
+        let sizes_rad_per_s2 = jumps_rad_per_s2(spin_segments);
+        let mut groups: Vec<JumpGroup> = Vec::new();
+        let mut sum_rad_per_s2 = 0.0;
+        let mut standing_s = 0.0;
+        let mut next_start_s = f64::INFINITY;
+        for (spin_segment, size_rad_per_s2) in spin_segments.iter().zip(sizes_rad_per_s2).rev() {
+            let start_s = spin_segment.start_s.0;
+            if spin_segment.is_standing() {
+                standing_s += (next_start_s.min(window_start_s) - start_s).max(0.0);
+            }
+            next_start_s = start_s;
+            if start_s < timing.end_s {
+                sum_rad_per_s2 += size_rad_per_s2;
+            }
+            if start_s >= window_end_s {
+                continue;
+            }
+            match groups.last_mut().filter(|group| group.standing_s == standing_s) {
+                Some(group) => group.sum_rad_per_s2 += size_rad_per_s2,
+                None => groups.push(JumpGroup { sum_rad_per_s2: size_rad_per_s2, standing_s }),
+            }
+        }
+        Self { before_window_end: groups, sum_rad_per_s2 }
+    }
+
+    /// Whether the drum stands after a jump and before the window.
+    fn are_before_standstill(&self) -> bool {
+        let is_before = |group: &JumpGroup| group.standing_s > 0.0 && group.sum_rad_per_s2 > 0.0;
+        self.before_window_end.iter().any(is_before)
+    }
+
+    /// Returns the sum of the jumps before the window's end (rad/s^2), each reduced by the decay of
+    /// the swing (1/s) while the drum stands.
+    fn left_in_window_rad_per_s2(&self, decay_per_s: f64) -> f64 {
+        let left =
+            |group: &JumpGroup| group.sum_rad_per_s2 * libm::exp(-decay_per_s * group.standing_s);
+        self.before_window_end.iter().map(left).sum()
+    }
+}
+
+/// The greatest deflections under all jumps of the drum's acceleration.
+#[derive(Clone, Debug)]
 pub(crate) struct Ringing {
+    jumps: Arc<Jumps>,
+    /// The rate at which the swing decays while the drum stands (1/s).
+    decay_per_s: f64,
+    /// The deflections by a jump of [`UNIT_JUMP_RAD_PER_S2`].
     bearings: FrontDeflection,
     hinge_and_bearings: FrontDeflection,
 }
 
-/// Returns the sum of all jumps of the drum's acceleration before `end_s` (rad/s^2).
-pub(crate) fn jump_sum_rad_per_s2(spin_segments: &[SpinSegment], end_s: f64) -> f64 {
+/// Returns the jump of the drum's acceleration at the start of each segment of the spin (rad/s^2).
+fn jumps_rad_per_s2(spin_segments: &[SpinSegment]) -> Vec<f64> {
     let mut previous_rad_per_s2 = 0.0;
-    let mut sum = 0.0;
+    let mut jumps = Vec::with_capacity(spin_segments.len());
     for (i, spin_segment) in spin_segments.iter().enumerate() {
-        let start_s = spin_segment.start_s.0;
-        if start_s >= end_s {
-            break;
-        }
-        sum += (spin_segment.acceleration_rad_per_s2(start_s) - previous_rad_per_s2).abs();
+        let start_rad_per_s2 = spin_segment.acceleration_rad_per_s2(spin_segment.start_s.0);
+        jumps.push((start_rad_per_s2 - previous_rad_per_s2).abs());
         if let Some(next) = spin_segments.get(i + 1) {
             previous_rad_per_s2 = spin_segment.acceleration_rad_per_s2(next.start_s.0);
         }
     }
-    sum
+    jumps
 }
 
 /// The modes that a step does not resolve, because it is longer than their periods.
@@ -94,28 +163,30 @@ pub enum UnresolvedModes {
 /// The swing of the quantities that a row reports of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
-    /// The swing of each channel (m, rad), in the order of [`Channel::ALL`].
+    /// The swing of each channel in the window (m, rad), in the order of [`Channel::ALL`].
     pub channels: [f64; CHANNELS],
-    /// The swing of the gap between drum and tub (m).
+    /// The swing of the gap between drum and tub in the whole run (m).
     pub gap_m: f64,
 }
 
 impl Ringing {
-    /// Computes the deflections under jumps of the drum's acceleration whose sum is
-    /// `jump_sum_rad_per_s2`. `matrices_at` returns the linear model's matrices at an angle (rad)
-    /// and an acceleration (rad/s^2) of the drum at rest.
+    /// Computes the deflections under jumps of the drum's acceleration, without a decay.
+    /// `matrices_at` returns the linear model's matrices at an angle (rad) and an acceleration
+    /// (rad/s^2) of the drum at rest.
     pub(crate) fn new(
         machine: &Machine,
-        jump_sum_rad_per_s2: f64,
+        jumps: Arc<Jumps>,
         matrices_at: impl Fn(f64, f64) -> Matrices,
     ) -> Self {
         let mut ringing = Self {
+            jumps,
+            decay_per_s: 0.0,
             bearings: FrontDeflection::default(),
             hinge_and_bearings: FrontDeflection::default(),
         };
         for angle_rad in ANGLES_RAD {
             let at_rest = matrices_at(angle_rad, 0.0);
-            let during_jump = matrices_at(angle_rad, jump_sum_rad_per_s2);
+            let during_jump = matrices_at(angle_rad, UNIT_JUMP_RAD_PER_S2);
             let load: [f64; COORDINATES] =
                 core::array::from_fn(|i| during_jump.force[i] - at_rest.force[i]);
             // The system has no solution if bearings or hinge have no stiffness; no level is stable
@@ -132,21 +203,35 @@ impl Ringing {
         ringing
     }
 
-    /// Returns the greatest swing of each channel and of the gap in the unresolved modes.
+    /// Whether the swing in the window depends on its decay.
+    pub(crate) fn depends_on_decay(&self) -> bool {
+        self.jumps.are_before_standstill()
+    }
+
+    /// Sets the rate at which the swing decays while the drum stands (1/s).
+    pub(crate) fn set_decay(&mut self, decay_per_s: f64) {
+        self.decay_per_s = decay_per_s;
+    }
+
+    /// Returns the greatest swing of each channel in the window and of the gap in the whole run, by
+    /// the modes that are not resolved.
     pub(crate) fn swing(&self, unresolved: UnresolvedModes) -> Swing {
         let deflection = match unresolved {
             UnresolvedModes::HingeAndBearings => self.hinge_and_bearings,
             UnresolvedModes::Bearings => self.bearings,
         };
+        let window_jumps_rad_per_s2 = self.jumps.left_in_window_rad_per_s2(self.decay_per_s);
+        let window_factor = SWING_FACTOR * window_jumps_rad_per_s2 / UNIT_JUMP_RAD_PER_S2;
+        let run_factor = SWING_FACTOR * self.jumps.sum_rad_per_s2 / UNIT_JUMP_RAD_PER_S2;
         let channels = Channel::ALL.map(|channel| {
-            SWING_FACTOR
+            window_factor
                 * match channel.kind() {
                     ChannelKind::DrumPoint => deflection.drum_front_m,
                     ChannelKind::TubPoint => deflection.tub_front_m,
                     ChannelKind::TubAngle => deflection.tub_rad,
                 }
         });
-        let gap_m = SWING_FACTOR * (deflection.drum_front_m + deflection.tub_front_m);
+        let gap_m = run_factor * (deflection.drum_front_m + deflection.tub_front_m);
         Swing { channels, gap_m }
     }
 }

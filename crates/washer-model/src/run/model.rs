@@ -29,6 +29,8 @@ pub(crate) trait LaneModel<T: Lane>: SemiImplicit<T, STATES> {
     fn set_spin(&mut self, lane: usize, spin_segment: &SpinSegment);
     /// Sets the caps of one lane.
     fn set_caps(&mut self, lane: usize, caps: &Caps);
+    /// Widens the corners of forces that depend on distances to a width (m), in one lane.
+    fn widen_corners(&mut self, _lane: usize, _width_m: f64) {}
     /// Returns the state at rest, from which trajectories start.
     fn at_rest(point: &Point) -> [f64; STATES];
     /// Appends the forces with corners at a state to a list, if the model has any.
@@ -176,6 +178,10 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
 
     fn set_caps(&mut self, lane: usize, caps: &Caps) {
         self.coupling.set_caps(lane, caps);
+    }
+
+    fn widen_corners(&mut self, lane: usize, width_m: f64) {
+        self.machine.elements.widen_corners(lane, width_m);
     }
 
     fn at_rest(point: &Point) -> [f64; STATES] {

@@ -65,8 +65,14 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
     let highest_rad_per_s = highest_frequency_rad_per_s(point, speed_rad_per_s)
         .map_err(|_| ResponseError::NoEigenvalues)?;
     let steps = (highest_rad_per_s * 60.0 / speed_rpm / STEP_PHASE_RAD).ceil().max(MIN_STEPS);
-    let setup =
-        TurnSetup { point, speed_rpm, steps: steps as usize, instants: INSTANTS, caps: None };
+    let setup = TurnSetup {
+        point,
+        speed_rpm,
+        steps: steps as usize,
+        instants: INSTANTS,
+        caps: None,
+        corner_width_m: 0.0,
+    };
     let unit_per_s = setup.unit_per_s();
     let matrix = scale_speeds(&Simd::dispatch_narrow(LinearTurn(setup)), unit_per_s);
     let decomposition = matrix.eigen().map_err(|_| ResponseError::NoEigenvalues)?;

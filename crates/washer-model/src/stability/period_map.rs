@@ -46,6 +46,8 @@ pub(crate) struct TurnSetup<'a> {
     pub(crate) instants: usize,
     /// The caps of the modes of bearings and hinge; `None` if the steps resolve these modes.
     pub(crate) caps: Option<Caps>,
+    /// The least width (m) of the corners of stops and free strokes; 0 leaves them as they are.
+    pub(crate) corner_width_m: f64,
 }
 
 /// The properties that all turns of a batch have in common: steps, instants, whether there are
@@ -53,11 +55,12 @@ pub(crate) struct TurnSetup<'a> {
 pub(crate) type BatchKey = (usize, usize, bool, bool);
 
 impl TurnSetup<'_> {
-    /// Returns the set-up at a nearby speed, with the same number of steps and with caps that
-    /// change in proportion to the speed.
+    /// Returns the set-up at a nearby speed, with the same number of steps, caps that change in
+    /// proportion to the speed, and corners that change in proportion to the step.
     pub(super) fn at_nearby_speed(self, speed_rpm: f64) -> Self {
         let caps = self.caps.map(|_| caps_for_steps(self.steps, 60.0 / speed_rpm));
-        Self { speed_rpm, caps, ..self }
+        let corner_width_m = self.corner_width_m * (self.speed_rpm / speed_rpm);
+        Self { speed_rpm, caps, corner_width_m, ..self }
     }
 
     /// Returns the duration of a turn (s).
@@ -206,6 +209,9 @@ pub(crate) fn lane_model<T: Lane, M: LaneModel<T>>(zero: N<T>, setups: &[TurnSet
         model.set_spin(lane, &SpinSegment::steady(setup.speed_rpm));
         if let Some(caps) = &setup.caps {
             model.set_caps(lane, caps);
+        }
+        if setup.corner_width_m > 0.0 {
+            model.widen_corners(lane, setup.corner_width_m);
         }
     }
     model

@@ -841,3 +841,41 @@ fn cost() {
     let count = all_responses(&held_speeds).iter().filter(|a| a.is_ok()).count();
     println!("{:.3} ms each, {count} found", 1e3 * start_time.elapsed().as_secs_f64() / 560.0);
 }
+
+/// The paper's machine with little damping and rubber stops to both sides and below, which it hits
+/// hard.
+fn machine_that_hits_stops(unbalance_mass_kg: f64) -> Machine {
+    let mut machine = machine_with(unbalance_mass_kg, 10.0);
+    let stop = |tub_m: [f64; 3], direction: [f64; 3], clearance_m: f64| BumpStop {
+        tub_m,
+        direction,
+        clearance_m,
+        stiffness_n_per_m: 40_000.0,
+        damping_n_s_per_m: 100.0,
+        softness_m: BumpStop::SOFTNESS_M,
+    };
+    machine.stops = vec![
+        stop([0.35, 0.0, 0.28], [0.0, 0.0, 1.0], 0.02),
+        stop([0.35, 0.0, -0.28], [0.0, 0.0, -1.0], 0.02),
+        stop([0.3, -0.28, 0.0], [0.0, -1.0, 0.0], 0.03),
+    ];
+    machine
+}
+
+/// Steps of a turn leap over the corners of the stops. The curve was lost at 100 rpm on the ripples
+/// that this gives the period map, so that 260 rpm had no response.
+#[test]
+fn a_curve_passes_the_corners_of_stops() {
+    let point = prepared(machine_that_hits_stops(0.4), 100.0);
+    let held_speed = HeldSpeed { point: &point, speed_rpm: 260.0 };
+    let responses = all_responses(&[held_speed]).remove(0).unwrap();
+    let branches: Vec<u32> = responses.iter().map(|response| response.branch).collect();
+    assert!(responses.iter().all(|response| response.is_on_curve), "{branches:?}");
+    assert_eq!(branches, [4, 5, 6, 9, 10]);
+    // Curves of machines with wider or narrower corners lead to these responses, too.
+    let heights_mm = [28.0910, 94.8839, 96.2487, 28.7194, 27.8499];
+    for (response, expected_mm) in responses.iter().zip(heights_mm) {
+        let height_mm = 1e3 * response.nonlinear_peaks[Channel::TotalCentreY.index()];
+        assert!((height_mm / expected_mm - 1.0).abs() < 1e-5, "{height_mm} for {expected_mm}");
+    }
+}

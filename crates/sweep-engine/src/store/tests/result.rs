@@ -295,6 +295,9 @@ fn the_counts_agree_with_the_rows() {
         (count_verdicts(Some(1)), count_verdicts(Some(0)), count_verdicts(None))
     );
     assert_eq!(tally.reliable + tally.unreliable + tally.undefined, POINTS);
+    let status = position("status");
+    let is_motionless = |row: &&Vec<Option<u64>>| row[reliable].is_none() && row[status] == Some(0);
+    assert_eq!(tally.motionless, rows.iter().filter(is_motionless).count() as u64);
     let ratios =
         (0..).zip(&rows).filter_map(|(point, row)| Some((point, f64::from_bits(row[ratio]?))));
     let (point, greatest) =

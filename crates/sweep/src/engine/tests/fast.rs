@@ -368,3 +368,21 @@ fn load_with_elements(text: &str) -> Plan {
         .unwrap();
     crate::config::load(&path, &[]).unwrap()
 }
+
+/// Neither a jump after the window nor one whose ringing has decayed before it sends a row to
+/// levels that resolve the bearings' modes.
+#[test]
+fn a_drum_that_stands_in_its_window_needs_no_fine_steps() {
+    // The drum stops at 20 s, 130 s before the window; and it starts 2 s after the window.
+    let stopped = "[spin]\nprofile = \"triangular\"\npeak_rpm = 350.0\nramp_s = 10.0\n\
+                   [time]\nend_s = 200.0\nwindow_s = [150.0, 200.0]\n";
+    let waiting = "[spin]\nprofile = \"table\"\ntime_s = [0.0, 10.0, 20.0]\n\
+                   speed_rpm = [0.0, 0.0, 300.0]\n\
+                   [time]\nend_s = 20.0\nwindow_s = [0.0, 8.0]\n";
+    for (grid, verdict) in [(stopped, Some(true)), (waiting, None)] {
+        let plan = load(grid);
+        let row = rows(&plan).remove(0);
+        assert!(row.method.is_capped(), "{:?} in {grid}", row.method);
+        assert_eq!((row.converged, reliable(&plan, &row)), (Some(true), verdict), "{grid}");
+    }
+}
