@@ -245,11 +245,11 @@ pub fn failure_reasons(engine: &Engine<'_>, tally: &Tally, job: &Job<'_>) -> Str
 /// Formats the values of the axes at a point.
 fn format_axis_values(point: u64, job: &Job<'_>) -> String {
     let values = (job.axis_values)(point);
-    name_axis_values(job.layout.axes.iter().map(|axis| &*axis.name).zip(values))
+    format_named_values(job.layout.axes.iter().map(|axis| &*axis.name).zip(values))
 }
 
-/// Formats values of axes with the names of these.
-pub(super) fn name_axis_values<'a>(values: impl Iterator<Item = (&'a str, f64)>) -> String {
+/// Formats values with their names.
+pub(super) fn format_named_values<'a>(values: impl Iterator<Item = (&'a str, f64)>) -> String {
     let words = values.map(|(axis, value)| format!("{axis} {}", format_number(value)));
     words.collect::<Vec<_>>().join(", ")
 }

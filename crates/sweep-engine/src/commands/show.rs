@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use super::boundary::limit_in_words;
-use super::run::{count_lines_at, name_axis_values};
+use super::run::{count_lines_at, format_named_values};
 use super::{
     Lines as _, conditions, format_cell, format_number, format_range, format_table, shorten,
 };
@@ -136,7 +136,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
             let axis_values = |point| {
                 let location = locations.iter().find(|(extreme, _)| *extreme == point);
                 location.map_or(String::new(), |(_, values)| {
-                    name_axis_values(values.iter().map(|(axis, value)| (axis.as_str(), *value)))
+                    format_named_values(values.iter().map(|(axis, value)| (axis.as_str(), *value)))
                 })
             };
             text.push_str(&count_lines_at(&tally, limits, &axis_values));

@@ -35,8 +35,9 @@ pub fn fit_tables(
     }
     let cancel = Cancel::Flag(execution.interrupt.flag());
     let work = FitWork { cancel, count_evaluations: &|_| {}, output: None, fresh: false };
-    let found = threads::pool(execution.threads()?)?.install(|| fit::fit(cases, options, &work))?;
-    Ok(found.map(|fitted| Explained { found: json!(fitted.report), text: fitted.report.text() }))
+    let fitted =
+        threads::pool(execution.threads()?)?.install(|| fit::fit(cases, options, &work))?;
+    Ok(fitted.map(|fit| Explained { found: json!(fit.report), text: fit.report.text() }))
 }
 
 #[cfg(test)]

@@ -281,8 +281,9 @@ mod tests {
             [([2.0, 3.0], 3.0), ([4.0, 4.0], 4.0), ([1.0, 1.0], 1.0), ([3.0, 3.0], 3.0)]
         );
         let lines = summary.lines();
-        let all = "2 of 8 rows, 5 not, 1 without a response; 2 points; 1 above an unstable speed: ";
-        assert!(lines[0].1.starts_with(all), "{lines:?}");
+        let counts =
+            "2 of 8 rows, 5 not, 1 without a response; 2 points; 1 above an unstable speed: ";
+        assert!(lines[0].1.starts_with(counts), "{lines:?}");
         assert!(lines[1].1.starts_with("2 rows off the curve"));
         assert!(lines[2].1.starts_with("1 further row: other responses"));
         assert!(lines[3].1.starts_with(
@@ -297,6 +298,7 @@ mod tests {
         summary.add(StabilityRow {
             speed_rpm: 250.0,
             growth_per_s: -0.1,
+            status: "ok".to_owned(),
             is_off_curve: true,
             ..StabilityRow::default()
         });
@@ -306,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn jumps_are_at_folds_of_the_curve_within_the_speeds() {
+    fn jumps_are_at_folds_of_the_curve_up_to_the_greatest_speed() {
         let mut summary = StabilitySummary::default();
         for (speed_rpm, fold_rpm, is_off_curve) in
             [(240.0, 245.0, false), (245.0, 248.0, true), (250.0, 260.0, false)]
