@@ -177,7 +177,7 @@ pub(crate) fn assemble_tub<T: Lane>(
     let arm_yaw_x = (centre * tilt.axis_c[2]).v();
     let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
     let arm_pitch = scale(centre, tilt.second_c);
-    let axis_drift = tilt.to_cabinet_axes(&motion.axis_acceleration);
+    let axis_drift = tilt.rotate_to_cabinet(&motion.axis_acceleration);
     let drift = scale(centre, axis_drift);
 
     let axial_force = (b.tub_mass * drift[0]).v();
@@ -338,7 +338,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         rho_s[2] += c9 * b.rho_3;
     }
     let rho_a = from_shaft_axes(spin, &rho_s);
-    let w = tilt.to_cabinet_axes(&[
+    let w = tilt.rotate_to_cabinet(&[
         b.shaft_centre_offset + b.drum_mass_share * rho_a[0],
         (b.drum_mass_share * rho_a[1]).v(),
         (b.drum_mass_share * rho_a[2]).v(),
@@ -349,20 +349,20 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         b.drum_mass_share,
         &rho_acceleration_a,
     );
-    let drift = tilt.to_cabinet_axes(&drift);
+    let drift = tilt.rotate_to_cabinet(&drift);
     let mut arm_9 = {
         let offset = -(b.drum_mass_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
-        scale(offset, tilt.to_cabinet_axes(&d3_a))
+        scale(offset, tilt.rotate_to_cabinet(&d3_a))
     };
     if SKEWED {
         let offset = (b.drum_mass_share * b.rho_3).v();
         let e1_a = [c9, (spin.sin * s9).v(), -(spin.cos * s9).v()];
-        arm_9 = add(arm_9, &scale(offset, tilt.to_cabinet_axes(&e1_a)));
+        arm_9 = add(arm_9, &scale(offset, tilt.rotate_to_cabinet(&e1_a)));
     }
     let arm_10 = {
         let [x, y] = [-(b.drum_mass_share * rho[1]).v(), (b.drum_mass_share * rho[0]).v()];
-        tilt.to_cabinet_axes(&from_shaft_axes(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
+        tilt.rotate_to_cabinet(&from_shaft_axes(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
     };
     let zero = s9.lit(0.0);
     let arm_7_z = -w[0];
@@ -379,7 +379,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         -(flexure_10 + drum_moment_e[2]),
     ];
     let axial_force = (b.rotor_mass * drift[0]).v();
-    let axis_drift = tilt.to_cabinet_axes(axis_acceleration);
+    let axis_drift = tilt.rotate_to_cabinet(axis_acceleration);
 
     let mut inertia = rotor_inertia::<T, SKEWED>(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {

@@ -27,9 +27,9 @@ pub(crate) fn points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
     let column = |entry: Bound<'_, PyAny>| {
         let (name, values): (String, Bound<'_, PyAny>) = entry.extract()?;
         let values = numbers(&values).map_err(|error| {
-            let error = PyTypeError::new_err(format!("column `{name}`: expected numbers"));
-            error.set_cause(py, Some(error));
-            error
+            let type_error = PyTypeError::new_err(format!("column `{name}`: expected numbers"));
+            type_error.set_cause(py, Some(error));
+            type_error
         })?;
         Ok((name, values))
     };

@@ -216,7 +216,7 @@ pub(crate) fn fit<'py>(
 
 /// Creates the package's `Explanation` from data and text.
 fn explanation(py: Python<'_>, explained: Explained) -> PyResult<Bound<'_, PyAny>> {
-    let data = py.import("json")?.call_method1("loads", (explained.explained.to_string(),))?;
+    let data = py.import("json")?.call_method1("loads", (explained.found.to_string(),))?;
     py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, explained.text))
 }
 

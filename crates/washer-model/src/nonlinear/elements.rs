@@ -174,11 +174,11 @@ impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
         for stop in &elements.stops {
             let point = tub.point(&stop.tub);
             let force = scale(-stop.force(&point), stop.direction);
-            add_force(load, &stop.tub, &tub.tilt.to_frame_axes(&force));
+            add_force(load, &stop.tub, &tub.tilt.rotate_to_frame(&force));
         }
         for bushing in &elements.bushings {
             let force = bushing.force(&tub.point(&bushing.tub));
-            add_force(load, &bushing.tub, &tub.tilt.to_frame_axes(&force));
+            add_force(load, &bushing.tub, &tub.tilt.rotate_to_frame(&force));
         }
     }
 }
@@ -530,18 +530,18 @@ impl<T: Real> TubMotion<T> {
 
     /// Transforms a vector from tub axes to cabinet axes.
     #[inline(always)]
-    pub(crate) fn to_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
-        self.tilt.to_cabinet_axes(v)
+    pub(crate) fn rotate_to_cabinet(&self, v: &Vec3<T>) -> Vec3<T> {
+        self.tilt.rotate_to_cabinet(v)
     }
 
     /// Computes the motion of a tub point, given in tub axes from P_T.
     #[inline(always)]
     fn point(&self, tub: &Vec3<T>) -> PointMotion<T> {
-        let mut displacement = subtract(self.tilt.to_cabinet_axes(tub), tub);
+        let mut displacement = subtract(self.tilt.rotate_to_cabinet(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
         let velocity =
-            self.tilt.to_cabinet_axes(&add_cross_product(&self.velocity, &self.rate, tub));
+            self.tilt.rotate_to_cabinet(&add_cross_product(&self.velocity, &self.rate, tub));
         PointMotion { displacement, velocity }
     }
 }

@@ -101,7 +101,7 @@ impl<T: Real> Tilt<T> {
 
     /// Transforms a vector from frame axes to cabinet axes. a3 is (sin yaw, 0, cos yaw).
     #[inline(always)]
-    pub(crate) fn to_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+    pub(crate) fn rotate_to_cabinet(&self, v: &Vec3<T>) -> Vec3<T> {
         let [a1, a2] = [&self.axis_c, &self.second_c];
         [
             a1[0] * v[0] + (a2[0] * v[1] + self.sin_yaw * v[2]),
@@ -112,7 +112,7 @@ impl<T: Real> Tilt<T> {
 
     /// Transforms a vector from cabinet axes to frame axes.
     #[inline(always)]
-    pub(crate) fn to_frame_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+    pub(crate) fn rotate_to_frame(&self, v: &Vec3<T>) -> Vec3<T> {
         [dot(&self.axis_c, v), dot(&self.second_c, v), self.sin_yaw * v[0] + self.cos_yaw * v[2]]
     }
 

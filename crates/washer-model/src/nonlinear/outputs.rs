@@ -147,10 +147,11 @@ impl<T: Real> Axes<T> {
         let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let drum_front = self.drum_front(b, motion);
         let [omega, alpha] = &self.tub_rates;
-        let separation = self.tub.to_frame_axes(&subtract(drum_front.value, &tub_front.value));
-        let relative_velocity = self.tub.to_frame_axes(&subtract(drum_front.rate, &tub_front.rate));
+        let separation = self.tub.rotate_to_frame(&subtract(drum_front.value, &tub_front.value));
+        let relative_velocity =
+            self.tub.rotate_to_frame(&subtract(drum_front.rate, &tub_front.rate));
         let relative_acceleration =
-            self.tub.to_frame_axes(&subtract(drum_front.acceleration, &tub_front.acceleration));
+            self.tub.rotate_to_frame(&subtract(drum_front.acceleration, &tub_front.acceleration));
         // Derivatives in the rotating frame of the tub.
         let rate = add_cross_product(&relative_velocity, &separation, omega);
         let acceleration = add_cross_product(
@@ -263,7 +264,7 @@ fn moving_axis<T: Real>(
     let zero = rates[0].lit(0.0);
     let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
     let by_pitch = &tilt.second_c;
-    let at_constant_speeds = tilt.to_cabinet_axes(&tilt_motion.axis_acceleration);
+    let at_constant_speeds = tilt.rotate_to_cabinet(&tilt_motion.axis_acceleration);
     let by_accelerations =
         linear_combination(accelerations[0], &by_yaw, accelerations[1], by_pitch);
     MovingVector {
@@ -318,7 +319,7 @@ fn drum_to_cabinet_axes<T: Real>(
     (s9, c9): (N<T>, N<T>),
     v: &Vec3<T>,
 ) -> Vec3<T> {
-    shaft.to_cabinet_axes(&from_shaft_axes(spin, &hinge_to_shaft_axes(s9, c9, v)))
+    shaft.rotate_to_cabinet(&from_shaft_axes(spin, &hinge_to_shaft_axes(s9, c9, v)))
 }
 
 /// Computes the motion of the point at `distance` along an axis from a bearing midpoint.

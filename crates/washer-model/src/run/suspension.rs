@@ -121,8 +121,8 @@ pub(super) fn load_on_cabinet_axes<T: Lane>(
     tub: &TubMotion<T>,
     (force, moment): &(Vec3<T>, Vec3<T>),
 ) -> [N<T>; LOAD_COMPONENTS] {
-    let [fx, fy, fz] = tub.to_cabinet_axes(force);
-    let [mx, my, mz] = tub.to_cabinet_axes(moment);
+    let [fx, fy, fz] = tub.rotate_to_cabinet(force);
+    let [mx, my, mz] = tub.rotate_to_cabinet(moment);
     let [y, z] = tub.midpoint;
     // The reaction of the load on the tub, with P_T at (0, y, z).
     [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
@@ -257,7 +257,7 @@ fn dual_span(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Du
 
 /// Computes the vector from the cabinet end to the tub end of a tilted tub, in cabinet axes.
 fn tilted_span<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &Ends<T>) -> Vec3<T> {
-    let tub = tilt.to_cabinet_axes(&ends.tub);
+    let tub = tilt.rotate_to_cabinet(&ends.tub);
     [
         tub[0] - ends.cabinet[0],
         tub[1] + q[TUB_Y] - ends.cabinet[1],
