@@ -50,7 +50,9 @@ fn write_workbook(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
     }
     let mut workbook = Workbook::new();
     let from_xlsx = |error: XlsxError| match error {
-        XlsxError::IoError(error) => temporary_file_error(table, error.to_string()),
+        XlsxError::IoError(error) | XlsxError::TempFileError(_, error) => {
+            temporary_file_error(table, error.to_string())
+        }
         other => export_error(other.to_string()),
     };
     let mut rows = SheetWriter::new(&mut workbook, "rows", 2).map_err(from_xlsx)?;
