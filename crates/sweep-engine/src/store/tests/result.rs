@@ -118,9 +118,8 @@ fn a_mark_without_a_worse_side_leaves_the_other_extremes() {
     let (tally, _) = finish(run, &job);
     let columns: Vec<&str> = tally.extremes.iter().map(|extreme| &*extreme.column).collect();
     assert_eq!(columns, ["linear_a"]);
-    let numbers =
-        (0..POINTS).filter_map(|point| synthetic::row(point)[with_side].map(f64::from_bits));
-    let greatest = numbers.reduce(f64::max);
+    let rows = (0..POINTS).map(synthetic::row);
+    let greatest = rows.filter_map(|row| job.layout.number(&row, "linear_a")).reduce(f64::max);
     assert_eq!(tally.extremes[0].worst.as_ref().map(|worst| worst.value), greatest);
 }
 
