@@ -61,7 +61,7 @@ fn check_plan(plan: &Plan) {
     let prepared = prepare(simd, &scenarios, &timing);
     let points: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let records = simulate(simd, model, &Method::Rk4 { step_s: STEP_S }, &points);
+        let records = simulate(simd, model, &Method::rk4(STEP_S), &points);
         assert_eq!(records.len(), points.len());
         for record in records {
             let is_finite = record.amplitudes.iter().all(|amplitude| amplitude.is_finite());

@@ -15,7 +15,7 @@ use sweep_engine::{
     About, Build, Engine, Error, Evaluator, GridInput, GridTable, Model, ModelParameter, Plan,
     RowSink, RowSource, RunContext, Scenario,
 };
-use sweep_parameter::Range;
+use sweep_parameter::{Range, Verdict};
 
 use crate::equations::{OscillatorModel, PreparedPoint};
 use crate::run::{Integration, ModelRun, OscillatorMethod};
@@ -205,15 +205,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 let linear = amplitudes[1].get(k).filter(|linear| **linear != 0.0)?;
                 Some(amplitudes[0].get(k)? / linear)
             };
-            let ratios: Vec<Option<f64>> = (0..channels.len()).map(ratio).collect();
-            let defined =
-                || ratios.iter().enumerate().filter_map(|(k, ratio)| Some((k, (*ratio)?)));
-            let greatest = defined().reduce(|most, next| if next.1 > most.1 { next } else { most });
-            let least = defined().reduce(|least, next| if next.1 < least.1 { next } else { least });
+            let ratios = (0..channels.len()).map(ratio).collect();
             Compared {
-                reliable: least.zip(greatest).map(|(least, most)| limits.contain(least.1, most.1)),
-                greatest,
-                least,
+                verdict: Verdict::new(ratios, limits),
                 converged: row.converged,
                 // Chaos is not examined.
                 sensitive: None,
@@ -224,7 +218,6 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 steps: row.runs.map(|run| run.steps),
                 rejected: row.runs.map(|run| run.rejected),
                 amplitudes,
-                ratios,
             }
         };
         self.rows(axis_values, cancel).into_iter().map(compared).collect()

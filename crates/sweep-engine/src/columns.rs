@@ -1,7 +1,7 @@
 //! Columns as functions of a row: those that compare a nonlinear with a linear motion, and
 //! constructors for a model's own columns.
 
-use sweep_parameter::{Channel, Limit, RatioLimits, Worse};
+use sweep_parameter::{Channel, Limit, RatioLimits, Verdict, Worse};
 
 use crate::store::{CellType, DeclaredColumn, RowCells};
 
@@ -14,14 +14,8 @@ pub const MODELS: [&str; 2] = ["nonlinear", "linear"];
 pub struct Compared {
     /// The amplitudes of each model; empty for a model that failed.
     pub amplitudes: [Vec<f64>; 2],
-    /// The ratios, `None` where one is not defined.
-    pub ratios: Vec<Option<f64>>,
-    /// The channel of the greatest ratio (the first of equal ones), and the ratio.
-    pub greatest: Option<(usize, f64)>,
-    /// The channel of the least ratio (the first of equal ones), and the ratio.
-    pub least: Option<(usize, f64)>,
-    /// Whether the ratios are within the limits.
-    pub reliable: Option<bool>,
+    /// The ratios and their verdict.
+    pub verdict: Verdict,
     /// Whether the estimated error is within the accuracy.
     pub converged: Option<bool>,
     /// Whether the motion is chaotic.
@@ -148,7 +142,7 @@ pub fn amplitude_columns<R: AsRef<Compared>>(
     for (i, channel) in channels.iter().enumerate() {
         let text = format!("{}: {ratio}", channel.description);
         let name = format!("ratio_{}", channel.name);
-        let get = move |row: &R| row.as_ref().ratios.get(i).copied().flatten();
+        let get = move |row: &R| row.as_ref().verdict.ratios.get(i).copied().flatten();
         let column = ResultColumn::measured(name, "1", text, get);
         columns.push(column.worse(Worse::Greater).limit(limits.upper, 1.0));
     }
@@ -164,10 +158,10 @@ pub fn verdict_columns<R: AsRef<Compared>>(
     method_description: &str,
 ) -> Vec<ResultColumn<R>> {
     let mut columns =
-        extreme_ratio(channels, "max", |row| row.greatest, Worse::Greater, limits.upper);
+        extreme_ratio(channels, "max", |verdict| verdict.greatest, Worse::Greater, limits.upper);
     let mut rule = format!("ratio_max below {}", limits.upper);
     if let Some(limit) = limits.lower {
-        columns.extend(extreme_ratio(channels, "min", |row| row.least, Worse::Less, limit));
+        columns.extend(extreme_ratio(channels, "min", |verdict| verdict.least, Worse::Less, limit));
         rule.push_str(&format!(" and ratio_min above {limit}"));
     }
     let rule = format!("{rule}; null where ratio_max is");
@@ -179,7 +173,7 @@ pub fn verdict_columns<R: AsRef<Compared>>(
     let converged =
         "true where error is within the accuracy asked for; null where nothing was compared";
     columns.extend([
-        ResultColumn::flag("reliable", rule, |row: &R| row.as_ref().reliable),
+        ResultColumn::flag("reliable", rule, |row: &R| row.as_ref().verdict.reliable),
         ResultColumn::flag("sensitive", sensitive, |row: &R| row.as_ref().sensitive),
         ResultColumn::name("method", method_description, methods, |row: &R| {
             Some(row.as_ref().method)
@@ -195,13 +189,13 @@ pub fn verdict_columns<R: AsRef<Compared>>(
 fn extreme_ratio<R: AsRef<Compared>>(
     channels: &[Channel],
     name: &str,
-    extreme: fn(&Compared) -> Option<(usize, f64)>,
+    extreme: fn(&Verdict) -> Option<(usize, f64)>,
     worse: Worse,
     limit: f64,
 ) -> Vec<ResultColumn<R>> {
     let names = channels.iter().map(|channel| channel.name).collect();
-    let ratio = move |row: &R| extreme(row.as_ref()).map(|(_, ratio)| ratio);
-    let channel = move |row: &R| extreme(row.as_ref()).map(|(channel, _)| channel);
+    let ratio = move |row: &R| extreme(&row.as_ref().verdict).map(|(_, ratio)| ratio);
+    let channel = move |row: &R| extreme(&row.as_ref().verdict).map(|(channel, _)| channel);
     let text = format!("{} of the defined ratios; null if none is", worse.extreme());
     let tie = format!("channel of ratio_{name}; the first of the plan's channels wins a tie");
     vec![

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::interrupt::Interrupt;
 use crate::store::PointRows;
-use sweep_files::panics::lock;
+use sweep_files::panics::{lock, unlocked};
 
 /// A source of rows: returns a row's number and the values of the plan's axes there.
 pub type RowSource<'a> = dyn Fn() -> Option<(u64, Vec<f64>)> + Sync + 'a;
@@ -28,6 +28,24 @@ pub trait Evaluator: Sync {
     /// A row that fails, even by a panic, is a result. A panic that leaves this function loses all
     /// rows that have left the source and not reached the sink.
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>);
+}
+
+/// Evaluates points, each given by the values of the plan's axes, on the grid or between its
+/// points. Returns the results in the order of the points, numbered from 0; `None` if the context
+/// stopped the work.
+pub fn evaluate_points(
+    evaluator: &dyn Evaluator,
+    axis_values: &[Vec<f64>],
+    context: &RunContext<'_>,
+) -> Option<Vec<PointRows>> {
+    let remaining = Mutex::new(axis_values.iter().enumerate());
+    let source = || lock(&remaining).next().map(|(point, values)| (point as u64, values.clone()));
+    let results = Mutex::new(Vec::with_capacity(axis_values.len()));
+    let sink = |result: PointRows| lock(&results).push(result);
+    evaluator.evaluate(&source, &sink, context);
+    let mut results = unlocked(results);
+    results.sort_by_key(|result| result.point);
+    (results.len() == axis_values.len()).then_some(results)
 }
 
 /// An evaluator with the facts that a run needs of it.

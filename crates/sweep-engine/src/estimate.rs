@@ -1,13 +1,10 @@
 //! The estimate of a run's time and memory, as `check` shows it.
 
-use std::sync::Mutex;
 use std::time::Instant;
 
-use sweep_files::panics::{lock, unlocked};
-
+use crate::engine::evaluate_points;
 use crate::method::Steps;
 use crate::store::read::{NameCounts, count_name};
-use crate::store::{CellType, PointRows};
 use crate::{Error, Interrupt, Model, Plan, RunContext, threads};
 
 /// The estimated time, memory and disk space of a run.
@@ -60,26 +57,19 @@ impl Estimate {
     pub fn from_first_rows<M: Model>(plan: &Plan<M>, threads: usize) -> Result<Self, Error> {
         let points = plan.points().min(SAMPLED_POINTS);
         let engine = M::engine(plan, None)?;
-        let next = Mutex::new(0..points);
-        let source = || lock(&next).next().map(|point| (point, plan.axis_values(point)));
-        let rows = Mutex::new(Vec::new());
-        let sink = |done: PointRows| lock(&rows).extend(done.rows);
+        let axis_values: Vec<Vec<f64>> = (0..points).map(|point| plan.axis_values(point)).collect();
         let interrupt = Interrupt::new();
         let context = RunContext::new(&interrupt);
         let pool = threads::pool(1)?;
         let start = Instant::now();
-        pool.install(|| engine.evaluator.evaluate(&source, &sink, &context));
+        let results =
+            pool.install(|| evaluate_points(engine.evaluator.as_ref(), &axis_values, &context));
         let core_s_per_point = start.elapsed().as_secs_f64() / points as f64;
         let layout = M::layout(plan);
-        let status = layout.columns.iter().enumerate().find_map(|(k, column)| match &column.kind {
-            CellType::Name(names) if column.name == "status" => Some((k, names)),
-            _ => None,
-        });
         let mut sampled = NameCounts::new();
-        if let Some((k, names)) = status {
-            for row in unlocked(rows) {
-                let name = row.get(k).copied().flatten().and_then(|name| names.get(name as usize));
-                name.iter().for_each(|name| count_name(&mut sampled, name));
+        for row in results.iter().flatten().flat_map(|result| &result.rows) {
+            if let Some(status) = layout.name(row, "status") {
+                count_name(&mut sampled, status);
             }
         }
         let result_bytes = plan.points() as f64 * layout.bytes_per_row() as f64;

@@ -217,6 +217,38 @@ impl RatioLimits {
     }
 }
 
+/// The comparison of the two models at one point by their ratios, nonlinear over linear amplitude.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Verdict {
+    /// The ratio of each channel of the plan; `None` where it is not defined.
+    pub ratios: Vec<Option<f64>>,
+    /// The channel's position and the value of the greatest defined ratio; of equal ones, the first
+    /// channel's.
+    pub greatest: Option<(usize, f64)>,
+    /// The channel's position and the value of the least defined ratio; of equal ones, the first
+    /// channel's.
+    pub least: Option<(usize, f64)>,
+    /// Whether the ratios are between the limits; `None` where no ratio is defined.
+    pub reliable: Option<bool>,
+}
+
+impl Verdict {
+    /// Compares ratios with their limits.
+    pub fn new(ratios: Vec<Option<f64>>, limits: RatioLimits) -> Self {
+        let extreme = |is_further: fn(f64, f64) -> bool| {
+            let defined = ratios.iter().enumerate().filter_map(|(i, ratio)| Some((i, (*ratio)?)));
+            defined.reduce(|so_far, next| if is_further(next.1, so_far.1) { next } else { so_far })
+        };
+        let greatest = extreme(|a, b| a > b);
+        let least = extreme(|a, b| a < b);
+        let reliable = match (least, greatest) {
+            (Some((_, least)), Some((_, greatest))) => Some(limits.contain(least, greatest)),
+            _ => None,
+        };
+        Self { ratios, greatest, least, reliable }
+    }
+}
+
 /// Returns a number as text for a message: the shortest decimal that parses to the same number,
 /// with an exponent if it would be long.
 pub fn decimal(value: f64) -> String {

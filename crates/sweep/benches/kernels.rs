@@ -63,26 +63,26 @@ fn part(bencher: Bencher<'_, '_>, model: ModelKind, simd: Simd, part: RhsPart, c
 /// Measures a thousand RK4 steps with their records, the second half within the window.
 #[divan::bench(args = kernels())]
 fn thousand_steps(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
-    trajectory(bencher, model, simd, 0.25, &Method::Rk4 { step_s: 2.5e-4 });
+    trajectory(bencher, model, simd, 0.25, &Method::rk4(2.5e-4));
 }
 
 /// Measures a second of the run-up by Dormand-Prince.
 #[divan::bench(args = kernels())]
 fn second_by_dopri5(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     let tolerance = Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX };
-    trajectory(bencher, model, simd, 1.0, &Method::Dopri5(tolerance));
+    trajectory(bencher, model, simd, 1.0, &Method::dopri5(tolerance));
 }
 
 #[divan::bench(args = kernels())]
 fn second_by_additive(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     let tolerance = Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX };
-    trajectory(bencher, model, simd, 1.0, &Method::Additive(tolerance));
+    trajectory(bencher, model, simd, 1.0, &Method::additive(tolerance));
 }
 
 /// Measures the whole 50 s of the paper.
 #[divan::bench(args = kernels(), sample_count = 5, sample_size = 1)]
 fn whole_trajectory(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
-    trajectory(bencher, model, simd, 50.0, &Method::Rk4 { step_s: 2.5e-4 });
+    trajectory(bencher, model, simd, 50.0, &Method::rk4(2.5e-4));
 }
 
 fn trajectory(bencher: Bencher<'_, '_>, model: ModelKind, simd: Simd, end_s: f64, method: &Method) {

@@ -9,8 +9,9 @@ use std::time::Instant;
 
 use lane_ode::{Cancel, Simd};
 use washer_model::{
-    BumpStop, Bushing, HeldSpeed, Machine, Method, ModelKind, Point, Profile, Spin, StartRule,
-    StepSelector, Timing, capped_method, find_attractors, find_responses, prepare, simulate,
+    BumpStop, Bushing, HeldSpeed, Machine, Method, MethodKind, ModelKind, Point, Profile, Spin,
+    StartRule, StepSelector, Timing, capped_method, find_attractors, find_responses, prepare,
+    simulate,
 };
 
 /// Number of trajectories of a kernel. Basis: the number of lanes of AVX-512. Doubling it takes two
@@ -81,7 +82,7 @@ fn trajectories(rounds: usize) {
     for _ in 0..rounds {
         for (&(simd, _, model), times) in subjects.iter().zip(&mut times) {
             let begin = Instant::now();
-            let records = simulate(simd, model, &Method::Rk4 { step_s: STEP_S }, &points);
+            let records = simulate(simd, model, &Method::rk4(STEP_S), &points);
             times.push(begin.elapsed().as_secs_f64() * 1e3 / TRAJECTORIES as f64);
             assert!(records.iter().all(|record| record.failure.is_none()));
         }
@@ -135,12 +136,10 @@ fn methods(rounds: usize) -> f64 {
     let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
     let capped = models.map(|(_, model)| {
         let step_s = steps.capped_step_s(model).expect("the paper's machine has modes");
-        capped_method(model, step_s.expect("its bearings are stiff"))
+        capped_method(model, MethodKind::Capped0, step_s.expect("its bearings are stiff"))
     });
-    let methods = [
-        (format!("rk4, {STEP_S:e} s"), [Method::Rk4 { step_s: STEP_S }; 2]),
-        ("capped_0".to_owned(), capped),
-    ];
+    let methods =
+        [(format!("rk4, {STEP_S:e} s"), [Method::rk4(STEP_S); 2]), ("capped_0".to_owned(), capped)];
     let subjects: Vec<_> = methods
         .iter()
         .flat_map(|(name, by_model)| {
@@ -291,7 +290,7 @@ fn motions(rounds: usize) {
     let as_long = prepare_points(followed_s);
     let integrate = |points: &[Point]| {
         let points: Vec<&Point> = points.iter().collect();
-        let method = Method::Rk4 { step_s: STEP_S };
+        let method = Method::rk4(STEP_S);
         let records = simulate(Simd::best(), ModelKind::Nonlinear, &method, &points);
         assert!(records.iter().all(|record| record.failure.is_none()));
     };
@@ -425,7 +424,7 @@ fn elements(rounds: usize) {
                 .collect();
             let begin = Instant::now();
             for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-                let records = simulate(Simd::best(), model, &Method::Rk4 { step_s: 2e-4 }, &points);
+                let records = simulate(Simd::best(), model, &Method::rk4(2e-4), &points);
                 assert!(records.iter().all(|record| record.failure.is_none()));
             }
             times.push(begin.elapsed().as_secs_f64() * 1e3 / TRAJECTORIES as f64);

@@ -28,9 +28,9 @@ use std::process::ExitCode;
 
 use rayon::prelude::*;
 use sweep::{
-    Integrator, Level, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict, rk4,
-    rk4_mass_scaled,
+    Integrator, Interrupt, MapRow, MethodKind, ModelEngine, Plan, RunContext, rk4, rk4_mass_scaled,
 };
+use washer_row::Criterion;
 
 /// Accuracies that grids request of the fast method, in turn. Basis: the default twice, a finer and
 /// a coarser one. Doubling them doubles the accepted errors.
@@ -221,9 +221,9 @@ pub(crate) struct TrialTotals {
     above_error: u64,
     /// The greatest error of the rows that keep the promise, relative to the accuracy.
     greatest_error: f64,
-    by_method: [u64; Level::ALL.len()],
+    by_method: [u64; MethodKind::ALL.len()],
     /// The greatest error relative to the row's own `error`, by method.
-    error_over_estimate: [f64; Level::ALL.len()],
+    error_over_estimate: [f64; MethodKind::ALL.len()],
     /// A description of each row that breaks the promise.
     pub(crate) exceptions: Vec<String>,
     /// The number of grids with exceptions. A grid is one machine, whose rows fail together.
@@ -266,73 +266,77 @@ fn relative_difference_above(min_scale: f64, a: f64, b: f64) -> f64 {
     if a == b { 0.0 } else { (a - b).abs() / b.abs().max(min_scale) }
 }
 
-fn amplitude_difference(a: &Trajectory, b: &Trajectory) -> f64 {
-    a.amplitudes.iter().zip(&b.amplitudes).map(relative_difference).fold(0.0, f64::max)
-}
-
 /// Minimum of the bound that a row's own `error` gives. Basis: RK4 at 1e-4 s has errors of this
 /// size. Doubling it accepts rows with twice the error where their `error` is smaller.
 const ERROR_FLOOR: f64 = 1e-6;
 
+/// The two models, by their names in columns.
+const MODELS: [&str; 2] = ["nonlinear", "linear"];
+
+/// Returns the difference of two rows' numbers in a column, relative to the greater of the second
+/// one and `min_scale`; `None` where a row has none.
+fn column_difference(column: &str, min_scale: f64, a: &MapRow, b: &MapRow) -> Option<f64> {
+    Some(relative_difference_above(min_scale, a.number(column)?, b.number(column)?))
+}
+
 /// Returns the greatest relative difference of the numbers of two rows.
-fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
+fn difference(plan: &Plan, a: &MapRow, b: &MapRow) -> f64 {
     greatest_difference(plan, a, b).1
 }
 
 /// Returns the number of two rows with the greatest relative difference, and that difference.
-fn greatest_difference(plan: &Plan, a: &Outcome, b: &Outcome) -> (String, f64) {
+fn greatest_difference(plan: &Plan, a: &MapRow, b: &MapRow) -> (String, f64) {
     let mut differences = metric_differences(plan, a, b);
-    let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
     // Gaps and ends are those of the whole run, which goes on after the window.
     let clearance_m = plan.model.machine.radial_clearance_m;
-    for (model, a, b) in models {
-        differences.push((format!("amplitudes {model}"), amplitude_difference(a, b)));
-        if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
-            differences
-                .push((format!("min_gap {model}"), relative_difference_above(clearance_m, a, b)));
-        }
-        if let Some((a, b)) = a.fail_time_s.zip(b.fail_time_s) {
-            differences.push((format!("fail_time {model}"), (a - b).abs() / plan.end_s));
+    for model in MODELS {
+        differences.push((format!("amplitudes {model}"), amplitude_difference(model, a, b)));
+        let gap = format!("min_gap_{model}_m");
+        if let Some(difference) = column_difference(&gap, clearance_m, a, b) {
+            differences.push((gap, difference));
         }
     }
-    let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
-    // A ratio has the errors of both models.
-    let ratios = turns.map(relative_difference).fold(0.0, f64::max) / 2.0;
-    differences.push(("turn_ratios".to_owned(), ratios));
+    if let Some((a, b)) = a.number("fail_time_s").zip(b.number("fail_time_s")) {
+        differences.push(("fail_time".to_owned(), (a - b).abs() / plan.end_s));
+    }
+    if plan.model.measures.criterion == Criterion::Envelope {
+        // Ratios by turn are no quotients of amplitudes. A ratio has the errors of both models.
+        let ratios = [a, b].map(|row| row.verdict().ratios);
+        let defined = ratios[0].iter().flatten().zip(ratios[1].iter().flatten());
+        let greatest = defined.map(relative_difference).fold(0.0, f64::max) / 2.0;
+        differences.push(("turn_ratios".to_owned(), greatest));
+    }
     let greatest = differences.into_iter().max_by(|(_, a), (_, b)| a.total_cmp(b));
     greatest.expect("every row has amplitudes")
 }
 
+fn amplitude_difference(model: &str, a: &MapRow, b: &MapRow) -> f64 {
+    let amplitudes = [a, b].map(|row| row.amplitudes(model));
+    amplitudes[0].iter().zip(&amplitudes[1]).map(relative_difference).fold(0.0, f64::max)
+}
+
 /// Returns the relative difference of each metric, with the name of its column.
-fn metric_differences(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
-    let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
+fn metric_differences(plan: &Plan, a: &MapRow, b: &MapRow) -> Vec<(String, f64)> {
     let machine = &plan.model.machine;
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
     let weight_n = moving_kg * machine.gravity_m_per_s2;
-    let metrics = models.iter().flat_map(|(model, a, b)| {
-        plan.model.measures.model_columns().zip(a.metrics.iter().zip(&b.metrics)).map(
-            |(number, (a, b))| {
-                let min_scale = number.metric.scale(plan.window_s, weight_n);
-                (number.column(model), relative_difference_above(min_scale, *a, *b))
-            },
-        )
+    let metrics = MODELS.into_iter().flat_map(|model| {
+        plan.model.measures.model_columns().filter_map(move |number| {
+            let min_scale = number.metric.scale(plan.window_s, weight_n);
+            let column = number.column(model);
+            let share = column_difference(&column, min_scale, a, b)?;
+            Some((column, share))
+        })
     });
     metrics.collect()
 }
 
-fn verdict(plan: &Plan, outcome: &Outcome) -> Option<bool> {
-    let rule = &plan.reliability;
-    Verdict::new(outcome, rule.channels.len(), rule.limits).reliable
-}
-
-fn statuses(outcome: &Outcome) -> [Status; 2] {
-    [outcome.nonlinear.status, outcome.linear.status]
-}
-
-fn evaluate_with(plan: &Plan, integrator: Integrator) -> Vec<Outcome> {
+fn evaluate_with(plan: &Plan, integrator: Integrator) -> Vec<MapRow> {
     let plan = Plan { integrator, ..plan.clone() };
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
-    ModelEngine::new(&plan).expect("an instruction set").evaluate_at(&values)
+    let interrupt = Interrupt::new();
+    let engine = ModelEngine::new(&plan).expect("an instruction set");
+    engine.evaluate_points(&values, &RunContext::new(&interrupt)).expect("no interrupt")
 }
 
 /// Returns the clearance at which drum and tub just touch in one of the rows, as an argument of
@@ -340,7 +344,7 @@ fn evaluate_with(plan: &Plan, integrator: Integrator) -> Vec<Outcome> {
 fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
     let mut rng = Rng(!seed);
     let rows = evaluate_with(plan, rk4_mass_scaled(1e-3));
-    let gap_m = rng.choose(&rows).nonlinear.min_gap_m?;
+    let gap_m = rng.choose(&rows).number("min_gap_nonlinear_m")?;
     let closest_approach_m = plan.model.machine.radial_clearance_m - gap_m;
     let overlap = 10f64.powf(rng.between(-6.0, -1.5));
     Some(format!("radial_clearance_m={}", closest_approach_m * (1.0 - overlap)))
@@ -438,56 +442,57 @@ fn check_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> TrialTota
     let mut finer_rows = None;
     let mut totals = TrialTotals { rows: rows.len() as u64, ..TrialTotals::default() };
     for (i, (row, reference)) in rows.iter().zip(&reference_rows).enumerate() {
-        totals.by_method[row.method as usize] += 1;
-        totals.failed += u64::from(statuses(row) != [Status::Ok; 2]);
+        let method = MethodKind::named(row.name("method").unwrap_or_default()).unwrap_or_default();
+        totals.by_method[method as usize] += 1;
+        totals.failed += u64::from(row.status() != "ok");
         let mut coarser =
             || coarser_rows.get_or_insert_with(|| evaluate(rk4(2.0 * step_s)))[i].clone();
-        if row.sensitive == Some(true) {
+        if row.flag("sensitive") == Some(true) {
             totals.sensitive += 1;
             let coarser = coarser();
-            let agrees = statuses(&coarser) == statuses(reference)
+            let agrees = coarser.status() == reference.status()
                 && difference(&plan, &coarser, reference) <= accuracy;
             totals.needlessly_sensitive += u64::from(agrees);
             continue;
         }
         let mut reference = reference;
-        let estimate = row.error.unwrap_or(f64::INFINITY).max(ERROR_FLOOR);
+        let estimate = row.number("error").unwrap_or(f64::INFINITY).max(ERROR_FLOOR);
         let differs = difference(&plan, row, reference) > accuracy.min(estimate)
-            || verdict(&plan, row) != verdict(&plan, reference);
+            || row.flag("reliable") != reference.flag("reliable");
         if differs {
             // The reference may be wrong, because the fast method refines rows to shorter steps.
             let finer = rk4(step_s / 8.0);
             reference = &finer_rows.get_or_insert_with(|| evaluate(finer))[i];
         }
         let error = difference(&plan, row, reference);
-        if row.converged == Some(false) {
+        if row.flag("converged") == Some(false) {
             totals.unconverged += 1;
-            let is_right = statuses(row) == statuses(reference) && error <= accuracy;
+            let is_right = row.status() == reference.status() && error <= accuracy;
             totals.needlessly_unconverged += u64::from(is_right);
             continue;
         }
         let mut report = |counter: fn(&mut TrialTotals) -> &mut u64, quantity: &str| {
             *counter(&mut totals) += 1;
-            let method = row.method.name();
-            let estimate = row.error.unwrap_or(f64::NAN);
+            let method = method.name();
+            let estimate = row.number("error").unwrap_or(f64::NAN);
             let (number, _) = greatest_difference(&plan, row, reference);
             totals.exceptions.push(format!(
                 "seed {seed}, row {i}, {method}: wrong {quantity}, by {error:.2e} in {number}; \
                  `error` is {estimate:.2e}"
             ));
         };
-        if statuses(row) != statuses(reference) {
+        if row.status() != reference.status() {
             report(|totals| &mut totals.wrong_status, "status");
         } else if error > accuracy {
             report(|totals| &mut totals.inaccurate, "number");
-        } else if verdict(&plan, row) != verdict(&plan, reference) {
+        } else if row.flag("reliable") != reference.flag("reliable") {
             report(|totals| &mut totals.wrong_verdict, "verdict");
         } else {
             totals.greatest_error = totals.greatest_error.max(error / accuracy);
-            let ratio = &mut totals.error_over_estimate[row.method as usize];
+            let ratio = &mut totals.error_over_estimate[method as usize];
             *ratio = ratio.max(error / estimate);
             totals.above_error +=
-                u64::from(row.error.is_some_and(|estimate| error > estimate.max(ERROR_FLOOR)));
+                u64::from(row.number("error").is_some_and(|own| error > own.max(ERROR_FLOOR)));
         }
     }
     totals.exceptional_grids = u64::from(!totals.exceptions.is_empty());
@@ -560,7 +565,7 @@ fn main() -> ExitCode {
         "{} rows of {grids} grids ({} refused), seed {first_seed}",
         totals.rows, totals.refused
     );
-    eprintln!("  by method {:?}: {:?}", Level::ALL.map(Level::name), totals.by_method);
+    eprintln!("  by method {:?}: {:?}", MethodKind::ALL.map(MethodKind::name), totals.by_method);
     eprintln!(
         "  failed {}, sensitive {} ({} of them needlessly), unconverged {} ({} of them right)",
         totals.failed,

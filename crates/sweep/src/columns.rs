@@ -9,8 +9,8 @@ use sweep_engine::store::{CellType, DeclaredColumn, PointRows};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Attractor, Channel, Disturbance, GeometryLimit, ModeMotion, StabilityKind};
 use washer_row::{
-    DwellPeaks, GrowingMode, Growth, Level, Measures, Metric, MetricProperties, Outcome,
-    ROW_STATUSES, Trajectory, Verdict, row_status,
+    DwellPeaks, GrowingMode, Growth, Measures, MethodKind, Metric, MetricProperties, Outcome,
+    ROW_STATUSES, Trajectory, row_status,
 };
 
 use crate::model::described;
@@ -33,8 +33,6 @@ type WasherColumn = ResultColumn<ResultRow>;
 /// The columns of a plan's rows.
 pub(crate) struct Columns {
     columns: Vec<WasherColumn>,
-    channels: usize,
-    limits: RatioLimits,
 }
 
 impl Columns {
@@ -64,7 +62,7 @@ impl Columns {
         columns.extend(has_friction.then(friction_column));
         columns.extend(metric_columns(channels, measures));
         columns.extend(run_columns(ROW_STATUSES.to_vec()));
-        Self { columns, channels: channels.len(), limits }
+        Self { columns }
     }
 
     /// Returns the columns of periodic responses at held speeds.
@@ -80,7 +78,7 @@ impl Columns {
         let text = "ok, or why there is no response";
         let status = |row: &ResultRow| Some(row.compared.status);
         columns.push(ResultColumn::name("status", text, ROW_STATUSES.to_vec(), status));
-        Self { columns, channels: channels.len(), limits }
+        Self { columns }
     }
 
     /// Returns the names, units and descriptions of the columns, as a file declares them.
@@ -91,23 +89,18 @@ impl Columns {
     /// Returns the rows of a point's outcome.
     pub(crate) fn done(&self, outcome: Outcome) -> PointRows {
         let point = outcome.point;
-        let rows = outcome.into_rows().map(|outcome| row(&self.columns, &self.result(outcome)));
+        let rows = outcome.into_rows().map(|outcome| row(&self.columns, &Self::result(outcome)));
         PointRows { point, rows: rows.collect() }
     }
 
-    fn result(&self, mut outcome: Outcome) -> ResultRow {
-        let Verdict { ratios, greatest, least, reliable } =
-            Verdict::new(&outcome, self.channels, self.limits);
+    fn result(mut outcome: Outcome) -> ResultRow {
         let (status, fail_time_s) = row_status(&outcome);
         let models = [&mut outcome.nonlinear, &mut outcome.linear];
         let compared = Compared {
             steps: models.each_ref().map(|model| model.steps),
             rejected: models.each_ref().map(|model| model.rejected),
             amplitudes: models.map(|model| take(&mut model.amplitudes)),
-            ratios,
-            greatest,
-            least,
-            reliable,
+            verdict: take(&mut outcome.verdict),
             converged: outcome.converged,
             sensitive: outcome.sensitive,
             method: outcome.method as usize,
@@ -132,7 +125,12 @@ fn descriptions(channels: &[Channel]) -> Vec<sweep_parameter::Channel> {
 fn washer_verdict_columns(channels: &[Channel], limits: RatioLimits) -> Vec<WasherColumn> {
     let text = "the method of the row's nonlinear numbers; with the fast method its level: \
                 capped_0 to capped_5, rk4, additive or dop853";
-    verdict_columns(&descriptions(channels), limits, Level::ALL.map(Level::name).to_vec(), text)
+    verdict_columns(
+        &descriptions(channels),
+        limits,
+        MethodKind::ALL.map(MethodKind::name).to_vec(),
+        text,
+    )
 }
 
 /// Returns the columns of the metrics that the grid file requests.

@@ -14,19 +14,20 @@ use std::sync::{Arc, Condvar, Mutex};
 
 use lane_ode::{Cancel, Simd};
 use once_cell::sync::OnceCell;
-use pool::{OutcomeSink, PointSource, Pool};
+use pool::{OutcomeSink, Pool};
 use washer_model::{Machine, Method, ModelKind, Point, Spin, StepSelector, Timing, prepare};
 use washer_row::{
-    Level, LevelRun, Outcome, OutcomePurpose, RefinementLevels, RowRule, Status, integrate_points,
-    refinement_levels,
+    LevelRun, MethodKind, Outcome, OutcomePurpose, RefinementLevels, RowRule, Status,
+    integrate_points, refinement_levels,
 };
 
 use crate::columns::Columns;
+use crate::map_row::{MapLayout, MapRow};
 use crate::method::direct;
 use crate::plan::{Plan, Scenario, compared_channels, failure_reason};
+use sweep_engine::engine::evaluate_points;
 use sweep_engine::method::Steps;
-use sweep_engine::{Error, Interrupt, RowSink, RowSource};
-use sweep_files::panics::{lock, unlocked};
+use sweep_engine::{Error, RowSink, RowSource};
 
 /// Number of parts of a run at whose ends a perturbed run is compared with its original. Basis: an
 /// exponential separation is measured over many of them. Doubling it doubles the memory of the
@@ -36,7 +37,6 @@ pub(crate) const CHECKPOINTS: u32 = 128;
 /// The methods by which a row with capped modes was computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CappedRun {
-    pub(crate) level: Level,
     /// The method of the nonlinear model, and that of the linear one.
     pub(crate) methods: [Method; 2],
     /// The number of equal parts of the run at whose ends a step ends.
@@ -151,24 +151,25 @@ impl<'a> ModelEngine<'a> {
         self.levels.get_or_try_init(find).ok()
     }
 
-    /// Returns the methods by which a row of this level was computed; `None` if the level caps no
-    /// modes.
-    pub(crate) fn capped_run(&self, level: Level) -> Option<CappedRun> {
-        if !level.is_capped() {
+    /// Returns the methods by which a row of this kind of method was computed; `None` if the kind
+    /// caps no modes.
+    pub(crate) fn capped_run(&self, kind: MethodKind) -> Option<CappedRun> {
+        if !kind.is_capped() {
             return None;
         }
         let [nonlinear, linear] = self.levels();
-        let methods = [nonlinear.capped_method(level)?, linear.capped_method(level)?];
-        Some(CappedRun { level, methods, checkpoints: self.timing.checkpoints })
+        let methods = [nonlinear.capped_method(kind)?, linear.capped_method(kind)?];
+        Some(CappedRun { methods, checkpoints: self.timing.checkpoints })
     }
 
     fn find_levels(&self, cancel: Cancel<'_>) -> [RefinementLevels; 2] {
-        if let Some((level, method)) = direct(&self.plan.integrator) {
-            return ModelKind::ALL.map(|_| RefinementLevels::direct(level, method));
+        if let Some(method) = direct(&self.plan.integrator) {
+            return ModelKind::ALL.map(|_| RefinementLevels::direct(method));
         }
         // The corners of the grid have the extremes of the machines' frequencies.
-        let scenarios: Vec<_> =
-            self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
+        let corners = self.plan.some_corners();
+        let scenarios: Vec<Scenario> =
+            corners.iter().map(|values| self.plan.scenario_at(values)).collect();
         let prepared = self.prepare(&scenarios);
         let points = prepared
             .iter()
@@ -178,43 +179,27 @@ impl<'a> ModelEngine<'a> {
         ModelKind::ALL.map(|model| refinement_levels(&steps, model, self.rule.accuracy))
     }
 
-    /// Computes a row for each point, given by the values of its axes, which need not be on the
-    /// grid. The field `point` of an outcome is the position in `axis_values`. Within a rayon pool
-    /// it uses all threads of the pool, otherwise the calling thread.
-    pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
-        let interrupt = Interrupt::new();
-        let context = RunContext::new(&interrupt);
-        self.evaluate_in_context(axis_values, &context).unwrap_or_default()
-    }
-
-    /// Computes rows like [`Self::evaluate_at`]; `None` if the context stopped the work.
-    pub fn evaluate_in_context(
+    /// Evaluates points, each given by the values of the plan's axes, on the grid or between its
+    /// points. Returns their rows in the order of the points; `None` if the context stopped the
+    /// work.
+    ///
+    /// Within a rayon pool it uses all threads of the pool, otherwise the calling thread.
+    pub fn evaluate_points(
         &self,
         axis_values: &[Vec<f64>],
         context: &RunContext<'_>,
-    ) -> Option<Vec<Outcome>> {
-        let next = Mutex::new(0..axis_values.len());
-        let source = |most: usize| {
-            let mut next = lock(&next);
-            let positions: Vec<usize> = next.by_ref().take(most).collect();
-            positions
-                .into_iter()
-                .map(|i| (i as u64, self.plan.scenario_at(&axis_values[i])))
-                .collect()
-        };
-        let found = Mutex::new(Vec::with_capacity(axis_values.len()));
-        let sink = |outcome: Outcome| lock(&found).push(outcome);
-        self.integrate_rows(&source, &sink, context);
-        let mut found = unlocked(found);
-        found.sort_by_key(|outcome| outcome.point);
-        (found.len() == axis_values.len()).then_some(found)
+    ) -> Option<Vec<MapRow>> {
+        let map = Arc::new(MapLayout::new(self.plan));
+        let results = evaluate_points(self, axis_values, context)?;
+        let cells = results.into_iter().flat_map(|result| result.rows);
+        Some(cells.map(|cells| MapRow::new(Arc::clone(&map), cells)).collect())
     }
 
     /// Computes the rows of all points from a source and passes them to a sink. Within a rayon pool
     /// it uses all threads of the pool, otherwise the calling thread.
     fn integrate_rows(
         &self,
-        source: &PointSource<'_>,
+        source: &RowSource<'_>,
         sink: &OutcomeSink<'_>,
         context: &RunContext<'_>,
     ) {
@@ -314,14 +299,10 @@ pub(crate) fn map_isolating_panics<I, R>(
 }
 
 impl Evaluator for ModelEngine<'_> {
-    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, context: &RunContext<'_>) {
+    fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         let columns = Columns::for_run(self.plan);
-        let sink = |outcome: Outcome| keep(columns.done(outcome));
-        let source = |most: usize| {
-            let rows = std::iter::from_fn(next).take(most);
-            rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
-        };
-        self.integrate_rows(&source, &sink, context);
+        let sink = |outcome: Outcome| sink(columns.done(outcome));
+        self.integrate_rows(source, &sink, context);
     }
 }
 

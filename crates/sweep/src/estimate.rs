@@ -3,7 +3,7 @@
 
 use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
-use washer_row::{Deviations, Metric, Outcome, ROW_STATUSES, RefinementLevels, row_status};
+use washer_row::{Deviations, Metric, Outcome, RefinementLevels};
 
 use crate::engine::ModelEngine;
 use crate::notes::{criterion_words, plan_notes};
@@ -200,13 +200,11 @@ fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<(f6
     let began_s = thread_time_s();
     let is_late = || thread_time_s() - began_s > most_s;
     let interrupt = Interrupt::new();
-    let outcomes = engine
-        .evaluate_in_context(&axis_values, &RunContext::with_time_limit(&interrupt, &is_late))?;
+    let context = RunContext::with_time_limit(&interrupt, &is_late);
+    let rows = engine.evaluate_points(&axis_values, &context)?;
     let cost_s = thread_time_s() - began_s;
     let mut sampled = NameCounts::new();
-    outcomes
-        .iter()
-        .for_each(|outcome| count_name(&mut sampled, ROW_STATUSES[row_status(outcome).0]));
+    rows.iter().for_each(|row| count_name(&mut sampled, row.status()));
     Some((cost_s, sampled))
 }
 

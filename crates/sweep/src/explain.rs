@@ -11,14 +11,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
-    Attractor, Channel, Crossing, CrossingEffect, LeftRangeError, NoEquilibrium, Point, Response,
-    Spin, StepSelector, Timing, follow_crossings, modes, peaks_without_departures,
+    Attractor, Channel, Crossing, CrossingEffect, LeftRangeError, Point, Response, Spin,
+    StepSelector, follow_crossings, modes, peaks_without_departures,
 };
 
 use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
 use crate::estimate::LONG_WORK_S;
-use crate::plan::{self, Plan, Scenario, compared_channels};
+use crate::map_row::MapRow;
+use crate::plan::{Plan, Scenario, compared_channels, prepare_scenario};
 use crate::speeds::Speeds;
+use sweep_engine::columns::MODELS;
 use sweep_engine::config::NamedValues;
 use sweep_engine::{
     Error, Execution, Interrupt, Progress, ProgressMode, RunContext, duration, tell, threads,
@@ -28,7 +30,7 @@ pub(crate) use cause::Cause;
 use sweep_parameter::RatioLimits;
 pub(crate) use tongue::{Closing, ModeResonance, Tongue, TongueEnd};
 use tongue::{ResponseFinder, SpeedScan, find_tongues};
-use washer_row::{Outcome, ROW_STATUSES, Status, Verdict, row_status};
+use washer_row::Verdict;
 
 /// Step between the speeds at which responses are sought (rpm), unless `--speed` gives another.
 /// Basis: the tongues of the paper's machine are wider. Doubling it halves the time and misses
@@ -52,8 +54,8 @@ const NOTICED_S: f64 = 10.0;
 pub(crate) struct Explanation {
     /// The grid's name.
     pub(crate) name: String,
-    /// The parameters of the point, with their names.
-    pub(crate) at: NamedValues,
+    /// The values of the parameters of the point, by name.
+    pub(crate) parameters: NamedValues,
     /// The result of the point in a map.
     pub(crate) swept: SweptResult,
     /// The scans over speed, one for each direction in which the drum turns, forwards first.
@@ -95,20 +97,20 @@ impl SweptResult {
         let ratios = pairs
             .filter(|((_, linear), _)| **linear != 0.0)
             .map(|((nonlinear, linear), channel)| (nonlinear / linear, *channel));
-        ratios.reduce(|most, next| if next.0 > most.0 { next } else { most })
+        ratios.reduce(|greatest, ratio| if ratio.0 > greatest.0 { ratio } else { greatest })
     }
 }
 
 /// A stretch of time in which the profile is inside a tongue.
 pub(crate) struct Passage {
     /// The times of entry and exit (s).
-    pub(crate) from_to_s: [f64; 2],
+    pub(crate) interval_s: [f64; 2],
     /// Whether the run ends inside the tongue.
-    pub(crate) is_cut: bool,
+    pub(crate) ends_inside: bool,
     /// The integral over the passage of the growth at the speed of each instant.
     pub(crate) e_folds: f64,
     /// The growth of disturbances in the passage.
-    pub(crate) crossed: Result<CrossingEffect, LeftRangeError>,
+    pub(crate) effect: Result<CrossingEffect, LeftRangeError>,
 }
 
 /// Explains the verdict of a plan's only point. Once the interrupt is raised it ends early, and the
@@ -119,16 +121,17 @@ pub(crate) struct Passage {
 /// has no equilibrium or no modes, and if this processor lacks the instruction set.
 pub(crate) fn explain(
     plan: &Plan,
-    at: NamedValues,
+    parameters: NamedValues,
     speeds: Option<Speeds>,
     execution: Execution<'_>,
 ) -> Result<Explanation, Error> {
-    threads::pool(execution.threads()?)?.install(|| explain_in_pool(plan, at, speeds, execution))
+    threads::pool(execution.threads()?)?
+        .install(|| explain_in_pool(plan, parameters, speeds, execution))
 }
 
 fn explain_in_pool(
     plan: &Plan,
-    at: NamedValues,
+    parameters: NamedValues,
     speeds: Option<Speeds>,
     Execution { progress: progress_mode, interrupt, .. }: Execution<'_>,
 ) -> Result<Explanation, Error> {
@@ -182,25 +185,26 @@ fn explain_in_pool(
             .collect::<Vec<_>>()
     };
     let (scanned, swept) = rayon::join(scan, || swept_result(plan, interrupt));
-    let (found, scans): (Vec<Vec<Tongue>>, Vec<SpeedScan>) = scanned.into_iter().unzip();
-    let found: Vec<Tongue> = found.into_iter().flatten().collect();
+    let (tongues, scans): (Vec<Vec<Tongue>>, Vec<SpeedScan>) = scanned.into_iter().unzip();
+    let tongues: Vec<Tongue> = tongues.into_iter().flatten().collect();
     let swept = swept?;
     let finder_for = |tongue: &Tongue| {
         let same_direction =
             |finder: &&ResponseFinder<'_>| finder.is_backward == tongue.is_backward;
         finders.iter().find(same_direction).unwrap_or(&finders[0])
     };
-    let ends_in = || -> Vec<Option<Attractor>> {
-        let directions = found.chunk_by(|a, b| a.is_backward == b.is_backward);
-        directions.flat_map(|found| tongue::find_endings(finder_for(&found[0]), found)).collect()
+    let endings = || -> Vec<Option<Attractor>> {
+        let directions = tongues.chunk_by(|a, b| a.is_backward == b.is_backward);
+        let endings = |tongues: &[Tongue]| tongue::find_endings(finder_for(&tongues[0]), tongues);
+        directions.flat_map(endings).collect()
     };
-    let crossings = || find_crossings(plan, (&point, spin), &finders, &found, &swept);
-    let closings = || found.par_iter().map(|tongue| tongue.find_closing(finder_for(tongue)));
-    let ((crossings, ends_in), closings) =
-        rayon::join(|| rayon::join(crossings, ends_in), || closings().collect::<Vec<_>>());
+    let crossings = || find_crossings(plan, (&point, spin), &finders, &tongues, &swept);
+    let closings = || tongues.par_iter().map(|tongue| tongue.find_closing(finder_for(tongue)));
+    let ((crossings, endings), closings) =
+        rayon::join(|| rayon::join(crossings, endings), || closings().collect::<Vec<_>>());
     let (passages, without_departures) = crossings;
     let step_s = reference_step_s(&StepSelector::new([(&point, spin)], plan.end_s));
-    let growing = found.iter().zip(&passages).flat_map(|(tongue, passages)| {
+    let growing = tongues.iter().zip(&passages).flat_map(|(tongue, passages)| {
         passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
     });
     let keeps_limit = |amplitudes: &Vec<f64>| {
@@ -208,13 +212,13 @@ fn explain_in_pool(
     };
     let has_passed = matches!(&without_departures, Some(Ok(amplitudes)) if keeps_limit(amplitudes));
     let cause = cause::find_cause((&point, spin), step_s, &swept, has_passed, growing);
-    let tongues = found.into_iter().zip(closings).zip(ends_in).zip(passages);
-    let tongues = tongues.map(|(((tongue, closing), ends_in), passages)| {
-        (Tongue { closing: Some(closing), ends_in, ..tongue }, passages)
+    let tongues = tongues.into_iter().zip(closings).zip(endings).zip(passages);
+    let tongues = tongues.map(|(((tongue, closing), ending), passages)| {
+        (Tongue { closing: Some(closing), ending, ..tongue }, passages)
     });
     Ok(Explanation {
         name: plan.name.clone(),
-        at,
+        parameters,
         scans,
         profile_rpm,
         tongues: tongues.collect(),
@@ -266,14 +270,14 @@ fn directions(
     plan: &Plan,
     scenario: &Scenario,
     point: &Point,
-    [least_rpm, most_rpm]: [f64; 2],
+    [lowest_rpm, highest_rpm]: [f64; 2],
     requested: Option<Speeds>,
 ) -> Result<Vec<TurningDirection>, Error> {
     let slowest_rpm = modes(point, 0.0, 0.0).map_err(Error::model)?.modes[0].frequency_rpm();
     let from_rpm = (LOWEST_SPEED * slowest_rpm).floor().max(1.0);
     let mut directions = Vec::new();
-    for (is_backward, fastest_rpm) in [(false, most_rpm), (true, -least_rpm)] {
-        let is_turned = fastest_rpm > 0.0 || !is_backward && least_rpm >= 0.0;
+    for (is_backward, fastest_rpm) in [(false, highest_rpm), (true, -lowest_rpm)] {
+        let is_turned = fastest_rpm > 0.0 || !is_backward && lowest_rpm >= 0.0;
         let scanned = match requested {
             Some(requested) if is_turned => requested,
             None if fastest_rpm > from_rpm => Speeds::new(from_rpm, fastest_rpm, STEP_RPM),
@@ -284,7 +288,7 @@ fn directions(
         directions.push(TurningDirection { is_backward, scenario, point, scanned, fastest_rpm });
     }
     if directions.is_empty() {
-        let fastest_rpm = most_rpm.max(-least_rpm);
+        let fastest_rpm = highest_rpm.max(-lowest_rpm);
         let expected = format!(
             "a profile that exceeds {from_rpm} rpm, half of the slowest mode's frequency, within \
              the run; to look at other speeds, give --speed FROM:TO:STEP"
@@ -305,33 +309,21 @@ fn mirrored(scenario: &Scenario) -> Scenario {
     mirrored
 }
 
-/// Prepares a machine and its spin for integration.
-fn prepare_scenario(plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
-    let timing = Timing { window_s: scenario.window_s, ..plan::timing(plan) };
-    plan::prepare_point(scenario.model.machine.clone(), scenario.model.spin.clone(), &timing)
-}
-
 /// Computes the row of the plan's only point. Once the interrupt is raised, the result is
 /// meaningless.
 fn swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResult, Error> {
-    let scenario = plan.scenario(0);
-    let channels = compared_channels(plan);
     let engine = ModelEngine::new(plan)?;
-    let context = RunContext::new(interrupt);
-    let outcomes = engine.evaluate_in_context(&[Vec::new()], &context);
-    let outcome = outcomes.and_then(|mut outcomes| outcomes.pop());
-    // A stopped engine returns no row.
-    let outcome = outcome.unwrap_or_else(|| Outcome::failed(0, Status::Panicked));
-    let (status, fail_time_s) = row_status(&outcome);
-    let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.limits);
+    let rows = engine.evaluate_points(&[Vec::new()], &RunContext::new(interrupt));
+    let row = rows.and_then(|mut rows| rows.pop());
+    let amplitudes = |model| row.as_ref().map_or_else(Vec::new, |row| row.amplitudes(model));
     Ok(SweptResult {
-        channels,
-        window_s: scenario.window_s,
+        channels: compared_channels(plan),
+        window_s: plan.scenario(0).window_s,
         limits: plan.reliability.limits,
-        status: ROW_STATUSES[status],
-        fail_time_s,
-        amplitudes: [outcome.nonlinear.amplitudes, outcome.linear.amplitudes],
-        verdict,
+        status: row.as_ref().map_or("", MapRow::status),
+        fail_time_s: row.as_ref().and_then(|row| row.number("fail_time_s")),
+        amplitudes: MODELS.map(amplitudes),
+        verdict: row.as_ref().map(MapRow::verdict).unwrap_or_default(),
     })
 }
 
@@ -350,10 +342,10 @@ fn find_crossings(
     let end_s = plan.end_s;
     // Passages in order of time, each with the number of its tongue.
     let times = tongues.iter().enumerate().flat_map(|(k, tongue)| {
-        let [from, to] = tongue.from_to_rpm;
+        let [from, to] = tongue.range_rpm;
         let band_rpm = if tongue.is_backward { [-to, -from] } else { [from, to] };
         let inside = profile::times_inside_s(spin, end_s, band_rpm);
-        inside.into_iter().map(move |from_to_s| (k, from_to_s))
+        inside.into_iter().map(move |interval_s| (k, interval_s))
     });
     let mut times: Vec<(usize, [f64; 2])> = times.collect();
     times.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
@@ -368,16 +360,16 @@ fn find_crossings(
         let numbers: Vec<usize> = (0..times.len()).filter(same_direction).collect();
         let ends_s = numbers.iter().flat_map(|&number| times[number].1);
         let speeds: Vec<f64> = spin.speeds_rpm(ends_s).map(f64::abs).collect();
-        let mut found = finder.find_responses(&speeds).into_iter();
+        let mut end_responses = finder.find_responses(&speeds).into_iter();
         for number in numbers {
-            responses[number] = [found.next().flatten(), found.next().flatten()];
+            responses[number] = [end_responses.next().flatten(), end_responses.next().flatten()];
         }
     }
     let crossings: Vec<Crossing<'_>> = times
         .iter()
         .zip(&responses)
-        .map(|((k, from_to_s), [entry, exit])| Crossing {
-            interval_s: *from_to_s,
+        .map(|((k, interval_s), [entry, exit])| Crossing {
+            interval_s: *interval_s,
             responses: [entry.as_ref(), exit.as_ref()],
             is_backward: tongues[*k].is_backward,
         })
@@ -387,7 +379,7 @@ fn find_crossings(
     }
     let step_s = reference_step_s(&StepSelector::new([(point, spin)], end_s));
     let before_end = |crossing: &&Crossing<'_>| crossing.interval_s[0] < swept.window_s[1];
-    let (crossed, peaks) = rayon::join(
+    let (effects, peaks) = rayon::join(
         || follow_crossings(point, step_s, &crossings),
         || {
             crossings.iter().find(before_end)?;
@@ -396,12 +388,12 @@ fn find_crossings(
         },
     );
     let mut passages: Vec<Vec<Passage>> = tongues.iter().map(|_| Vec::new()).collect();
-    for ((k, from_to_s), crossed) in times.into_iter().zip(crossed) {
+    for ((k, interval_s), effect) in times.into_iter().zip(effects) {
         passages[k].push(Passage {
-            from_to_s,
-            is_cut: from_to_s[1] >= end_s,
-            e_folds: profile::e_folds(spin, from_to_s, &tongues[k].growths),
-            crossed,
+            interval_s,
+            ends_inside: interval_s[1] >= end_s,
+            e_folds: profile::e_folds(spin, interval_s, &tongues[k].growths),
+            effect,
         });
     }
     (passages, peaks)

@@ -26,7 +26,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
-use washer_model::{MachineParameter, Method, ModelKind, Target};
+use washer_model::{MachineParameter, Method, MethodKind, ModelKind, Target};
 
 use crate::config::WasherGridInput;
 use crate::engine::simd_from_environment;
@@ -316,19 +316,19 @@ fn run_fit<'a>(
     let mut step_effect = None;
     // A step that is too long for the corners of forces changes the numbers; then it is halved.
     for _ in 0..=HALVINGS {
-        let Method::Rk4 { step_s } = problem.method else { break };
-        if !best.is_settled {
+        if problem.method.kind != MethodKind::Rk4 || !best.is_settled {
             break;
         }
+        let step_s = problem.method.step_s;
         let against = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
-        problem.method = Method::Rk4 { step_s: 0.5 * step_s };
+        problem.method = Method::rk4(0.5 * step_s);
         let finer = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
         let bread = algebra::inverse(&best.summary.normal);
         let changes = effect(&bread, &best.summary, &against, &finer);
         let greatest_change = changes.into_iter().fold(0.0, f64::max);
         step_effect = Some(greatest_change);
         if greatest_change < MAX_STEP_EFFECT {
-            problem.method = Method::Rk4 { step_s };
+            problem.method = Method::rk4(step_s);
             break;
         }
         let search = MinimumSearch::further(&problem, work, &evaluations_made);

@@ -4,7 +4,7 @@
 //! * `config` reads a grid file into a [`Plan`], or reports all mistakes in it. `method` is the
 //!   table of the methods of integration.
 //! * `engine` integrates both models of `washer_model` at points of a plan, and `columns` makes
-//!   rows of the outcomes. `estimate` predicts the cost of a run.
+//!   rows of the outcomes. A [`MapRow`] is a row in memory. `estimate` predicts the cost of a run.
 //! * [`sweep_engine`] computes the points of a plan on all cores, stores finished rows, traces
 //!   boundaries and runs studies; [`sweep_files`] reads and writes files. `identity` is the version
 //!   that decides which builds write the same bytes.
@@ -23,17 +23,17 @@
 //!
 //! ```
 //! use std::path::Path;
-//! use sweep::{ModelEngine, Plan, Verdict};
+//! use sweep::{Interrupt, ModelEngine, Plan, RunContext};
 //!
 //! let grid = Path::new("../../sweeps/fig12_reference.toml");
 //! let plan = sweep::load(grid, &[])?;
 //! assert_eq!((plan.axes.len(), plan.points()), (2, 39 * 33));
 //!
 //! let plan = Plan { end_s: 2.0, window_s: [1.0, 2.0], ..plan };
-//! let outcome = &ModelEngine::new(&plan)?.evaluate_at(&[vec![0.4, 100.0]])[0];
-//! let channels = plan.reliability.channels.len();
-//! let verdict = Verdict::new(outcome, channels, plan.reliability.limits);
-//! assert_eq!(verdict.reliable, Some(true));
+//! let interrupt = Interrupt::new();
+//! let context = RunContext::new(&interrupt);
+//! let rows = ModelEngine::new(&plan)?.evaluate_points(&[vec![0.4, 100.0]], &context);
+//! assert_eq!(rows.unwrap()[0].flag("reliable"), Some(true));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -48,6 +48,7 @@ mod fit;
 mod identity;
 mod library;
 mod live;
+mod map_row;
 mod method;
 mod model;
 mod notes;
@@ -71,6 +72,7 @@ pub use library::{
     RanToFile, TraceOptions, explain_point, find_boundary, find_modes, fit_tables, hold_speeds,
     list_parameters, optimise_study, trace_point,
 };
+pub use map_row::MapRow;
 pub use method::{Integrator, rk4, rk4_mass_scaled};
 pub use model::Washer;
 pub use plan::Plan;
@@ -81,8 +83,8 @@ pub use sweep_engine::store::{
     Job, OpenOptions, OpenOutcome, OpenRun, RunStage, Shard, ShardRequest, StoreError, status,
 };
 pub use sweep_engine::{
-    Error, Exit, Interrupt, check_random_numbers, survive_file_size_limits, tell,
+    Error, Exit, Interrupt, RunContext, check_random_numbers, survive_file_size_limits, tell,
 };
 pub use trace::TraceExtras;
 pub use washer_model::StartRule;
-pub use washer_row::{Level, MIN_SPEED_SCALE_M_PER_S, Outcome, Status, Trajectory, Verdict};
+pub use washer_row::{MIN_SPEED_SCALE_M_PER_S, MethodKind, Verdict};

@@ -8,7 +8,7 @@ use sweep_files::{ParquetFile, key};
 use washer_live::{Setup, Sliders};
 use washer_model::{Attractor, Channel, ModeOverSpeed, ModelKind, StabilityKind, campbell};
 use washer_plot::{Live, Slider};
-use washer_row::{Level, Metric, MetricColumn};
+use washer_row::{MethodKind, Metric, MetricColumn};
 
 use crate::config::WasherGridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
@@ -114,7 +114,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
         instability_kinds: StabilityKind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         compared_channels: compared_channels(&plan).iter().map(|channel| channel.index()).collect(),
-        levels: Level::ALL.map(|level| level.name().to_owned()).to_vec(),
+        levels: MethodKind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         accuracy: setup.rule.accuracy,
         ratio_limit: setup.rule.limits.upper,
         ratio_min: setup.rule.limits.lower,

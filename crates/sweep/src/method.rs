@@ -7,8 +7,8 @@ use sweep_engine::method::{
     ACCURACY, ATOL, DOPRI5, IntegrationMethod, RK4, RTOL, Setting, StepRule,
 };
 use sweep_parameter::Range;
-use washer_model::{Method, MethodNumbers};
-use washer_row::{Level, MAX_ADAPTIVE_STEPS};
+use washer_model::{Method, MethodKind};
+use washer_row::MAX_ADAPTIVE_STEPS;
 
 /// Share of the longest stable step that plain RK4 uses as the fast method's reference.
 pub(crate) const REFERENCE_SHARE: f64 = 0.75;
@@ -51,19 +51,18 @@ pub fn rk4_mass_scaled(accuracy: f64) -> Integrator {
     METHODS[3].with(|_| accuracy)
 }
 
-/// Returns the level and the method by which each trajectory is integrated; `None` for the fast
-/// method, which compares levels.
-pub(crate) fn direct(integrator: &Integrator) -> Option<(Level, Method)> {
-    let level = Level::named(integrator.name())?;
-    let mut method = Method::with_zero_numbers(level);
-    match (method.numbers_mut(), &integrator.settings()[..]) {
-        (MethodNumbers::Step(step_s), [(_, value)]) => *step_s = *value,
-        (MethodNumbers::Tolerance(tolerance), &[(_, relative), (_, absolute)]) => {
-            *tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
+/// Returns the method by which each trajectory is integrated; `None` for the fast method, which
+/// compares levels.
+pub(crate) fn direct(integrator: &Integrator) -> Option<Method> {
+    let mut method = Method::new(MethodKind::named(integrator.name())?);
+    match (method.kind.adapts_steps(), &integrator.settings()[..]) {
+        (false, &[(_, step_s)]) => method.step_s = step_s,
+        (true, &[(_, relative), (_, absolute)]) => {
+            method.tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
         }
         _ => return None,
     }
-    Some((level, method))
+    Some(method)
 }
 
 #[cfg(test)]
@@ -86,8 +85,8 @@ mod tests {
                 assert!(setting.range.contains(value), "{key} = {value}");
                 assert_eq!(method.to_json()[key], value);
             }
-            if let Some((level, _)) = direct(&method) {
-                assert_eq!(level.name(), entry.name, "a row names its method");
+            if let Some(direct) = direct(&method) {
+                assert_eq!(direct.kind.name(), entry.name, "a row names its method");
             }
         }
     }

@@ -47,10 +47,18 @@ pub(crate) fn prepare_point(
     prepare(Simd::Scalar, &[(machine, spin)], timing).remove(0)
 }
 
+/// Prepares the machine and the spin of a scenario for integration.
+///
+/// # Errors
+/// Returns [`NoEquilibrium`] if the machine has none.
+pub(crate) fn prepare_scenario(plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
+    let timing = Timing { window_s: scenario.window_s, ..timing(plan) };
+    prepare_point(scenario.model.machine.clone(), scenario.model.spin.clone(), &timing)
+}
+
 /// Returns the reason why a point of a plan has no equilibrium, if it has none.
 pub(crate) fn failure_reason(plan: &Plan, point: u64) -> Option<String> {
-    let Washer { machine, spin, .. } = plan.scenario(point).model;
-    prepare_point(machine, spin, &timing(plan)).err().map(|reason| reason.to_string())
+    prepare_scenario(plan, &plan.scenario(point)).err().map(|reason| reason.to_string())
 }
 
 /// Returns the speed amplitudes (m/s) at which the linear model of a point takes the friction of

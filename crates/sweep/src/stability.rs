@@ -254,7 +254,9 @@ impl HeldSpeedEvaluator<'_> {
         };
         let nonlinear = trajectory(&response.nonlinear_peaks);
         let linear = trajectory(&response.linear_peaks);
-        Outcome { growth: Some(Growth::from(response)), ..Outcome::new(row, nonlinear, linear) }
+        let mut outcome = Outcome::new(row, nonlinear, linear);
+        outcome.compare(&channels, self.held.plan.reliability.limits);
+        Outcome { growth: Some(Growth::from(response)), ..outcome }
     }
 }
 

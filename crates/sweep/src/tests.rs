@@ -12,7 +12,7 @@ use sweep_engine::store::{OpenOutcome, Trials};
 use sweep_engine::{Interrupt, Model as _};
 use sweep_parameter::Worse;
 use sweep_plot::contour::zero_lines;
-use washer_row::{Criterion, Outcome, Verdict};
+use washer_row::{Criterion, Outcome};
 
 const GRID_HEAD: &str = r#"
 name = "short"
@@ -89,15 +89,14 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
     assert!(one_thread == three_threads, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
-    let outcomes = engine.evaluate_at(&all_points(&plan));
-    let channels = plan.reliability.channels.len();
+    let outcomes = engine.outcomes_at(&all_points(&plan));
     for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
         assert!(row.trials < 21, "{row:?}");
         let edge = row.edges[0];
         let distances: Vec<(f64, f64)> = outcomes
             .iter()
             .map(|outcome| {
-                let verdict = Verdict::new(outcome, channels, 2.0);
+                let verdict = &outcome.verdict;
                 let [_, damping] = plan.axis_values(outcome.point)[..] else { panic!("two axes") };
                 (damping, (verdict.greatest.unwrap().1 / 2.0).ln())
             })
@@ -131,14 +130,13 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
 /// Returns the distance of an outcome's greatest ratio from the limit.
 fn distance(outcome: &Outcome, plan: &Plan) -> f64 {
     let (quantity, _) = quantity::find_quantity(plan, "ratio_max", None).unwrap();
-    let verdict = Verdict::new(outcome, plan.reliability.channels.len(), quantity.limit);
-    quantity.distance(verdict.greatest.unwrap().1)
+    quantity.distance(outcome.verdict.greatest.unwrap().1)
 }
 
 /// Returns the distances of a grid's greatest ratios from the limit, in rows by the first axis.
 fn grid_distances(plan: &Plan) -> Vec<Vec<f64>> {
     let engine = ModelEngine::new(plan).unwrap();
-    let outcomes = engine.evaluate_at(&all_points(plan));
+    let outcomes = engine.outcomes_at(&all_points(plan));
     let ratio_distance = |outcome: &Outcome| distance(outcome, plan);
     outcomes
         .chunks(plan.axes[1].values.len() as usize)
@@ -321,7 +319,7 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
         let dampings: Vec<f64> = (0..=24).map(|k| 60.0 + 10.0 * f64::from(k)).collect();
         let points: Vec<Vec<f64>> =
             dampings.iter().map(|damping| vec![row.first, *damping]).collect();
-        for (damping, outcome) in dampings.iter().zip(engine.evaluate_at(&points)) {
+        for (damping, outcome) in dampings.iter().zip(engine.outcomes_at(&points)) {
             let is_reliable = distance(&outcome, &plan) < 0.0;
             let bracket_below =
                 row.edges.iter().rev().find(|edge| edge.bracket.is_some_and(|b| b[1] <= *damping));
@@ -469,7 +467,7 @@ fn a_force_crosses_its_limit_within_the_bracket() {
     let mut crossing_count = 0;
     for (mass, edge) in crossings.filter(|(_, edge)| edge.kind == EdgeKind::Crossing) {
         let ends = edge.bracket.unwrap().map(|damping| vec![mass, damping]);
-        let outcomes = ModelEngine::new(&task.plan).unwrap().evaluate_at(&ends);
+        let outcomes = ModelEngine::new(&task.plan).unwrap().outcomes_at(&ends);
         let forces: Vec<f64> =
             outcomes.iter().map(|outcome| outcome.nonlinear.metrics[0]).collect();
         assert!((forces[0] < limit) != (forces[1] < limit), "{mass} kg: {forces:?}");

@@ -21,7 +21,7 @@ use lane_ode::Cancel;
 use sweep_engine::config::NamedValues;
 use sweep_engine::{Error, Table, threads};
 use sweep_files::key;
-use washer_row::Level;
+use washer_row::MethodKind;
 
 use columns::add_columns;
 pub(crate) use point_files::{MAX_POINT_TRACES, write_point_traces};
@@ -156,26 +156,26 @@ pub(crate) struct TraceTable {
     pub(crate) instants: usize,
     /// A message for each integration that failed.
     pub(crate) failures: Vec<String>,
-    /// The level by which the nonlinear model was integrated; `None` for several points.
-    pub(crate) level: Option<Level>,
+    /// The kind of the nonlinear model's method; `None` for several points.
+    pub(crate) method: Option<MethodKind>,
 }
 
-/// Computes the histories of a plan's only point, whose axis values are `at`, or those of all its
-/// points if `at` is `None`. It runs in a thread pool of its own, or on the calling thread if the
-/// system starts no threads; the results have the same bits.
+/// Computes the histories of a plan's only point, which these parameters name, or those of all
+/// points without parameters. Uses a thread pool, or the calling thread if the system starts no
+/// threads; the results have the same bits.
 ///
 /// # Errors
 /// Returns [`NoEquilibrium`] if the only point has none.
 pub(crate) fn trace_in_pool(
     plan: &Plan,
-    at: Option<Vec<(String, f64)>>,
+    parameters: Option<NamedValues>,
     settings: &TraceSettings,
     cancel: Cancel<'_>,
 ) -> Result<TraceTable, NoEquilibrium> {
     // A single point has at most two integrations, one of each model.
-    let thread_count = if at.is_some() { 2 } else { threads::cores() };
-    let work = || match at {
-        Some(at) => trace_scenario(plan, plan.scenario(0), at, settings, cancel),
+    let thread_count = if parameters.is_some() { 2 } else { threads::cores() };
+    let work = || match parameters {
+        Some(parameters) => trace_scenario(plan, plan.scenario(0), parameters, settings, cancel),
         None => Ok(trace_all_points(plan, settings, cancel)),
     };
     match threads::pool(thread_count) {
@@ -186,15 +186,15 @@ pub(crate) fn trace_in_pool(
 
 /// Integrates the models of a scenario from 0 to the end of the run; both at once in a thread pool.
 ///
-/// `at` has the parameters that name the point, for the metadata. Once `stop` returns true, the
-/// integration ends early and the result is meaningless.
+/// The parameters name the point in the metadata. Once `cancel` is requested, the integration ends
+/// early and the result is meaningless.
 ///
 /// # Errors
 /// Returns [`NoEquilibrium`] if the machine has none.
 pub(crate) fn trace_scenario(
     plan: &Plan,
     scenario: Scenario,
-    at: NamedValues,
+    parameters: NamedValues,
     settings: &TraceSettings,
     cancel: Cancel<'_>,
 ) -> Result<TraceTable, NoEquilibrium> {
@@ -209,7 +209,7 @@ pub(crate) fn trace_scenario(
     };
     table.metadata(key::PLAN, &plan.to_json());
     let mut facts = json!({
-        "at": at.into_iter().collect::<BTreeMap<_, _>>(),
+        "at": parameters.into_iter().collect::<BTreeMap<_, _>>(),
         "every_s": settings.every_s,
         "equilibrium": numbered('q', run.point.equilibrium()),
         "start": start_json(&settings.start),
@@ -223,7 +223,12 @@ pub(crate) fn trace_scenario(
     }
     table.metadata(key::TRACE, &facts);
     let failures = failures.into_iter().flatten().flatten().collect();
-    Ok(TraceTable { table, instants: run.times_s.len(), failures, level: Some(run.level) })
+    Ok(TraceTable {
+        table,
+        instants: run.times_s.len(),
+        failures,
+        method: Some(run.methods[0].kind),
+    })
 }
 
 /// Computes the traces of all points of a plan, in one table with the points' numbers and axes. As
@@ -262,7 +267,7 @@ pub(crate) fn trace_all_points(
     let facts = json!({ "every_s": settings.every_s, "start": start_json(&settings.start) });
     table.metadata(key::TRACE, &facts);
     let instants = runs.iter().map(|run| run.times_s.len()).sum();
-    TraceTable { table, instants, failures, level: None }
+    TraceTable { table, instants, failures, method: None }
 }
 
 /// A point that is prepared for integration.
@@ -272,8 +277,6 @@ struct TraceRun {
     start: InitialDeviation,
     /// The method of the nonlinear model, and that of the linear one.
     methods: [Method; 2],
-    /// The level of the nonlinear model's method.
-    level: Level,
     method_json: Value,
     times_s: Vec<f64>,
 }
@@ -288,14 +291,14 @@ impl TraceRun {
         let checkpoints = settings.capped.map_or(0, |capped| capped.checkpoints);
         let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
         let point = prepare_point(machine, spin.clone(), &timing)?;
-        let (methods, level, method_json) = methods(plan, &point, &spin, settings.capped);
+        let (methods, method_json) = methods(plan, &point, &spin, settings.capped);
         let times_s = match settings.every_s {
             Some(every_s) => {
                 (0..instant_count(plan.end_s, every_s)).map(|k| k as f64 * every_s).collect()
             }
             None => spin.whole_turns_s(plan.end_s),
         };
-        Ok(Self { point, spin, start: settings.start, methods, level, method_json, times_s })
+        Ok(Self { point, spin, start: settings.start, methods, method_json, times_s })
     }
 }
 
@@ -342,34 +345,33 @@ fn numbered(letter: char, values: &[f64; COORDINATES]) -> Value {
     (1..).zip(values).map(|(i, value)| (format!("{letter}{i}"), *value)).collect()
 }
 
-/// Returns the methods of the nonlinear and the linear model, the level of the former and its
-/// description. With `capped` they are those of a map's row, which caps fast modes. Otherwise a
-/// plan that chooses levels by error gets the reference method, without capped modes.
+/// Returns the methods of the nonlinear and the linear model, and a description of the former. With
+/// `capped` they are those of a map's row, which caps fast modes. Otherwise a plan that chooses
+/// levels by error gets the reference method, without capped modes.
 fn methods(
     plan: &Plan,
     point: &Point,
     spin: &Spin,
     capped: Option<CappedRun>,
-) -> ([Method; 2], Level, Value) {
-    let json_with_level = |level: Level| {
+) -> ([Method; 2], Value) {
+    let json_with_row = |[nonlinear, _]: &[Method; 2]| {
         let mut json = plan.integrator.to_json();
-        json["row"] = level.name().into();
+        json["row"] = nonlinear.kind.name().into();
         json
     };
-    if let Some(CappedRun { level, methods, .. }) = capped {
-        return (methods, level, json_with_level(level));
+    if let Some(CappedRun { methods, .. }) = capped {
+        return (methods, json_with_row(&methods));
     }
-    match direct(&plan.integrator) {
-        Some((level, method)) => ([method; 2], level, plan.integrator.to_json()),
-        None => {
-            let steps = StepSelector::new([(point, spin)], plan.end_s);
-            let methods = ModelKind::ALL.map(|model| reference_method(&steps, model));
-            match methods[0] {
-                Method::Rk4 { step_s } => (methods, Level::Rk4, rk4(step_s).to_json()),
-                _ => (methods, Level::Dop853, json_with_level(Level::Dop853)),
-            }
-        }
+    if let Some(method) = direct(&plan.integrator) {
+        return ([method; 2], plan.integrator.to_json());
     }
+    let steps = StepSelector::new([(point, spin)], plan.end_s);
+    let methods = ModelKind::ALL.map(|model| reference_method(&steps, model));
+    let json = match methods[0].kind {
+        MethodKind::Rk4 => rk4(methods[0].step_s).to_json(),
+        _ => json_with_row(&methods),
+    };
+    (methods, json)
 }
 
 #[cfg(test)]

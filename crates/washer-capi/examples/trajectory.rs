@@ -14,5 +14,5 @@ fn main() {
     let point = prepare(simd, &[(Machine::paper(), spin)], &timing).pop();
     let point = point.expect("a point").expect("an equilibrium");
     let copies = vec![&point; simd.lanes()];
-    drop(simulate(simd, ModelKind::Nonlinear, &Method::Rk4 { step_s: 2.5e-4 }, &copies));
+    drop(simulate(simd, ModelKind::Nonlinear, &Method::rk4(2.5e-4), &copies));
 }

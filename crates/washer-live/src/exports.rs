@@ -190,11 +190,11 @@ fn write_answer(output: &mut Vec<f64>, result: &Result<Answer, PointError>, setu
         output.resize(output.len() + number_count, f64::NAN);
         return;
     };
-    let Answer { outcome, amplitudes, ratios, level_indices, levels, errors } = answer;
+    let Answer { outcome, amplitudes, ratios, level_indices, methods, errors } = answer;
     output.push(f64::from(u8::from(outcome.sensitive == Some(true))));
     for (model, run) in [&outcome.nonlinear, &outcome.linear].into_iter().enumerate() {
         let error = errors[model].unwrap_or(f64::NAN);
-        output.extend([level_indices[model] as f64, f64::from(levels[model] as u8), error]);
+        output.extend([level_indices[model] as f64, f64::from(methods[model] as u8), error]);
         let Trajectory { status, fail_time_s, steps, min_gap_m, metrics, .. } = run;
         // Failures of runs are the first statuses, in the order of `Failure`.
         let failure = f64::from((*status as u8).min(Status::StepLimit as u8));

@@ -7,8 +7,8 @@ use washer_model::{
     Spin, StartRule, Target, Timing, find_attractors, find_responses, history, prepare,
 };
 use washer_row::{
-    Deviations, DwellPeaks, Level, LevelRun, NextStep, Outcome, OutcomePurpose, RefinementLevels,
-    RefinementRule, RowRefinement, RowRule, Status, Trajectory, Verdict, integrate_points,
+    Deviations, DwellPeaks, LevelRun, MethodKind, NextStep, Outcome, OutcomePurpose,
+    RefinementLevels, RefinementRule, RowRefinement, RowRule, Status, Trajectory, integrate_points,
 };
 
 use crate::setup::Setup;
@@ -34,8 +34,8 @@ pub struct Answer {
     pub ratios: Vec<Option<f64>>,
     /// The index of the refinement level of each model's numbers.
     pub level_indices: [usize; 2],
-    /// The name of the refinement level of each model's numbers.
-    pub levels: [Level; 2],
+    /// The kind of the method of each model's numbers.
+    pub methods: [MethodKind; 2],
     /// The estimated relative error of each model's numbers, if it is known.
     pub errors: [Option<f64>; 2],
 }
@@ -55,11 +55,10 @@ impl Answer {
         let nonlinear = with_all_channels(&outcome.nonlinear, &amplitudes[0]);
         let linear = with_all_channels(&outcome.linear, &amplitudes[1]);
         let mut all_channels_outcome = Outcome::new(outcome.point, nonlinear, linear);
-        all_channels_outcome.compare_turns(&Channel::ALL);
-        let Verdict { ratios, .. } =
-            Verdict::new(&all_channels_outcome, Channel::ALL.len(), limits);
-        let levels = [0, 1].map(|model| levels_of_models[model].levels[level_indices[model]].level);
-        Self { outcome, amplitudes, ratios, level_indices, levels, errors: [None; 2] }
+        all_channels_outcome.compare(&Channel::ALL, limits);
+        let ratios = all_channels_outcome.verdict.ratios;
+        let methods = [0, 1].map(|model| levels_of_models[model].levels[level_indices[model]].kind);
+        Self { outcome, amplitudes, ratios, level_indices, methods, errors: [None; 2] }
     }
 }
 
@@ -156,7 +155,7 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, PointError>
         let answer = |(nonlinear, linear): (LevelRun, LevelRun)| {
             let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
             let mut outcome = Outcome::new(0, nonlinear.trajectory, linear.trajectory);
-            outcome.compare_turns(&rule.channels);
+            outcome.compare(&rule.channels, rule.limits);
             Answer::new(outcome, amplitudes, level_indices, levels, rule.limits)
         };
         answers.extend(group.iter().map(|(_, prepared)| match prepared {
@@ -178,22 +177,19 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
     let rule = &setup.rule;
     let refinement_rule = RefinementRule { levels, purpose: OutcomePurpose::Row, row_rule: rule };
     let mut refinement = RowRefinement::default();
+    let mut runs = Vec::new();
     let outcome = loop {
-        match refinement.next_step(0, &point, refinement_rule) {
+        let requests = match refinement.advance(runs, 0, &point, refinement_rule) {
             NextStep::Done(outcome) => break *outcome,
-            NextStep::Runs(requests) => {
-                for (model, level_index) in requests {
-                    let model_levels = &levels[model];
-                    let perturbed =
-                        model_levels.is_perturbed(level_index).then(|| point.perturbed());
-                    let start_point = perturbed.as_ref().unwrap_or(&point);
-                    for run in
-                        run_method(model, model_levels.method(level_index), &[start_point], rule)
-                    {
-                        refinement.add_run((model, level_index), run, &point, refinement_rule);
-                    }
-                }
-            }
+            NextStep::Runs(requests) => requests,
+        };
+        runs = Vec::with_capacity(requests.len());
+        for (model, level_index) in requests {
+            let model_levels = &levels[model];
+            let perturbed = model_levels.is_perturbed(level_index).then(|| point.perturbed());
+            let start_point = perturbed.as_ref().unwrap_or(&point);
+            let run = run_method(model, model_levels.method(level_index), &[start_point], rule);
+            runs.extend(run.into_iter().map(|run| ((model, level_index), run)));
         }
     };
     let finest = [0, 1].map(|model| refinement.finest_run(model, &point, refinement_rule));
@@ -214,7 +210,7 @@ fn run_method(model: usize, method: &Method, points: &[&Point], rule: &RowRule) 
 /// Returns the index of the quick level: the second level, which is accurate enough for most rows,
 /// or the first level if no modes are capped.
 fn quick_level_index(levels: &RefinementLevels) -> usize {
-    usize::from(levels.levels.get(1).is_some_and(|second_level| second_level.level.is_capped()))
+    usize::from(levels.levels.get(1).is_some_and(|second_level| second_level.kind.is_capped()))
 }
 
 /// Integrates the motion of one model at a point, at a refinement level or by default at the quick
@@ -232,9 +228,9 @@ pub fn motion(
 ) -> Result<PointHistory, PointError> {
     let point = prepare_point(setup, values)?;
     let levels = &refinement_levels(setup, values)[model as usize];
-    let level = level_index.and_then(|level_index| levels.levels.get(level_index));
-    let level = level.unwrap_or(&levels.levels[quick_level_index(levels)]);
-    let history = history(model, &level.method, &point, &InitialDeviation::default(), every_s);
+    let method = level_index.and_then(|level_index| levels.levels.get(level_index));
+    let method = method.unwrap_or(&levels.levels[quick_level_index(levels)]);
+    let history = history(model, method, &point, &InitialDeviation::default(), every_s);
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();
     Ok(PointHistory { failure: history.failure, channels, gaps_m })

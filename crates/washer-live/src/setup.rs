@@ -3,9 +3,9 @@
 use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, ElementList, Machine, MachineParameter, Method, MethodNumbers, Profile, Spin,
+    Channel, ElementList, Machine, MachineParameter, Method, MethodKind, Profile, Spin,
 };
-use washer_row::{Criterion, Level, Measures, Metric, RefinementLevel, RefinementLevels, RowRule};
+use washer_row::{Criterion, Measures, Metric, RefinementLevels, RowRule};
 
 use crate::numbers::NumberWalk;
 
@@ -50,9 +50,8 @@ impl Setup {
 
     /// Decodes a setup from [`Self::to_numbers`]; `None` for other numbers.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        let direct_levels =
-            || RefinementLevels::direct(Level::Rk4, Method::with_zero_numbers(Level::Rk4));
-        let levels = [0, 1].map(|_| direct_levels());
+        let direct = RefinementLevels::direct(Method::new(MethodKind::Rk4));
+        let levels = [direct.clone(), direct];
         let mut setup = Self {
             machine: Machine::paper(),
             spin: Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() },
@@ -141,7 +140,7 @@ fn walk_rule(walk: &mut NumberWalk<'_>, rule: &mut RowRule) -> Option<()> {
 fn walk_levels(walk: &mut NumberWalk<'_>, levels: &mut RefinementLevels) -> Option<()> {
     let mut resized = levels.levels.clone();
     walk.resize(&mut resized, &levels.levels[0])?;
-    resized.iter_mut().try_for_each(|level| walk_level(walk, level))?;
+    resized.iter_mut().try_for_each(|method| walk_method(walk, method))?;
     if resized.len() < 2 {
         return None;
     }
@@ -149,22 +148,23 @@ fn walk_levels(walk: &mut NumberWalk<'_>, levels: &mut RefinementLevels) -> Opti
     Some(())
 }
 
-fn walk_level(walk: &mut NumberWalk<'_>, level: &mut RefinementLevel) -> Option<()> {
-    walk.choice(&mut level.level, &Level::ALL)?;
+fn walk_method(walk: &mut NumberWalk<'_>, method: &mut Method) -> Option<()> {
+    walk.choice(&mut method.kind, &MethodKind::ALL)?;
     if walk.is_reading() {
-        level.method = Method::with_zero_numbers(level.level);
+        *method = Method::new(method.kind);
     }
-    match level.method.numbers_mut() {
-        MethodNumbers::Step(step_s) => walk.numbers([step_s]),
-        MethodNumbers::Capped(step_s, caps) => {
-            walk.numbers([step_s, &mut caps.bearings_rad_per_s])?;
-            walk.optional(&mut caps.hinge_rad_per_s)
-        }
-        MethodNumbers::Tolerance(Tolerance { relative, absolute, max_steps }) => {
-            let mut steps = *max_steps as f64;
-            walk.numbers([relative, absolute, &mut steps])?;
-            *max_steps = steps as u64;
-            Some(())
-        }
+    let Method { kind, step_s, caps, tolerance } = method;
+    if kind.adapts_steps() {
+        let Tolerance { relative, absolute, max_steps } = tolerance;
+        let mut steps = *max_steps as f64;
+        walk.numbers([relative, absolute, &mut steps])?;
+        *max_steps = steps as u64;
+        return Some(());
     }
+    walk.numbers([step_s])?;
+    if kind.is_capped() {
+        walk.numbers([&mut caps.bearings_rad_per_s])?;
+        walk.optional(&mut caps.hinge_rad_per_s)?;
+    }
+    Some(())
 }

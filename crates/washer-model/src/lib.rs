@@ -116,8 +116,8 @@ pub use run::history::{
 };
 pub use run::suspension::{Forces, stops_at_rest_n};
 pub use run::{
-    Checkpoint, Checkpoints, Gauge, Level, Method, MethodNumbers, Reading, Record, Recorders,
-    Snapshot, simulate, simulate_until, simulate_with,
+    Checkpoint, Checkpoints, Gauge, Method, MethodKind, Reading, Record, Recorders, Snapshot,
+    simulate, simulate_until, simulate_with,
 };
 pub use stability::{
     Crossing, CrossingEffect, Disturbance, FloquetMode, GeometryLimit, HeldSpeed, LeftRangeError,

@@ -14,8 +14,8 @@ use crate::modes::{highest_rigid_frequency_rad_per_s, modes};
 use crate::point::{self, segments};
 use crate::steps::round_down_to_bits;
 use crate::{
-    Caps, FrictionSpeed, Gauge, Machine, Method, ModelKind, NoEquilibrium, Point, Recorders, Spin,
-    Timing, simulate_with,
+    Caps, FrictionSpeed, Gauge, Machine, Method, MethodKind, ModelKind, NoEquilibrium, Point,
+    Recorders, Spin, Timing, simulate_with,
 };
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -268,7 +268,7 @@ pub fn prepare(
             let step_s = batch[0].step_s;
             let cap = CAP_STABILITY_SHARE * RK4_STABILITY_LIMIT / step_s;
             let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
-            let method = Method::Capped { step_s, caps };
+            let method = Method::capped(MethodKind::Capped0, step_s, caps);
             let batch_points: Vec<&Point> =
                 batch.iter().map(|point_search| &point_search.point).collect();
             let simd = simd.narrowed(batch_points.len());

@@ -13,7 +13,7 @@ mod snapshots;
 pub(crate) mod suspension;
 
 pub use loads::Gauge;
-pub use method::{Level, Method, MethodNumbers};
+pub use method::{Method, MethodKind};
 pub use recorders::{Reading, Recorders};
 pub use snapshots::Snapshot;
 
@@ -390,6 +390,6 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         let point = self.points[state.point];
         let segment = &point.segments[state.segment];
         self.in_window.0.set(lane, f64::from(u8::from(segment.in_window)));
-        start_segment(&mut self.model, lane, *self.method, point, segment)
+        start_segment(&mut self.model, lane, self.method, point, segment)
     }
 }

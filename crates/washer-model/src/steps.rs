@@ -9,7 +9,7 @@ pub(crate) mod formula;
 
 use crate::highest_frequency_rad_per_s;
 use crate::modes::{highest_capped_frequency_rad_per_s, mode_roots};
-use crate::{Caps, Formula, Method, ModelKind, ModesError, Point, Spin};
+use crate::{Caps, Formula, Method, MethodKind, ModelKind, ModesError, Point, Spin};
 use lane_ode::Cancel;
 
 /// The number of modes of the suspension: yaw, pitch and two translations.
@@ -99,9 +99,9 @@ fn caps(model: ModelKind, step_s: f64) -> Caps {
     Caps { bearings_rad_per_s, hinge_rad_per_s: None }
 }
 
-/// Returns the method that integrates a model in steps of `step_s` with capped bearing modes.
-pub fn capped_method(model: ModelKind, step_s: f64) -> Method {
-    Method::Capped { step_s, caps: caps(model, step_s) }
+/// Returns the method of a capped kind that integrates a model in these steps (s).
+pub fn capped_method(model: ModelKind, kind: MethodKind, step_s: f64) -> Method {
+    Method::capped(kind, step_s, caps(model, step_s))
 }
 
 impl<'a> StepSelector<'a> {

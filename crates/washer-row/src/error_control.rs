@@ -35,9 +35,9 @@
 //! oscillation of a free body (`SWING_FACTOR`), and the scale of each metric.
 
 use lane_ode::Tolerance;
-use washer_model::{Formula, Level, Method, ModelKind, StepSelector, capped_method};
+use washer_model::{Formula, Method, MethodKind, ModelKind, StepSelector, capped_method};
 
-use crate::levels::{FamilyStart, RESOLVING_LEVELS, RefinementLevel, RefinementLevels};
+use crate::levels::{FamilyStart, RESOLVING_LEVELS, RefinementLevels};
 
 /// Safety factor: the estimated error of a level, divided by its difference from the level before.
 ///
@@ -115,14 +115,17 @@ fn step_ratio(order: f64) -> f64 {
     STEP_CONTRACTION.powf(1.0 / order)
 }
 
-/// Returns the contraction of the error from a level to the next `level`.
+/// Returns the contraction of the error from a level to the next, whose method
+/// is of this kind.
 ///
 /// `start` is that of the first of the two. The difference of a level that starts to resolve modes
 /// is their ringing, and says nothing of its own error: the contraction is infinite.
-pub(crate) fn contraction(level: Level, start: FamilyStart) -> f64 {
-    match (start, level) {
+pub(crate) fn contraction(kind: MethodKind, start: FamilyStart) -> f64 {
+    match (start, kind) {
         (FamilyStart::Modes, _) => f64::INFINITY,
-        (FamilyStart::Method, _) | (FamilyStart::None, Level::Additive) => 1.0 / TOLERANCE_RATIO,
+        (FamilyStart::Method, _) | (FamilyStart::None, MethodKind::Additive) => {
+            1.0 / TOLERANCE_RATIO
+        }
         (FamilyStart::None, _) => STEP_CONTRACTION,
     }
 }
@@ -163,15 +166,15 @@ pub fn refinement_levels(
     // The rows of a machine whose modes are unknown report that themselves.
     if let Ok(Some(longest_s)) = steps.capped_step_s(model) {
         let mut step_s = longest_s;
-        for level in Level::CAPPED {
+        for kind in MethodKind::CAPPED {
             if step_s < ratio * first_s {
                 break;
             }
-            levels.push(RefinementLevel { level, method: capped_method(model, step_s) });
+            levels.push(capped_method(model, kind, step_s));
             step_s /= ratio;
         }
     }
-    let following_s = push_uncapped(&mut levels, UNCAPPED_LEVELS, rk4, [first_s, ratio]);
+    let following_s = push_uncapped(&mut levels, UNCAPPED_LEVELS, Method::rk4, [first_s, ratio]);
     push_resolving(&mut levels, steps, model, following_s);
     RefinementLevels::checked(levels, None)
 }
@@ -185,8 +188,7 @@ fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevel
     while relative > 0.999 * LEAST_TOLERANCE {
         let absolute = ABSOLUTE_TO_RELATIVE * relative;
         let tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
-        let method = Method::Additive(tolerance);
-        levels.push(RefinementLevel { level: Level::Additive, method });
+        levels.push(Method::additive(tolerance));
         relative *= TOLERANCE_RATIO;
     }
     let first_s = match steps.plain_step_s(Formula::Dop853) {
@@ -194,54 +196,44 @@ fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevel
         None => CORNER_STEP_S,
     };
     let ratio = step_ratio(CORNER_ORDER);
-    let following_s = push_uncapped(&mut levels, CORNER_LEVELS, dop853, [first_s, ratio]);
+    let following_s = push_uncapped(&mut levels, CORNER_LEVELS, Method::dop853, [first_s, ratio]);
     push_resolving(&mut levels, steps, ModelKind::Nonlinear, following_s);
     RefinementLevels::checked(levels, Some(AT_CORNERS.to_owned()))
 }
 
 /// Adds the levels whose steps resolve the bearings' modes.
 fn push_resolving(
-    levels: &mut Vec<RefinementLevel>,
+    levels: &mut Vec<Method>,
     steps: &StepSelector<'_>,
     model: ModelKind,
     longest_s: f64,
 ) {
-    let (formula, level, resolving_rad): (_, fn(f64) -> RefinementLevel, _) = match model {
-        ModelKind::Nonlinear => (Formula::Dop853, dop853, RESOLVING_RAD[0]),
-        ModelKind::Linear => (Formula::Rk4, rk4, RESOLVING_RAD[1]),
+    let (formula, method, resolving_rad): (_, fn(f64) -> Method, _) = match model {
+        ModelKind::Nonlinear => (Formula::Dop853, Method::dop853, RESOLVING_RAD[0]),
+        ModelKind::Linear => (Formula::Rk4, Method::rk4, RESOLVING_RAD[1]),
     };
     let resolving_s = match steps.plain_step_s(formula) {
         Some(stable_s) => stable_s * resolving_rad / formula.limit(),
         None => longest_s,
     };
     let first_s = resolving_s.min(longest_s);
-    push_uncapped(levels, RESOLVING_LEVELS, level, [first_s, step_ratio(CAPPED_ORDER)]);
+    push_uncapped(levels, RESOLVING_LEVELS, method, [first_s, step_ratio(CAPPED_ORDER)]);
 }
 
 /// Adds levels without capped modes, the first with a step of `first_s`, each other with the step
 /// before divided by `ratio`. Returns the step after the last.
 fn push_uncapped(
-    levels: &mut Vec<RefinementLevel>,
+    levels: &mut Vec<Method>,
     count: usize,
-    level: fn(f64) -> RefinementLevel,
+    method: fn(f64) -> Method,
     [first_s, ratio]: [f64; 2],
 ) -> f64 {
     let mut step_s = first_s;
     for _ in 0..count {
-        levels.push(level(step_s));
+        levels.push(method(step_s));
         step_s /= ratio;
     }
     step_s
-}
-
-/// Returns a level of order 4 without capped modes.
-fn rk4(step_s: f64) -> RefinementLevel {
-    RefinementLevel { level: Level::Rk4, method: Method::Rk4 { step_s } }
-}
-
-/// Returns a level of order 8 without capped modes.
-fn dop853(step_s: f64) -> RefinementLevel {
-    RefinementLevel { level: Level::Dop853, method: Method::Dop853 { step_s } }
 }
 
 /// The reason why a machine with friction or stops has no levels with capped modes.
@@ -262,10 +254,10 @@ mod tests {
 
     #[test]
     fn a_new_family_contracts_the_error_more_than_a_shorter_step() {
-        assert_eq!(contraction(Level::Dop853, FamilyStart::None), 1.5);
-        assert_eq!(contraction(Level::Dop853, FamilyStart::Method), 10.0);
-        assert_eq!(contraction(Level::Dop853, FamilyStart::Modes), f64::INFINITY);
-        assert_eq!(contraction(Level::Additive, FamilyStart::None), 10.0);
+        assert_eq!(contraction(MethodKind::Dop853, FamilyStart::None), 1.5);
+        assert_eq!(contraction(MethodKind::Dop853, FamilyStart::Method), 10.0);
+        assert_eq!(contraction(MethodKind::Dop853, FamilyStart::Modes), f64::INFINITY);
+        assert_eq!(contraction(MethodKind::Additive, FamilyStart::None), 10.0);
     }
 
     /// Levels whose errors decrease at least by the ratio have errors of at most the estimate.
@@ -277,7 +269,7 @@ mod tests {
                 let error = |level: i32| ratio.powf(-f64::from(level) * (order + steeper));
                 let [first, second] = [1, 2].map(|level| error(level - 1) - error(level));
                 assert!(error_of_level(first, 0.0).unwrap() >= 0.999_999 * error(1));
-                let contracted = first / contraction(Level::Capped1, FamilyStart::None);
+                let contracted = first / contraction(MethodKind::Capped1, FamilyStart::None);
                 assert!(error_of_level(second, contracted).unwrap() >= 0.999_999 * error(2));
             }
         }

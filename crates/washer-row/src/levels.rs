@@ -1,43 +1,9 @@
 //! Refinement levels: the methods by which a trajectory is integrated, coarsest first.
 
-use washer_model::{Formula, Level, Method, MethodNumbers, ModelKind, UnresolvedModes};
+use washer_model::{Method, MethodKind, UnresolvedModes};
 
 /// The number of levels that resolve the bearings' modes, which come last. Two give one difference.
 pub(crate) const RESOLVING_LEVELS: usize = 2;
-
-/// A level of refinement.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RefinementLevel {
-    /// The row's `method`.
-    pub level: Level,
-    /// The integrator with its numbers.
-    pub method: Method,
-}
-
-impl RefinementLevel {
-    /// Returns a one-line description of the level for this model.
-    pub fn describe(&self, model: ModelKind) -> String {
-        let name = self.level.name();
-        let mut method = self.method;
-        match method.numbers_mut() {
-            MethodNumbers::Capped(step_s, caps) => {
-                let order = match Formula::for_model(model) {
-                    Formula::Rk4 => 4,
-                    Formula::Dop853 => 8,
-                };
-                let cap = caps.bearings_rad_per_s;
-                format!(
-                    "{name} (order {order}, step {:.3} ms, bearings capped at {cap:.0} rad/s)",
-                    1e3 * *step_s
-                )
-            }
-            MethodNumbers::Step(step_s) => format!("{name} (step {:.3} ms)", 1e3 * *step_s),
-            MethodNumbers::Tolerance(tolerance) => {
-                format!("{name} (tolerance {:.0e})", tolerance.relative)
-            }
-        }
-    }
-}
 
 /// The change by which a level starts a family, whose errors have other terms than those of the
 /// level before.
@@ -55,7 +21,7 @@ pub enum FamilyStart {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RefinementLevels {
     /// The levels, coarsest first; at least one.
-    pub levels: Vec<RefinementLevel>,
+    pub levels: Vec<Method>,
     /// Whether each level is compared with the one before.
     is_checked: bool,
     /// The reason why no modes are capped, if there is one.
@@ -64,12 +30,12 @@ pub struct RefinementLevels {
 
 impl RefinementLevels {
     /// Creates a single level of this method, without a comparison.
-    pub fn direct(level: Level, method: Method) -> Self {
-        Self { levels: vec![RefinementLevel { level, method }], is_checked: false, note: None }
+    pub fn direct(method: Method) -> Self {
+        Self { levels: vec![method], is_checked: false, note: None }
     }
 
     /// Creates levels each of which is compared with the one before; at least two.
-    pub const fn checked(levels: Vec<RefinementLevel>, note: Option<String>) -> Self {
+    pub const fn checked(levels: Vec<Method>, note: Option<String>) -> Self {
         Self { levels, is_checked: true, note }
     }
 
@@ -80,17 +46,16 @@ impl RefinementLevels {
 
     /// Returns the index of the first level without capped modes.
     pub fn first_uncapped(&self) -> usize {
-        let is_capped = |level: &RefinementLevel| level.level.is_capped();
-        self.levels.iter().take_while(|level| is_capped(level)).count()
+        self.levels.iter().take_while(|method| method.kind.is_capped()).count()
     }
 
     /// Returns whether a level starts a family of levels, and by which change.
     pub fn family_start(&self, level_index: usize) -> FamilyStart {
         let Some(previous_index) = level_index.checked_sub(1) else { return FamilyStart::None };
-        let [previous, level] = [previous_index, level_index].map(|index| self.levels[index].level);
+        let [previous, kind] = [previous_index, level_index].map(|index| self.levels[index].kind);
         if self.unresolved_modes(previous_index) != self.unresolved_modes(level_index) {
             FamilyStart::Modes
-        } else if previous != level && !level.is_capped() {
+        } else if previous != kind && !kind.is_capped() {
             FamilyStart::Method
         } else {
             FamilyStart::None
@@ -104,7 +69,7 @@ impl RefinementLevels {
 
     /// Returns the modes that a level does not resolve, if there are any.
     pub fn unresolved_modes(&self, level_index: usize) -> Option<UnresolvedModes> {
-        if self.levels[level_index].level.is_capped() {
+        if self.levels[level_index].kind.is_capped() {
             Some(UnresolvedModes::HingeAndBearings)
         } else if level_index < self.first_resolving() {
             Some(UnresolvedModes::Bearings)
@@ -126,14 +91,13 @@ impl RefinementLevels {
 
     /// Returns the method of a level, or of its perturbed run.
     pub fn method(&self, level_index: usize) -> &Method {
-        &self.levels[level_index % self.levels.len()].method
+        &self.levels[level_index % self.levels.len()]
     }
 
-    /// Returns the method of the given capped level. If the model lacks that level, returns the
-    /// method of the finest capped level that is coarser.
-    pub fn capped_method(&self, level: Level) -> Option<Method> {
-        let is_within =
-            |candidate: &&RefinementLevel| candidate.level.is_capped() && candidate.level <= level;
-        self.levels.iter().rfind(is_within).map(|candidate| candidate.method)
+    /// Returns the method of the given capped kind; if the model lacks it, of the finest coarser
+    /// capped kind.
+    pub fn capped_method(&self, kind: MethodKind) -> Option<Method> {
+        let is_within = |method: &&Method| method.kind.is_capped() && method.kind <= kind;
+        self.levels.iter().rfind(is_within).copied()
     }
 }

@@ -9,8 +9,8 @@
 //!   trajectories at one of them.
 //! * [`RowRefinement`] is a row under refinement: it requests trajectories, compares them with the
 //!   level before, and estimates the error by the rule of `error_control.rs`.
-//! * An [`Outcome`] is the result: both models' amplitudes and [`Metric`]s. A [`Verdict`] compares
-//!   them.
+//! * An [`Outcome`] is the result: both models' amplitudes and [`Metric`]s. Its [`Verdict`]
+//!   compares them.
 
 #![allow(missing_docs, reason = "a name that is clear needs no comment")]
 
@@ -25,11 +25,12 @@ mod separation;
 mod verdict;
 
 pub use error_control::{MAX_ADAPTIVE_STEPS, refinement_levels};
-pub use levels::{RefinementLevel, RefinementLevels};
+pub use levels::RefinementLevels;
 pub use measures::{Criterion, MIN_SPEED_SCALE_M_PER_S, Measures, MetricColumn};
 pub use metrics::{Metric, MetricProperties, MetricSource, PartKind};
 pub use outcome::{Deviations, DwellPeaks, GrowingMode, Growth, Outcome, Status, Trajectory};
 pub use refinement::{NextStep, OutcomePurpose, RefinementRule, RowRefinement};
 pub use run::{LevelRun, RowRule, integrate_points};
-pub use verdict::{ROW_STATUSES, Verdict, row_status};
-pub use washer_model::Level;
+pub use sweep_parameter::Verdict;
+pub use verdict::{ROW_STATUSES, row_status};
+pub use washer_model::MethodKind;

@@ -1,10 +1,11 @@
 //! Measures of a trajectory: the amplitude by which the two models are compared, and metrics.
 
-use sweep_parameter::{Worse, named};
+use sweep_parameter::{RatioLimits, Worse, named};
 use washer_model::{Channel, Gauge, Reading, Recorders};
 
 use crate::metrics::{LeastScale, Metric, MetricProperties, MetricSource, PartKind};
 use crate::outcome::{Deviations, Outcome};
+use crate::verdict::verdict;
 
 /// The greatest deviation of a machine at rest, relative to the clearance between drum and tub (for
 /// angles, to the clearance over a lever of one metre).
@@ -217,8 +218,14 @@ impl Measures {
 }
 
 impl Outcome {
+    /// Compares the amplitudes of both models, or their turns if both have turns.
+    pub fn compare(&mut self, channels: &[Channel], limits: RatioLimits) {
+        self.compare_turns(channels);
+        self.verdict = verdict(self, channels.len(), limits);
+    }
+
     /// Computes [`Outcome::turn_ratios`] from the turns of both models, if both have turns.
-    pub fn compare_turns(&mut self, channels: &[Channel]) {
+    fn compare_turns(&mut self, channels: &[Channel]) {
         let nonlinear = &self.nonlinear.turns;
         let linear = &self.linear.turns;
         self.turn_ratios.clear();
@@ -235,7 +242,7 @@ impl Outcome {
         }));
     }
 
-    /// Removes the deviations by turn, which only [`Self::compare_turns`] needs.
+    /// Removes the deviations by turn, which only [`Self::compare`] needs.
     pub fn drop_turns(&mut self) {
         self.nonlinear.turns = Vec::new();
         self.linear.turns = Vec::new();

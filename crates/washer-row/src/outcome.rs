@@ -1,11 +1,12 @@
 //! The outcome of a grid point: one row of the result file.
 
+use sweep_parameter::Verdict;
 use washer_model::{
     Attractor, AttractorStatus, Attractors, Channel, Disturbance, GeometryLimit, Response,
     ResponseError,
 };
 
-use crate::Level;
+use crate::MethodKind;
 
 /// The reason why a trajectory ended. Its position in this list is its code in chunk files, so that
 /// new reasons are added at the end.
@@ -186,8 +187,8 @@ pub struct Outcome {
     pub point: u64,
     pub nonlinear: Trajectory,
     pub linear: Trajectory,
-    /// The refinement level of the nonlinear trajectory.
-    pub method: Level,
+    /// The kind of the method of the nonlinear trajectory.
+    pub method: MethodKind,
     /// The estimate of the row's relative error by the differences of its levels; `None` if no
     /// levels were compared.
     pub error: Option<f64>,
@@ -196,6 +197,8 @@ pub struct Outcome {
     /// Whether the motion is chaotic: its levels do not agree, and a perturbed run separates
     /// exponentially. `None` if no levels were compared.
     pub sensitive: Option<bool>,
+    /// The comparison of the two trajectories, once it is made.
+    pub verdict: Verdict,
     /// The ratios of the envelope criterion, per channel of the plan; `None` where undefined. Empty
     /// if the ratios are quotients of amplitudes, or if a model failed.
     pub turn_ratios: Vec<Option<f64>>,

@@ -1,7 +1,8 @@
 //! Refines a row: stores the finest trajectory of each model, and decides which level is integrated
 //! next.
 
-use washer_model::{Level, ModelKind, Point, UnresolvedModes};
+use sweep_parameter::{RatioLimits, Verdict};
+use washer_model::{MethodKind, ModelKind, Point, UnresolvedModes};
 
 use crate::error_control::{amplification, contraction, error_of_chaos, error_of_level};
 use crate::levels::{FamilyStart, RefinementLevels};
@@ -10,7 +11,6 @@ use crate::metrics::Metric;
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::run::{LevelRun, RowRule};
 use crate::separation::Separation;
-use crate::verdict::Verdict;
 
 /// The purpose of an outcome, on which its accuracy depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,11 +103,12 @@ struct LevelDifference {
 }
 
 impl LevelDifference {
-    /// Returns the difference divided by the contraction of the error from this level to the next
-    /// `level`. Families that cannot be compared say nothing of each other's errors.
-    fn contracted_to(self, level: Level) -> f64 {
+    /// Returns the difference divided by the contraction of the error from this level to the
+    /// next, whose method is of this kind. Families that cannot be compared say nothing of each
+    /// other's errors.
+    fn contracted_to(self, kind: MethodKind) -> f64 {
         match (self.relative, self.start) {
-            (Some(relative), start) => relative / contraction(level, start),
+            (Some(relative), start) => relative / contraction(kind, start),
             (None, FamilyStart::None) => f64::INFINITY,
             (None, _) => 0.0,
         }
@@ -167,9 +168,9 @@ impl ModelRefinement {
         if let Some(PerturbedComparison { is_chaotic: true, difference }) = self.perturbed {
             return error_of_chaos(self.last_difference()?, difference?);
         }
-        let level = rule.levels.levels[self.level].level;
+        let kind = rule.levels.levels[self.level].kind;
         let contracted_difference = match self.differences[..] {
-            [.., previous, _] => previous.contracted_to(level),
+            [.., previous, _] => previous.contracted_to(kind),
             _ => 0.0,
         };
         let error = error_of_level(self.last_difference()?, contracted_difference)?;
@@ -228,15 +229,19 @@ pub enum NextStep {
 }
 
 impl RowRefinement {
-    /// Adds a run that [`Self::next_step`] has requested.
-    pub fn add_run(
+    /// Takes the runs that the last call has requested, none at first, and returns the next step.
+    /// `point_index` is the point of the outcome.
+    pub fn advance(
         &mut self,
-        (model, level): (usize, usize),
-        run: LevelRun,
+        runs: Vec<((usize, usize), LevelRun)>,
+        point_index: u64,
         point: &Point,
         refinement_rule: RefinementRule<'_>,
-    ) {
-        self.0[model].add_run(level, run, refinement_rule.for_model(model, point));
+    ) -> NextStep {
+        for ((model, level), run) in runs {
+            self.0[model].add_run(level, run, refinement_rule.for_model(model, point));
+        }
+        self.next_step(point_index, point, refinement_rule)
     }
 
     /// Returns the finest run of a model with its level and its error; `None` if no run was added.
@@ -257,9 +262,8 @@ impl RowRefinement {
         self.0[model].run.as_ref().map_or(0, |run| run.trajectory.steps)
     }
 
-    /// Returns the next step, after every requested run has been added. `point_index` is the index
-    /// of the outcome's point.
-    pub fn next_step(
+    /// Returns the next step, once every requested run has been taken.
+    fn next_step(
         &self,
         point_index: u64,
         point: &Point,
@@ -271,8 +275,9 @@ impl RowRefinement {
         let errors =
             [0, 1].map(|model| self.0[model].error(refinement_rule.for_model(model, point)));
         let outcome = self.outcome(point_index, point, refinement_rule, errors);
+        let limits = refinement_rule.row_rule.limits;
         let verdict_margin =
-            outcome.as_ref().and_then(|outcome| relative_margin(outcome, refinement_rule.row_rule));
+            outcome.as_ref().and_then(|outcome| relative_margin(&outcome.verdict, limits));
         let error = errors[0].zip(errors[1]).map(|(nonlinear, linear)| nonlinear + linear);
         let is_verdict_certain =
             verdict_margin.zip(error).is_some_and(|(verdict_margin, error)| error < verdict_margin);
@@ -306,8 +311,8 @@ impl RowRefinement {
             refinement.run.as_ref().map(|run| run.trajectory.clone())
         };
         let mut outcome = Outcome::new(point_index, trajectory(nonlinear)?, trajectory(linear)?);
-        outcome.compare_turns(&rule.channels);
-        outcome.method = levels[0].levels[nonlinear.level].level;
+        outcome.compare(&rule.channels, rule.limits);
+        outcome.method = levels[0].levels[nonlinear.level].kind;
         if rule.measures.metrics.contains(&Metric::StaticSag) {
             outcome.static_sag_m = Some(point.static_sag_m());
         }
@@ -327,9 +332,8 @@ impl RowRefinement {
 }
 
 /// Returns the distance of the ratios from the nearest limit, relative to the limit.
-fn relative_margin(outcome: &Outcome, rule: &RowRule) -> Option<f64> {
-    let Verdict { least, greatest, .. } = Verdict::new(outcome, rule.channels.len(), rule.limits);
-    Some(rule.limits.margin(least?.1, greatest?.1))
+fn relative_margin(verdict: &Verdict, limits: RatioLimits) -> Option<f64> {
+    Some(limits.margin(verdict.least?.1, verdict.greatest?.1))
 }
 
 /// Returns the greatest relative difference of the numbers that a row takes from two trajectories;

@@ -1,7 +1,7 @@
 //! The verdict of a row: the ratios of its two trajectories, the greatest of them, whether the
 //! linear model is reliable, and the row's status.
 
-use sweep_parameter::RatioLimits;
+use sweep_parameter::{RatioLimits, Verdict};
 
 use crate::outcome::{Outcome, Status};
 
@@ -46,52 +46,26 @@ pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
     }
 }
 
-/// The comparison of the two models at one grid point.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Verdict {
-    /// The ratio of nonlinear to linear amplitude per channel of the plan, or the greatest such
-    /// ratio over the drum's turns; `None` if the linear amplitude is zero or a model failed.
-    pub ratios: Vec<Option<f64>>,
-    /// The greatest defined ratio, with its channel's position in the plan; the first channel's if
-    /// several are equal.
-    pub greatest: Option<(usize, f64)>,
-    /// The least defined ratio, with its channel's position in the plan; the first channel's if
-    /// several are equal.
-    pub least: Option<(usize, f64)>,
-    /// Whether the ratios are between the limits; `None` where no ratio is defined.
-    pub reliable: Option<bool>,
-}
-
-impl Verdict {
-    /// Compares the amplitudes of an outcome over `channels` channels.
-    pub fn new(outcome: &Outcome, channels: usize, limits: impl Into<RatioLimits>) -> Self {
-        let limits = limits.into();
-        let nonlinear = &outcome.nonlinear.amplitudes;
-        let linear = &outcome.linear.amplitudes;
-        let ratio = |i: usize| {
-            if let Some(turn_ratio) = outcome.turn_ratios.get(i) {
-                return *turn_ratio;
-            }
-            match (nonlinear.get(i), linear.get(i)) {
-                (Some(nonlinear), Some(linear)) if *linear != 0.0 => Some(nonlinear / linear),
-                _ => None,
-            }
-        };
-        let ratios: Vec<Option<f64>> = (0..channels).map(ratio).collect();
-        let extreme = |is_more_extreme: fn(f64, f64) -> bool| {
-            let defined = ratios.iter().enumerate().filter_map(|(i, ratio)| Some((i, (*ratio)?)));
-            defined.reduce(
-                |extreme, next| if is_more_extreme(next.1, extreme.1) { next } else { extreme },
-            )
-        };
-        let greatest = extreme(|a, b| a > b);
-        let least = extreme(|a, b| a < b);
-        let reliable = match (least, greatest) {
-            (Some((_, least)), Some((_, greatest))) => Some(limits.contain(least, greatest)),
+/// Compares the amplitudes of an outcome over `channels` channels: their ratios, or the greatest
+/// ratios over the drum's turns. A ratio is not defined if the linear amplitude is zero or a model
+/// failed.
+pub(crate) fn verdict(
+    outcome: &Outcome,
+    channels: usize,
+    limits: impl Into<RatioLimits>,
+) -> Verdict {
+    let nonlinear = &outcome.nonlinear.amplitudes;
+    let linear = &outcome.linear.amplitudes;
+    let ratio = |i: usize| {
+        if let Some(turn_ratio) = outcome.turn_ratios.get(i) {
+            return *turn_ratio;
+        }
+        match (nonlinear.get(i), linear.get(i)) {
+            (Some(nonlinear), Some(linear)) if *linear != 0.0 => Some(nonlinear / linear),
             _ => None,
-        };
-        Self { ratios, greatest, least, reliable }
-    }
+        }
+    };
+    Verdict::new((0..channels).map(ratio).collect(), limits.into())
 }
 
 #[cfg(test)]
@@ -113,11 +87,11 @@ mod tests {
             trajectory(Status::Ok, &[2.0, 3.0, 6.0], None),
             trajectory(Status::Ok, &[2.0, 1.0, 2.0], None),
         );
-        let verdict = Verdict::new(&row, 3, 3.0);
-        assert_eq!(verdict.ratios, [Some(1.0), Some(3.0), Some(3.0)]);
-        assert_eq!(verdict.greatest, Some((1, 3.0)));
-        assert_eq!(verdict.reliable, Some(false), "reliable means below the limit, not at it");
-        assert_eq!(Verdict::new(&row, 3, 3.5).reliable, Some(true));
+        let found = verdict(&row, 3, 3.0);
+        assert_eq!(found.ratios, [Some(1.0), Some(3.0), Some(3.0)]);
+        assert_eq!(found.greatest, Some((1, 3.0)));
+        assert_eq!(found.reliable, Some(false), "reliable means below the limit, not at it");
+        assert_eq!(verdict(&row, 3, 3.5).reliable, Some(true));
     }
 
     #[test]
@@ -127,8 +101,8 @@ mod tests {
             trajectory(Status::Ok, &[1.0, 2.0, 2.0], None),
         );
         let reliable =
-            |lower| Verdict::new(&row, 3, RatioLimits { upper: 2.0, lower }).reliable.unwrap();
-        assert_eq!(Verdict::new(&row, 3, 2.0).least, Some((1, 0.15)));
+            |lower| verdict(&row, 3, RatioLimits { upper: 2.0, lower }).reliable.unwrap();
+        assert_eq!(verdict(&row, 3, 2.0).least, Some((1, 0.15)));
         assert!(reliable(None) && reliable(Some(0.1)));
         assert!(!reliable(Some(0.15)) && !reliable(Some(0.5)), "at the limit is not above it");
     }
@@ -140,9 +114,9 @@ mod tests {
             trajectory(Status::Ok, &[2.0, 1.0], None),
         );
         row.turn_ratios = vec![Some(4.0), None];
-        let verdict = Verdict::new(&row, 2, 3.5);
-        assert_eq!((verdict.ratios, verdict.greatest), (vec![Some(4.0), None], Some((0, 4.0))));
-        assert_eq!(verdict.reliable, Some(false));
+        let found = verdict(&row, 2, 3.5);
+        assert_eq!((found.ratios, found.greatest), (vec![Some(4.0), None], Some((0, 4.0))));
+        assert_eq!(found.reliable, Some(false));
     }
 
     #[test]
@@ -151,14 +125,14 @@ mod tests {
             trajectory(Status::Ok, &[1.0, 1.0], None),
             trajectory(Status::Ok, &[0.0, 1.0], None),
         );
-        assert_eq!(Verdict::new(&row, 2, 2.0).ratios, [None, Some(1.0)]);
-        assert_eq!(Verdict::new(&row, 2, 2.0).reliable, Some(true));
+        assert_eq!(verdict(&row, 2, 2.0).ratios, [None, Some(1.0)]);
+        assert_eq!(verdict(&row, 2, 2.0).reliable, Some(true));
         let at_rest = outcome(
             trajectory(Status::Ok, &[0.0, 0.0], None),
             trajectory(Status::Ok, &[0.0, 0.0], None),
         );
         assert_eq!(
-            Verdict::new(&at_rest, 2, 2.0),
+            verdict(&at_rest, 2, 2.0),
             Verdict { ratios: vec![None, None], greatest: None, least: None, reliable: None }
         );
     }
@@ -169,7 +143,7 @@ mod tests {
             trajectory(Status::Diverged, &[], Some(3.5)),
             trajectory(Status::Ok, &[1.0, 1.0], None),
         );
-        assert_eq!(Verdict::new(&row, 2, 2.0).reliable, None);
+        assert_eq!(verdict(&row, 2, 2.0).reliable, None);
         assert_eq!(row_status(&row), (1, Some(3.5)));
         let row = outcome(
             trajectory(Status::Ok, &[1.0], None),

@@ -271,6 +271,28 @@ impl Layout {
         Arc::new(Schema::new(self.all_columns().map(DeclaredColumn::field).collect::<Vec<_>>()))
     }
 
+    /// Returns the number in a row's cell of a column; `None` for null, flags and names, and
+    /// without such a column.
+    pub fn number(&self, row: &RowCells, column: &str) -> Option<f64> {
+        let k = self.position(column)?;
+        self.columns[k].number(*row.get(k)?)
+    }
+
+    /// Returns the truth value in a row's cell of a column; `None` for null, and without such a
+    /// column.
+    pub fn flag(&self, row: &RowCells, column: &str) -> Option<bool> {
+        let k = self.position(column).filter(|k| self.columns[*k].kind == CellType::Flag)?;
+        row.get(k)?.map(|flag| flag != 0)
+    }
+
+    /// Returns the name in a row's cell of a column; `None` for null, and without such a column of
+    /// names.
+    pub fn name(&self, row: &RowCells, column: &str) -> Option<&'static str> {
+        let k = self.position(column)?;
+        let CellType::Name(names) = &self.columns[k].kind else { return None };
+        names.get((*row.get(k)?)? as usize).copied()
+    }
+
     /// Returns the position of a column among those of the model.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.name == name)

@@ -35,12 +35,12 @@ disturbance is measured by its energy. docs/stability.md explains every line.";
 /// Returns an error for mistakes in the grid file or the options, for a profile that cannot be
 /// explained, and for a machine without equilibrium or modes.
 pub(crate) fn run(args: &ExplainArgs) -> Result<Exit, Error> {
-    let (plan, at) = args.grid.load_point(&args.grid.at)?;
+    let (plan, parameters) = args.grid.load_point(&args.grid.at)?;
     // A signal ends the process, because there are no partial results to keep.
     let interrupt = Interrupt::new();
-    let found = explain(&plan, at, args.speed, args.execution.with(&interrupt))?;
+    let explanation = explain(&plan, parameters, args.speed, args.execution.with(&interrupt))?;
     if args.json {
-        return show(&format!("{:#}\n", json::to_json(&found)));
+        return show(&format!("{:#}\n", json::to_json(&explanation)));
     }
-    show(&format::to_text(&found))
+    show(&format::to_text(&explanation))
 }

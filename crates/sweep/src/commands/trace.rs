@@ -10,14 +10,15 @@ use crate::trace::{
     start_from, trace_in_pool,
 };
 use lane_ode::Cancel;
+use sweep_engine::columns::MODELS;
 use sweep_engine::commands::cells::{Lines as _, format_number, format_range, format_table};
 use sweep_engine::commands::grid::quoted;
-use sweep_engine::{Error, Exit, Job, tell};
+use sweep_engine::{Error, Exit, Interrupt, Job, RunContext, tell};
 use sweep_files::{FileKind, Output, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, ResultTable, top};
 use washer_model::Channel;
-use washer_row::{Level, Trajectory, Verdict};
+use washer_row::MethodKind;
 
 /// Arguments of `sweep trace`.
 #[derive(Debug, clap::Args)]
@@ -75,9 +76,12 @@ pub struct TraceArgs {
 /// equilibrium, and if the file cannot be written.
 pub(crate) fn run(args: &TraceArgs) -> Result<Exit, Error> {
     let chosen = if args.all { Vec::new() } else { choose_point(args)? };
-    let (plan, at) = match args.all {
+    let (plan, parameters) = match args.all {
         true => (args.grid.load()?, None),
-        false => args.grid.load_point(&chosen).map(|(plan, at)| (plan, Some(at)))?,
+        false => {
+            let (plan, parameters) = args.grid.load_point(&chosen)?;
+            (plan, Some(parameters))
+        }
     };
     let every_s = check_spacing((!args.turns).then_some(args.every), &plan)?;
     let TraceArgs { rates, states, forces, angle, model: models, .. } = *args;
@@ -86,8 +90,9 @@ pub(crate) fn run(args: &TraceArgs) -> Result<Exit, Error> {
     let output = Output::begin(&args.out, FileKind::Trace)?;
     let settings = TraceSettings { every_s, models, start, extras, capped: None };
     // A signal ends the process, because there are no partial results to keep.
-    let traced = trace_in_pool(&plan, at, &settings, Cancel::Never).map_err(Error::model)?;
-    let TraceTable { table, instants, failures, level } = traced;
+    let traced =
+        trace_in_pool(&plan, parameters, &settings, Cancel::Never).map_err(Error::model)?;
+    let TraceTable { table, instants, failures, method } = traced;
     failures.iter().for_each(|failure| tell(failure));
     output.finish(&table.into_bytes(&args.out)?)?;
     let points = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
@@ -95,7 +100,7 @@ pub(crate) fn run(args: &TraceArgs) -> Result<Exit, Error> {
     tell(&format!("wrote {out}: {instants} instants{points} from 0 to {} s", plan.end_s));
     // The row of a map has both models, which start at equilibrium.
     if args.start.is_empty() && !args.all && models == Models::Both {
-        tell(summarise_row(&plan, &chosen, level)?.trim_end());
+        tell(summarise_row(&plan, &chosen, method)?.trim_end());
     }
     Ok(Exit::Done)
 }
@@ -152,34 +157,36 @@ fn find_worst(args: &TraceArgs, plan: &Plan, column: &str) -> Result<(u64, Worse
 }
 
 /// Returns the contents of the point's row in a map as text: the amplitudes of both models, their
-/// ratios and the verdict. `trace_level` is the method of the trace.
-fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Result<String, Error> {
+/// ratios and the verdict. `trace_method` is the kind of the method of the trace.
+fn summarise_row(
+    plan: &Plan,
+    at: &[String],
+    trace_method: Option<MethodKind>,
+) -> Result<String, Error> {
     // The text has no metrics, so those at held speeds are not computed.
     let mut plan = plan.clone();
     plan.model.held_speeds = None;
-    let mut outcomes = ModelEngine::new(&plan)?.evaluate_at(&[Vec::new()]);
-    let Some(outcome) = outcomes.pop() else { return Ok(String::new()) };
+    let engine = ModelEngine::new(&plan)?;
+    let interrupt = Interrupt::new();
+    let rows = engine.evaluate_points(&[Vec::new()], &RunContext::new(&interrupt));
+    let Some(row) = rows.and_then(|mut rows| rows.pop()) else { return Ok(String::new()) };
     let channels = &compared_channels(&plan);
     let limits = plan.reliability.limits;
-    let verdict = Verdict::new(&outcome, channels.len(), limits);
-    let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), format_number);
-    let row = |(k, channel): (usize, &Channel)| {
-        let amplitude = |model: &Trajectory| number(model.amplitudes.get(k).copied());
-        vec![
-            channel.name().to_owned(),
-            channel.unit().to_owned(),
-            amplitude(&outcome.nonlinear),
-            amplitude(&outcome.linear),
-            number(verdict.ratios.get(k).copied().flatten()),
-        ]
+    let verdict = row.verdict();
+    let number = |column: &str| row.number(column).map_or_else(|| "none".to_owned(), format_number);
+    let line = |channel: &Channel| {
+        let name = channel.name();
+        let numbers =
+            ["nonlinear", "linear", "ratio"].map(|prefix| number(&format!("{prefix}_{name}")));
+        [vec![name.to_owned(), channel.unit().to_owned()], numbers.to_vec()].concat()
     };
-    let rows: Vec<Vec<String>> = channels.iter().enumerate().map(row).collect();
+    let lines: Vec<Vec<String>> = channels.iter().map(line).collect();
     let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
     let window = format_range(plan.window_s, format_number);
     let amplitude = plan.model.measures.criterion.amplitude_description();
     let point = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
     let mut text =
-        format!("{amplitude}, {window} s{point}:\n{}", format_table(&headings, &rows, ""));
+        format!("{amplitude}, {window} s{point}:\n{}", format_table(&headings, &lines, ""));
     // The decisive ratio is one that is beyond its limit, or else the greatest.
     let too_low = limits.lower.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
     let decisive = match (verdict.greatest, too_low) {
@@ -199,15 +206,16 @@ fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Resu
         _ => "undefined: no ratio is defined".to_owned(),
     };
     text.line("verdict", &verdict_text);
-    if let Some(trace_level) = trace_level.filter(|_| direct(&plan.integrator).is_none()) {
-        let [row, trace] = [outcome.method, trace_level].map(Level::name);
-        let methods = format!("{row}, as in the point's row of a map; the file: {trace}");
+    if let Some(trace_method) = trace_method.filter(|_| direct(&plan.integrator).is_none()) {
+        let method = row.name("method").unwrap_or_default();
+        let trace = trace_method.name();
+        let methods = format!("{method}, as in the point's row of a map; the file: {trace}");
         text.line("method", methods);
     }
-    if outcome.sensitive == Some(true) {
+    if row.flag("sensitive") == Some(true) {
         text.line("sensitive", "chaotic: the digits are those of one trajectory");
     }
-    let gaps = [&outcome.nonlinear, &outcome.linear].map(|model| number(model.min_gap_m));
+    let gaps = MODELS.map(|model| number(&format!("min_gap_{model}_m")));
     let gap_text = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
     text.line("least gap", &gap_text);
     Ok(text)

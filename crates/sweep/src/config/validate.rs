@@ -8,7 +8,7 @@ use washer_model::{
     ElementList, ModesError, Point, Spin, Target, Violation, decimal,
     highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, prepare,
 };
-use washer_row::{Criterion, Level};
+use washer_row::{Criterion, MethodKind};
 
 use crate::method::{REFERENCE_SHARE, direct};
 use crate::model::Washer;
@@ -194,7 +194,7 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
     let is_too_fast =
         |frequency: f64| step_ratio * RK4_STABILITY_LIMIT / frequency < shortest_step_s(end_s);
     let is_additive =
-        direct(&draft.plan.integrator).is_some_and(|(level, _)| level == Level::Additive);
+        direct(&draft.plan.integrator).is_some_and(|method| method.kind == MethodKind::Additive);
     let highest_frequency = if is_additive {
         highest_explicit_frequency_rad_per_s
     } else {

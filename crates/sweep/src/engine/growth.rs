@@ -30,16 +30,18 @@ pub(crate) fn find_responses(
 /// `exceeded_limit` is the limit of the machine's geometry that this response passes, or else one
 /// that a response at another speed passes. `is_on_curve` holds only if every speed has a response
 /// on the curve of a run-up: otherwise the machine may be in another motion at some of them.
-pub(crate) fn fastest_growth(found: &[Result<Vec<Response>, Status>]) -> Option<Growth> {
-    let firsts = || found.iter().map(|found| found.as_ref().ok()?.first());
-    let faster = |most: &Response, next: &Response| next.growth_per_s() > most.growth_per_s();
-    let fastest =
-        firsts().flatten().reduce(|most, next| if faster(most, next) { next } else { most })?;
-    let beyond = fastest
+pub(crate) fn fastest_growth(
+    responses_at_speeds: &[Result<Vec<Response>, Status>],
+) -> Option<Growth> {
+    let firsts = || responses_at_speeds.iter().map(|responses| responses.as_ref().ok()?.first());
+    let fastest = firsts().flatten().reduce(|fastest, response| {
+        if response.growth_per_s() > fastest.growth_per_s() { response } else { fastest }
+    })?;
+    let exceeded_limit = fastest
         .exceeded_limit
         .or_else(|| firsts().flatten().find_map(|first| first.exceeded_limit));
     let is_on_curve = firsts().all(|first| first.is_some_and(|first| first.is_on_curve));
-    Some(Growth { exceeded_limit: beyond, is_on_curve, ..Growth::from(fastest) })
+    Some(Growth { exceeded_limit, is_on_curve, ..Growth::from(fastest) })
 }
 
 /// Returns the motions in which points end at held speeds, or the status of a point without one.
@@ -52,8 +54,8 @@ pub(crate) fn find_motions(
 ) -> Vec<Result<Attractors, Status>> {
     let find_group = |dwells: &[(HeldSpeed<'_>, Carried)]| {
         let (dwells, carried): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
-        let found = find_attractors(simd, &dwells, &carried, starts, cancel).into_iter();
-        found.map(|found| found.map_err(Status::from)).collect()
+        let attractors = find_attractors(simd, &dwells, &carried, starts, cancel).into_iter();
+        attractors.map(|attractors| attractors.map_err(Status::from)).collect()
     };
     map_isolating_panics(dwells, find_group, || Err(Status::Panicked))
 }
@@ -70,16 +72,16 @@ pub(super) fn add_held_speed_metrics(
     let at_speeds = |point| speeds_rpm.iter().map(move |&speed_rpm| HeldSpeed { point, speed_rpm });
     let dwells: Vec<HeldSpeed<'_>> = rows.iter().flat_map(|(_, point)| at_speeds(*point)).collect();
     if metrics.contains(&Metric::Growth) {
-        let found = find_responses(&dwells, cancel);
-        for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
-            outcome.growth = fastest_growth(found);
+        let responses = find_responses(&dwells, cancel);
+        for ((outcome, _), responses) in rows.iter_mut().zip(responses.chunks(speeds_rpm.len())) {
+            outcome.growth = fastest_growth(responses);
         }
     }
     if metrics.contains(&Metric::Dwell) {
         let dwells: Vec<_> = dwells.iter().map(|dwell| (*dwell, None)).collect();
-        let found = find_motions(simd, &dwells, &StartRule::default(), cancel);
-        for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
-            outcome.dwell_peaks = DwellPeaks::from_attractors(speeds_rpm, found);
+        let motions = find_motions(simd, &dwells, &StartRule::default(), cancel);
+        for ((outcome, _), motions) in rows.iter_mut().zip(motions.chunks(speeds_rpm.len())) {
+            outcome.dwell_peaks = DwellPeaks::from_attractors(speeds_rpm, motions);
         }
     }
 }

@@ -13,16 +13,18 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
+use std::mem::take;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::Duration;
 
 use lane_ode::Cancel;
 use lane_ode::MAX_LANES;
 use washer_model::{Method, Point};
-use washer_row::{NextStep, Outcome, RefinementRule, RowRefinement, Status};
+use washer_row::{LevelRun, NextStep, Outcome, RefinementRule, RowRefinement, Status};
 
 use super::{ModelEngine, RunContext, growth};
 use crate::plan::Scenario;
+use sweep_engine::RowSource;
 use sweep_files::panics::lock;
 
 /// Number of points that are prepared together: one for each lane. Doubling it makes threads wait
@@ -31,7 +33,7 @@ const PREPARE_BATCH: usize = MAX_LANES;
 
 /// Returns the number of runs by a method that a thread takes at once.
 fn batch_size(method: &Method) -> usize {
-    if method.adapts_steps() { 4 * MAX_LANES } else { MAX_LANES }
+    if method.kind.adapts_steps() { 4 * MAX_LANES } else { MAX_LANES }
 }
 
 impl ModelEngine<'_> {
@@ -39,7 +41,7 @@ impl ModelEngine<'_> {
     /// each level of both models less than a batch waits, and each thread has one batch.
     pub(crate) fn max_rows_in_flight(&self, threads: usize) -> usize {
         let levels: usize = self.levels().iter().map(|levels| 2 * levels.levels.len()).sum();
-        (levels + threads) * batch_size(&self.levels()[0].levels[0].method)
+        (levels + threads) * batch_size(&self.levels()[0].levels[0])
     }
 }
 
@@ -47,10 +49,6 @@ impl ModelEngine<'_> {
 /// full, so that chunks complete and an interrupt loses little. Doubling it halves the batches that
 /// are not full.
 const MAX_QUEUE_AGE: u64 = 2048;
-
-/// A source of points, each with its caller's identifier. The argument is the maximum number; it
-/// returns none at the end.
-pub(super) type PointSource<'a> = dyn Fn(usize) -> Vec<(u64, Scenario)> + Sync + 'a;
 
 /// A sink of rows, in no particular order.
 pub(super) type OutcomeSink<'a> = dyn Fn(Outcome) + Sync + 'a;
@@ -69,6 +67,8 @@ struct RowTask {
     /// The prepared point, or the reason why there is none.
     point: Result<Arc<Point>, Status>,
     refinement: RowRefinement,
+    /// The runs that have returned since the last step, each with its model and its level.
+    runs: Vec<((usize, usize), LevelRun)>,
     /// The number of runs that were requested and have not returned.
     pending: usize,
     /// The number of rows queued before it.
@@ -77,11 +77,11 @@ struct RowTask {
 
 impl RowTask {
     /// Returns the runs that the row needs next, or its outcome. No run may be pending.
-    fn next(&self, rule: RefinementRule<'_>) -> NextStep {
+    fn next(&mut self, rule: RefinementRule<'_>) -> NextStep {
         match &self.point {
-            Ok(point) => self.refinement.next_step(self.id, point, rule),
+            Ok(point) => self.refinement.advance(take(&mut self.runs), self.id, point, rule),
             Err(status) => {
-                let method = rule.levels[0].levels[0].level;
+                let method = rule.levels[0].levels[0].kind;
                 NextStep::Done(Box::new(Outcome { method, ..Outcome::failed(self.id, *status) }))
             }
         }
@@ -114,7 +114,7 @@ enum Work {
 /// The threads' shared work.
 pub(super) struct Pool<'a> {
     pub(super) engine: &'a ModelEngine<'a>,
-    pub(super) source: &'a PointSource<'a>,
+    pub(super) source: &'a RowSource<'a>,
     pub(super) sink: &'a OutcomeSink<'a>,
     pub(super) context: &'a RunContext<'a>,
     pub(super) state: Mutex<PoolState>,
@@ -173,9 +173,7 @@ impl Pool<'_> {
                     for ((position, _), run) in taken.iter().zip(runs) {
                         let Some(mut row) = state.rows.remove(position) else { continue };
                         row.pending -= 1;
-                        if let Ok(point) = &row.point {
-                            row.refinement.add_run((model, level), run, point, rule);
-                        }
+                        row.runs.push(((model, level), run));
                         rows.push(row);
                     }
                     self.advance(state, rows);
@@ -199,12 +197,20 @@ impl Pool<'_> {
 
     /// Prepares the next points of the source; none at its end.
     fn prepare_rows(&self) -> Vec<RowTask> {
-        let (ids, scenarios): (Vec<u64>, Vec<Scenario>) =
-            (self.source)(PREPARE_BATCH).into_iter().unzip();
+        let rows = std::iter::from_fn(self.source).take(PREPARE_BATCH);
+        let scenario = |(id, values): (u64, Vec<f64>)| (id, self.engine.plan.scenario_at(&values));
+        let (ids, scenarios): (Vec<u64>, Vec<Scenario>) = rows.map(scenario).unzip();
         let points = self.engine.prepare(&scenarios);
         let row = |(id, point): (u64, Result<Point, Status>)| {
             let point = point.map(Arc::new);
-            RowTask { id, point, refinement: RowRefinement::default(), pending: 0, sequence: 0 }
+            RowTask {
+                id,
+                point,
+                refinement: RowRefinement::default(),
+                runs: Vec::new(),
+                pending: 0,
+                sequence: 0,
+            }
         };
         ids.into_iter().zip(points).map(row).collect()
     }

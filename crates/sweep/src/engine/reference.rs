@@ -18,9 +18,9 @@ const CORNER_STEP_S: f64 = 2.5e-4;
 pub(crate) fn reference_method(steps: &StepSelector<'_>, model: ModelKind) -> Method {
     if model == ModelKind::Nonlinear && steps.has_nonsmooth_force() {
         let stable_s = steps.uncapped_step_s(model).unwrap_or(f64::INFINITY);
-        return Method::Dop853 { step_s: CORNER_STEP_S.min(0.5 * stable_s) };
+        return Method::dop853(CORNER_STEP_S.min(0.5 * stable_s));
     }
-    Method::Rk4 { step_s: reference_step_s(steps) }
+    Method::rk4(reference_step_s(steps))
 }
 
 /// Returns the step (s) of classical Runge-Kutta for a single trajectory.

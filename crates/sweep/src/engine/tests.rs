@@ -2,6 +2,9 @@
 
 mod fast;
 
+use sweep_engine::Interrupt;
+use sweep_files::panics::{lock, unlocked};
+
 use super::*;
 
 /// A grid with springs too soft to carry the machine, unbalances that drive the solution out of the
@@ -24,6 +27,21 @@ parameter = "unbalance_mass_kg"
 values = [0.1, 10, 300]
 "#;
 
+impl ModelEngine<'_> {
+    /// Returns the outcomes from which the rows of points are written, in the order of the points.
+    pub(crate) fn outcomes_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
+        let remaining = Mutex::new(axis_values.iter().enumerate());
+        let source =
+            || lock(&remaining).next().map(|(point, values)| (point as u64, values.clone()));
+        let outcomes = Mutex::new(Vec::new());
+        let sink = |outcome: Outcome| lock(&outcomes).push(outcome);
+        self.integrate_rows(&source, &sink, &RunContext::new(&Interrupt::new()));
+        let mut outcomes = unlocked(outcomes);
+        outcomes.sort_by_key(|outcome| outcome.point);
+        outcomes
+    }
+}
+
 fn plan(text: &str) -> Plan {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
@@ -34,7 +52,7 @@ fn plan(text: &str) -> Plan {
 fn evaluate(engine: &ModelEngine<'_>, points: std::ops::Range<u64>) -> Vec<Outcome> {
     let first = points.start;
     let values: Vec<_> = points.map(|point| engine.plan.axis_values(point)).collect();
-    let mut outcomes = engine.evaluate_at(&values);
+    let mut outcomes = engine.outcomes_at(&values);
     outcomes.iter_mut().for_each(|outcome| outcome.point += first);
     outcomes
 }

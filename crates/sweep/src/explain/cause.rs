@@ -34,7 +34,7 @@ pub(crate) struct Cause {
 struct PassageGrowth {
     /// The instants, up to that of the entry, whose greatest difference is the disturbance at the
     /// entry.
-    at_entry: std::ops::RangeInclusive<usize>,
+    entry_instants: std::ops::RangeInclusive<usize>,
     /// The growth (e-folds) until each instant.
     e_folds: Vec<f64>,
 }
@@ -52,7 +52,7 @@ pub(super) fn find_cause<'p>(
     let (position, _) = swept.verdict.greatest?;
     let channel = swept.channels[position].index();
     let run = |model| {
-        history(model, &Method::Rk4 { step_s }, point, &InitialDeviation::default(), INTERVAL_S)
+        history(model, &Method::rk4(step_s), point, &InitialDeviation::default(), INTERVAL_S)
     };
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(run);
     let value = |history: &History<'_>, k: usize| Some(history.instant(k)?.channels[channel]);
@@ -84,27 +84,27 @@ pub(super) fn find_cause<'p>(
 /// The disturbance at the entry is the greatest difference of the models in the turn before it, or
 /// in the first turn of a run that begins in the tongue.
 fn passage_growth(passage: &Passage, growths: &[[f64; 2]], speeds_rpm: &[f64]) -> PassageGrowth {
-    let [from_s, to_s] = passage.from_to_s;
+    let [from_s, to_s] = passage.interval_s;
     let last = speeds_rpm.len().saturating_sub(1);
     let entry = ((from_s / INTERVAL_S) as usize).min(last);
     let turn_s = 60.0 / speeds_rpm.get(entry).map_or(1.0, |rpm| rpm.abs().max(1.0));
     let turn = (turn_s / INTERVAL_S).ceil() as usize;
-    let at_entry = match entry.checked_sub(turn) {
+    let entry_instants = match entry.checked_sub(turn) {
         Some(before) => before..=entry,
         None => 0..=turn.min(last),
     };
     let mut sum = 0.0;
     let e_folds = speeds_rpm.iter().enumerate().map(|(k, rpm)| {
         // The part of the interval about the instant that is in the passage.
-        let begin_s = ((k as f64 - 0.5) * INTERVAL_S).max(from_s);
+        let start_s = ((k as f64 - 0.5) * INTERVAL_S).max(from_s);
         let end_s = ((k as f64 + 0.5) * INTERVAL_S).min(to_s);
-        if end_s > begin_s {
-            sum += (end_s - begin_s) * growth_at(growths, rpm.abs());
+        if end_s > start_s {
+            sum += (end_s - start_s) * growth_at(growths, rpm.abs());
         }
         sum
     });
     let e_folds = e_folds.collect();
-    PassageGrowth { at_entry, e_folds }
+    PassageGrowth { entry_instants, e_folds }
 }
 
 /// The motion without the part that tongues add.
@@ -139,22 +139,22 @@ fn remove_growth(
     let entered: Vec<(f64, &[f64])> = passage_growths
         .iter()
         .map(|growth| {
-            let at_entry = growth.at_entry.clone().map(difference).fold(0.0, f64::max);
-            (at_entry, growth.e_folds.as_slice())
+            let disturbance = growth.entry_instants.clone().map(difference).fold(0.0, f64::max);
+            (disturbance, growth.e_folds.as_slice())
         })
         .collect();
     let e_folds = |k: usize| -> f64 { entered.iter().map(|(_, e_folds)| e_folds[k]).sum() };
     let deviation_without = |k: usize| -> f64 {
         let [nonlinear, linear] = values[k];
-        let now = difference(k);
-        if now == 0.0 {
+        let difference = difference(k);
+        if difference == 0.0 {
             return nonlinear.abs();
         }
         let mut added_share = -(-e_folds(k)).exp_m1();
         if !has_passed {
             let added = |(entry, e_folds): &(f64, &[f64])| entry * e_folds[k].exp_m1();
             let added: f64 = entered.iter().map(added).sum();
-            added_share = added_share.min(added / now);
+            added_share = added_share.min(added / difference);
         }
         (linear + (nonlinear - linear) * (1.0 - added_share)).abs()
     };
@@ -183,7 +183,7 @@ mod tests {
     fn tongue(from: usize, to: usize, e_folds: f64) -> PassageGrowth {
         let share = |k: usize| (k.clamp(from, to) - from) as f64 / (to - from) as f64;
         PassageGrowth {
-            at_entry: from - 40..=from,
+            entry_instants: from - 40..=from,
             e_folds: (0..1000).map(|k| e_folds * share(k)).collect(),
         }
     }
@@ -206,9 +206,9 @@ mod tests {
     fn growth_in_a_tongue_is_removed() {
         let values = values(growing_difference(0.2, 300, 600, 3.0));
         let tongues = [tongue(300, 600, 3.0)];
-        let found = remove_growth(&values, &tongues, 500..1000, (1.0, 2.0), false).unwrap();
-        assert!(found.first < 600 && (found.e_folds - 3.0).abs() < 1e-9, "{found:?}");
-        assert!((1.0..1.3).contains(&found.ratio_without), "{found:?}");
+        let remainder = remove_growth(&values, &tongues, 500..1000, (1.0, 2.0), false).unwrap();
+        assert!(remainder.first < 600 && (remainder.e_folds - 3.0).abs() < 1e-9, "{remainder:?}");
+        assert!((1.0..1.3).contains(&remainder.ratio_without), "{remainder:?}");
     }
 
     /// The tongue has enough growth, but the run enters it after its deviation.

@@ -33,31 +33,37 @@ fn push_line(text: &mut String, name: &str, words: impl AsRef<str>) {
 }
 
 /// Returns an explanation as text.
-pub(crate) fn to_text(found: &Explanation) -> String {
+pub(crate) fn to_text(explanation: &Explanation) -> String {
     let mut text = String::new();
-    let at: Vec<String> =
-        found.at.iter().map(|(name, value)| format!("{name} {}", decimal(*value))).collect();
-    let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
-    text += format!("{}{place}", found.name).trim_end();
+    let parameters: Vec<String> = explanation
+        .parameters
+        .iter()
+        .map(|(name, value)| format!("{name} {}", decimal(*value)))
+        .collect();
+    let point = match parameters.is_empty() {
+        true => String::new(),
+        false => format!(" at {}", parameters.join(", ")),
+    };
+    text += format!("{}{point}", explanation.name).trim_end();
     text.push('\n');
-    push_verdict(&mut text, &found.swept);
-    for scan in &found.scans {
-        push_scan(&mut text, found, scan);
+    push_verdict(&mut text, &explanation.swept);
+    for scan in &explanation.scans {
+        push_scan(&mut text, explanation, scan);
     }
-    for (tongue, passages) in &found.tongues {
+    for (tongue, passages) in &explanation.tongues {
         text.push('\n');
-        push_tongue(&mut text, found, tongue, passages);
+        push_tongue(&mut text, explanation, tongue, passages);
     }
     text.push('\n');
-    push_conclusion(&mut text, found);
-    push_limitations(&mut text, found);
+    push_conclusion(&mut text, explanation);
+    push_limitations(&mut text, explanation);
     text
 }
 
 /// Appends the stability over the speeds of one direction of turning.
-fn push_scan(text: &mut String, found: &Explanation, scan: &SpeedScan) {
+fn push_scan(text: &mut String, explanation: &Explanation, scan: &SpeedScan) {
     let direction = direction_prefix(scan.is_backward);
-    push_line(text, "dwells", format!("{direction}{}", stable_speeds(found, scan)));
+    push_line(text, "dwells", format!("{direction}{}", describe_stability(explanation, scan)));
     for rpm in &scan.jumps_rpm {
         let words = format!(
             "{direction}at {rpm:.2} rpm the response folds back: a machine that runs up jumps to \
@@ -65,12 +71,14 @@ fn push_scan(text: &mut String, found: &Explanation, scan: &SpeedScan) {
         );
         push_line(text, "jump", words);
     }
-    if let Some(words) = off_curve_words(&scan.off_curve_rpm) {
+    if let Some(words) = describe_off_curve(&scan.off_curve_rpm) {
         push_line(text, "off curve", format!("{direction}{words}"));
     }
-    if let (Some((from, limit)), Some((to, _))) = (scan.beyond.first(), scan.beyond.last()) {
+    if let (Some((from, limit)), Some((to, _))) =
+        (scan.exceeded_limits.first(), scan.exceeded_limits.last())
+    {
         let [from, to] = [from, to].map(|rpm| format_number(*rpm));
-        let count = scan.beyond.len();
+        let count = scan.exceeded_limits.len();
         let limit = limit.name().replace('_', " ");
         let words = format!(
             "{direction}at {count} of the speeds, from {from} to {to} rpm, the response exceeds \
@@ -86,7 +94,7 @@ const fn direction_prefix(is_backward: bool) -> &'static str {
 }
 
 /// Returns a sentence on the speeds at which the response is stable, unstable or not known.
-fn stable_speeds(found: &Explanation, scan: &SpeedScan) -> String {
+fn describe_stability(explanation: &Explanation, scan: &SpeedScan) -> String {
     let [from, to] = [scan.speeds.from, scan.speeds.to].map(decimal);
     let count = scan.speeds.values().len();
     let missing = scan.without_response;
@@ -97,10 +105,11 @@ fn stable_speeds(found: &Explanation, scan: &SpeedScan) -> String {
     if missing == count {
         return unknown;
     }
-    let tongues = found.tongues.iter().filter(|(it, _)| it.is_backward == scan.is_backward);
+    let tongues =
+        explanation.tongues.iter().filter(|(tongue, _)| tongue.is_backward == scan.is_backward);
     let ends: Vec<[TongueEnd; 2]> = tongues.map(|(tongue, _)| tongue.ends).collect();
     if !ends.is_empty() {
-        let bands = bands_words(ends.into_iter());
+        let bands = describe_bands(ends.into_iter());
         let unstable =
             format!("the periodic response is unstable in {bands} from {from} to {to} rpm");
         return if missing == 0 {
@@ -117,7 +126,7 @@ fn stable_speeds(found: &Explanation, scan: &SpeedScan) -> String {
 }
 
 /// Returns a sentence on the speeds (rpm) at which the response is not on the curve of a run-up.
-fn off_curve_words(speeds_rpm: &[f64]) -> Option<String> {
+fn describe_off_curve(speeds_rpm: &[f64]) -> Option<String> {
     let [from, to] = [speeds_rpm.first()?, speeds_rpm.last()?].map(|rpm| format_number(*rpm));
     Some(format!(
         "at {} of the speeds, from {from} to {to} rpm, the response is off the curve: a machine \
@@ -128,7 +137,7 @@ fn off_curve_words(speeds_rpm: &[f64]) -> Option<String> {
 
 /// Returns the numbers of unstable bands of speed and of the tongues in them. A tongue that ends
 /// because the kind of instability changes does not end its band.
-fn bands_words(ends: impl ExactSizeIterator<Item = [TongueEnd; 2]>) -> String {
+fn describe_bands(ends: impl ExactSizeIterator<Item = [TongueEnd; 2]>) -> String {
     let tongues = ends.len();
     let bands = ends.filter(|[from, _]| *from != TongueEnd::OtherKind).count().max(1);
     match (bands, tongues) {
@@ -203,9 +212,14 @@ fn over_estimates(swept: &SweptResult) -> bool {
     swept.verdict.least.is_some_and(|(_, least)| least < swept.limits.over_estimate())
 }
 
-fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: &[Passage]) {
-    let at = &tongue.at;
-    let kind = match at.kind() {
+fn push_tongue(
+    text: &mut String,
+    explanation: &Explanation,
+    tongue: &Tongue,
+    passages: &[Passage],
+) {
+    let response = &tongue.fastest_response;
+    let kind = match response.kind() {
         StabilityKind::PeriodDoubling => "its period doubles",
         StabilityKind::QuasiPeriodic => {
             "a second frequency appears that is no multiple of the speed"
@@ -213,15 +227,18 @@ fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages
         StabilityKind::Fold => "it jumps to another motion",
         StabilityKind::Stable => "it is stable",
     };
-    let [from, to] = tongue.from_to_rpm;
-    let growth =
-        format!("{kind}, growing at up to {:.4} /s at {:.2} rpm", at.growth_per_s(), at.speed_rpm);
+    let [from, to] = tongue.range_rpm;
+    let growth = format!(
+        "{kind}, growing at up to {:.4} /s at {:.2} rpm",
+        response.growth_per_s(),
+        response.speed_rpm
+    );
     let direction = direction_prefix(tongue.is_backward);
-    let words = format!("{direction}{from:.2} to {to:.2} rpm: {growth}{}", ends_words(tongue));
+    let words = format!("{direction}{from:.2} to {to:.2} rpm: {growth}{}", describe_ends(tongue));
     push_line(text, "tongue", words);
-    let low = at.frequency_cpm();
-    let high = at.speed_rpm - at.frequency_cpm();
-    let lines = match at.kind() {
+    let low = response.frequency_cpm();
+    let high = response.speed_rpm - response.frequency_cpm();
+    let lines = match response.kind() {
         StabilityKind::PeriodDoubling => format!("at half the speed, {low:.2} per minute"),
         StabilityKind::Fold => "none beside those of the turn".to_owned(),
         StabilityKind::QuasiPeriodic | StabilityKind::Stable => {
@@ -229,7 +246,7 @@ fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages
         }
     };
     push_line(text, "lines", lines);
-    for mode in &at.participating_modes {
+    for mode in &response.participating_modes {
         let number = mode.mode;
         let motion = mode.motion;
         let cpm = mode.frequency_cpm;
@@ -238,17 +255,17 @@ fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages
         push_line(text, "mode", format!("{frequency}; {percent:.0} % of the energy"));
     }
     let words = match &tongue.resonance {
-        Some(resonance) => resonance_words(resonance, at.speed_rpm),
+        Some(resonance) => describe_resonance(resonance, response.speed_rpm),
         None => "no sum or difference of these modes' frequencies is within 5 % of a multiple of \
                  the speed: the source of the growth is not explained"
             .to_owned(),
     };
     push_line(text, "resonance", words);
-    if let Some(ends_in) = &tongue.ends_in {
-        push_line(text, "ends in", ending_words(ends_in));
+    if let Some(ending) = &tongue.ending {
+        push_line(text, "ends in", describe_ending(ending));
     }
     if passages.is_empty() {
-        let [least, most] = found.profile_rpm.map(decimal);
+        let [least, most] = explanation.profile_rpm.map(decimal);
         let words = format!("never: the profile stays between {least} and {most} rpm in this run");
         push_line(text, "crossed", words);
     }
@@ -259,7 +276,7 @@ fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages
 }
 
 /// Returns a description of the motion in which a machine ends.
-fn ending_words(motion: &Attractor) -> String {
+fn describe_ending(motion: &Attractor) -> String {
     let amplitudes = [Channel::TubYaw, Channel::TubPitch].map(|channel| {
         let name = channel.name().replace('_', " ");
         format!("{name} {}", milli(motion.peaks[channel.index()], channel))
@@ -283,9 +300,9 @@ fn ending_words(motion: &Attractor) -> String {
     format!("{}, {kind}, if the drum is held there (`sweep dwell`)", amplitudes.join(", "))
 }
 
-fn ends_words(tongue: &Tongue) -> String {
+fn describe_ends(tongue: &Tongue) -> String {
     let mut words = String::new();
-    for (rpm, end) in tongue.from_to_rpm.iter().zip(tongue.ends) {
+    for (rpm, end) in tongue.range_rpm.iter().zip(tongue.ends) {
         let why = match end {
             TongueEnd::Edge => continue,
             TongueEnd::OtherKind => "the kind of growth changes",
@@ -298,7 +315,7 @@ fn ends_words(tongue: &Tongue) -> String {
 }
 
 /// Returns the sum or difference of a resonance, such as `f1 + f2`, `2 f2` or `f3 - f1`.
-fn sum_words(resonance: &ModeResonance) -> String {
+fn format_sum(resonance: &ModeResonance) -> String {
     let [a, b] = resonance.modes;
     match (a == b, resonance.sign > 0.0) {
         (true, _) => format!("2 f{a}"),
@@ -307,33 +324,35 @@ fn sum_words(resonance: &ModeResonance) -> String {
     }
 }
 
-fn resonance_words(resonance: &ModeResonance, speed_rpm: f64) -> String {
+fn describe_resonance(resonance: &ModeResonance, speed_rpm: f64) -> String {
     let target = match resonance.order {
         1 => "the speed".to_owned(),
         order => format!("{order} times the speed"),
     };
     let multiple = f64::from(resonance.order) * speed_rpm;
     let miss = 100.0 * (resonance.sum_cpm / multiple - 1.0);
-    let sum = sum_words(resonance);
+    let sum = format_sum(resonance);
     let cpm = resonance.sum_cpm;
     format!("{sum} = {cpm:.2} per minute, against {target}, {multiple:.2} ({miss:+.2} %)")
 }
 
 fn push_passage(text: &mut String, passage: &Passage) {
-    let [from, to] = passage.from_to_s;
-    let cut = if passage.is_cut { ", where the run ends" } else { "" };
+    let [from, to] = passage.interval_s;
+    let cut = if passage.ends_inside { ", where the run ends" } else { "" };
     let folds = passage.e_folds;
     let factor = significant(passage.e_folds.exp());
     let mut words =
         format!("from {from:.3} to {to:.3} s{cut}: {folds:.2} e-folds, a factor of {factor}");
-    match &passage.crossed {
+    match &passage.effect {
         Err(LeftRangeError { time_s }) => {
             words += &format!("; the run leaves the model's range at {time_s:.3} s");
         }
-        Ok(crossed) => {
-            let most = significant(crossed.amplification);
-            words += &format!("; a small disturbance of the actual run grows at most {most}-fold");
-            if let [Some(before), Some(after)] = crossed.departure_j {
+        Ok(effect) => {
+            let amplification = significant(effect.amplification);
+            words += &format!(
+                "; a small disturbance of the actual run grows at most {amplification}-fold"
+            );
+            if let [Some(before), Some(after)] = effect.departure_j {
                 let numbers = [1e3 * before, 1e3 * after, (after / before).sqrt()];
                 let [before, after, factor] = numbers.map(significant);
                 words += &format!(
@@ -364,14 +383,14 @@ fn push_remedy(text: &mut String, tongue: &Tongue) {
 }
 
 /// Appends the part of the tongues in the swept verdict.
-fn push_conclusion(text: &mut String, found: &Explanation) {
-    let swept = &found.swept;
+fn push_conclusion(text: &mut String, explanation: &Explanation) {
+    let swept = &explanation.swept;
     let Some((_, greatest)) = swept.verdict.greatest else {
         push_line(text, "so", "there is no verdict to explain");
         return;
     };
     let is_within = greatest < swept.limits.upper;
-    let words = match &found.without_departures {
+    let words = match &explanation.without_departures {
         None if is_within && !over_estimates(swept) => {
             "no tongue is crossed before the window ends, and the models agree".to_owned()
         }
@@ -393,8 +412,8 @@ fn push_conclusion(text: &mut String, found: &Explanation) {
                     significant(ratio),
                     channel.name()
                 );
-                let growth = growth_until(found.cause.as_ref());
-                let is_cause = found.cause.is_some_and(|cause| cause.is_enough);
+                let growth = describe_growth(explanation.cause.as_ref());
+                let is_cause = explanation.cause.is_some_and(|cause| cause.is_enough);
                 match (is_within, ratio < swept.limits.upper) {
                     (false, true) if is_cause => format!(
                         "{same}, within the limit: the verdict is due to motion left over from \
@@ -429,7 +448,7 @@ fn push_conclusion(text: &mut String, found: &Explanation) {
 }
 
 /// Returns a sentence on the time of the deviation and the growth in tongues before it.
-fn growth_until(cause: Option<&Cause>) -> String {
+fn describe_growth(cause: Option<&Cause>) -> String {
     let Some(cause) = cause else { return "the deviation's time is not known".to_owned() };
     format!(
         "the motion deviates from {:.2} s and {:.0} rpm on; until the greatest deviation the \
@@ -441,14 +460,14 @@ fn growth_until(cause: Option<&Cause>) -> String {
     )
 }
 
-fn push_limitations(text: &mut String, found: &Explanation) {
+fn push_limitations(text: &mut String, explanation: &Explanation) {
     let mut words = format!(
         "a tongue narrower than {} rpm may be missed. E-folds take the growth at each instant as \
          that at its speed, held constant; equal e-folds do not mean equal ratios, and a map's \
          boundary is not the edge of a tongue",
-        found.scans.first().map_or_else(String::new, |scan| decimal(scan.speeds.step))
+        explanation.scans.first().map_or_else(String::new, |scan| decimal(scan.speeds.step))
     );
-    let without: usize = found.scans.iter().map(|scan| scan.without_response).sum();
+    let without: usize = explanation.scans.iter().map(|scan| scan.without_response).sum();
     if without > 0 {
         words += &format!(". No response was found at {without} of the speeds, which are left out");
     }
@@ -470,25 +489,22 @@ mod tests {
         let mut text = String::new();
         push_line(&mut text, "name", "word ".repeat(40));
         let lines: Vec<&str> = text.lines().collect();
-        assert!(
-            lines.len() > 1
-                && lines.iter().all(|push_line| push_line.chars().count() <= LINE_WIDTH)
-        );
+        assert!(lines.len() > 1 && lines.iter().all(|line| line.chars().count() <= LINE_WIDTH));
         assert!(lines[0].starts_with("      name  word"), "{}", lines[0]);
         assert!(lines[1].starts_with("            word"), "{}", lines[1]);
     }
 
     #[test]
     fn responses_off_the_curve_are_reported() {
-        assert_eq!(off_curve_words(&[]), None);
-        let words = off_curve_words(&[255.0, 256.0, 270.0]).unwrap();
+        assert_eq!(describe_off_curve(&[]), None);
+        let words = describe_off_curve(&[255.0, 256.0, 270.0]).unwrap();
         assert!(words.starts_with("at 3 of the speeds, from 255 to 270 rpm, the response is off"));
         assert!(words.ends_with("(`sweep dwell`)"));
     }
 
     #[test]
     fn a_band_continues_where_the_kind_of_growth_changes() {
-        let words = |ends: &[[TongueEnd; 2]]| bands_words(ends.iter().copied());
+        let words = |ends: &[[TongueEnd; 2]]| describe_bands(ends.iter().copied());
         let edge = TongueEnd::Edge;
         let other = TongueEnd::OtherKind;
         assert_eq!(words(&[[edge, edge]]), "one band of speed (a \"tongue\")");
@@ -505,10 +521,10 @@ mod tests {
             let frequencies_cpm = [150.0, 100.0];
             ModeResonance { modes, frequencies_cpm, sign, sum_cpm: 150.0 + sign * 100.0, order }
         };
-        assert_eq!(sum_words(&resonance([2, 2], 1.0, 1)), "2 f2");
-        assert_eq!(sum_words(&resonance([1, 2], 1.0, 1)), "f1 + f2");
-        assert_eq!(sum_words(&resonance([2, 1], -1.0, 1)), "f2 - f1");
-        let words = resonance_words(&resonance([1, 2], 1.0, 2), 125.0);
+        assert_eq!(format_sum(&resonance([2, 2], 1.0, 1)), "2 f2");
+        assert_eq!(format_sum(&resonance([1, 2], 1.0, 1)), "f1 + f2");
+        assert_eq!(format_sum(&resonance([2, 1], -1.0, 1)), "f2 - f1");
+        let words = describe_resonance(&resonance([1, 2], 1.0, 2), 125.0);
         assert_eq!(
             words,
             "f1 + f2 = 250.00 per minute, against 2 times the speed, 250.00 (+0.00 %)"

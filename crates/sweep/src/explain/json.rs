@@ -8,14 +8,16 @@ use washer_model::{Attractor, Channel, LeftRangeError, ParticipatingMode};
 use super::{Explanation, Passage, SpeedScan, SweptResult, Tongue};
 
 /// Returns an explanation as JSON. Units are part of the names.
-pub(crate) fn to_json(found: &Explanation) -> Value {
-    let tongues =
-        found.tongues.iter().map(|(tongue, passages)| tongue_json(tongue, passages, &found.swept));
-    let without = found.without_departures.as_ref().map(|entered| match entered {
+pub(crate) fn to_json(explanation: &Explanation) -> Value {
+    let tongues = explanation
+        .tongues
+        .iter()
+        .map(|(tongue, passages)| tongue_json(tongue, passages, &explanation.swept));
+    let without = explanation.without_departures.as_ref().map(|entered| match entered {
         Ok(amplitudes) => {
-            let greatest = found.swept.greatest_ratio(amplitudes);
+            let greatest = explanation.swept.greatest_ratio(amplitudes);
             json!({
-                "amplitudes": by_channel(&found.swept, amplitudes),
+                "amplitudes": by_channel(&explanation.swept, amplitudes),
                 "ratio_max": greatest.map(|(ratio, _)| ratio),
                 "ratio_max_channel": greatest.map(|(_, channel)| channel.name()),
             })
@@ -23,18 +25,18 @@ pub(crate) fn to_json(found: &Explanation) -> Value {
         Err(LeftRangeError { time_s }) => json!({ "left_range_at_s": time_s }),
     });
     let scan = |is_backward: bool| {
-        found.scans.iter().find(|scan| scan.is_backward == is_backward).map(scan_json)
+        explanation.scans.iter().find(|scan| scan.is_backward == is_backward).map(scan_json)
     };
     json!({
-        "name": found.name,
-        "at": found.at.iter().cloned().collect::<BTreeMap<_, _>>(),
-        "swept": swept_json(&found.swept),
+        "name": explanation.name,
+        "at": explanation.parameters.iter().cloned().collect::<BTreeMap<_, _>>(),
+        "swept": swept_json(&explanation.swept),
         "speeds": scan(false),
         "speeds_backwards": scan(true),
-        "profile_rpm": found.profile_rpm,
+        "profile_rpm": explanation.profile_rpm,
         "tongues": tongues.collect::<Value>(),
         "entered_on_responses": without,
-        "deviation": found.cause.map(|cause| json!({
+        "deviation": explanation.cause.map(|cause| json!({
             "time_s": cause.time_s,
             "speed_rpm": cause.speed_rpm,
             "e_folds_of_tongues": cause.e_folds,
@@ -46,8 +48,10 @@ pub(crate) fn to_json(found: &Explanation) -> Value {
 
 /// Returns the scan over the speeds of one direction of turning.
 fn scan_json(scan: &SpeedScan) -> Value {
-    let beyond =
-        scan.beyond.iter().map(|(rpm, limit)| json!({ "speed_rpm": rpm, "passes": limit.name() }));
+    let exceeded_limits = scan
+        .exceeded_limits
+        .iter()
+        .map(|(rpm, limit)| json!({ "speed_rpm": rpm, "passes": limit.name() }));
     json!({
         "from_rpm": scan.speeds.from,
         "to_rpm": scan.speeds.to,
@@ -55,7 +59,7 @@ fn scan_json(scan: &SpeedScan) -> Value {
         "without_response": scan.without_response,
         "jumps_rpm": scan.jumps_rpm,
         "off_curve_rpm": scan.off_curve_rpm,
-        "beyond": beyond.collect::<Value>(),
+        "beyond": exceeded_limits.collect::<Value>(),
     })
 }
 
@@ -85,21 +89,21 @@ fn swept_json(swept: &SweptResult) -> Value {
 }
 
 fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Value {
-    let at = &tongue.at;
+    let response = &tongue.fastest_response;
     json!({
         "is_backward": tongue.is_backward,
-        "from_rpm": tongue.from_to_rpm[0],
-        "to_rpm": tongue.from_to_rpm[1],
+        "from_rpm": tongue.range_rpm[0],
+        "to_rpm": tongue.range_rpm[1],
         "ends": tongue.ends,
-        "kind": at.kind().name(),
-        "growth_per_s": at.growth_per_s(),
-        "growth_at_rpm": at.speed_rpm,
-        "frequency_cpm": at.frequency_cpm(),
-        "other_frequency_cpm": at.speed_rpm - at.frequency_cpm(),
-        "modes": at.participating_modes.iter().map(participant).collect::<Value>(),
+        "kind": response.kind().name(),
+        "growth_per_s": response.growth_per_s(),
+        "growth_at_rpm": response.speed_rpm,
+        "frequency_cpm": response.frequency_cpm(),
+        "other_frequency_cpm": response.speed_rpm - response.frequency_cpm(),
+        "modes": response.participating_modes.iter().map(participant).collect::<Value>(),
         "resonance": tongue.resonance,
         "crossed": passages.iter().map(passage).collect::<Value>(),
-        "ends_in": tongue.ends_in.as_ref().map(|motion| json!({
+        "ends_in": tongue.ending.as_ref().map(|motion| json!({
             "kind": Attractor::KIND_NAMES[motion.kind()],
             "amplitudes": by_channel(swept, &swept.plan_channels(&motion.peaks)),
             "followed_s": motion.time_s,
@@ -118,14 +122,14 @@ fn participant(mode: &ParticipatingMode) -> Value {
 }
 
 fn passage(passage: &Passage) -> Value {
-    let crossed = passage.crossed.as_ref();
+    let effect = passage.effect.as_ref();
     json!({
-        "from_s": passage.from_to_s[0],
-        "to_s": passage.from_to_s[1],
-        "is_cut_by_the_end": passage.is_cut,
+        "from_s": passage.interval_s[0],
+        "to_s": passage.interval_s[1],
+        "is_cut_by_the_end": passage.ends_inside,
         "e_folds": passage.e_folds,
-        "amplification": crossed.ok().map(|crossed| crossed.amplification),
-        "departure_j": crossed.ok().map(|crossed| crossed.departure_j),
-        "left_range_at_s": crossed.err().map(|left| left.time_s),
+        "amplification": effect.ok().map(|effect| effect.amplification),
+        "departure_j": effect.ok().map(|effect| effect.departure_j),
+        "left_range_at_s": effect.err().map(|left| left.time_s),
     })
 }

@@ -17,14 +17,14 @@ const INTEGRATION_PARTS: usize = 1000;
 
 /// Returns the lowest and the greatest speed (rpm) up to the run's end, negative backwards.
 pub(super) fn range(spin: &Spin, end_s: f64) -> [f64; 2] {
-    let mut least = f64::INFINITY;
-    let mut most = f64::NEG_INFINITY;
-    for speed in spin.speeds_rpm(instants_s(spin, end_s)) {
-        least = least.min(speed);
-        most = most.max(speed);
+    let mut lowest_rpm = f64::INFINITY;
+    let mut greatest_rpm = f64::NEG_INFINITY;
+    for speed_rpm in spin.speeds_rpm(instants_s(spin, end_s)) {
+        lowest_rpm = lowest_rpm.min(speed_rpm);
+        greatest_rpm = greatest_rpm.max(speed_rpm);
     }
     // Speeds are stored in rad/s; rounding gives back the digits that the user wrote.
-    [least, most].map(|rpm| (1e9 * rpm).round() / 1e9)
+    [lowest_rpm, greatest_rpm].map(|rpm| (1e9 * rpm).round() / 1e9)
 }
 
 /// Returns equally spaced instants and the kinks of the profile, in order.
@@ -44,8 +44,8 @@ fn instants_s(spin: &Spin, end_s: f64) -> Vec<f64> {
 
 /// Returns the intervals of time (s) in which the speed is within a band (rpm), in order.
 pub(super) fn times_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
-    let speed = |at_s: f64| spin.speeds_rpm([at_s]).next().unwrap_or(0.0);
-    let is_inside = |at_s: f64| (low..=high).contains(&speed(at_s));
+    let speed_rpm = |time_s: f64| spin.speeds_rpm([time_s]).next().unwrap_or(0.0);
+    let is_inside = |time_s: f64| (low..=high).contains(&speed_rpm(time_s));
     let times = instants_s(spin, end_s);
     let mut intervals: Vec<[f64; 2]> = Vec::new();
     let mut since_s = is_inside(0.0).then_some(0.0);
@@ -54,20 +54,21 @@ pub(super) fn times_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> 
         let was_inside = since_s.is_some();
         let ends_inside = is_inside(to_s);
         // A ramp may pass the whole band between two instants.
-        let from_rpm = speed(from_s);
-        let to_rpm = speed(to_s);
+        let from_rpm = speed_rpm(from_s);
+        let to_rpm = speed_rpm(to_s);
         let passes = !was_inside && !ends_inside && (from_rpm < low) != (to_rpm < low);
         if passes {
-            let up = from_rpm < to_rpm;
-            let below = |edge: f64| move |speed: f64| (speed < edge) == up;
-            let (first, last) = if up { (low, high) } else { (high, low) };
-            let at = |edge: f64| bisect_s(&|at_s| below(edge)(speed(at_s)), from_s, to_s);
-            intervals.push([at(first), at(last)]);
+            let is_rising = from_rpm < to_rpm;
+            let edges_rpm = if is_rising { [low, high] } else { [high, low] };
+            intervals.push(edges_rpm.map(|edge_rpm| {
+                let is_before = |time_s: f64| (speed_rpm(time_s) < edge_rpm) == is_rising;
+                bisect_s(&is_before, from_s, to_s)
+            }));
         } else if was_inside != ends_inside {
-            let at_s = bisect_s(&|at_s| is_inside(at_s) == was_inside, from_s, to_s);
+            let edge_s = bisect_s(&|time_s| is_inside(time_s) == was_inside, from_s, to_s);
             match since_s.take() {
-                Some(since_s) => intervals.push([since_s, at_s]),
-                None => since_s = Some(at_s),
+                Some(since_s) => intervals.push([since_s, edge_s]),
+                None => since_s = Some(edge_s),
             }
         }
     }
@@ -98,8 +99,8 @@ pub(super) fn e_folds(spin: &Spin, [from_s, to_s]: [f64; 2], growths: &[[f64; 2]
 pub(super) fn growth_at(growths: &[[f64; 2]], speed_rpm: f64) -> f64 {
     let above = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
     match (above.checked_sub(1).map(|below| growths[below]), growths.get(above)) {
-        (Some([low, at_low]), Some([high, at_high])) if high > &low => {
-            at_low + (at_high - at_low) * (speed_rpm - low) / (high - low)
+        (Some([low_rpm, low_growth]), Some([high_rpm, high_growth])) if high_rpm > &low_rpm => {
+            low_growth + (high_growth - low_growth) * (speed_rpm - low_rpm) / (high_rpm - low_rpm)
         }
         (Some([_, growth]), _) => growth,
         (None, Some([_, growth])) => *growth,

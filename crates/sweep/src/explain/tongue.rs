@@ -10,8 +10,7 @@ use washer_model::{
     find_attractors_from_responses, modes,
 };
 
-use super::prepare_scenario;
-use crate::plan::{Plan, Scenario};
+use crate::plan::{Plan, Scenario, prepare_scenario};
 use crate::speeds::Speeds;
 use sweep_engine::Interrupt;
 
@@ -80,7 +79,7 @@ const MAX_ORDER: u32 = 3;
 /// Maximum relative distance of a sum of frequencies from a multiple of the speed. Basis: the
 /// frequencies are those of the linear model, and an unstable motion has others. Doubling it finds
 /// multiples by chance.
-const MAX_MISS: f64 = 0.05;
+const MAX_RESONANCE_DISTANCE: f64 = 0.05;
 
 /// The periodic responses of one machine over speed, computed where they are requested.
 pub(crate) struct ResponseFinder<'a> {
@@ -156,19 +155,19 @@ pub(crate) struct Tongue {
     /// Whether the drum turns backwards.
     pub(crate) is_backward: bool,
     /// The edges (rpm).
-    pub(crate) from_to_rpm: [f64; 2],
+    pub(crate) range_rpm: [f64; 2],
     /// The kinds of the edges.
     pub(crate) ends: [TongueEnd; 2],
     /// Pairs of speed (rpm) and growth (1/s) in order of speed, from edge to edge.
     pub(crate) growths: Vec<[f64; 2]>,
     /// The response with the greatest growth.
-    pub(crate) at: Response,
+    pub(crate) fastest_response: Response,
     /// The resonance of modes at this response, if there is one.
     pub(crate) resonance: Option<ModeResonance>,
     /// The damping that closes the tongue, once it is searched for.
     pub(crate) closing: Option<Closing>,
     /// The motion of a drum held at the speed of the greatest growth, once it is computed.
-    pub(crate) ends_in: Option<Attractor>,
+    pub(crate) ending: Option<Attractor>,
 }
 
 /// Two frequencies of modes, or one twice, whose sum or difference is a multiple of the speed.
@@ -224,7 +223,7 @@ pub(crate) struct SpeedScan {
     /// Speeds (rpm) at which the response is not on the curve of a machine that runs up.
     pub(crate) off_curve_rpm: Vec<f64>,
     /// Speeds (rpm) at which the response exceeds the machine's geometry, and the limit exceeded.
-    pub(crate) beyond: Vec<(f64, GeometryLimit)>,
+    pub(crate) exceeded_limits: Vec<(f64, GeometryLimit)>,
 }
 
 /// Finds the tongues within a range of speeds.
@@ -247,7 +246,7 @@ pub(crate) fn find_tongues(
         let unstable_kind = kind(&same_kind[0]).filter(|kind| *kind != StabilityKind::Stable);
         let Some(unstable_kind) = unstable_kind else { continue };
         let run: Vec<&Response> = same_kind.iter().flatten().collect();
-        let edge = |inside: &Response, beyond: Option<&Option<Response>>| match beyond {
+        let edge = |inside: &Response, outside: Option<&Option<Response>>| match outside {
             None => (inside.speed_rpm, TongueEnd::Range),
             Some(None) => (inside.speed_rpm, TongueEnd::NoResponse),
             Some(Some(other)) => {
@@ -262,11 +261,20 @@ pub(crate) fn find_tongues(
         tongues.push(tongue(finder, unstable_kind, &run, [from, to]));
     }
     let without_response = responses.iter().filter(|response| response.is_none()).count();
-    let beyond = found().filter_map(|it| Some((it.speed_rpm, it.exceeded_limit?))).collect();
+    let exceeded_limit = |response: &Response| Some((response.speed_rpm, response.exceeded_limit?));
+    let exceeded_limits = found().filter_map(exceeded_limit).collect();
     let off_curve = found().filter(|response| !response.is_on_curve);
     let off_curve_rpm = off_curve.map(|response| response.speed_rpm).collect();
     let is_backward = finder.is_backward;
-    (tongues, SpeedScan { is_backward, speeds, without_response, jumps_rpm, off_curve_rpm, beyond })
+    let scan = SpeedScan {
+        is_backward,
+        speeds,
+        without_response,
+        jumps_rpm,
+        off_curve_rpm,
+        exceeded_limits,
+    };
+    (tongues, scan)
 }
 
 /// Finds the motion in which a drum ends that is held at the speed of each tongue's greatest
@@ -275,14 +283,19 @@ pub(crate) fn find_endings(
     finder: &ResponseFinder<'_>,
     tongues: &[Tongue],
 ) -> Vec<Option<Attractor>> {
-    let dwell = |tongue: &Tongue| HeldSpeed { point: finder.point, speed_rpm: tongue.at.speed_rpm };
+    let dwell = |tongue: &Tongue| HeldSpeed {
+        point: finder.point,
+        speed_rpm: tongue.fastest_response.speed_rpm,
+    };
     let dwells: Vec<HeldSpeed<'_>> = tongues.iter().map(dwell).collect();
-    let responses = tongues.iter().map(|tongue| Ok(vec![tongue.at.clone()])).collect();
+    let responses =
+        tongues.iter().map(|tongue| Ok(vec![tongue.fastest_response.clone()])).collect();
     let starts = StartRule { count: 1, ..StartRule::default() };
     let cancel = Cancel::Flag(finder.interrupt.flag());
-    let found =
+    let attractors =
         find_attractors_from_responses(finder.simd, &dwells, responses, &[], &starts, cancel);
-    found.into_iter().map(|found| found.ok()?.attractors.into_iter().next()).collect()
+    let first = attractors.into_iter().map(|found| found.ok()?.attractors.into_iter().next());
+    first.collect()
 }
 
 /// Returns the tongue of a run of speeds with responses of one kind, between two ends.
@@ -300,21 +313,22 @@ fn tongue(
         }
     }
     growths.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let at = greatest_growth(finder, kind, run, &growths);
-    let index = growths.partition_point(|[rpm, _]| *rpm < at.speed_rpm);
-    if growths.get(index).is_none_or(|[rpm, _]| *rpm != at.speed_rpm) {
-        growths.insert(index, speed_and_growth(&at));
+    let fastest_response = fastest_response(finder, kind, run, &growths);
+    let speed_rpm = fastest_response.speed_rpm;
+    let index = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
+    if growths.get(index).is_none_or(|[rpm, _]| *rpm != speed_rpm) {
+        growths.insert(index, speed_and_growth(&fastest_response));
     }
-    let resonance = nearest_resonance(finder.point, &at);
+    let resonance = nearest_resonance(finder.point, &fastest_response);
     Tongue {
         is_backward: finder.is_backward,
-        from_to_rpm: [from.0, to.0],
+        range_rpm: [from.0, to.0],
         ends: [from.1, to.1],
         growths,
-        at,
+        fastest_response,
         resonance,
         closing: None,
-        ends_in: None,
+        ending: None,
     }
 }
 
@@ -334,8 +348,9 @@ fn trials_about_root(open: [f64; 2], closed: [f64; 2], tolerance: f64) -> Vec<f6
     let interpolated = (open[1] / (open[1] - closed[1])).clamp(0.0, 1.0);
     let root = if interpolated.is_nan() { 0.5 } else { interpolated };
     let distance = closed[0] - open[0];
-    let about = ROOT_OFFSETS.map(|offset| root + offset * tolerance / distance.abs());
-    let mut shares: Vec<f64> = about.into_iter().filter(|it| *it > 0.0 && *it < 1.0).collect();
+    let about_root = ROOT_OFFSETS.map(|offset| root + offset * tolerance / distance.abs());
+    let mut shares: Vec<f64> =
+        about_root.into_iter().filter(|share| *share > 0.0 && *share < 1.0).collect();
     if shares.len() < ROOT_OFFSETS.len() {
         shares.push(0.5);
         shares.sort_by(f64::total_cmp);
@@ -357,7 +372,7 @@ fn edge_rpm(
             false => speeds_between(inside[0], outside[0], TRIALS_BETWEEN),
         };
         for (rpm, response) in trials.iter().zip(finder.find_responses(&trials)) {
-            let is_inside = response.as_ref().is_some_and(|it| it.kind() == kind);
+            let is_inside = response.as_ref().is_some_and(|response| response.kind() == kind);
             let trial = response.as_ref().map_or([*rpm, f64::NAN], speed_and_growth);
             if !is_inside {
                 outside = trial;
@@ -369,58 +384,59 @@ fn edge_rpm(
     0.5 * (inside[0] + outside[0])
 }
 
-/// Returns the response of a kind with the greatest growth, at a speed of the run or between two of
-/// its speeds.
-fn greatest_growth(
+/// Returns the response of a kind with the greatest growth, at a speed of the run or between two
+/// speeds of the run.
+fn fastest_response(
     finder: &ResponseFinder<'_>,
     kind: StabilityKind,
     run: &[&Response],
     growths: &[[f64; 2]],
 ) -> Response {
     let by_growth = |a: &&Response, b: &&Response| a.growth_per_s().total_cmp(&b.growth_per_s());
-    let mut best: Response = (*run.iter().copied().max_by(by_growth).unwrap_or(run[0])).clone();
-    let index = growths.partition_point(|[rpm, _]| *rpm < best.speed_rpm);
-    let rpm_at = |k: usize| growths.get(k).map_or(best.speed_rpm, |[rpm, _]| *rpm);
-    let mut around = [rpm_at(index.saturating_sub(1)), rpm_at(index + 1)];
+    let mut fastest: Response = (*run.iter().copied().max_by(by_growth).unwrap_or(run[0])).clone();
+    let index = growths.partition_point(|[rpm, _]| *rpm < fastest.speed_rpm);
+    let rpm_at = |k: usize| growths.get(k).map_or(fastest.speed_rpm, |[rpm, _]| *rpm);
+    let mut bracket_rpm = [rpm_at(index.saturating_sub(1)), rpm_at(index + 1)];
     for _ in 0..PEAK_ROUNDS {
-        let trials = speeds_between(around[0], around[1], TRIALS_BETWEEN);
-        let responses = finder.find_responses(&trials);
-        for response in responses.into_iter().flatten().filter(|it| it.kind() == kind) {
-            if response.growth_per_s() > best.growth_per_s() {
-                best = response;
+        let [low_rpm, high_rpm] = bracket_rpm;
+        let trials = speeds_between(low_rpm, high_rpm, TRIALS_BETWEEN);
+        for response in finder.find_responses(&trials).into_iter().flatten() {
+            if response.kind() == kind && response.growth_per_s() > fastest.growth_per_s() {
+                fastest = response;
             }
         }
-        let step = (around[1] - around[0]) / (TRIALS_BETWEEN + 1) as f64;
-        around = [best.speed_rpm - step, best.speed_rpm + step]
-            .map(|rpm| rpm.clamp(around[0], around[1]));
+        let step_rpm = (high_rpm - low_rpm) / (TRIALS_BETWEEN + 1) as f64;
+        bracket_rpm = [fastest.speed_rpm - step_rpm, fastest.speed_rpm + step_rpm]
+            .map(|rpm| rpm.clamp(low_rpm, high_rpm));
     }
-    best
+    fastest
 }
 
 /// Returns the sum or difference of the modes' frequencies that is nearest to a multiple of the
 /// speed. A period doubling admits odd multiples, a fold even ones, and both twice the frequency of
 /// one mode.
-fn nearest_resonance(point: &Point, at: &Response) -> Option<ModeResonance> {
+fn nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance> {
     let frequencies = |speed_rpm: f64| -> Option<Vec<f64>> {
         let found = modes(point, 0.0, speed_rpm * core::f64::consts::TAU / 60.0).ok()?;
         Some(found.modes.iter().map(washer_model::Mode::frequency_rpm).collect())
     };
-    let frequencies = frequencies(at.speed_rpm)?;
-    let named: Vec<usize> = at.participating_modes.iter().map(|mode| mode.mode - 1).collect();
-    let pairs: Vec<(usize, usize)> = match (at.kind(), named.as_slice()) {
+    let frequencies = frequencies(response.speed_rpm)?;
+    let participants: Vec<usize> =
+        response.participating_modes.iter().map(|mode| mode.mode - 1).collect();
+    let pairs: Vec<(usize, usize)> = match (response.kind(), participants.as_slice()) {
         (_, []) => return None,
         (StabilityKind::QuasiPeriodic, &[one]) => {
             (0..SUSPENSION_MODES).filter(|other| *other != one).map(|other| (one, other)).collect()
         }
         (StabilityKind::QuasiPeriodic, &[one, other, ..]) => vec![(one, other)],
-        (_, named) => named.iter().map(|&one| (one, one)).collect(),
+        (_, participants) => participants.iter().map(|&one| (one, one)).collect(),
     };
-    let admits = |order: &u32| match at.kind() {
+    let is_admitted = |order: &u32| match response.kind() {
         StabilityKind::PeriodDoubling => order % 2 == 1,
         StabilityKind::Fold => order.is_multiple_of(2),
         StabilityKind::QuasiPeriodic | StabilityKind::Stable => true,
     };
-    let meeting = |(one, other): (usize, usize), sign: f64, order: u32| {
+    let resonance = |(one, other): (usize, usize), sign: f64, order: u32| {
         // Sums name the lower mode first, differences the higher frequency.
         let is_swapped =
             if sign > 0.0 { one > other } else { frequencies[one] < frequencies[other] };
@@ -429,18 +445,23 @@ fn nearest_resonance(point: &Point, at: &Response) -> Option<ModeResonance> {
         let sum_cpm = frequencies_cpm[0] + sign * frequencies_cpm[1];
         ModeResonance { modes: modes.map(|mode| mode + 1), frequencies_cpm, sign, sum_cpm, order }
     };
-    let orders = || (1..=MAX_ORDER).filter(admits);
+    let orders = || (1..=MAX_ORDER).filter(is_admitted);
     let all = pairs.iter().flat_map(|&pair| {
-        let signed = [1.0, -1.0].into_iter().flat_map(|sign| orders().map(move |at| (sign, at)));
-        signed.map(move |(sign, order)| meeting(pair, sign, order))
+        let signed =
+            [1.0, -1.0].into_iter().flat_map(|sign| orders().map(move |order| (sign, order)));
+        signed.map(move |(sign, order)| resonance(pair, sign, order))
     });
-    let miss = |it: &ModeResonance| (it.sum_cpm / (f64::from(it.order) * at.speed_rpm) - 1.0).abs();
-    let nearest = all.min_by(|a, b| miss(a).total_cmp(&miss(b)));
-    nearest.filter(|nearest| miss(nearest) < MAX_MISS)
+    let distance = |resonance: &ModeResonance| {
+        let multiple_rpm = f64::from(resonance.order) * response.speed_rpm;
+        (resonance.sum_cpm / multiple_rpm - 1.0).abs()
+    };
+    let nearest = all.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    nearest.filter(|nearest| distance(nearest) < MAX_RESONANCE_DISTANCE)
 }
 
 /// Returns the factors to try next, above `open`, which leaves growth, and below `closed`, which
-/// does not, once one is known. Each of the two is a factor with the growth that it leaves.
+/// leaves none, once such a factor is known. Each of the two is a factor with the growth that
+/// remains.
 fn trial_factors(open: [f64; 2], closed: Option<[f64; 2]>) -> Vec<f64> {
     let above_limit = |[factor, growth]: [f64; 2]| [factor, growth + CLOSED_DECAY_PER_S];
     match closed {
@@ -463,18 +484,17 @@ impl Tongue {
             return Closing::NoDampers;
         }
         // Pairs of a factor and the growth that it leaves.
-        let mut open = [1.0, self.at.growth_per_s()];
+        let mut open = [1.0, self.fastest_response.growth_per_s()];
         let mut closed: Option<[f64; 2]> = None;
         while closed.is_none_or(|closed| closed[0] - open[0] > DAMPING_FACTOR_TOLERANCE * open[0]) {
             let factors = trial_factors(open, closed);
             let growths = self.remaining_growths(finder, &factors);
-            let tried = factors.iter().zip(growths).map(|(&factor, growth)| [factor, growth]);
-            for tried in tried {
-                if tried[1] <= -CLOSED_DECAY_PER_S {
-                    closed = Some(tried);
+            for (factor, growth) in factors.into_iter().zip(growths) {
+                if growth <= -CLOSED_DECAY_PER_S {
+                    closed = Some([factor, growth]);
                     break;
                 }
-                open = tried;
+                open = [factor, growth];
             }
             if closed.is_none() && open[0] > MAX_DAMPING_FACTOR {
                 return Closing::NotUpTo { factor: MAX_DAMPING_FACTOR };
@@ -490,7 +510,7 @@ impl Tongue {
     /// Returns the lowest and the greatest speed (rpm) at which growth is sought in machines with
     /// stronger dampers.
     fn searched_rpm(&self) -> [f64; 2] {
-        let [from, to] = self.from_to_rpm;
+        let [from, to] = self.range_rpm;
         let margin = DAMPING_TRIAL_MARGIN * (to - from) + 1.0;
         [(from - margin).max(0.5 * from), to + margin]
     }
@@ -514,24 +534,24 @@ impl Tongue {
         let below = finder.find_responses(&[range_rpm[0]]).pop().flatten();
         let mut curves = ResponseCurves::continue_curves(&machines, below.as_ref(), cancel);
         let mut growths = vec![f64::NEG_INFINITY; machines.len()];
-        let mut around = vec![range_rpm; machines.len()];
+        let mut brackets_rpm = vec![range_rpm; machines.len()];
         let mut count = DAMPING_TRIAL_SPEEDS;
         for _ in 0..=PEAK_ROUNDS {
             // A machine with growth at one speed needs no further ones: its tongue is open.
             let may_be_closed = (0..machines.len()).filter(|&k| growths[k] <= -CLOSED_DECAY_PER_S);
             let requests: Vec<(usize, f64)> = may_be_closed
                 .flat_map(|k| {
-                    let [low, high] = around[k];
+                    let [low, high] = brackets_rpm[k];
                     let ends = if count == DAMPING_TRIAL_SPEEDS { vec![low, high] } else { vec![] };
                     let speeds = ends.into_iter().chain(speeds_between(low, high, count));
                     speeds.map(move |rpm| (k, rpm))
                 })
                 .collect();
-            let found = ResponseCurves::find_at_speeds(&mut curves, &requests, cancel);
-            (finder.count_speeds)(found.len());
+            let answers = ResponseCurves::find_at_speeds(&mut curves, &requests, cancel);
+            (finder.count_speeds)(answers.len());
             // The speed of a greater growth than before; 0 if this round has none.
             let mut greatest_rpm = vec![0.0; machines.len()];
-            for ((k, rpm), responses) in requests.into_iter().zip(found) {
+            for ((k, rpm), responses) in requests.into_iter().zip(answers) {
                 let first = responses.ok().and_then(|responses| responses.into_iter().next());
                 let growth = first.map_or(f64::INFINITY, |response| response.growth_per_s());
                 if growth > growths[k] {
@@ -539,11 +559,12 @@ impl Tongue {
                     greatest_rpm[k] = rpm;
                 }
             }
-            for (around, rpm) in around.iter_mut().zip(greatest_rpm) {
-                let step = (around[1] - around[0]) / (count + 1) as f64;
-                let near =
-                    [rpm - step, rpm + step].map(|rpm| rpm.clamp(range_rpm[0], range_rpm[1]));
-                *around = if rpm > 0.0 { near } else { *around };
+            for (bracket_rpm, rpm) in brackets_rpm.iter_mut().zip(greatest_rpm) {
+                let step_rpm = (bracket_rpm[1] - bracket_rpm[0]) / (count + 1) as f64;
+                if rpm > 0.0 {
+                    *bracket_rpm = [rpm - step_rpm, rpm + step_rpm]
+                        .map(|rpm| rpm.clamp(range_rpm[0], range_rpm[1]));
+                }
             }
             count = TRIALS_BETWEEN;
         }

@@ -135,7 +135,7 @@ impl Problem<'_> {
     /// Selects the integration method: that of the grid if it is a method of fixed steps, or else
     /// Runge and Kutta's with the step of references, which depends on the machine at the start.
     pub(crate) fn method(cases: &[FitCase]) -> Result<Method, washer_model::NoEquilibrium> {
-        if let Some((_, method)) = cases.iter().find_map(|case| direct(&case.plan.integrator)) {
+        if let Some(method) = cases.iter().find_map(|case| direct(&case.plan.integrator)) {
             return Ok(method);
         }
         let mut step_s = f64::INFINITY;
@@ -147,7 +147,7 @@ impl Problem<'_> {
             step_s =
                 step_s.min(reference_step_s(&StepSelector::new([(&point, case.spin())], end_s)));
         }
-        Ok(Method::Rk4 { step_s })
+        Ok(Method::rk4(step_s))
     }
 
     /// Returns the number of unknowns.

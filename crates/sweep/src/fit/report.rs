@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use serde_json::Value;
-use washer_model::Method;
+use washer_model::MethodKind;
 
 use super::algebra::{centred, dot, middle_95};
 use super::model::{Problem, SignalComparison};
 use super::search::Descent;
 use super::speed::SmoothedSpin;
 use super::statistics::{Statistics, Z_975};
-use super::verdict::{FittedVerdict, MapRow};
+use super::verdict::{FittedMap, FittedVerdict};
 use crate::config;
 use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, format_range, format_table};
@@ -206,10 +206,7 @@ impl ReportData<'_> {
             parameters,
             settled: best.is_settled,
             evaluations: self.evaluations,
-            step_s: match problem.method {
-                Method::Rk4 { step_s } => Some(step_s),
-                _ => None,
-            },
+            step_s: (problem.method.kind == MethodKind::Rk4).then_some(problem.method.step_s),
             step_effect: self.step_effect,
             suspected_units,
             notes: self.notes(),
@@ -258,7 +255,7 @@ impl ReportData<'_> {
         let problem = self.problem;
         let x = &self.minima[0].x;
         let measured = &problem.cases[case].measured;
-        let map_row = MapRow { problem, x, statistics: self.statistics, draws: self.draws };
+        let fitted_map = FittedMap { problem, x, statistics: self.statistics, draws: self.draws };
         let comparisons = || {
             let all = problem.signals().zip(self.against).enumerate();
             all.filter(move |(_, ((signal_case, ..), _))| *signal_case == case)
@@ -284,7 +281,7 @@ impl ReportData<'_> {
             spin: problem.cases[case].smoothed.clone(),
             gaps_s: measured.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
-            verdict: (self.draws > 0).then(|| map_row.verdict(case, follows)).transpose()?,
+            verdict: (self.draws > 0).then(|| fitted_map.verdict(case, follows)).transpose()?,
         })
     }
 

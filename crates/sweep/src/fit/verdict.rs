@@ -4,16 +4,17 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 use washer_model::{HeldSpeed, MachineParameter, Response};
-use washer_row::{Growth, Outcome, Status, Verdict as RowVerdict};
+use washer_row::{Growth, Status, Verdict as RowVerdict};
 
 use super::algebra::{dot, middle_95};
 use super::draws;
 use super::model::Problem;
 use super::statistics::{Statistics, Z_975};
 use crate::engine::{ModelEngine, fastest_growth, find_responses};
+use crate::map_row::MapRow;
 use crate::plan::{Axis, AxisValues, Plan, axis_between, prepare_point, timing};
-use sweep_engine::Error;
 use sweep_engine::commands::cells::format_range;
+use sweep_engine::{Error, Interrupt, RunContext};
 
 /// The number of speeds at which the stability of the fitted machine is computed. Basis: bands of
 /// instability of the paper's machine are several times wider than their distance. Doubling it
@@ -79,7 +80,7 @@ impl FittedVerdict {
 }
 
 /// The computation of rows of the map for a fitted machine.
-pub(super) struct MapRow<'a> {
+pub(super) struct FittedMap<'a> {
     pub(super) problem: &'a Problem<'a>,
     /// The unknowns.
     pub(super) x: &'a [f64],
@@ -88,7 +89,7 @@ pub(super) struct MapRow<'a> {
     pub(super) draws: u64,
 }
 
-impl MapRow<'_> {
+impl FittedMap<'_> {
     /// Computes the row of a case's map at its fitted machine, and over the fitted distribution.
     pub(super) fn verdict(&self, case: usize, follows: bool) -> Result<FittedVerdict, Error> {
         let problem = self.problem;
@@ -116,12 +117,11 @@ impl MapRow<'_> {
         let points: Vec<Vec<f64>> =
             sets.iter().map(|set| case_parameters.iter().map(|&k| set[k]).collect()).collect();
         let engine = ModelEngine::new(&plan)?;
-        let outcomes =
-            if problem.cancel.is_requested() { Vec::new() } else { engine.evaluate_at(&points) };
-        let channels = plan.reliability.channels.len();
-        let limits = plan.reliability.limits;
-        let verdict = |outcome: &Outcome| RowVerdict::new(outcome, channels, limits);
-        let verdicts: Vec<RowVerdict> = outcomes.iter().map(verdict).collect();
+        let is_canceled = || problem.cancel.is_requested();
+        let interrupt = Interrupt::new();
+        let context = RunContext::with_time_limit(&interrupt, &is_canceled);
+        let rows = engine.evaluate_points(&points, &context).unwrap_or_default();
+        let verdicts: Vec<RowVerdict> = rows.iter().map(MapRow::verdict).collect();
         let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
         let drawn = verdicts.get(1..).unwrap_or_default();
         let reliable = drawn.iter().filter(|verdict| verdict.reliable == Some(true)).count();
@@ -133,7 +133,7 @@ impl MapRow<'_> {
         Ok(FittedVerdict {
             reliable: verdicts.first().and_then(|verdict| verdict.reliable),
             ratio_max: verdicts.first().and_then(ratio),
-            ratio_limit: limits.upper,
+            ratio_limit: plan.reliability.limits.upper,
             probability_reliable: (!drawn.is_empty()).then(|| reliable as f64 / drawn.len() as f64),
             ratio_max_95: middle_95(drawn.iter().filter_map(ratio)),
             draws: drawn.len(),

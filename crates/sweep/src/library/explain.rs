@@ -33,7 +33,7 @@ pub fn explain_point(
     speeds_rpm: Option<&[f64]>,
     execution: Execution<'_>,
 ) -> Result<Option<Explained>, Error> {
-    let (plan, point_values) = grid.load_point(point_values)?;
+    let (plan, parameters) = grid.load_point(point_values)?;
     let parse = |speeds: &[f64]| {
         Speeds::from_values(speeds).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
             let expected = "at least two equally spaced speeds in rpm above 0, as those of \
@@ -42,11 +42,11 @@ pub fn explain_point(
         })
     };
     let speeds = speeds_rpm.map(parse).transpose()?;
-    let found = explain(&plan, point_values, speeds, execution)?;
+    let explanation = explain(&plan, parameters, speeds, execution)?;
     if execution.interrupt.stopped() {
         return Ok(None);
     }
-    Ok(Some(Explained { found: json::to_json(&found), text: format::to_text(&found) }))
+    Ok(Some(Explained { found: json::to_json(&explanation), text: format::to_text(&explanation) }))
 }
 
 #[cfg(test)]

@@ -43,10 +43,10 @@ pub fn trace_point(
     options: &TraceOptions,
     interrupt: &Interrupt,
 ) -> Result<Option<(MemoryTable, Vec<String>)>, Error> {
-    let (plan, point_values) = match options.all {
+    let (plan, parameters) = match options.all {
         true => (grid.clone().with_fixed(point_values).load()?, None),
         false => {
-            grid.load_point(point_values).map(|(plan, point_values)| (plan, Some(point_values)))?
+            grid.load_point(point_values).map(|(plan, parameters)| (plan, Some(parameters)))?
         }
     };
     let every_s = check_spacing(options.every_s, &plan)?;
@@ -63,7 +63,7 @@ pub fn trace_point(
     };
     let settings = TraceSettings { every_s, models, start, extras: options.extras, capped: None };
     let cancel = Cancel::Flag(interrupt.flag());
-    let trace = trace_in_pool(&plan, point_values, &settings, cancel).map_err(Error::model)?;
+    let trace = trace_in_pool(&plan, parameters, &settings, cancel).map_err(Error::model)?;
     if interrupt.stopped() {
         return Ok(None);
     }

@@ -1,6 +1,6 @@
 //! Tests of a page's checked points, which have the levels, errors and bits of the program's rows.
 
-use washer_row::{Criterion, Outcome, Status, Verdict};
+use washer_row::{Criterion, Outcome, Status};
 
 use super::*;
 
@@ -25,7 +25,7 @@ fn assert_is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
     let checked = washer_live::check(setup, values).unwrap();
     let errors = checked.errors[0].zip(checked.errors[1]).map(|(a, b)| a.max(b));
     assert_eq!(errors, outcome.error, "{values:?}");
-    assert_eq!(checked.levels[0], outcome.method, "{values:?}");
+    assert_eq!(checked.methods[0], outcome.method, "{values:?}");
     let mut row = checked.outcome;
     row.drop_turns();
     assert_eq!((row, values), (Outcome { point: 0, ..outcome.clone() }, values));
@@ -47,7 +47,7 @@ fn a_checked_point_is_the_row_of_the_map() {
     let engine = ModelEngine::new(&plan).unwrap();
     // The first point converges at once, the second late, and the third is chaotic.
     for values in [[0.1, 300.0], [0.4, 180.0], [0.95, 180.0]] {
-        let outcomes = engine.evaluate_at(&[values.to_vec()]);
+        let outcomes = engine.outcomes_at(&[values.to_vec()]);
         assert_is_row(&outcomes[0], &setup, &values);
     }
 }
@@ -67,13 +67,12 @@ stability = { speed_rpm = "200:240:20" }
         let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
         let engine = ModelEngine::new(&plan).unwrap();
         let values = [0.95, 300.0];
-        let outcome = &engine.evaluate_at(&[values.to_vec()])[0];
+        let outcome = &engine.outcomes_at(&[values.to_vec()])[0];
         assert_eq!(outcome.linear.metrics.len(), 2);
         assert!(outcome.static_sag_m > Some(0.0));
         assert_is_row(outcome, &setup, &values);
         let answer = washer_live::check(&setup, &values).unwrap();
-        let limit = plan.reliability.limits;
-        let verdict = Verdict::new(outcome, setup.rule.channels.len(), limit);
+        let verdict = &outcome.verdict;
         // The page has the ratios by turn of every channel.
         let turn_ratios = answer.outcome.turn_ratios;
         assert!(criterion == "rms" || turn_ratios == verdict.ratios);
@@ -87,7 +86,7 @@ fn motions_of_held_speeds_are_the_rows() {
     let further = "metrics = [\"dwell\"]\nstability = { speed_rpm = \"240,250\" }\n";
     let mut plan = plan(&(further.to_owned() + GRID));
     let values = [0.4, 140.0];
-    let outcome = &ModelEngine::new(&plan).unwrap().evaluate_at(&[values.to_vec()])[0];
+    let outcome = &ModelEngine::new(&plan).unwrap().outcomes_at(&[values.to_vec()])[0];
     let (speeds_rpm, metrics) = take_held_metrics(&mut plan);
     assert_eq!(metrics, [Metric::Dwell]);
     let (setup, _) = setup(&plan, &[]).unwrap();
@@ -104,7 +103,7 @@ fn a_point_beyond_the_axes_is_the_row_of_a_wider_grid() {
     let wide = with_sliders(&plan, &sliders);
     let engine = ModelEngine::new(&wide).unwrap();
     let values = [0.4, 240.0, 26.0];
-    assert_is_row(&engine.evaluate_at(&[values.to_vec()])[0], &setup, &values);
+    assert_is_row(&engine.outcomes_at(&[values.to_vec()])[0], &setup, &values);
 }
 
 #[test]

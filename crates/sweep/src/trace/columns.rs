@@ -86,8 +86,8 @@ impl<'a> ModelColumns<'a> {
         for channel in Channel::ALL {
             let name = format!("{}_{}", self.model, channel.name());
             let description = format!("{} from equilibrium", channel.description());
-            self.add_column(table, (&name, channel.unit(), &description), |at| {
-                at.channels[channel.index()]
+            self.add_column(table, (&name, channel.unit(), &description), |instant| {
+                instant.channels[channel.index()]
             });
         }
     }
@@ -100,16 +100,20 @@ impl<'a> ModelColumns<'a> {
             let name = |per: &str| format!("{}_{name}_{unit}_per_{per}", self.model);
             let description = channel.description();
             let rate = format!("rate of the {description}");
-            self.add_column(table, (&name("s"), &format!("{unit}/s"), &rate), |at| at.rates[k]);
+            self.add_column(table, (&name("s"), &format!("{unit}/s"), &rate), |instant| {
+                instant.rates[k]
+            });
             let acceleration = format!("acceleration of the {description}");
             let unit = format!("{unit}/s^2");
-            self.add_column(table, (&name("s2"), &unit, &acceleration), |at| at.accelerations[k]);
+            self.add_column(table, (&name("s2"), &unit, &acceleration), |instant| {
+                instant.accelerations[k]
+            });
         }
     }
 
     fn add_gap(&self, table: &mut Table) {
         let name = format!("gap_{}_m", self.model);
-        self.add_column(table, (&name, "m", "gap between drum and tub"), |at| at.gap_m);
+        self.add_column(table, (&name, "m", "gap between drum and tub"), |instant| instant.gap_m);
     }
 
     fn add_states(&self, table: &mut Table) {
@@ -117,10 +121,10 @@ impl<'a> ModelColumns<'a> {
             let (unit, per_s) = if i < 4 { ("m", "m/s") } else { ("rad", "rad/s") };
             let name = format!("q{}_{}_{unit}", i + 1, self.model);
             let description = format!("coordinate q{} from equilibrium", i + 1);
-            self.add_column(table, (&name, unit, &description), |at| at.deviations[i]);
+            self.add_column(table, (&name, unit, &description), |instant| instant.deviations[i]);
             let name = format!("u{}_{}_{unit}_per_s", i + 1, self.model);
-            self.add_column(table, (&name, per_s, &format!("speed of q{}", i + 1)), |at| {
-                at.speeds[i]
+            self.add_column(table, (&name, per_s, &format!("speed of q{}", i + 1)), |instant| {
+                instant.speeds[i]
             });
         }
     }
@@ -136,7 +140,12 @@ impl<'a> ModelColumns<'a> {
             let name = format!("{force}_{}_n", self.model);
             let description =
                 format!("{description}, {} model; null from where it failed", self.model);
-            table.numbers(&name, "N", &description, forces.iter().map(|at| at.as_ref().map(value)));
+            table.numbers(
+                &name,
+                "N",
+                &description,
+                forces.iter().map(|forces| forces.as_ref().map(value)),
+            );
         };
         let Some(first) = forces.first().and_then(Option::as_ref) else { return };
         let axes = ["x", "y", "z"];
@@ -150,7 +159,7 @@ impl<'a> ModelColumns<'a> {
                     name += &format!("_{}", axes[k % count]);
                     description += &(k % count + 1).to_string();
                 }
-                add(&name, &description, &|at| at.by_kind()[kind][k]);
+                add(&name, &description, &|forces| forces.by_kind()[kind][k]);
             }
         }
         let elements = if first.stops_n.is_empty() && first.bushings_n.is_empty() {
@@ -160,33 +169,33 @@ impl<'a> ModelColumns<'a> {
         };
         for (k, axis) in axes.into_iter().enumerate() {
             let description = format!("force of {elements} on the cabinet along c{}", k + 1);
-            add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
+            add(&format!("cabinet_force_{axis}"), &description, &|forces| forces.cabinet_n[k]);
         }
         for k in 0..first.feet_n.len() {
             let description = "vertical load of the foot, negative where it would lift";
-            add(&format!("foot_{}_load", k + 1), description, &|at| at.feet_n[k]);
+            add(&format!("foot_{}_load", k + 1), description, &|forces| forces.feet_n[k]);
         }
         if first.slip_margin_n.is_some() {
             let description = "margin of the cabinet against slipping, friction on all feet \
                                together less the horizontal force";
-            add("slip_margin", description, &|at| at.slip_margin_n.unwrap_or(f64::NAN));
+            add("slip_margin", description, &|forces| forces.slip_margin_n.unwrap_or(f64::NAN));
             let description = "margin of the cabinet against walking: that against slipping less \
                                what turning takes of it";
-            add("walk_margin", description, &|at| at.walk_margin_n.unwrap_or(f64::NAN));
+            add("walk_margin", description, &|forces| forces.walk_margin_n.unwrap_or(f64::NAN));
         }
     }
 
-    /// Returns for each history why and when the integration failed, if it did.
+    /// Returns the reason and the time of each history's failure, if it failed.
     fn failures(&self) -> Vec<Option<String>> {
         let failure = |history: &History<'_>| {
             let (reason, time_s) = history.failure?;
-            let what = match reason {
+            let failure = match reason {
                 Failure::Diverged => "diverged",
                 Failure::StepTooSmall => "needs steps too small for double precision",
                 Failure::StepLimit => "used up its allowance of steps",
             };
             Some(format!(
-                "the {} model {what} at {time_s:.4} s: its columns are null from there on",
+                "the {} model {failure} at {time_s:.4} s: its columns are null from there on",
                 self.model
             ))
         };

@@ -8,7 +8,7 @@ use sweep_engine::store::read;
 use sweep_engine::{StoreError, threads};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
 use washer_model::InitialDeviation;
-use washer_row::Level;
+use washer_row::MethodKind;
 
 use super::{Models, TraceExtras, TraceSettings, trace_scenario};
 use crate::engine::ModelEngine;
@@ -42,24 +42,24 @@ pub(crate) fn write_point_traces(
     let plan = engine.plan();
     files::ready(folder)?;
     remove_point_traces(folder)?;
-    let levels = read::read_methods(result)?;
+    let methods = read::read_methods(result)?;
     threads::pool(threads)?.install(|| {
-        levels.into_par_iter().enumerate().try_for_each(|(point, level)| {
+        methods.into_par_iter().enumerate().try_for_each(|(point, method)| {
             let point = point as u64;
             if cancel.is_requested() {
                 return Ok(());
             }
             let names = plan.axes.iter().map(|axis| axis.parameter.name.to_string());
-            let at = names.zip(plan.axis_values(point)).collect();
-            let level = level.and_then(|name| Level::named(&name));
+            let parameters = names.zip(plan.axis_values(point)).collect();
+            let kind = method.and_then(|name| MethodKind::named(&name));
             let settings = TraceSettings {
                 every_s: Some(plan.end_s / TIME_STEPS),
                 models: Models::Both,
                 start: InitialDeviation::default(),
                 extras: TraceExtras::default(),
-                capped: level.and_then(|level| engine.capped_run(level)),
+                capped: kind.and_then(|kind| engine.capped_run(kind)),
             };
-            let traced = trace_scenario(plan, plan.scenario(point), at, &settings, cancel);
+            let traced = trace_scenario(plan, plan.scenario(point), parameters, &settings, cancel);
             if cancel.is_requested() {
                 return Ok(());
             }

@@ -52,10 +52,10 @@ fn a_trace_with_friction_is_as_accurate_as_its_row() {
             trace_scenario(&plan, plan.scenario(0), Vec::new(), &settings, Cancel::Never).unwrap();
         let rows = traced.table.finish().unwrap().0;
         let column = rows.column_by_name("foot_1_load_nonlinear_n").unwrap();
-        (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), traced.level)
+        (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), traced.method)
     };
-    let (reference, level) = loads("");
-    assert_eq!(level, Some(Level::Dop853));
+    let (reference, method) = loads("");
+    assert_eq!(method, Some(MethodKind::Dop853));
     let (expected, _) = loads("[integrator]\nmethod = \"rk4\"\nstep_s = 1e-5\n");
     for (load_n, expected_n) in reference.iter().zip(&expected) {
         assert!((load_n / expected_n - 1.0).abs() < 2e-3, "{load_n} for {expected_n}");
@@ -77,10 +77,10 @@ fn a_trace_by_a_rows_method_is_the_trajectory_of_the_row() {
     let every_s = 0.002;
     let from = (plan.window_s[0] / every_s) as usize;
     let mut capped_rows = 0;
-    for row in engine.evaluate_at(&points) {
+    for row in engine.outcomes_at(&points) {
         let Some(capped) = engine.capped_run(row.method) else { continue };
         capped_rows += 1;
-        assert_eq!(capped.level, row.method);
+        assert_eq!(capped.methods[0].kind, row.method);
         let settings = TraceSettings {
             every_s: Some(every_s),
             models: Models::Both,

@@ -343,7 +343,7 @@ fn continue_in_short_steps(
         deviations: core::array::from_fn(|i| motion.end[i] - rest[i]),
         speeds: core::array::from_fn(|i| motion.end[COORDINATES + i]),
     };
-    let method = Method::Rk4 { step_s: STEP_S };
+    let method = Method::rk4(STEP_S);
     let history = history(ModelKind::Nonlinear, &method, &point, &start, turn_s / SAMPLES as f64);
     assert!(history.failure.is_none());
     let mut peaks = [0.0_f64; CHANNELS];

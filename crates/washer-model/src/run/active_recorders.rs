@@ -3,9 +3,9 @@
 //! These recorders run over lanes after every step, in a function that is not inlined
 //! ([`Lane::run_out_of_line`]), so that the loop over steps is not slower if they are not in use.
 
-use super::Method;
 use super::loads::{Gauge, Loads};
 use super::snapshots::Snapshots;
+use super::{Method, MethodKind};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::whole_turn_cuts_s;
@@ -41,14 +41,11 @@ impl Substeps {
 
     /// Creates the division of the steps of a method.
     pub(crate) fn for_method(method: &Method) -> Self {
-        match method {
-            Method::Rk4 { .. } => Self::new(true),
-            Method::Capped { step_s, .. } => {
-                let count = (step_s / CAPPED_SUBSTEP_S).ceil() as u32;
-                Self { count: count.clamp(1, LONG_STEP_SUBSTEPS) }
-            }
-            _ => Self::new(false),
+        if method.kind.is_capped() {
+            let count = (method.step_s / CAPPED_SUBSTEP_S).ceil() as u32;
+            return Self { count: count.clamp(1, LONG_STEP_SUBSTEPS) };
         }
+        Self::new(method.kind == MethodKind::Rk4)
     }
 }
 

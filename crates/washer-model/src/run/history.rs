@@ -19,7 +19,7 @@ use crate::run::method::{
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::run::snapshots::position_in_step;
 use crate::run::suspension::forces;
-use crate::{COORDINATES, Forces, Method, ModelKind, Point};
+use crate::{COORDINATES, Forces, Method, MethodKind, ModelKind, Point};
 use core::marker::PhantomData;
 use lane_ode::{
     Cancel, Failure, Kernel, Lane, MAX_LANES, N, ObservedStep, OutOfLine, Sample, Segment,
@@ -107,7 +107,7 @@ pub fn histories<'a>(
     requests: Vec<HistoryRequest<'a>>,
     cancel: Cancel<'_>,
 ) -> Vec<History<'a>> {
-    let is_rk4 = requests.iter().all(|request| matches!(request.method, Method::Rk4 { .. }));
+    let is_rk4 = requests.iter().all(|request| request.method.kind == MethodKind::Rk4);
     let batch_len = if is_rk4 { histories_per_batch() } else { 1 };
     let mut requests = requests.into_iter();
     let mut histories = Vec::with_capacity(requests.len());
@@ -338,7 +338,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
         }
         let segment = segment?;
         self.segments[lane] = Some(next_segment_index);
-        Some(start_segment(&mut self.model, lane, *method, point, segment))
+        Some(start_segment(&mut self.model, lane, method, point, segment))
     }
 
     #[inline(always)]

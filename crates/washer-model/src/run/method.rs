@@ -1,4 +1,4 @@
-//! The methods of integration: their parameters, their names in rows, and their steppers.
+//! The methods of integration: their kinds, their numbers, and their steppers.
 //!
 //! Each stepper is compiled as a separate kernel, because the compiler takes longer for one
 //! function with all of them than for all functions together.
@@ -10,30 +10,15 @@ use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::{Caps, Formula, ModelKind, Point};
 use lane_ode::{Lane, N, Segment, Task, Tolerance, additive, dop853, dopri5, rk4};
 
-/// A method of integration with its parameters.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Method {
-    /// Classical Runge-Kutta of order 4.
-    Rk4 { step_s: f64 },
-    /// The model's formula ([`Formula::for_model`]) for the machine with scaled mass at the
-    /// bearings, and at the hinge if the hinge has a cap, which keeps the frequencies of their
-    /// modes below the caps (section 4.3 of the model page).
-    Capped { step_s: f64, caps: Caps },
-    /// Dormand and Prince's formula of order 8 with fixed steps, without caps. The linear model
-    /// uses RK4 instead.
-    Dop853 { step_s: f64 },
-    /// Dormand and Prince's method of order 5(4), adaptive.
-    Dopri5(Tolerance),
-    /// Kennedy and Carpenter's additive method of order 5(4), adaptive. The springs of bearings and
-    /// hinge are implicit, so that their stiffness does not limit the step.
-    Additive(Tolerance),
-}
-
 sweep_parameter::named! {
-    /// The method of a row's numbers, with the refinement level if modes are capped. Unfinished
-    /// files store the position in this list, so that new methods are added at the end.
+    /// The kinds of methods. The position in this list is the code in results and pages, so that
+    /// new kinds are added at the end.
+    ///
+    /// Capped kinds integrate by the model's formula ([`Formula::for_model`]) the machine with
+    /// scaled mass at the bearings, and at the hinge if that has a cap, so that none of their modes
+    /// is faster than its cap (section 4.3 of the model page).
     #[derive(Default)]
-    pub enum Level {
+    pub enum MethodKind {
         /// Capped bearing modes, the longest stable steps.
         Capped0 = "capped_0",
         /// Capped bearing modes, the second level.
@@ -46,38 +31,56 @@ sweep_parameter::named! {
         Capped4 = "capped_4",
         /// Capped bearing modes, the shortest steps.
         Capped5 = "capped_5",
-        /// RK4 without capped modes.
+        /// Classical Runge-Kutta of order 4, without capped modes.
         #[default]
         Rk4 = "rk4",
-        /// Dormand-Prince 5(4).
+        /// Dormand and Prince's method of order 5(4), adaptive.
         Dopri5 = "dopri5",
-        /// The additive method.
+        /// Kennedy and Carpenter's additive method of order 5(4), adaptive. The springs of bearings
+        /// and hinge are implicit, so that their stiffness does not limit the step.
         Additive = "additive",
-        /// Dormand and Prince's formula of order 8 without capped modes.
+        /// Dormand and Prince's formula of order 8 with fixed steps, without capped modes. The
+        /// linear model uses classical Runge-Kutta instead.
         Dop853 = "dop853",
     }
 }
 
-impl Level {
-    /// The levels with capped bearing modes, coarsest first.
+impl MethodKind {
+    /// The kinds with capped bearing modes, coarsest first.
     pub const CAPPED: [Self; 6] =
         [Self::Capped0, Self::Capped1, Self::Capped2, Self::Capped3, Self::Capped4, Self::Capped5];
 
-    /// Returns whether modes of the bearings are capped.
-    pub fn is_capped(self) -> bool {
-        Self::CAPPED.contains(&self)
+    /// Whether modes of the bearings are capped.
+    pub const fn is_capped(self) -> bool {
+        matches!(
+            self,
+            Self::Capped0
+                | Self::Capped1
+                | Self::Capped2
+                | Self::Capped3
+                | Self::Capped4
+                | Self::Capped5
+        )
+    }
+
+    /// Whether each lane has its own steps, which follow the error estimate.
+    pub const fn adapts_steps(self) -> bool {
+        matches!(self, Self::Dopri5 | Self::Additive)
     }
 }
 
-/// The parameters of a method.
-#[derive(Debug)]
-pub enum MethodNumbers<'a> {
-    /// The longest step (s).
-    Step(&'a mut f64),
-    /// The longest step (s) and the caps.
-    Capped(&'a mut f64, &'a mut Caps),
-    /// The tolerance of an adaptive method.
-    Tolerance(&'a mut Tolerance),
+/// A method of integration: its kind with the numbers of that kind. Numbers that the kind does not
+/// use are zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Method {
+    /// The kind.
+    pub kind: MethodKind,
+    /// The longest step (s), or the first step that an adaptive method tries.
+    pub step_s: f64,
+    /// The caps of capped kinds.
+    pub caps: Caps,
+    /// The tolerance of adaptive kinds.
+    pub tolerance: Tolerance,
 }
 
 /// A function that is generic over the stepper, and is therefore compiled once for each stepper.
@@ -87,38 +90,58 @@ pub(crate) trait StepperVisitor<F: ModelFamily>: Sized {
 }
 
 impl Method {
-    /// Returns the method of a level with parameters of zero, which the caller sets.
-    pub const fn with_zero_numbers(level: Level) -> Self {
-        let caps = Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None };
-        let tolerance = Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 };
-        match level {
-            Level::Capped0
-            | Level::Capped1
-            | Level::Capped2
-            | Level::Capped3
-            | Level::Capped4
-            | Level::Capped5 => Self::Capped { step_s: 0.0, caps },
-            Level::Rk4 => Self::Rk4 { step_s: 0.0 },
-            Level::Dopri5 => Self::Dopri5(tolerance),
-            Level::Additive => Self::Additive(tolerance),
-            Level::Dop853 => Self::Dop853 { step_s: 0.0 },
+    /// Returns a method of a kind whose numbers are zero, except for the first step of adaptive
+    /// kinds.
+    pub const fn new(kind: MethodKind) -> Self {
+        Self {
+            kind,
+            step_s: if kind.adapts_steps() { FIRST_STEP_S } else { 0.0 },
+            caps: Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None },
+            tolerance: Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 },
         }
     }
 
-    /// Returns the parameters, to be read or set.
-    pub const fn numbers_mut(&mut self) -> MethodNumbers<'_> {
-        match self {
-            Self::Rk4 { step_s } | Self::Dop853 { step_s } => MethodNumbers::Step(step_s),
-            Self::Capped { step_s, caps } => MethodNumbers::Capped(step_s, caps),
-            Self::Dopri5(tolerance) | Self::Additive(tolerance) => {
-                MethodNumbers::Tolerance(tolerance)
-            }
-        }
+    /// Returns classical Runge-Kutta in fixed steps (s).
+    pub const fn rk4(step_s: f64) -> Self {
+        Self { step_s, ..Self::new(MethodKind::Rk4) }
     }
 
-    /// Whether each lane has its own steps, which an adaptive method chooses.
-    pub const fn adapts_steps(&self) -> bool {
-        matches!(self, Self::Dopri5(_) | Self::Additive(_))
+    /// Returns the formula of order 8 in fixed steps (s).
+    pub const fn dop853(step_s: f64) -> Self {
+        Self { step_s, ..Self::new(MethodKind::Dop853) }
+    }
+
+    /// Returns a capped kind in fixed steps (s).
+    pub const fn capped(kind: MethodKind, step_s: f64, caps: Caps) -> Self {
+        Self { step_s, caps, ..Self::new(kind) }
+    }
+
+    /// Returns Dormand and Prince's adaptive method.
+    pub const fn dopri5(tolerance: Tolerance) -> Self {
+        Self { tolerance, ..Self::new(MethodKind::Dopri5) }
+    }
+
+    /// Returns the additive method.
+    pub const fn additive(tolerance: Tolerance) -> Self {
+        Self { tolerance, ..Self::new(MethodKind::Additive) }
+    }
+
+    /// Returns a one-line description of the method with its numbers for a model.
+    pub fn describe(&self, model: ModelKind) -> String {
+        let name = self.kind.name();
+        let step_ms = 1e3 * self.step_s;
+        if self.kind.adapts_steps() {
+            return format!("{name} (tolerance {:.0e})", self.tolerance.relative);
+        }
+        if !self.kind.is_capped() {
+            return format!("{name} (step {step_ms:.3} ms)");
+        }
+        let order = match Formula::for_model(model) {
+            Formula::Rk4 => 4,
+            Formula::Dop853 => 8,
+        };
+        let cap = self.caps.bearings_rad_per_s;
+        format!("{name} (order {order}, step {step_ms:.3} ms, bearings capped at {cap:.0} rad/s)")
     }
 
     /// Calls a visitor with the stepper of this method.
@@ -128,13 +151,17 @@ impl Method {
     ) -> V::Output {
         // A match on the formula would compile both arms for each model.
         const { assert!(F::FixedStepStepper::FORMULA as u8 == Formula::for_model(F::KIND) as u8) };
-        match *self {
-            Self::Rk4 { .. } => visitor.visit(Rk4Stepper),
-            Self::Capped { .. } | Self::Dop853 { .. } => {
-                visitor.visit(F::FixedStepStepper::INSTANCE)
-            }
-            Self::Dopri5(tolerance) => visitor.visit(Dopri5Stepper(tolerance)),
-            Self::Additive(tolerance) => visitor.visit(AdditiveStepper(tolerance)),
+        match self.kind {
+            MethodKind::Rk4 => visitor.visit(Rk4Stepper),
+            MethodKind::Dopri5 => visitor.visit(Dopri5Stepper(self.tolerance)),
+            MethodKind::Additive => visitor.visit(AdditiveStepper(self.tolerance)),
+            MethodKind::Capped0
+            | MethodKind::Capped1
+            | MethodKind::Capped2
+            | MethodKind::Capped3
+            | MethodKind::Capped4
+            | MethodKind::Capped5
+            | MethodKind::Dop853 => visitor.visit(F::FixedStepStepper::INSTANCE),
         }
     }
 }
@@ -149,30 +176,28 @@ const FIRST_STEP_S: f64 = 1e-5;
 pub(crate) fn start_segment<T: Lane, M: LaneModel<T>>(
     model: &mut M,
     lane: usize,
-    mut method: Method,
+    method: &Method,
     point: &Point,
     segment: &PlannedSegment,
 ) -> Segment {
     model.set_spin(lane, &point.spin_segments[segment.spin_segment]);
-    let step_s = match method.numbers_mut() {
-        MethodNumbers::Step(step_s) | MethodNumbers::Capped(step_s, _) => *step_s,
-        MethodNumbers::Tolerance(_) => FIRST_STEP_S,
-    };
-    Segment { start_s: segment.start_s, end_s: segment.end_s, step_s }
+    Segment { start_s: segment.start_s, end_s: segment.end_s, step_s: method.step_s }
 }
 
 /// Returns the coupling of tub and rotor by a method's caps.
 #[inline(always)]
 pub(crate) fn coupling_for_method<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
-    let Method::Capped { caps, .. } = method else { return Coupling::Springs };
-    Coupling::new(zero, Some(caps))
+    if !method.kind.is_capped() {
+        return Coupling::Springs;
+    }
+    Coupling::new(zero, Some(&method.caps))
 }
 
 /// The nonlinear or the linear model, as a type that is independent of the lanes.
 pub(crate) trait ModelFamily {
     /// The model over lanes.
     type OnLanes<T: Lane>: LaneModel<T>;
-    /// The stepper of [`Method::Capped`] and [`Method::Dop853`], by the model's formula.
+    /// The stepper of capped kinds and of [`MethodKind::Dop853`], by the model's formula.
     type FixedStepStepper: FixedStepper;
     /// The model as a value.
     const KIND: ModelKind;

@@ -160,7 +160,7 @@ mod tests {
             .map(|point| point.unwrap().with_snapshots_at(Arc::clone(&instants)))
             .collect();
         let recorders = Recorders { snapshots: true, ..Recorders::default() };
-        let method = Method::Rk4 { step_s: 2e-4 };
+        let method = Method::rk4(2e-4);
         for model in ModelKind::ALL {
             let all_points: Vec<&Point> = points.iter().collect();
             let (_, in_lanes) = simulate_with(Simd::best(), model, &method, &all_points, recorders);

@@ -230,7 +230,7 @@ fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f6
         start.deviations[i] += 1e-6;
     }
     let turn_s = 60.0 / speed_rpm;
-    let method = Method::Rk4 { step_s };
+    let method = Method::rk4(step_s);
     let history = history(ModelKind::Nonlinear, &method, &point, &start, turn_s);
     let turn_count = (TIMING.end_s.min(end_s) / turn_s) as usize;
     let states: Vec<[f64; COORDINATES]> =

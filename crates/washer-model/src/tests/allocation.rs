@@ -25,7 +25,7 @@ fn a_long_trajectory_allocates_no_more_than_a_short_one() {
     };
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-            for method in [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(tolerance)] {
+            for method in [Method::rk4(2e-4), Method::dopri5(tolerance)] {
                 for recorders in [Recorders::default(), ALL_RECORDERS] {
                     let (short_count, short_steps) =
                         allocations(simd, model, &method, recorders, 0.02);

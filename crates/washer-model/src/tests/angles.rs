@@ -110,7 +110,7 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
     let run = |machine: &Machine, rpm: f64| -> Vec<[f64; COORDINATES]> {
         let spin = Spin::Table { time_s: vec![0.0, 2.0], speed_rpm: vec![0.0, rpm] };
         let point = prepared(machine.clone(), spin, 2.0);
-        let method = Method::Rk4 { step_s: 2e-4 };
+        let method = Method::rk4(2e-4);
         let history =
             history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), 0.1);
         (0..history.len()).map(|k| history.instant(k).unwrap().deviations).collect()
@@ -135,7 +135,7 @@ fn an_unbalance_at_an_angle_in_other_lanes_does_not_change_the_bits() {
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
             let simulate_points =
-                |points: &[&Point]| simulate(simd, model, &Method::Rk4 { step_s: 2e-4 }, points);
+                |points: &[&Point]| simulate(simd, model, &Method::rk4(2e-4), points);
             let together = simulate_points(&[
                 &reference,
                 &rotated_unbalance,

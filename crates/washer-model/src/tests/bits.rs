@@ -3,8 +3,8 @@
 
 use super::instruments::{ALL_RECORDERS, paper, random_machine, random_spin};
 use crate::{
-    Caps, Machine, Method, ModelKind, Point, Profile, Reading, Record, Recorders, Spin, Timing,
-    prepare, simulate_until, simulate_with,
+    Caps, Machine, Method, MethodKind, ModelKind, Point, Profile, Reading, Record, Recorders, Spin,
+    Timing, prepare, simulate_until, simulate_with,
 };
 use core::sync::atomic::{AtomicU32, Ordering};
 use lane_ode::{CANCEL_POLL_STEPS, Cancel, Simd, Tolerance};
@@ -16,11 +16,11 @@ const TIMING: Timing = Timing { end_s: END_S, window_s: [0.4, 0.9], checkpoints:
 const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 const CAPS: Caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: Some(1200.0) };
 const METHODS: [Method; 5] = [
-    Method::Rk4 { step_s: 1e-4 },
-    Method::Capped { step_s: 1e-3, caps: CAPS },
-    Method::Dop853 { step_s: 4e-4 },
-    Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
-    Method::Additive(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
+    Method::rk4(1e-4),
+    Method::capped(MethodKind::Capped0, 1e-3, CAPS),
+    Method::dop853(4e-4),
+    Method::dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
+    Method::additive(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 
 /// Returns eleven scenarios, so that some of four or eight lanes stay idle: the corners, the
@@ -174,8 +174,8 @@ fn blocks_of_steps_do_not_change_bits() {
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let all_points: Vec<_> = points.iter().collect();
-    let dop853 = Method::Capped { step_s: 2e-5, caps: CAPS };
-    for method in [Method::Rk4 { step_s: 2e-5 }, dop853] {
+    let dop853 = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
+    for method in [Method::rk4(2e-5), dop853] {
         for model in MODELS {
             let together = simulate_with(simd, model, &method, &all_points, ALL_RECORDERS);
             assert!(together.0[0].steps > 3 * CANCEL_POLL_STEPS, "{} steps", together.0[0].steps);
@@ -199,9 +199,9 @@ fn every_method_stops_within_a_segment() {
         (paper(0.4, 90.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 });
     let point = prepare(Simd::best(), &[scenario], &timing).remove(0).unwrap();
     let tolerance = Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000 };
-    let dop853 = Method::Capped { step_s: 2e-5, caps: CAPS };
-    let adaptive = [Method::Dopri5(tolerance), Method::Additive(tolerance)];
-    for method in [Method::Rk4 { step_s: 2e-5 }, dop853].into_iter().chain(adaptive) {
+    let dop853 = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
+    let adaptive = [Method::dopri5(tolerance), Method::additive(tolerance)];
+    for method in [Method::rk4(2e-5), dop853].into_iter().chain(adaptive) {
         for model in MODELS {
             let calls = AtomicU32::new(0);
             let run_until = |max_calls: u32| {

@@ -123,9 +123,9 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
 #[test]
 fn val_histories_with_every_element_match_those_of_independent_programs() {
     for name in ["friction", "stops", "gasket_cubic", "second_unbalance", "all"] {
-        let rk4 = |step_s| Method::Rk4 { step_s };
+        let rk4 = Method::rk4;
         let tolerance = Tolerance { relative: 1e-7, absolute: 1e-9, max_steps: 10_000_000 };
-        let methods = [rk4(1e-4), rk4(5e-5), Method::Additive(tolerance)];
+        let methods = [rk4(1e-4), rk4(5e-5), Method::additive(tolerance)];
         let [coarse, fine, additive] = reference_errors(name, methods);
         eprintln!(
             "{name}: {coarse:.1e} of the peak at steps of 1e-4 s, {fine:.1e} at 5e-5 s, \
@@ -171,7 +171,7 @@ fn heights_m(machine: Machine, start_m: f64, interval_s: f64, count: u32) -> Vec
     let mut start = InitialDeviation::default();
     start.deviations[0] = start_m;
     start.deviations[2] = start_m;
-    let method = Method::Rk4 { step_s: 2e-5 };
+    let method = Method::rk4(2e-5);
     let history = history(ModelKind::Nonlinear, &method, &point, &start, interval_s);
     (0..history.len()).map(|k| history.instant(k).unwrap().deviations[0]).collect()
 }
@@ -343,7 +343,7 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
             speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
         };
         let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
-            history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 0.1).forces(0).unwrap()
+            history(model, &Method::rk4(1e-4), &point, &start, 0.1).forces(0).unwrap()
         });
         assert!(nonlinear.stops_n.iter().any(|force_n| *force_n > 100.0), "{nonlinear:?}");
         let all_forces = |forces: &crate::Forces| {
@@ -375,7 +375,7 @@ fn elements_without_force_and_machines_in_other_lanes_do_not_change_bits() {
     let [without_friction, with_friction_speed, with_friction] =
         [without_friction, with_friction_speed, with_friction]
             .map(|machine| prepared(machine, spin(), 1.5));
-    let method = Method::Rk4 { step_s: 2e-4 };
+    let method = Method::rk4(2e-4);
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         let records = |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);
         let alone = records(&[&without_friction])[0];

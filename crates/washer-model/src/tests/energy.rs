@@ -180,8 +180,7 @@ fn history_from_initial_velocity(
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
         (start.speeds[tub], start.speeds[rotor]) = (speed, speed);
     }
-    let history =
-        history(ModelKind::Nonlinear, &Method::Rk4 { step_s }, &point, &start, interval_s);
+    let history = history(ModelKind::Nonlinear, &Method::rk4(step_s), &point, &start, interval_s);
     let with_full_coordinates = |k| {
         let mut instant = history.instant(k).unwrap();
         instant.deviations = std::array::from_fn(|i| point.equilibrium[i] + instant.deviations[i]);

@@ -12,7 +12,7 @@ fn simulate_both_models(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let points: Vec<_> = points.iter().collect();
-    let method = Method::Rk4 { step_s: 2e-4 };
+    let method = Method::rk4(2e-4);
     let nonlinear = simulate(simd, ModelKind::Nonlinear, &method, &points);
     let linear = simulate(simd, ModelKind::Linear, &method, &points);
     nonlinear.into_iter().zip(linear).map(|(nonlinear, linear)| [nonlinear, linear]).collect()

@@ -42,7 +42,7 @@ fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
     let cases = [(0.4, [60.0, 60.0]), (0.2, [20.0, 60.0]), (0.9, [10.0, 0.0]), (0.5, [80.0, 81.0])];
     let machines = cases.map(|(mass_kg, frictions_n)| machine(mass_kg, frictions_n, None));
     let points = prepared(&machines);
-    let method = Method::Rk4 { step_s: 2e-4 };
+    let method = Method::rk4(2e-4);
     let recorders = Recorders::gauge(Gauge::DamperSpeed);
     let simulated: Vec<&Point> = points.iter().collect();
     let (_, readings) =
@@ -72,7 +72,7 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
         machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 4.0);
         machine
     };
-    let method = Method::Rk4 { step_s: 2e-4 };
+    let method = Method::rk4(2e-4);
     let recorders = Recorders::gauge(Gauge::DamperSpeed);
     for friction_n in [45.0, 50.0, 55.0] {
         let point = prepared(&[machine_with(None, friction_n)]).remove(0);

@@ -43,7 +43,7 @@ fn assert_close(quantity: &str, values: &[f64], expected: &[f64], tolerance: f64
 
 /// Returns the readings of all gauges of loads and damper speeds.
 fn read_gauges(point: &Point, model: ModelKind, simd: Simd) -> Reading {
-    let method = Method::Rk4 { step_s: 1e-4 };
+    let method = Method::rk4(1e-4);
     let [clash, force] = [Gauge::ClashTime, Gauge::CabinetForce];
     let gauges = Gauge::ALL.map(|gauge| gauge != clash && gauge != force);
     let recorders = Recorders { gauges, ..Recorders::default() };
@@ -99,7 +99,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     machine.cabinet.as_mut().unwrap().mass_kg = 1000.0;
     let point = point(machine.clone());
     let feet = Feet::new(&machine).unwrap();
-    let method = Method::Rk4 { step_s: 1e-4 };
+    let method = Method::rk4(1e-4);
     let history =
         history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), INTERVAL_S);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
@@ -196,7 +196,7 @@ fn loads_of_the_linear_model_agree_with_its_history() {
     let mut machine = with_cabinet(with_every_element());
     machine.unbalance.mass_kg = 0.9;
     let point = point(machine.clone());
-    let method = Method::Rk4 { step_s: 1e-4 };
+    let method = Method::rk4(1e-4);
     let history =
         history(ModelKind::Linear, &method, &point, &InitialDeviation::default(), INTERVAL_S);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
@@ -240,7 +240,7 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
     let feet = Feet::new(&machine).unwrap();
     let history = history(
         ModelKind::Nonlinear,
-        &Method::Rk4 { step_s: 1e-4 },
+        &Method::rk4(1e-4),
         &point,
         &InitialDeviation::default(),
         0.1,

@@ -3,8 +3,8 @@
 use super::instruments::{ALL_RECORDERS, paper};
 use crate::machine::spin::whole_turn_cuts_s;
 use crate::{
-    Caps, Channel, Gauge, InitialDeviation, Machine, Method, ModelKind, Point, Profile, Recorders,
-    Spin, Timing, history, prepare, simulate, simulate_with,
+    Caps, Channel, Gauge, InitialDeviation, Machine, Method, MethodKind, ModelKind, Point, Profile,
+    Recorders, Spin, Timing, history, prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
@@ -66,7 +66,7 @@ fn assert_close(quantity: &str, value: f64, expected: f64, tolerance: f64) {
 #[test]
 fn readings_agree_with_densely_sampled_histories() {
     let point = point();
-    let method = Method::Rk4 { step_s: 2e-4 };
+    let method = Method::rk4(2e-4);
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let (records, readings) =
             simulate_with(Simd::best(), model, &method, &[&point], ALL_RECORDERS);
@@ -122,8 +122,8 @@ fn readings_do_not_depend_on_the_method() {
         let run = |method| {
             simulate_with(Simd::best(), model, &method, &[&point], ALL_RECORDERS).1.remove(0)
         };
-        let reference = run(Method::Rk4 { step_s: 2e-4 });
-        for reading in [run(Method::Dopri5(tolerance)), run(Method::Additive(tolerance))] {
+        let reference = run(Method::rk4(2e-4));
+        for reading in [run(Method::dopri5(tolerance)), run(Method::additive(tolerance))] {
             let root_mean_squares =
                 [&reading, &reference].map(|reading| reading.root_mean_squares.unwrap());
             root_mean_squares[0]
@@ -156,7 +156,7 @@ fn readings_do_not_depend_on_the_method() {
 fn recorders_that_are_not_in_use_leave_no_readings() {
     let point = point();
     let caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None };
-    let method = Method::Capped { step_s: 1e-3, caps };
+    let method = Method::capped(MethodKind::Capped0, 1e-3, caps);
     let run = |recorders| {
         simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], recorders)
     };
@@ -180,13 +180,8 @@ fn at_rest_the_cabinet_carries_the_weight() {
     let still = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
     let point = prepare(Simd::best(), &[(machine, still)], &timing).remove(0).unwrap();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let (_, readings) = simulate_with(
-            Simd::best(),
-            model,
-            &Method::Rk4 { step_s: 2e-4 },
-            &[&point],
-            ALL_RECORDERS,
-        );
+        let (_, readings) =
+            simulate_with(Simd::best(), model, &Method::rk4(2e-4), &[&point], ALL_RECORDERS);
         // The springs also have a small force along c1, which the model's constraint balances.
         assert_close("force", readings[0].gauge(Gauge::CabinetForce)[0], weight_n, 1e-4);
         assert_eq!(readings[0].gauge(Gauge::ClashTime), [0.0]);

@@ -175,7 +175,7 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let points: Vec<_> = points.iter().collect();
-    let method = Method::Rk4 { step_s: 2e-4 };
+    let method = Method::rk4(2e-4);
     let [nonlinear, linear] =
         [ModelKind::Nonlinear, ModelKind::Linear].map(|m| simulate(simd, m, &method, &points));
     let column = |name: &str| names.iter().position(|n| n == name).unwrap();

@@ -39,9 +39,9 @@ fn difference(a: &Record, b: &Record) -> f64 {
 fn the_additive_method_agrees_with_converged_rk4() {
     let point = point(2e8);
     for model in ModelKind::ALL {
-        let reference = run(model, &Method::Rk4 { step_s: 5e-5 }, &point);
+        let reference = run(model, &Method::rk4(5e-5), &point);
         for (relative, max_error) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
-            let record = run(model, &Method::Additive(tolerance(relative)), &point);
+            let record = run(model, &Method::additive(tolerance(relative)), &point);
             let error = difference(&record, &reference);
             eprintln!("{model:?} at {relative:e}: {error:.1e} in {} steps", record.steps);
             assert!(error < max_error, "{model:?} at {relative:e}: {error:e}");
@@ -55,10 +55,10 @@ fn the_additive_method_integrates_bearings_too_stiff_for_explicit_methods() {
     for model in ModelKind::ALL {
         // The bearings of the reference deflect by a tenth of a micrometre only, so that the almost
         // rigid bearings of the other points give a similar motion.
-        let reference = run(model, &Method::Rk4 { step_s: 5e-5 }, &points[0]);
+        let reference = run(model, &Method::rk4(5e-5), &points[0]);
         for stiff_point in &points[1..] {
-            assert!(run(model, &Method::Rk4 { step_s: 5e-5 }, stiff_point).failure.is_some());
-            let record = run(model, &Method::Additive(tolerance(1e-4)), stiff_point);
+            assert!(run(model, &Method::rk4(5e-5), stiff_point).failure.is_some());
+            let record = run(model, &Method::additive(tolerance(1e-4)), stiff_point);
             let error = difference(&record, &reference);
             let attempted_steps = record.steps + record.rejected;
             eprintln!("{model:?}: {error:.1e} in {attempted_steps} steps");
@@ -75,7 +75,7 @@ fn records_of_stiff_bearings_do_not_depend_on_other_points() {
     let all_points: Vec<&Point> = points.iter().collect();
     // With a single lane the points run one after another; on other instruction sets they share
     // lanes.
-    let method = Method::Additive(tolerance(1e-5));
+    let method = Method::additive(tolerance(1e-5));
     for model in ModelKind::ALL {
         let together = simulate(Simd::Scalar, model, &method, &all_points);
         assert_eq!(simulate(Simd::best(), model, &method, &all_points), together, "{model:?}");

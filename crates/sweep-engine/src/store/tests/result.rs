@@ -1,5 +1,7 @@
 //! Tests of results and sidecars: their content, and files that are refused in their place.
 
+use sweep_parameter::Worse;
+
 use super::*;
 
 #[test]
@@ -99,6 +101,26 @@ fn the_result_does_not_depend_on_the_order_of_chunks() {
     let (tally, _) = finish(run, &job);
     assert_eq!(tally.points, points);
     assert_eq!(fs::read(home.output()).unwrap(), bytes);
+}
+
+/// Other programs may write a mark for summaries without a worse side.
+#[test]
+fn a_mark_without_a_worse_side_leaves_the_other_extremes() {
+    let home = Home::new();
+    let mut job = synthetic::job(POINTS);
+    let without_side = job.layout.position("nonlinear_a").unwrap();
+    job.layout.columns[without_side].is_in_summary = true;
+    let with_side = job.layout.position("linear_a").unwrap();
+    job.layout.columns[with_side].is_in_summary = true;
+    job.layout.columns[with_side].worse = Some(Worse::Greater);
+    let run = open(&home.output(), &job);
+    write_missing(&run);
+    let (tally, _) = finish(run, &job);
+    let columns: Vec<&str> = tally.extremes.iter().map(|extreme| &*extreme.column).collect();
+    assert_eq!(columns, ["linear_a"]);
+    let rows = (0..POINTS).map(synthetic::row);
+    let greatest = rows.filter_map(|row| job.layout.number(&row, "linear_a")).reduce(f64::max);
+    assert_eq!(tally.extremes[0].worst.as_ref().map(|worst| worst.value), greatest);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! on random machines of every kind.
 
 use rayon::prelude::*;
-use washer_row::{Level, Verdict};
+use washer_row::MethodKind;
 
 use super::super::*;
 use crate::method::{rk4, rk4_mass_scaled};
@@ -18,12 +18,7 @@ fn load(text: &str) -> Plan {
 fn rows(plan: &Plan) -> Vec<Outcome> {
     let engine = ModelEngine::new(plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
-    values.par_chunks(256).map(|values| engine.evaluate_at(values)).collect::<Vec<_>>().concat()
-}
-
-fn reliable(plan: &Plan, outcome: &Outcome) -> Option<bool> {
-    let rule = &plan.reliability;
-    Verdict::new(outcome, rule.channels.len(), rule.limits).reliable
+    values.par_chunks(256).map(|values| engine.outcomes_at(values)).collect::<Vec<_>>().concat()
 }
 
 /// Lower limit of the gap (m) to which differences of gaps are related: the clearance of the
@@ -53,7 +48,7 @@ fn rows_by_rk4(plan: &Plan, step_s: f64) -> Vec<Outcome> {
 /// Computes the row of one point by plain RK4 with a step (s).
 fn row_by_rk4(plan: &Plan, point: u64, step_s: f64) -> Outcome {
     let plan = Plan { integrator: rk4(step_s), ..plan.clone() };
-    ModelEngine::new(&plan).unwrap().evaluate_at(&[plan.axis_values(point)]).remove(0)
+    ModelEngine::new(&plan).unwrap().outcomes_at(&[plan.axis_values(point)]).remove(0)
 }
 
 /// Computes the rows of a plan by the fast method and compares them with plain RK4 at 2e-4 s.
@@ -82,7 +77,7 @@ fn compare_with_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
         if row.converged == Some(false) {
             continue;
         }
-        assert_eq!(reliable(plan, row), reliable(plan, expected), "{}: {row:?}", plan.name);
+        assert_eq!(row.verdict.reliable, expected.verdict.reliable, "{}: {row:?}", plan.name);
         let error = error(row, expected);
         rows_beyond += u64::from(error > accuracy);
         assert!(
@@ -104,7 +99,7 @@ fn every_row_of_fig12_is_that_of_rk4_or_flagged() {
     let rows = compare_with_rk4(&plan, 1e-3);
     let unconverged = rows.iter().filter(|row| row.converged == Some(false)).count();
     assert!(unconverged < 13, "{unconverged} rows have not converged: more than 1 %");
-    for level in [Level::Capped1, Level::Capped2, Level::Rk4] {
+    for level in [MethodKind::Capped1, MethodKind::Capped2, MethodKind::Rk4] {
         assert!(rows.iter().any(|row| row.method == level), "no row holds {level:?}");
     }
 }
@@ -123,8 +118,8 @@ fn a_single_channel_is_as_accurate_as_all() {
     );
     let engine = ModelEngine::new(&plan).unwrap();
     for (mass_kg, damping, ratio) in points {
-        let row = &engine.evaluate_at(&[vec![mass_kg, damping]])[0];
-        let found = Verdict::new(row, 1, 2.0).greatest.unwrap().1;
+        let row = &engine.outcomes_at(&[vec![mass_kg, damping]])[0];
+        let found = row.verdict.greatest.unwrap().1;
         assert!(
             (found / ratio - 1.0).abs() < 1e-3,
             "{mass_kg} kg, {damping} N s/m: {found} for {ratio}"
@@ -194,7 +189,7 @@ fn rows_agree_with_rk4_on_machines_with_friction_stops_and_gasket() {
         let why = engine.levels()[0].note.clone().unwrap();
         assert!(why.starts_with("no modes are capped, because friction and stops"), "{why}");
         let is_by = |level| rows.iter().any(|row| row.method == level);
-        assert!(is_by(Level::Additive) && is_by(Level::Dop853), "{set}");
+        assert!(is_by(MethodKind::Additive) && is_by(MethodKind::Dop853), "{set}");
         assert!(rows.iter().all(|row| !row.method.is_capped()), "{set}");
     }
 }
@@ -242,7 +237,7 @@ fn rows_by_other_criteria_agree_with_rk4() {
             }
             // The ratio in the turn of the nonlinear model's peak is at least that of the peaks: in
             // this turn the linear amplitude is at most its own peak.
-            let peak_ratios = Verdict::new(peak, 6, 2.0).ratios;
+            let peak_ratios = &peak.verdict.ratios;
             for (by_turn, by_peaks) in row.turn_ratios.iter().zip(peak_ratios) {
                 assert!(by_turn.unwrap() > 0.99 * by_peaks.unwrap(), "{row:?}");
             }
@@ -254,14 +249,14 @@ fn rows_by_other_criteria_agree_with_rk4() {
 fn a_row_near_the_limit_is_refined() {
     let plan = load(include_str!("../../../../../sweeps/fig12.toml"));
     let at = [vec![0.4, 140.0]];
-    let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
-    assert_eq!(row.method, Level::Capped1);
-    let ratio = Verdict::new(row, plan.reliability.channels.len(), 2.0).greatest.unwrap().1;
+    let row = &ModelEngine::new(&plan).unwrap().outcomes_at(&at)[0];
+    assert_eq!(row.method, MethodKind::Capped1);
+    let ratio = row.verdict.greatest.unwrap().1;
     let reliability =
         sweep_engine::Reliability { limits: ratio.into(), ..plan.reliability.clone() };
     let plan = Plan { reliability, ..plan };
-    let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
-    assert_eq!((row.method, row.sensitive), (Level::Rk4, Some(false)));
+    let row = &ModelEngine::new(&plan).unwrap().outcomes_at(&at)[0];
+    assert_eq!((row.method, row.sensitive), (MethodKind::Rk4, Some(false)));
     // This is the error of the uncapped level, which the capped level does not reach.
     assert!(row.error.unwrap() < 1e-5, "{row:?}");
 }
@@ -272,11 +267,11 @@ fn a_row_does_not_depend_on_the_rows_beside_it() {
     let plan = Plan { integrator: rk4_mass_scaled(1e-3), ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
-    let together = engine.evaluate_at(&values);
+    let together = engine.outcomes_at(&values);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-    assert_eq!(pool.install(|| engine.evaluate_at(&values)), together, "on three threads");
+    assert_eq!(pool.install(|| engine.outcomes_at(&values)), together, "on three threads");
     for point in [3, 40, 77] {
-        let alone = engine.evaluate_at(&values[point..=point]).remove(0);
+        let alone = engine.outcomes_at(&values[point..=point]).remove(0);
         assert_eq!(Outcome { point: point as u64, ..alone }, together[point]);
     }
 }
@@ -289,13 +284,13 @@ fn a_search_for_the_verdict_alone_gives_the_rows_verdict() {
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
     let side_engine =
         ModelEngine { demand: OutcomePurpose::Side, ..ModelEngine::new(&plan).unwrap() };
-    let sides = side_engine.evaluate_at(&values);
-    let rows = engine.evaluate_at(&values);
+    let sides = side_engine.outcomes_at(&values);
+    let rows = engine.outcomes_at(&values);
     let steps =
         |outcomes: &[Outcome]| outcomes.iter().map(|outcome| outcome.nonlinear.steps).sum::<u64>();
     assert!(steps(&sides) < steps(&rows));
     for (side, row) in sides.iter().zip(&rows) {
-        assert_eq!(reliable(&plan, side), reliable(&plan, row), "{side:?}");
+        assert_eq!(side.verdict.reliable, row.verdict.reliable, "{side:?}");
     }
 }
 
@@ -383,6 +378,6 @@ fn a_drum_that_stands_in_its_window_needs_no_fine_steps() {
         let plan = load(grid);
         let row = rows(&plan).remove(0);
         assert!(row.method.is_capped(), "{:?} in {grid}", row.method);
-        assert_eq!((row.converged, reliable(&plan, &row)), (Some(true), verdict), "{grid}");
+        assert_eq!((row.converged, row.verdict.reliable), (Some(true), verdict), "{grid}");
     }
 }

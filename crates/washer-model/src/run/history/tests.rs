@@ -42,7 +42,7 @@ fn val_a_run_up_matches_that_of_an_independent_program() {
     let point = point(Machine::paper(), spin, 6.0);
     // Most instants are inside a step, because the interval between instants is no multiple of the
     // step.
-    let method = Method::Rk4 { step_s: 0.97e-4 };
+    let method = Method::rk4(0.97e-4);
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
         let history = history(model, &method, &point, &InitialDeviation::default(), 0.01);
         let max_difference = difference(&format!("cycloidal_600rpm_4s_{file}.csv"), &history);
@@ -60,7 +60,7 @@ fn val_a_run_up_and_down_matches_that_of_an_independent_program() {
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 8.0 },
         16.0,
     );
-    let method = Method::Rk4 { step_s: 1e-4 };
+    let method = Method::rk4(1e-4);
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
         let history = history(model, &method, &point, &InitialDeviation::default(), 0.01);
         let max_difference = difference(&format!("triangular_350rpm_8s_{file}.csv"), &history);
@@ -76,9 +76,7 @@ fn a_trajectory_does_not_depend_on_the_instants() {
         1.0,
     );
     let adaptive = lane_ode::Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: 1_000_000 };
-    for method in
-        [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive), Method::Additive(adaptive)]
-    {
+    for method in [Method::rk4(2e-4), Method::dopri5(adaptive), Method::additive(adaptive)] {
         let sample = |every_s: f64| {
             history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), every_s)
         };
@@ -100,8 +98,7 @@ fn a_failed_trajectory_ends_before_the_time_of_its_failure() {
     );
     let mut start = InitialDeviation::default();
     start.speeds[4] = 100.0;
-    let history =
-        history(ModelKind::Nonlinear, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 1e-4);
+    let history = history(ModelKind::Nonlinear, &Method::rk4(1e-4), &point, &start, 1e-4);
     let (_, time_s) = history.failure.unwrap();
     assert!(time_s > 0.0 && time_s < 1.0, "{time_s}");
     assert!(history.len() as f64 * 1e-4 <= time_s + 1e-9);
@@ -121,13 +118,7 @@ fn at_rest_the_cabinet_carries_the_weight() {
     let point =
         point(machine, Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let history = history(
-            model,
-            &Method::Rk4 { step_s: 1e-4 },
-            &point,
-            &InitialDeviation::default(),
-            0.1,
-        );
+        let history = history(model, &Method::rk4(1e-4), &point, &InitialDeviation::default(), 0.1);
         let forces = history.forces(0).unwrap();
         let [x, y, z] = forces.cabinet_n;
         // The force along c1 may differ from zero, because the model does not move along c1.
@@ -150,7 +141,7 @@ fn linear_forces_equal_the_nonlinear_forces_to_first_order() {
             speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
         };
         let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
-            history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 0.1).forces(0).unwrap()
+            history(model, &Method::rk4(1e-4), &point, &start, 0.1).forces(0).unwrap()
         });
         let all_forces = |forces: &crate::Forces| {
             [&forces.springs_n[..], &forces.dampers_n[..], &forces.cabinet_n[..]].concat()
@@ -177,8 +168,7 @@ fn both_models_start_at_the_given_state() {
         speeds: std::array::from_fn(|i| 0.1 - 0.01 * i as f64),
     };
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let first =
-            history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 0.1).instant(0).unwrap();
+        let first = history(model, &Method::rk4(1e-4), &point, &start, 0.1).instant(0).unwrap();
         for i in 0..COORDINATES {
             assert!((first.deviations[i] - start.deviations[i]).abs() < 1e-15);
             assert_eq!(first.speeds[i], start.speeds[i]);
