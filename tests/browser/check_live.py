@@ -89,7 +89,7 @@ def opens(page):
     counts = [module.count(opcode) for opcode in OPCODES]
     check(min(counts) > 1000, f"the module has few vector instructions: {counts}")
     script = """const done = arguments[arguments.length - 1];
-        unpacked(DATA.live.module).then((bytes) => WebAssembly.compile(bytes))
+        unpackGzip(DATA.live.module).then((bytes) => WebAssembly.compile(bytes))
           .then((module) => done(WebAssembly.Module.imports(module).length));"""
     imports = page.driver.execute_async_script(script)
     check(imports == 0, f"the module wants {imports} things from outside")

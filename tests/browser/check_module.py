@@ -28,7 +28,7 @@ const run = async (bytes) => {
     new Float64Array(api.memory.buffer, at, numbers.length).set(numbers);
   };
   const read = (count) => [...new BigUint64Array(api.memory.buffer, api.output(), count)];
-  write(doubles(live.setup));
+  write(decodeDoubles(live.setup));
   if (api.setup() !== 1) throw new Error("the setup is refused");
   const found = [];
   for (const [x, y] of places) {
@@ -45,7 +45,7 @@ const run = async (bytes) => {
   }
   return found;
 };
-Promise.all([live.module, other].map((packed) => unpacked(packed).then(run))).then(([a, b]) => {
+Promise.all([live.module, other].map((packed) => unpackGzip(packed).then(run))).then(([a, b]) => {
   const apart = a.findIndex((bits, k) => bits !== b[k]);
   done([a.length, b.length, apart]);
 }, (error) => done(String(error)));
