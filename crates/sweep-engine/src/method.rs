@@ -61,7 +61,7 @@ pub enum StepRule {
     Fixed,
     /// Steps that follow the error estimate.
     ByError,
-    /// Fixed steps, refined until two levels agree to the first setting's relative accuracy.
+    /// Fixed steps, refined until two levels agree to a relative accuracy: the method's first setting.
     Checked,
 }
 

@@ -238,12 +238,13 @@ impl AxisValues {
 }
 
 impl<M: Model> Plan<M> {
-    /// The number of axes of which [`Plan::corners`] takes both ends; axes after these stay at
-    /// their least value. Basis: 2^8 corners. Each additional axis doubles the corners.
+    /// The number of axes whose least and greatest values [`Plan::corners`] combines; further axes
+    /// stay at their least value. Basis: these are 2^8 combinations. Each additional axis doubles
+    /// them.
     const CORNER_AXES: usize = 8;
 
-    /// The greatest number of corners at which machines are prepared before a run. Basis: the
-    /// preparation of a long list takes a second. Doubling it doubles that time.
+    /// The greatest number of points at which machines are prepared before a run. Basis: the
+    /// preparation of that many points takes a second. Doubling it doubles that time.
     const MAX_PREPARED: u64 = 256;
 
     /// Returns the number of points of the design or grid; 1 without axes.

@@ -65,7 +65,7 @@ const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
     (FileKind::Differences, "differences", key::DIFFERENCES, "result of `sweep compare --out`"),
 ];
 
-/// Beginning of the model's own file.
+/// The beginning of a model's file of parameters that a command wrote.
 pub const OWN_FILE: &str = "# Written by sweep: ";
 
 /// The first lines of our PDF figures. The second line distinguishes them from other documents.
@@ -167,9 +167,9 @@ pub fn beside(output: &Path, ending: &str) -> PathBuf {
     output.with_file_name(name)
 }
 
-/// Whether the file at `path` is an account that may be overwritten. It must not be that of another
-/// result with the same sidecar path; but an account that was renamed together with its result
-/// still names the old file.
+/// Whether the file at `path` is a run's summary (`run.json`) that may be overwritten: that of the
+/// result `of`, or one that was renamed together with its result and still names the old file. The
+/// summary of another result that has the same path is kept.
 fn is_account(path: &Path, of: &OsStr) -> std::io::Result<bool> {
     let text = regular::read_json(path)?;
     let account: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();

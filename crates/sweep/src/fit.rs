@@ -55,12 +55,12 @@ const START_RANGE: [f64; 2] = [0.3, 1.7];
 const MAX_DESCENTS: usize = 3;
 /// The seed of all draws.
 const SEED: u64 = 1;
-/// The greatest change of a number by half the step, in standard errors. Basis: it adds some five
+/// The greatest change of a fitted parameter by half the integration step, in standard errors. Basis: it adds some five
 /// percent to an error. Doubling it adds four times as much.
 const MAX_STEP_EFFECT: f64 = 0.3;
-/// The greatest number of halvings of the step. Basis: test `reference_data_lead_to_the_truth`
+/// The greatest number of halvings of the integration step. Basis: test `reference_data_lead_to_the_truth`
 /// needs none. Doubling it makes a fit that needs them four times as long.
-const HALVINGS: usize = 2;
+const MAX_STEP_HALVINGS: usize = 2;
 
 /// The options of a fit.
 #[derive(Clone, Debug, clap::Args)]
@@ -314,8 +314,9 @@ fn run_fit<'a>(
     let mut minima = minima?;
     let mut best = minima.first().cloned().ok_or_else(no_answer)?;
     let mut step_effect = None;
-    // A step that is too long for the corners of forces changes the numbers; then it is halved.
-    for _ in 0..=HALVINGS {
+    // An integration step that is too long for the corners of forces changes the fitted
+    // parameters; then the step is halved.
+    for _ in 0..=MAX_STEP_HALVINGS {
         if problem.method.kind != MethodKind::Rk4 || !best.is_settled {
             break;
         }
@@ -392,11 +393,11 @@ fn no_answer() -> Error {
 fn effect(
     covariance: &[Vec<f64>],
     summary: &NormalEquations,
-    model: &[SignalComparison],
+    comparisons: &[SignalComparison],
     other: &[SignalComparison],
 ) -> Vec<f64> {
     let mut pull = vec![0.0; covariance.len()];
-    for ((model, other), sigma) in model.iter().zip(other).zip(&summary.sigma) {
+    for ((model, other), sigma) in comparisons.iter().zip(other).zip(&summary.sigma) {
         let pairs = model.residual.iter().zip(&other.residual);
         let difference: Vec<f64> = pairs.map(|(model, other)| model - other).collect();
         for (pull, slope) in pull.iter_mut().zip(&model.slopes) {
@@ -449,7 +450,7 @@ fn bootstrap(
     /// The number of samples in a block of the block bootstrap. Basis: residuals of the test data
     /// are correlated over some ten samples. Doubling it preserves slower correlations, but leaves
     /// fewer blocks.
-    const BLOCK: usize = 100;
+    const BLOCK_SAMPLES: usize = 100;
     let measured = problem.cases.clone();
     let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
     let mut drawn = 0;
@@ -457,12 +458,13 @@ fn bootstrap(
     for _ in 0..count {
         for one in against {
             let residual = &one.residual;
-            let mut resampled = Vec::with_capacity(residual.len() + BLOCK);
+            let mut resampled = Vec::with_capacity(residual.len() + BLOCK_SAMPLES);
             while resampled.len() < residual.len() {
                 let place = draw.position(drawn, 0).unwrap_or(0.5);
                 drawn += 1;
                 let first = (place * residual.len() as f64) as usize;
-                resampled.extend((first..first + BLOCK).map(|i| residual[i % residual.len()]));
+                resampled
+                    .extend((first..first + BLOCK_SAMPLES).map(|i| residual[i % residual.len()]));
             }
             let signal = &mut problem.cases[one.case].measured.signals[one.signal];
             let rows: Vec<usize> = signal.samples().map(|(row, _)| row).collect();
@@ -605,7 +607,8 @@ fn normal_draws(count: u64) -> impl Fn(u64, usize) -> f64 {
     move |point, k| normal.quantile(design.position(point, k).unwrap_or(0.5))
 }
 
-/// Draws free numbers from the fitted distribution, evenly spread, each within its range.
+/// Draws values of the free parameters from the fitted distribution by a low-discrepancy sequence,
+/// each within its range.
 fn draws(problem: &Problem<'_>, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
     let normal = normal_draws(count);
     let (unit, scale) = algebra::scaled(covariance);

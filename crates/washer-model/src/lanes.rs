@@ -17,7 +17,7 @@ pub(crate) trait InLanes<T: Lane> {
     fn get_lane(&self, lane: usize) -> Self::SingleLane;
 }
 
-/// A structure that can be made of dual numbers whose derivatives are zero.
+/// A structure that can be converted to dual numbers with derivatives of zero.
 pub(crate) trait ToDual {
     /// The structure of dual numbers.
     type Dual;

@@ -1,5 +1,5 @@
-//! The boundary file: one row for each edge, or one row for a value of the first axis without an
-//! edge.
+//! The boundary file: a row for each crossing of the limit, and a row for each value of the first
+//! axis without a crossing.
 
 use serde_json::{Value, json};
 use sweep_parameter::unit_suffix;

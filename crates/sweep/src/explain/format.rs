@@ -382,7 +382,7 @@ fn push_remedy(text: &mut String, tongue: &Tongue) {
     push_line(text, "remedy", words);
 }
 
-/// Appends the part of the tongues in the swept verdict.
+/// Appends whether tongues cause the verdict of the run over the spin profile.
 fn push_conclusion(text: &mut String, explanation: &Explanation) {
     let swept = &explanation.swept;
     let Some((_, greatest)) = swept.verdict.greatest else {
@@ -447,7 +447,7 @@ fn push_conclusion(text: &mut String, explanation: &Explanation) {
     push_line(text, "so", words);
 }
 
-/// Returns a sentence on the time of the deviation and the growth in tongues before it.
+/// Describes when the models begin to differ, and the growth in tongues before that time.
 fn describe_growth(cause: Option<&Cause>) -> String {
     let Some(cause) = cause else { return "the deviation's time is not known".to_owned() };
     format!(

@@ -97,7 +97,7 @@ pub(crate) struct Dependence {
     pub(crate) tolerance: f64,
     /// The error of the fixed number that the record leaves open.
     pub(crate) error: f64,
-    /// The change of the fitted number by that error.
+    /// The change of the fitted number by `error`.
     pub(crate) moves_by: f64,
 }
 
@@ -124,7 +124,7 @@ pub(crate) struct FileReport {
     pub(crate) explained: ByColumn<f64>,
     /// The correlation of neighbouring residuals.
     pub(crate) autocorrelation: ByColumn<f64>,
-    /// The factor by which this correlation widens variances.
+    /// The variance inflation factor of correlated residuals.
     pub(crate) widening: ByColumn<f64>,
     /// The noise (rpm) and the knots of the measured spin.
     pub(crate) spin: Option<SmoothedSpin>,
@@ -165,7 +165,7 @@ impl ReportData<'_> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
         let suspected_units: Vec<String> = self.suspicions.iter().flatten().cloned().collect();
-        // The search of a record in another unit ends early.
+        // A search ends early where a unit is suspected, which is not a failure of the search.
         let is_unfinished = !best.is_settled && suspected_units.is_empty();
         let unsettled = is_unfinished.then(|| UNSETTLED.to_owned());
         let objection = unsettled.or_else(|| statistics.objection(problem));
@@ -396,7 +396,8 @@ impl FitReport {
         for fit in &self.parameters {
             let Some(on) = &fit.depends_on else { continue };
             let error = format!("{} {}", short(on.error), on.unit);
-            // The record says nothing of an error as large as the tolerance.
+            // The error that the record leaves open is less than the tolerance where the record
+            // limits it.
             let limit = if on.error < SEEN_RATIO * on.tolerance {
                 format!(" (of {}: the record limits it)", short(on.tolerance))
             } else {

@@ -61,8 +61,8 @@ pub(super) struct SmoothMonodromy<'a, T> {
     pub(super) turn_count: usize,
     /// The number of equally spaced instants of a turn at which derivatives are computed.
     pub(super) instants: usize,
-    /// The states in the turns' lanes, at the instants or at a multiple of as many equally spaced
-    /// instants.
+    /// The states at equally spaced instants, a lane for each turn. Their number is a multiple of
+    /// `instants`.
     pub(super) states: &'a [[N<T>; STATES]],
     /// The forces with corners in the turns' lanes, at the start, middle and end of all steps.
     pub(super) corner_forces: &'a [CornerForce<T>],
@@ -121,7 +121,7 @@ fn add_weighted(
     }
 }
 
-/// Computes the weighted sums of the derivatives of one acceleration.
+/// Adds the derivatives of one acceleration, times the weights of their instants, to each sum.
 #[inline(always)]
 fn add_weighted_slopes<const SUMS: usize>(
     samples: &[SmoothCoefficients],

@@ -53,8 +53,8 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
         m.drum.mass_kg * drum_point(m.drum.centre_x_m, 0.0, 0.0)[1],
     ];
     let height = |u: &Unbalance| u.mass_kg * drum_point(u.x_m, u.radius_m, u.angle_deg)[1];
-    let unbalances = m.unbalances().map(height);
-    let mut energy = m.gravity_m_per_s2 * heights.into_iter().chain(unbalances).sum::<f64>();
+    let unbalance_moments = m.unbalances().map(height);
+    let mut energy = m.gravity_m_per_s2 * heights.into_iter().chain(unbalance_moments).sum::<f64>();
     for s in &m.springs {
         let free = s.free_length_m.unwrap_or_else(|| distance(s.cabinet_m, s.tub_m));
         let elongation = distance(position(p_t, &tub, s.tub_m), s.cabinet_m) - free;

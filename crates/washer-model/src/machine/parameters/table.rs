@@ -48,7 +48,7 @@ macro_rules! row {
     }};
 }
 
-/// Expands the access of a row to its target and to the functions that read and write it.
+/// Expands to the target of a parameter and to the functions that read and write its value.
 macro_rules! access {
     (machine $($field:tt)+) => {
         (Target::Machine, |m, _, _| Some(m.$($field)+), |m, _, _, v| m.$($field)+ = v)
@@ -140,7 +140,7 @@ const ASSUMED_NONE: &str = "assumed: none unless given";
 const USUAL_SPEED: &str = "assumed: a usual value";
 /// The source of the speed amplitude V of friction in the linear model.
 const LINEAR_MOTION_SPEED: &str = "assumed: that of the linear motion";
-/// The range of the speeds v_s and V (m/s), in which friction over speed is finite.
+/// The range of the speeds v_s and V (m/s) of friction. Friction is divided by them.
 const FRICTION_SPEEDS: Range = Within(1e-6, 1e3);
 /// The source of the unbalances' angles.
 const ALONG_D2: &str = "assumed: along d2, up at the start";
