@@ -61,7 +61,8 @@ pub enum StepRule {
     Fixed,
     /// Steps that follow the error estimate.
     ByError,
-    /// Fixed steps, refined until two levels agree to a relative accuracy: the method's first setting.
+    /// Fixed steps, refined until two levels agree to a relative accuracy, which is the method's
+    /// first setting.
     Checked,
 }
 

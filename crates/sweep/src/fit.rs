@@ -55,11 +55,12 @@ const START_RANGE: [f64; 2] = [0.3, 1.7];
 const MAX_DESCENTS: usize = 3;
 /// The seed of all draws.
 const SEED: u64 = 1;
-/// The greatest change of a fitted parameter by half the integration step, in standard errors. Basis: it adds some five
-/// percent to an error. Doubling it adds four times as much.
+/// The greatest change of a fitted parameter by half the integration step, in standard errors.
+/// Basis: it adds some five percent to an error. Doubling it adds four times as much.
 const MAX_STEP_EFFECT: f64 = 0.3;
-/// The greatest number of halvings of the integration step. Basis: test `reference_data_lead_to_the_truth`
-/// needs none. Doubling it makes a fit that needs them four times as long.
+/// The greatest number of halvings of the integration step. Basis: test
+/// `reference_data_lead_to_the_truth` needs none. Doubling it makes a fit that needs them four times
+/// as long.
 const MAX_STEP_HALVINGS: usize = 2;
 
 /// The options of a fit.

@@ -25,9 +25,9 @@ impl<T: Real> Deflection<T> {
         }
     }
 
-    /// Computes the deflection in the linear model from the partial derivatives of the tub's and the
-    /// rotor's axis. `q` are deviations from equilibrium, or accelerations for the second derivative
-    /// of the deflection.
+    /// Computes the deflection in the linear model from the partial derivatives of the tub's and
+    /// the rotor's axis. `q` are deviations from equilibrium, or accelerations for the second
+    /// derivative of the deflection.
     #[inline(always)]
     pub(crate) fn linear(
         q: &[N<T>; COORDINATES],
