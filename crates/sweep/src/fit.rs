@@ -59,8 +59,8 @@ const SEED: u64 = 1;
 /// Basis: it adds some five percent to an error. Doubling it adds four times as much.
 const MAX_STEP_EFFECT: f64 = 0.3;
 /// The greatest number of halvings of the integration step. Basis: test
-/// `reference_data_lead_to_the_truth` needs none. Doubling it makes a fit that needs them four times
-/// as long.
+/// `reference_data_lead_to_the_truth` needs none. Doubling it makes a fit that needs them four
+/// times as long.
 const MAX_STEP_HALVINGS: usize = 2;
 
 /// The options of a fit.
