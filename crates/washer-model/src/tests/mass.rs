@@ -8,7 +8,7 @@ use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::forces::Deflection;
 use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::{accelerations, coupled_halves};
-use crate::tests::reference::{machine, numbers, reference, spin};
+use crate::tests::reference::{assert_matrix, machine, numbers, reference, spin};
 use lane_ode::{Dual, N};
 
 #[test]
@@ -17,21 +17,7 @@ fn val_mass_matrix_matches_that_of_an_independent_program() {
     for case in reference("rhs.json")["cases"].as_array().unwrap() {
         let computed =
             mass_matrix(&Coefficients::new(&machine(case)), &spin(case), &numbers(&case["q"]));
-        let expected: [[f64; COORDINATES]; COORDINATES] =
-            std::array::from_fn(|i| numbers(&case["mass_matrix"].as_array().unwrap()[i]));
-        let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
-        for i in 0..COORDINATES {
-            for j in 0..COORDINATES {
-                let error = (computed[i][j] - expected[i][j]).abs() / largest;
-                assert!(
-                    error < 1e-14,
-                    "M[{i}][{j}]: {} against {}",
-                    computed[i][j],
-                    expected[i][j]
-                );
-                max_error = max_error.max(error);
-            }
-        }
+        max_error = max_error.max(assert_matrix("M", &computed, &case["mass_matrix"], 1e-14));
     }
     eprintln!("mass matrix: at most {max_error:.1e} of the largest entry");
 }

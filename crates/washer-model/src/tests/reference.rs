@@ -27,6 +27,33 @@ pub(crate) fn numbers<const K: usize>(value: &Value) -> [f64; K] {
     std::array::from_fn(|i| list[i].as_f64().unwrap())
 }
 
+/// Asserts that each entry of a matrix differs from the reference by less than `tolerance`, relative
+/// to the largest entry of the reference. Returns the greatest difference.
+pub(crate) fn assert_matrix(
+    name: &str,
+    computed: &[[f64; COORDINATES]; COORDINATES],
+    reference: &Value,
+    tolerance: f64,
+) -> f64 {
+    let rows = reference.as_array().unwrap();
+    let expected: [[f64; COORDINATES]; COORDINATES] = std::array::from_fn(|i| numbers(&rows[i]));
+    let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+    let mut max_error = 0.0_f64;
+    for i in 0..COORDINATES {
+        for j in 0..COORDINATES {
+            let error = (computed[i][j] - expected[i][j]).abs() / largest;
+            assert!(
+                error < tolerance,
+                "{name}[{i}][{j}]: {} against {}",
+                computed[i][j],
+                expected[i][j]
+            );
+            max_error = max_error.max(error);
+        }
+    }
+    max_error
+}
+
 /// Returns the paper's machine with the unbalance mass and damping of a case.
 pub(crate) fn machine(case: &Value) -> Machine {
     let mut machine = Machine::paper();
@@ -99,20 +126,7 @@ fn val_linear_matrices_match_an_independent_expansion() {
         for (name, computed) in
             [("M", computed.mass), ("C", computed.damping), ("K", computed.stiffness)]
         {
-            let expected: [[f64; COORDINATES]; COORDINATES] =
-                std::array::from_fn(|i| numbers(&case[name].as_array().unwrap()[i]));
-            let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
-            for i in 0..COORDINATES {
-                for j in 0..COORDINATES {
-                    let error = (computed[i][j] - expected[i][j]).abs() / largest;
-                    assert!(
-                        error < 1e-9,
-                        "{name}[{i}][{j}]: {} against {}",
-                        computed[i][j],
-                        expected[i][j]
-                    );
-                }
-            }
+            assert_matrix(name, &computed, &case[name], 1e-9);
         }
         let expected: [f64; COORDINATES] = numbers(&case["F"]);
         let largest = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
