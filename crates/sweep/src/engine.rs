@@ -27,7 +27,7 @@ use crate::method::direct;
 use crate::plan::{Plan, Scenario, compared_channels, failure_reason};
 use sweep_engine::engine::evaluate_points;
 use sweep_engine::method::Steps;
-use sweep_engine::{Error, RowSink, RowSource};
+use sweep_engine::{Error, Interrupt, RowSink, RowSource};
 
 /// Number of parts of a run at whose ends a perturbed run is compared with its original. Basis: an
 /// exponential separation is measured over many of them. Doubling it doubles the memory of the
@@ -193,6 +193,11 @@ impl<'a> ModelEngine<'a> {
         let results = evaluate_points(self, axis_values, context)?;
         let cells = results.into_iter().flat_map(|result| result.rows);
         Some(cells.map(|cells| MapRow::new(Arc::clone(&map), cells)).collect())
+    }
+
+    /// Evaluates the only point of a plan without axes. Returns `None` if the interrupt was raised.
+    pub(crate) fn evaluate_only_point(&self, interrupt: &Interrupt) -> Option<MapRow> {
+        self.evaluate_points(&[Vec::new()], &RunContext::new(interrupt))?.pop()
     }
 
     /// Computes the rows of all points from a source and passes them to a sink. Within a rayon pool

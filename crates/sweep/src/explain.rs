@@ -22,9 +22,7 @@ use crate::plan::{Plan, Scenario, compared_channels, prepare_scenario};
 use crate::speeds::Speeds;
 use sweep_engine::columns::MODELS;
 use sweep_engine::config::NamedValues;
-use sweep_engine::{
-    Error, Execution, Interrupt, Progress, ProgressMode, RunContext, duration, tell, threads,
-};
+use sweep_engine::{Error, Execution, Interrupt, Progress, ProgressMode, duration, tell, threads};
 
 pub(crate) use cause::Cause;
 use sweep_parameter::RatioLimits;
@@ -313,8 +311,7 @@ fn mirrored(scenario: &Scenario) -> Scenario {
 /// meaningless.
 fn swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResult, Error> {
     let engine = ModelEngine::new(plan)?;
-    let rows = engine.evaluate_points(&[Vec::new()], &RunContext::new(interrupt));
-    let row = rows.and_then(|mut rows| rows.pop());
+    let row = engine.evaluate_only_point(interrupt);
     let amplitudes = |model| row.as_ref().map_or_else(Vec::new, |row| row.amplitudes(model));
     Ok(SweptResult {
         channels: compared_channels(plan),

@@ -115,11 +115,11 @@ fn step_ratio(order: f64) -> f64 {
     STEP_CONTRACTION.powf(1.0 / order)
 }
 
-/// Returns the contraction of the error from a level to the next, whose method
-/// is of this kind.
+/// Returns the contraction of the error from a level to the next.
 ///
-/// `start` is that of the first of the two. The difference of a level that starts to resolve modes
-/// is their ringing, and says nothing of its own error: the contraction is infinite.
+/// `kind` is that of the next level's method, and `start` that of the first level. The difference
+/// of a level that starts to resolve modes is their ringing, and says nothing of its own error: the
+/// contraction is infinite.
 pub(crate) fn contraction(kind: MethodKind, start: FamilyStart) -> f64 {
     match (start, kind) {
         (FamilyStart::Modes, _) => f64::INFINITY,

@@ -13,7 +13,7 @@ use lane_ode::Cancel;
 use sweep_engine::columns::MODELS;
 use sweep_engine::commands::cells::{Lines as _, format_number, format_range, format_table};
 use sweep_engine::commands::grid::quoted;
-use sweep_engine::{Error, Exit, Interrupt, Job, RunContext, tell};
+use sweep_engine::{Error, Exit, Interrupt, Job, tell};
 use sweep_files::{FileKind, Output, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, ResultTable, top};
@@ -168,8 +168,7 @@ fn summarise_row(
     plan.model.held_speeds = None;
     let engine = ModelEngine::new(&plan)?;
     let interrupt = Interrupt::new();
-    let rows = engine.evaluate_points(&[Vec::new()], &RunContext::new(&interrupt));
-    let Some(row) = rows.and_then(|mut rows| rows.pop()) else { return Ok(String::new()) };
+    let Some(row) = engine.evaluate_only_point(&interrupt) else { return Ok(String::new()) };
     let channels = &compared_channels(&plan);
     let limits = plan.reliability.limits;
     let verdict = row.verdict();

@@ -27,8 +27,8 @@ pub(crate) fn numbers<const K: usize>(value: &Value) -> [f64; K] {
     std::array::from_fn(|i| list[i].as_f64().unwrap())
 }
 
-/// Asserts that each entry of a matrix differs from the reference by less than `tolerance`, relative
-/// to the largest entry of the reference. Returns the greatest difference.
+/// Asserts that each entry of a matrix differs from the reference by less than `tolerance`,
+/// relative to the largest entry of the reference. Returns the greatest difference.
 pub(crate) fn assert_matrix(
     name: &str,
     computed: &[[f64; COORDINATES]; COORDINATES],
