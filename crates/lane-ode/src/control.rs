@@ -75,10 +75,10 @@ pub(crate) struct Proposals<T> {
 /// Clamps a step's factor to [`SHRINK_LIMIT`] and `greatest`.
 #[inline(always)]
 fn clamp_factor<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
-    let least = factor.lit(SHRINK_LIMIT);
+    let min_factor = factor.lit(SHRINK_LIMIT);
     let greatest = factor.lit(greatest);
     let factor = factor.where_less(greatest, factor, greatest);
-    least.where_less(factor, factor, least)
+    min_factor.where_less(factor, factor, min_factor)
 }
 
 /// The safety factor of the step size. Basis: `dopri5.f` (0.9). With double the value nearly every

@@ -39,17 +39,17 @@ impl<T: Lane, const M: usize> IntervalPeaks<T, M> {
         self.cuts_s[lane].extend(cuts_s.iter().rev());
         self.completed_peaks[lane].clear();
         self.completed_peaks[lane].reserve(cuts_s.len());
-        let first = self.cuts_s[lane].pop().unwrap_or(f64::INFINITY);
-        self.interval_end_s.0.set(lane, first);
+        let first_cut_s = self.cuts_s[lane].pop().unwrap_or(f64::INFINITY);
+        self.interval_end_s.0.set(lane, first_cut_s);
     }
 
     /// Returns the peaks of the parts of one lane and ends its trajectory. The last part may be
     /// incomplete.
     pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
         self.interval_end_s.0.set(lane, f64::INFINITY);
-        let mut parts = core::mem::take(&mut self.completed_peaks[lane]);
-        parts.push(self.peaks.lane(lane));
-        parts
+        let mut peaks_of_lane = core::mem::take(&mut self.completed_peaks[lane]);
+        peaks_of_lane.push(self.peaks.lane(lane));
+        peaks_of_lane
     }
 
     /// Adds the samples at the start of the first step, in the lanes in which `counts` is true.
@@ -102,8 +102,8 @@ impl<T: Lane, const M: usize> IntervalPeaks<T, M> {
             for lane in (0..T::LANES).filter(|lane| cut_lanes >> lane & 1 == 1) {
                 self.completed_peaks[lane].push(self.peaks.lane(lane));
                 self.peaks.reset(lane);
-                let next = self.cuts_s[lane].pop().unwrap_or(f64::INFINITY);
-                self.interval_end_s.0.set(lane, next);
+                let next_cut_s = self.cuts_s[lane].pop().unwrap_or(f64::INFINITY);
+                self.interval_end_s.0.set(lane, next_cut_s);
             }
             self.peaks.begin(&part_end, cut);
         }

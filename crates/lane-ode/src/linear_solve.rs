@@ -86,9 +86,9 @@ mod tests {
         ];
         let x = [1.5, -2.0, 0.25, 3.0];
         let b = core::array::from_fn(|i| N((0..4).map(|j| a[i][j] * x[j]).sum::<f64>()));
-        let solved = Lu::new(a.map(|row| row.map(N))).unwrap().solve(&b);
+        let solution = Lu::new(a.map(|row| row.map(N))).unwrap().solve(&b);
         for i in 0..4 {
-            assert!((solved[i].0 - x[i]).abs() < 1e-12, "{i}: {} for {}", solved[i].0, x[i]);
+            assert!((solution[i].0 - x[i]).abs() < 1e-12, "{i}: {} for {}", solution[i].0, x[i]);
         }
     }
 

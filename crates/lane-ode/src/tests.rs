@@ -317,9 +317,10 @@ impl Equation<4, 1> for CoupledEquation {
 impl TestTrajectory<3, 1> {
     /// Returns a trajectory of [`SwingEquation`] from 0 to `end_s` in `count` equal segments.
     fn swing(w: f64, end_s: f64, count: u32, step_s: f64) -> Self {
-        let edge = |i: u32| end_s * f64::from(i) / f64::from(count);
-        let segments =
-            (0..count).map(|i| Segment { start_s: edge(i), end_s: edge(i + 1), step_s }).collect();
+        let boundary_s = |i: u32| end_s * f64::from(i) / f64::from(count);
+        let segments = (0..count)
+            .map(|i| Segment { start_s: boundary_s(i), end_s: boundary_s(i + 1), step_s })
+            .collect();
         Self { parameters: [w], start: [1.0, 1.0, 0.0], segments }
     }
 }

@@ -67,9 +67,9 @@ fn rotate_by_quarter_turns<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<
 /// Selects the value of the quadrant that `fraction` (0, 0.25, 0.5 or 0.75 of a turn) stands for.
 #[inline(always)]
 fn select_by_quadrant<T: Real>(fraction: N<T>, values: [N<T>; 4]) -> N<T> {
-    let upper = fraction.where_less(fraction.lit(0.625), values[2], values[3]);
-    let lower = fraction.where_less(fraction.lit(0.125), values[0], values[1]);
-    fraction.where_less(fraction.lit(0.375), lower, upper)
+    let upper_value = fraction.where_less(fraction.lit(0.625), values[2], values[3]);
+    let lower_value = fraction.where_less(fraction.lit(0.125), values[0], values[1]);
+    fraction.where_less(fraction.lit(0.375), lower_value, upper_value)
 }
 
 /// Computes sine and cosine of any angle up to about 1e6 rad.
@@ -108,7 +108,7 @@ fn sin_cos_by_lanes<T: Lane>(x: T) -> (T, T) {
 pub fn sin_cos_turns<T: Lane>(turns: N<T>) -> (N<T>, N<T>) {
     let fraction = turns - N(turns.0.round());
     let quadrant = N((fraction * 4.0).v().0.round());
-    let rest = fraction - quadrant * 0.25;
-    let (sin, cos) = sin_cos_within_quarter((rest * core::f64::consts::TAU).v());
+    let remainder = fraction - quadrant * 0.25;
+    let (sin, cos) = sin_cos_within_quarter((remainder * core::f64::consts::TAU).v());
     rotate_by_quarter_turns(quadrant, sin, cos)
 }

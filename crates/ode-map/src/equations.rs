@@ -180,13 +180,14 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
 
     #[inline(always)]
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask {
-        let mut largest = x[0].abs();
+        let mut max_magnitude = x[0].abs();
         for i in 1..C {
             // A coordinate that is NaN is selected as the larger one, and fails the comparison with
             // the limit.
-            largest = N(T::select(x[i].abs().0.less(largest.0), largest.0, x[i].abs().0));
+            max_magnitude =
+                N(T::select(x[i].abs().0.less(max_magnitude.0), max_magnitude.0, x[i].abs().0));
         }
-        largest.0.less(self.limit.0)
+        max_magnitude.0.less(self.limit.0)
     }
 }
 

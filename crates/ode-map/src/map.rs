@@ -94,12 +94,13 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     }
 
     fn parameters(&self) -> Vec<ModelParameter<Self>> {
-        let own = O::PARAMETERS.into_iter().zip(self.values).map(|(parameter, value)| {
-            let OscillatorParameter { name, unit, description, range, source, .. } = parameter;
-            (name, unit, description, range, source, Some(value))
-        });
+        let model_parameters =
+            O::PARAMETERS.into_iter().zip(self.values).map(|(parameter, value)| {
+                let OscillatorParameter { name, unit, description, range, source, .. } = parameter;
+                (name, unit, description, range, source, Some(value))
+            });
         let source = "the grid file's [time]";
-        let edges = WINDOW_EDGES
+        let window_edges = WINDOW_EDGES
             .into_iter()
             .map(|(name, description)| (name, "s", description, Range::NonNegative, source, None));
         let to_model = |(handle, (name, unit, description, range, source, value))| {
@@ -117,7 +118,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
                 handle,
             }
         };
-        own.chain(edges).enumerate().map(to_model).collect()
+        model_parameters.chain(window_edges).enumerate().map(to_model).collect()
     }
 
     fn write(&mut self, handle: &usize, value: f64) {
@@ -319,21 +320,22 @@ fn error_of_finer_run<const C: usize>(
     fine: &[ModelRun<C>; 2],
     channels: &[usize],
 ) -> Option<f64> {
-    let mut greatest = 0.0_f64;
+    let mut max_difference = 0.0_f64;
     for (coarse, fine) in coarse.iter().zip(fine) {
         if coarse.failure.or(fine.failure).is_some() {
             return None;
         }
-        let largest = fine.peaks.iter().copied().fold(0.0, f64::max);
+        let max_peak = fine.peaks.iter().copied().fold(0.0, f64::max);
         for &channel in channels {
             let a = coarse.peaks[channel];
             let b = fine.peaks[channel];
             if a != b {
-                greatest = greatest.max((a - b).abs() / b.max(AMPLITUDE_FLOOR * largest));
+                max_difference =
+                    max_difference.max((a - b).abs() / b.max(AMPLITUDE_FLOOR * max_peak));
             }
         }
     }
-    Some(RICHARDSON_FACTOR * greatest)
+    Some(RICHARDSON_FACTOR * max_difference)
 }
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Evaluator

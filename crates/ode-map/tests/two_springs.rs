@@ -108,12 +108,14 @@ const FAST: &str = "{ method = \"rk4\", step_s = 0.05 }";
 
 #[test]
 fn all_mistakes_are_reported_together_with_their_places_and_suggestions() {
-    let wrong = grid("{ method = \"rk5\" }", "[[axis]]\nparameter = \"forcin\"\nvalues = [1, 1]\n");
-    let output = GridFolder::new(&wrong).output("check grid.toml");
+    let invalid_grid =
+        grid("{ method = \"rk5\" }", "[[axis]]\nparameter = \"forcin\"\nvalues = [1, 1]\n");
+    let output = GridFolder::new(&invalid_grid).output("check grid.toml");
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{text}");
-    for part in ["did you mean `rk4`", "did you mean `forcing`", "grid.toml:6", "is twice"] {
-        assert!(text.contains(part), "no {part} in {text}");
+    for message_part in ["did you mean `rk4`", "did you mean `forcing`", "grid.toml:6", "is twice"]
+    {
+        assert!(text.contains(message_part), "no {message_part} in {text}");
     }
 }
 
@@ -197,13 +199,13 @@ fn a_study_finds_the_resonance_that_a_fine_map_shows() {
         assert!(text.contains("feasible  160 of 160\n"), "{text}");
     }
     assert!(folder.bytes("1.parquet") == folder.bytes("2.parquet"));
-    let best = folder.run_successfully(
+    let best_point = folder.run_successfully(
         "show 1.parquet --where on_front --json --columns forcing_rad_per_s,linear_x1",
     );
-    let best: serde_json::Value = serde_json::from_str(&best).unwrap();
-    let frequency = best[0]["forcing_rad_per_s"].as_f64().unwrap();
+    let best_point: serde_json::Value = serde_json::from_str(&best_point).unwrap();
+    let frequency = best_point[0]["forcing_rad_per_s"].as_f64().unwrap();
     assert!((frequency - resonance).abs() <= 0.003, "{frequency} for {resonance}");
-    assert!(best[0]["linear_x1"].as_f64().unwrap() >= linear_x1(highest), "{best}");
+    assert!(best_point[0]["linear_x1"].as_f64().unwrap() >= linear_x1(highest), "{best_point}");
 }
 
 #[test]

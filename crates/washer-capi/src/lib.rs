@@ -331,21 +331,22 @@ mod tests {
                     let step = 1e-5;
                     let mut shifted_rates = [[0.0; STATE_LEN]; 2];
                     for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-                        let mut shifted = x;
-                        shifted[j] += sign * step;
+                        let mut shifted_state = x;
+                        shifted_state[j] += sign * step;
                         washer_rhs(
                             20.0,
-                            shifted.as_ptr(),
+                            shifted_state.as_ptr(),
                             shifted_rates[side].as_mut_ptr(),
                             machine,
                         );
                     }
-                    let largest = (0..STATE_LEN)
-                        .fold(1.0_f64, |largest, i| largest.max(f64::abs(jacobian[i][j])));
+                    let max_derivative = (0..STATE_LEN).fold(1.0_f64, |max_derivative, i| {
+                        max_derivative.max(f64::abs(jacobian[i][j]))
+                    });
                     for i in 0..STATE_LEN {
                         let difference_quotient =
                             (shifted_rates[0][i] - shifted_rates[1][i]) / (2.0 * step);
-                        let error = (jacobian[i][j] - difference_quotient).abs() / largest;
+                        let error = (jacobian[i][j] - difference_quotient).abs() / max_derivative;
                         assert!(
                             error < 1e-6,
                             "{model:?} [{i}][{j}]: {} {difference_quotient}",

@@ -314,11 +314,15 @@ fn run_to_end(
                 match trajectory.next_computation {
                     NextComputation::Turns => needing_turns.push(trajectory),
                     NextComputation::Multipliers(period) => {
-                        orbits.push(PeriodicOrbit { held_case, held: trajectory.held, period });
+                        orbits.push(PeriodicOrbit {
+                            held_case,
+                            held_state: trajectory.held_state,
+                            period,
+                        });
                         needing_multipliers.push((trajectory, period));
                     }
                     NextComputation::Exponent => {
-                        exponent_requests.push((trajectory.held, direction));
+                        exponent_requests.push((trajectory.held_state, direction));
                         needing_exponent.push(trajectory);
                     }
                     NextComputation::Nothing => {}
@@ -333,10 +337,10 @@ fn run_to_end(
         for ((trajectory, period), growth_per_s) in needing_multipliers.into_iter().zip(growths) {
             trajectory.add_growth(period, growth_per_s);
         }
-        let held: Vec<HeldState<'_>> =
-            needing_turns.iter().map(|trajectory| trajectory.held).collect();
+        let held_states: Vec<HeldState<'_>> =
+            needing_turns.iter().map(|trajectory| trajectory.held_state).collect();
         for (trajectory, turns) in
-            needing_turns.into_iter().zip(integrate_turns(simd, &held, BLOCK_TURNS))
+            needing_turns.into_iter().zip(integrate_turns(simd, &held_states, BLOCK_TURNS))
         {
             trajectory.add_turns(turns);
         }
@@ -439,11 +443,11 @@ impl<'a> SpeedSearch<'a> {
     }
 
     fn start(&mut self, state: [f64; STATES], origin: Origin) {
-        let held = HeldState { setup: self.held_case.setup, state };
+        let held_state = HeldState { setup: self.held_case.setup, state };
         let is_unstable = |response: &&Response| response.growth_per_s() > 0.0;
         let unstable = self.responses.iter().filter(is_unstable);
         let unstable_orbits = unstable.map(|response| vec![response.start]).collect();
-        self.trajectories.push(HeldTrajectory::new(held, unstable_orbits, self.max_time_s));
+        self.trajectories.push(HeldTrajectory::new(held_state, unstable_orbits, self.max_time_s));
         self.origins.push(origin);
     }
 
@@ -456,8 +460,9 @@ impl<'a> SpeedSearch<'a> {
             let first_survivor = self.trajectories.len();
             let unstable_orbits = self.trajectories[chaotic].unstable_orbits().to_vec();
             for state in self.trajectories[chaotic].recent_states() {
-                let held = HeldState { setup: self.held_case.setup, state };
-                self.trajectories.push(HeldTrajectory::survivor(held, unstable_orbits.clone()));
+                let held_state = HeldState { setup: self.held_case.setup, state };
+                self.trajectories
+                    .push(HeldTrajectory::survivor(held_state, unstable_orbits.clone()));
                 self.origins.push(Origin::Trajectory);
             }
             self.survivors.push((chaotic, first_survivor..self.trajectories.len()));

@@ -262,7 +262,7 @@ impl LinearPoint {
             unit[i] = N(1.0);
             Deflection::linear(&unit, tub_axis, rotor_axis)
         };
-        let work = |i: usize, load: &AxisLoad<f64>| {
+        let generalized_force = |i: usize, load: &AxisLoad<f64>| {
             let Deflection { offset, tilt } = unit_deflection(i);
             let force = load.force[0] * offset[0] + load.force[1] * offset[1];
             -(force + (load.moment[0] * tilt[0] + load.moment[1] * tilt[1])).0
@@ -271,7 +271,7 @@ impl LinearPoint {
         for j in 0..COORDINATES {
             let load = unit_deflection(j).load_on_shaft(bodies);
             for (i, row) in stiffness.iter_mut().enumerate() {
-                row[j] = work(i, &load);
+                row[j] = generalized_force(i, &load);
             }
         }
         stiffness
@@ -369,9 +369,9 @@ impl<const R: usize> MassCentreMap<R> {
         for r in 0..R {
             for s in 0..=r {
                 let product = arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0;
-                let entry = inertia(r, s).0 + m * product;
-                mass[rotations[r]][rotations[s]] = entry;
-                mass[rotations[s]][rotations[r]] = entry;
+                let mass_entry = inertia(r, s).0 + m * product;
+                mass[rotations[r]][rotations[s]] = mass_entry;
+                mass[rotations[s]][rotations[r]] = mass_entry;
             }
         }
     }

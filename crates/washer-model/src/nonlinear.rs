@@ -131,7 +131,8 @@ fn uncoupled_halves<T: Lane>(
 ) -> (Half<T, 2>, Half<T, 4>) {
     let tub = assemble_tub(machine, q, u);
     let mut rotor = assemble_rotor_in_lanes(&machine.bodies, spin, q, u);
-    if let Some(hinge_mass) = coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge)
+    if let Some(hinge_mass) =
+        coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge_angles)
     {
         for (index, r) in [2, 3].into_iter().enumerate() {
             rotor.inertia[r][r] += hinge_mass.inertia;

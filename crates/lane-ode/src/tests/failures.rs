@@ -68,10 +68,14 @@ fn solve_among_regular(
                 positions.push(position);
             }
             let (outcomes, _) = solve::<FailingEquation, 3, 5>(simd, method, &mixed);
-            let mut failed = Vec::new();
+            let mut failed_lanes = Vec::new();
             let mut completed = Vec::new();
             for (i, outcome) in outcomes.into_iter().enumerate() {
-                if positions.contains(&i) { failed.push(outcome) } else { completed.push(outcome) }
+                if positions.contains(&i) {
+                    failed_lanes.push(outcome)
+                } else {
+                    completed.push(outcome)
+                }
             }
             for (i, (mixed, expected)) in completed.iter().zip(&unmixed).enumerate() {
                 assert!(
@@ -79,9 +83,13 @@ fn solve_among_regular(
                     "{simd:?}, sound {i}: {mixed:?} against {expected:?}"
                 );
             }
-            let first = first_failed.get_or_insert_with(|| failed.clone());
-            for (outcome, first) in failed.iter().zip(first.iter()) {
-                assert_eq!((outcome.end, outcome.count), (first.end, first.count), "{simd:?}");
+            let first_failure = first_failed.get_or_insert_with(|| failed_lanes.clone());
+            for (outcome, first_failure) in failed_lanes.iter().zip(first_failure.iter()) {
+                assert_eq!(
+                    (outcome.end, outcome.count),
+                    (first_failure.end, first_failure.count),
+                    "{simd:?}"
+                );
             }
         }
     }

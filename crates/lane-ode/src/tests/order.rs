@@ -163,11 +163,11 @@ fn every_segment_ends_exactly_at_its_end() {
         let trajectories: Vec<_> = end_times
             .into_iter()
             .map(|end_s| {
-                let edges = [0.0, 0.3 * end_s, 0.31 * end_s, end_s];
+                let boundaries_s = [0.0, 0.3 * end_s, 0.31 * end_s, end_s];
                 let segment =
                     |pair: &[f64]| Segment { start_s: pair[0], end_s: pair[1], step_s: 0.007 };
                 TestTrajectory {
-                    segments: edges.windows(2).map(segment).collect(),
+                    segments: boundaries_s.windows(2).map(segment).collect(),
                     ..TestTrajectory::swing(1.0, 1.0, 1, 1.0)
                 }
             })

@@ -31,14 +31,20 @@ impl Waves {
         let cells = 4000;
         let step = end / f64::from(cells);
         let magnitude = |i: i32| self.derivatives(step * f64::from(i))[0].abs();
-        let best = (0..=cells).max_by(|&i, &j| magnitude(i).total_cmp(&magnitude(j))).unwrap();
-        let mut t = step * f64::from(best);
+        let largest_sample =
+            (0..=cells).max_by(|&i, &j| magnitude(i).total_cmp(&magnitude(j))).unwrap();
+        let mut t = step * f64::from(largest_sample);
         for _ in 0..20 {
             let [_, slope, curvature] = self.derivatives(t);
             t -= slope / curvature;
         }
-        let is_inside = (0.0..=end).contains(&t) && (t - step * f64::from(best)).abs() <= step;
-        if is_inside { self.derivatives(t)[0].abs().max(magnitude(best)) } else { magnitude(best) }
+        let is_inside =
+            (0.0..=end).contains(&t) && (t - step * f64::from(largest_sample)).abs() <= step;
+        if is_inside {
+            self.derivatives(t)[0].abs().max(magnitude(largest_sample))
+        } else {
+            magnitude(largest_sample)
+        }
     }
 
     pub(super) fn sample(&self, t: f64) -> Sample<f64> {
@@ -74,7 +80,7 @@ fn largest_error(steps_per_period: u32) -> f64 {
 /// Returns the largest error like [`largest_error`], by the method `advance`.
 fn largest_error_by(advance: Advance, steps_per_period: u32) -> f64 {
     let mut rng = fastrand::Rng::with_seed(7);
-    let mut largest = 0.0_f64;
+    let mut max_error = 0.0_f64;
     for _ in 0..400 {
         let waves = Waves {
             amplitude: [1.0, 0.3 * rng.f64()],
@@ -85,9 +91,9 @@ fn largest_error_by(advance: Advance, steps_per_period: u32) -> f64 {
         let peak = waves.peak(f64::from(periods));
         let sampled_peak =
             waves.sampled_peak_by(advance, f64::from(periods), periods * steps_per_period);
-        largest = largest.max((sampled_peak - peak).abs() / peak);
+        max_error = max_error.max((sampled_peak - peak).abs() / peak);
     }
-    largest
+    max_error
 }
 
 #[test]

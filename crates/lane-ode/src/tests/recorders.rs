@@ -42,13 +42,13 @@ fn peak_between(waves: &Waves, start: f64, end: f64) -> f64 {
 #[test]
 fn the_peak_of_a_part_is_that_of_a_separate_trajectory() {
     // The cuts are at the end of a step, one step apart, several within a step, and far apart.
-    let cuts = [0.5, 0.71, 0.775, 0.78, 0.79, 1.7, 4.3];
-    let edges: Vec<f64> = [0.0].into_iter().chain(cuts).chain([5.0]).collect();
+    let cut_times_s = [0.5, 0.71, 0.775, 0.78, 0.79, 1.7, 4.3];
+    let boundaries_s: Vec<f64> = [0.0].into_iter().chain(cut_times_s).chain([5.0]).collect();
     for seed in 0..20 {
         let waves = waves(seed);
-        let peaks = part_peaks(&waves, &cuts, 5.0, 100);
-        assert_eq!(peaks.len(), cuts.len() + 1);
-        for (peak, edge) in peaks.iter().zip(edges.windows(2)) {
+        let peaks = part_peaks(&waves, &cut_times_s, 5.0, 100);
+        assert_eq!(peaks.len(), cut_times_s.len() + 1);
+        for (peak, edge) in peaks.iter().zip(boundaries_s.windows(2)) {
             let expected = peak_between(&waves, edge[0], edge[1]);
             assert!((peak - expected).abs() < 1e-6, "{edge:?}: {peak} for {expected}");
         }
@@ -58,12 +58,12 @@ fn the_peak_of_a_part_is_that_of_a_separate_trajectory() {
 
 #[test]
 fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
-    let cuts = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
+    let cut_times_s = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
     let mut combined = IntervalPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
-    let all: Vec<Waves> = (0..3).map(waves).collect();
+    let waves_by_lane: Vec<Waves> = (0..3).map(waves).collect();
     let sample = |t: f64| {
         let mut lanes = Sample::constant(N(Array([0.0; 3])), N(Array([0.0; 3])));
-        for (lane, waves) in all.iter().enumerate() {
+        for (lane, waves) in waves_by_lane.iter().enumerate() {
             let sample_of_wave = waves.sample(t);
             lanes.value.0.set(lane, sample_of_wave.value.0);
             lanes.slope.0.set(lane, sample_of_wave.slope.0);
@@ -71,7 +71,7 @@ fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
         }
         [lanes]
     };
-    for (lane, cuts) in cuts.iter().enumerate() {
+    for (lane, cuts) in cut_times_s.iter().enumerate() {
         combined.reset(lane, cuts);
     }
     combined.begin(&sample(0.0), [true; 3]);
@@ -82,11 +82,11 @@ fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
     }
     for lane in 0..3 {
         let mut separate = IntervalPeaks::<f64, 1>::new(N(0.0));
-        separate.reset(0, &cuts[lane]);
-        separate.begin(&[all[lane].sample(0.0)], true);
+        separate.reset(0, &cut_times_s[lane]);
+        separate.begin(&[waves_by_lane[lane].sample(0.0)], true);
         for i in 1..=60 {
             let t = 0.05 * f64::from(i);
-            separate.advance(N(t), N(0.05), &[all[lane].sample(t)], true);
+            separate.advance(N(t), N(0.05), &[waves_by_lane[lane].sample(t)], true);
         }
         assert_eq!(combined.finish(lane), separate.finish(0), "lane {lane}");
     }
@@ -156,10 +156,10 @@ fn time_above_zero_is_found_between_steps() {
 #[test]
 fn steps_outside_the_window_add_no_time() {
     let mut time = TimeAbove::<f64>::new(N(0.0));
-    let high = Sample::constant(N(1.0), N(0.0));
-    time.begin(&high);
-    time.advance(N(1.0), &high, false);
-    time.advance(N(0.25), &high, true);
+    let constant_one = Sample::constant(N(1.0), N(0.0));
+    time.begin(&constant_one);
+    time.advance(N(1.0), &constant_one, false);
+    time.advance(N(0.25), &constant_one, true);
     assert_eq!(time.lane(0), 0.25);
     time.reset(0);
     assert_eq!(time.lane(0), 0.0);

@@ -60,17 +60,17 @@ fn largest_error(
     angles: impl Iterator<Item = f64>,
     mut error: impl FnMut(f64) -> f64,
 ) -> f64 {
-    let mut largest = 0.0_f64;
+    let mut max_error = 0.0_f64;
     let mut worst_angle = 0.0;
     for angle in angles {
         let error = error(angle);
         assert!(error.is_finite(), "{name}: {angle}");
-        if error > largest {
-            (largest, worst_angle) = (error, angle);
+        if error > max_error {
+            (max_error, worst_angle) = (error, angle);
         }
     }
-    eprintln!("{name}: at most {largest:.4} ulp, at {worst_angle:e}");
-    largest
+    eprintln!("{name}: at most {max_error:.4} ulp, at {worst_angle:e}");
+    max_error
 }
 
 /// Generates `count` random numbers of either sign from a seed.
@@ -83,11 +83,11 @@ fn random(seed: u64, count: usize, number: impl Fn(f64) -> f64) -> impl Iterator
 fn sines_of_coordinates_are_within_1_5_ulp() {
     let mut reference = Reference::new();
     // Within a quarter turn on one path, up to where a trajectory has diverged on the other.
-    let narrow =
+    let small_angles =
         random(1, 3000, |u| u * FRAC_PI_4).chain(random(2, 1000, |u| 10.0_f64.powf(-12.0 * u)));
-    assert!(largest_error("below pi/4", narrow, |x| reference.radians(x)) < 1.2);
-    let wide = random(3, 3000, |u| FRAC_PI_4 + u * FRAC_PI_4);
-    assert!(largest_error("pi/4 to pi/2", wide, |x| reference.radians(x)) < 1.5);
+    assert!(largest_error("below pi/4", small_angles, |x| reference.radians(x)) < 1.2);
+    let wide_angles = random(3, 3000, |u| FRAC_PI_4 + u * FRAC_PI_4);
+    assert!(largest_error("pi/4 to pi/2", wide_angles, |x| reference.radians(x)) < 1.5);
 }
 
 #[test]
@@ -96,10 +96,12 @@ fn sines_of_any_angle_are_within_1_5_ulp() {
     let large = random(4, 3000, |u| 10.0_f64.powf(6.0 * u));
     assert!(largest_error("up to 1e6", large, |x| reference.radians(x)) < 1.5);
     // Almost all digits cancel at these angles.
-    let close = (1..500_u32)
+    let angles_near_zeros = (1..500_u32)
         .map(|k| f64::from(k * k) * FRAC_PI_2)
         .chain((1..500).map(|k| f64::from(k) * PI));
-    assert!(largest_error("near multiples of pi/2", close, |x| reference.radians(x)) < 1.5);
+    assert!(
+        largest_error("near multiples of pi/2", angles_near_zeros, |x| reference.radians(x)) < 1.5
+    );
 }
 
 #[test]
@@ -109,8 +111,8 @@ fn sines_of_any_number_of_turns_are_within_1_6_ulp() {
         largest_error("turns below 1/2", random(5, 3000, |u| 0.5 * u), |t| reference.turns(t))
             < 1.6
     );
-    let many = random(6, 3000, |u| 10.0_f64.powf(9.0 * u));
-    assert!(largest_error("up to 1e9 turns", many, |t| reference.turns(t)) < 1.6);
+    let large_angles = random(6, 3000, |u| 10.0_f64.powf(9.0 * u));
+    assert!(largest_error("up to 1e9 turns", large_angles, |t| reference.turns(t)) < 1.6);
     // Angles near multiples of a quarter turn, but not the multiples themselves, at which sine or
     // cosine is zero and has no unit in the last place.
     let close = (0..2000_i32).map(|k| f64::from(k) * 0.125 + 1e-9 * (0.5 + f64::from(k % 7 - 3)));

@@ -11,7 +11,7 @@ use lane_ode::{Cancel, N};
 /// A periodic orbit: a state on it, and the turns after which it repeats.
 pub(super) struct PeriodicOrbit<'c, 'a> {
     pub(super) held_case: &'c HeldCase<'a>,
-    pub(super) held: HeldState<'a>,
+    pub(super) held_state: HeldState<'a>,
     pub(super) period: u32,
 }
 
@@ -24,7 +24,8 @@ pub(super) fn growths_per_s(
     cancel: Cancel<'_>,
 ) -> Vec<Option<f64>> {
     let mut matrices: Vec<Option<StateMatrix>> = vec![None; orbits.len()];
-    let mut states: Vec<[f64; STATES]> = orbits.iter().map(|orbit| orbit.held.state).collect();
+    let mut states: Vec<[f64; STATES]> =
+        orbits.iter().map(|orbit| orbit.held_state.state).collect();
     let max_period = orbits.iter().map(|orbit| orbit.period).max().unwrap_or(0);
     for turn in 0..max_period {
         let unfinished: Vec<usize> =
@@ -32,7 +33,7 @@ pub(super) fn growths_per_s(
         let requests: Vec<TurnRequest<'_>> = unfinished
             .iter()
             .map(|&k| TurnRequest {
-                setup: orbits[k].held.setup,
+                setup: orbits[k].held_state.setup,
                 start: states[k],
                 is_recorded: true,
             })
@@ -52,7 +53,7 @@ pub(super) fn growths_per_s(
         }
     }
     let growth = |(orbit, matrix): (&PeriodicOrbit<'_, '_>, Option<StateMatrix>)| {
-        let setup = &orbit.held.setup;
+        let setup = &orbit.held_state.setup;
         let matrix = scale_speeds(&matrix?, setup.unit_per_s());
         let (multiplier, _) = leading_multiplier(orbit.held_case, &matrix)?;
         let period_s = f64::from(orbit.period) * setup.turn_s();

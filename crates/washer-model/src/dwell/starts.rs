@@ -30,8 +30,8 @@ pub(super) type Directions = Vec<[f64; COORDINATES]>;
 
 /// Returns the largest deviation of the tub's coordinates from equilibrium (m, rad), at least 1e-4.
 pub(super) fn largest_deviation(point: &Point, state: &[f64; STATES]) -> f64 {
-    let rest = point.equilibrium();
-    TUB.iter().map(|&i| (state[i] - rest[i]).abs()).fold(1e-4, f64::max)
+    let equilibrium = point.equilibrium();
+    TUB.iter().map(|&i| (state[i] - equilibrium[i]).abs()).fold(1e-4, f64::max)
 }
 
 /// Returns a state that is perturbed in each of the suspension's modes.
@@ -39,9 +39,9 @@ pub(super) fn perturb(point: &Point, frozen_modes: &Modes, state: &[f64; STATES]
     let size = PERTURBATION * largest_deviation(point, state);
     let mut perturbed = *state;
     for mode in &frozen_modes.modes[..SUSPENSION_MODES] {
-        let largest = TUB.iter().map(|&i| mode.shape[i][0].abs()).fold(0.0, f64::max);
+        let max_displacement = TUB.iter().map(|&i| mode.shape[i][0].abs()).fold(0.0, f64::max);
         for i in 0..COORDINATES {
-            perturbed[i] += size * round_last_digits(mode.shape[i][0] / largest);
+            perturbed[i] += size * round_last_digits(mode.shape[i][0] / max_displacement);
         }
     }
     perturbed
@@ -72,16 +72,20 @@ pub(super) fn kick_directions(point: &Point, frozen_modes: &Modes, random: usize
         let shape = &frozen_modes.modes[modes[rank].0].shape;
         core::array::from_fn(|i| round_last_digits(shape[i][0] * amplitude(rank)))
     };
-    let first = unit(0);
-    let second = unit(1);
-    let mut directions = vec![first, second, core::array::from_fn(|i| first[i] + second[i])];
+    let first_mode_velocity = unit(0);
+    let second_mode_velocity = unit(1);
+    let mut directions = vec![
+        first_mode_velocity,
+        second_mode_velocity,
+        core::array::from_fn(|i| first_mode_velocity[i] + second_mode_velocity[i]),
+    ];
     let mut numbers = fastrand::Rng::with_seed(DIRECTION_SEED);
     for _ in 0..random {
-        let parts: [f64; SUSPENSION_MODES] = core::array::from_fn(|_| normal(&mut numbers));
-        let length = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let components: [f64; SUSPENSION_MODES] = core::array::from_fn(|_| normal(&mut numbers));
+        let length = components.iter().map(|component| component * component).sum::<f64>().sqrt();
         let velocity = |i: usize| -> f64 {
             let shapes = frozen_modes.modes[..SUSPENSION_MODES].iter().map(|mode| mode.shape[i][0]);
-            parts.iter().zip(shapes).map(|(part, shape)| part * shape).sum()
+            components.iter().zip(shapes).map(|(component, shape)| component * shape).sum()
         };
         let scale = amplitude(0) / length;
         directions.push(core::array::from_fn(|i| round_last_digits(scale * velocity(i))));

@@ -267,20 +267,23 @@ fn random_kicks_end_in_motions_that_the_search_found() {
         let search_result =
             find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
         let case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
-        let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
-        let response = search_result.responses.first().map_or(rest, |response| response.start);
-        let held: Vec<HeldState<'_>> = (0..number_from_env("KICKS", 16))
+        let state_at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
+        let response =
+            search_result.responses.first().map_or(state_at_rest, |response| response.start);
+        let held_states: Vec<HeldState<'_>> = (0..number_from_env("KICKS", 16))
             .map(|kick| {
-                let mut state = if kick % 2 == 0 { rest } else { response };
+                let mut state = if kick % 2 == 0 { state_at_rest } else { response };
                 let size_rad_per_s = 0.3 * 20.0_f64.powf(numbers.f64());
-                let parts: [f64; 4] = core::array::from_fn(|_| 2.0 * numbers.f64() - 1.0);
-                let length = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
+                let components: [f64; 4] = core::array::from_fn(|_| 2.0 * numbers.f64() - 1.0);
+                let length =
+                    components.iter().map(|component| component * component).sum::<f64>().sqrt();
                 // The shaft moves with the tub. A quarter of a metre is about the tub's radius.
                 let arms_m = [0.25, 0.25, 1.0, 1.0];
-                for (k, (part, arm_m)) in parts.iter().zip(arms_m).enumerate() {
+                for (k, (component, arm_m)) in components.iter().zip(arms_m).enumerate() {
                     let tub_coordinate = if k < 2 { k } else { k + 2 };
                     for coordinate in [tub_coordinate, tub_coordinate + 2] {
-                        state[COORDINATES + coordinate] += size_rad_per_s * arm_m * part / length;
+                        state[COORDINATES + coordinate] +=
+                            size_rad_per_s * arm_m * component / length;
                     }
                 }
                 HeldState { setup: case.setup, state }
@@ -288,7 +291,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
             .collect();
         let turns = (FOLLOWED_S / case.setup.turn_s()) as usize;
         for (kick, turn_records) in
-            integrate_turns(Simd::best(), &held, turns).into_iter().enumerate()
+            integrate_turns(Simd::best(), &held_states, turns).into_iter().enumerate()
         {
             let peaks = |turns: &[turns::TurnRecord]| -> [f64; CHANNELS] {
                 core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))
@@ -338,9 +341,9 @@ fn continue_in_short_steps(
     const TURNS: usize = 256;
     let turn_s = 60.0 / speed_rpm;
     let point = prepare_at(keys, speed_rpm, TURNS as f64 * turn_s);
-    let rest = point.equilibrium();
+    let equilibrium = point.equilibrium();
     let start = InitialDeviation {
-        deviations: core::array::from_fn(|i| motion.end[i] - rest[i]),
+        deviations: core::array::from_fn(|i| motion.end[i] - equilibrium[i]),
         speeds: core::array::from_fn(|i| motion.end[COORDINATES + i]),
     };
     let method = Method::rk4(STEP_S);

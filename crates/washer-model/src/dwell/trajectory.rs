@@ -117,7 +117,7 @@ pub(super) enum NextComputation {
 
 /// A trajectory at a held speed.
 pub(super) struct HeldTrajectory<'a> {
-    pub(super) held: HeldState<'a>,
+    pub(super) held_state: HeldState<'a>,
     /// Unstable periodic orbits, by their states once a turn, which trajectories leave slowly.
     unstable_orbits: Vec<Vec<[f64; STATES]>>,
     /// The turns of the last two windows.
@@ -136,13 +136,14 @@ pub(super) struct HeldTrajectory<'a> {
 
 impl<'a> HeldTrajectory<'a> {
     pub(super) fn new(
-        held: HeldState<'a>,
+        held_state: HeldState<'a>,
         unstable_orbits: Vec<Vec<[f64; STATES]>>,
         max_time_s: f64,
     ) -> Self {
-        let windows = (max_time_s / held.setup.turn_s() / WINDOW_TURNS as f64).ceil().max(2.0);
+        let windows =
+            (max_time_s / held_state.setup.turn_s() / WINDOW_TURNS as f64).ceil().max(2.0);
         Self {
-            held,
+            held_state,
             unstable_orbits,
             turns: Vec::with_capacity(2 * WINDOW_TURNS + BLOCK_TURNS),
             turn_count: 0,
@@ -157,8 +158,14 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Creates a trajectory from a state of a chaotic one, which tests for [`SURVIVAL_S`] whether
     /// the motion lasts. Its exponent is not computed.
-    pub(super) fn survivor(held: HeldState<'a>, unstable_orbits: Vec<Vec<[f64; STATES]>>) -> Self {
-        Self { next_exponent_turn: usize::MAX, ..Self::new(held, unstable_orbits, SURVIVAL_S) }
+    pub(super) fn survivor(
+        held_state: HeldState<'a>,
+        unstable_orbits: Vec<Vec<[f64; STATES]>>,
+    ) -> Self {
+        Self {
+            next_exponent_turn: usize::MAX,
+            ..Self::new(held_state, unstable_orbits, SURVIVAL_S)
+        }
     }
 
     /// Whether the motion is chaotic, unless survivors show that it is a transient.
@@ -214,7 +221,7 @@ impl<'a> HeldTrajectory<'a> {
         let surplus_turns = self.turns.len().saturating_sub(2 * WINDOW_TURNS);
         self.turns.drain(..surplus_turns);
         if let Some(last) = self.turns.last() {
-            self.held.state = last.end;
+            self.held_state.state = last.end;
         }
         // Near an unstable orbit a trajectory looks settled, and needs further turns.
         if !self.is_near_unstable_orbit() {
@@ -304,12 +311,12 @@ impl<'a> HeldTrajectory<'a> {
     }
 
     fn turn_s(&self) -> f64 {
-        self.held.setup.turn_s()
+        self.held_state.setup.turn_s()
     }
 
     /// Returns a state with its coordinates from equilibrium.
     fn deviation(&self, state: &[f64; STATES]) -> [f64; STATES] {
-        let equilibrium = self.held.setup.point.equilibrium();
+        let equilibrium = self.held_state.setup.point.equilibrium();
         core::array::from_fn(|i| state[i] - equilibrium.get(i).copied().unwrap_or(0.0))
     }
 
@@ -330,7 +337,7 @@ impl<'a> HeldTrajectory<'a> {
             exponent: self.exponent,
             least_kick_rad_per_s: None,
             time_s: self.time_s(),
-            end: self.held.state,
+            end: self.held_state.state,
             sections: self.turns.iter().map(|turn| self.deviation(&turn.end)).collect(),
             extra: Reading::default(),
         }
@@ -341,11 +348,12 @@ impl<'a> HeldTrajectory<'a> {
         let window = (self.turns.len() / 2).min(WINDOW_TURNS);
         let (before, after) = self.turns.split_at(self.turns.len() - window);
         self.unstable_orbits.iter().any(|orbit| {
-            let sizes = orbit.iter().map(|state| largest_deviation(self.held.setup.point, state));
+            let sizes =
+                orbit.iter().map(|state| largest_deviation(self.held_state.setup.point, state));
             let size = sizes.fold(0.0, f64::max);
             let orbit_distance = |turn: &TurnRecord| {
                 let distances =
-                    orbit.iter().map(|state| distance(&self.held.setup, &turn.end, state));
+                    orbit.iter().map(|state| distance(&self.held_state.setup, &turn.end, state));
                 distances.fold(f64::INFINITY, f64::min) / size
             };
             let max_distance =
@@ -368,13 +376,14 @@ impl<'a> HeldTrajectory<'a> {
     /// size.
     fn period(&self, tolerance: f64) -> Option<u32> {
         let first = self.turns.len().checked_sub(PERIOD_TEST_TURNS)?;
-        let deviation = |turn: &TurnRecord| largest_deviation(self.held.setup.point, &turn.end);
+        let deviation =
+            |turn: &TurnRecord| largest_deviation(self.held_state.setup.point, &turn.end);
         let size = self.turns[first..].iter().map(deviation).fold(0.0, f64::max);
         let repeats = |period: &usize| {
             *period <= first
                 && (first..self.turns.len()).all(|k| {
                     let [state, earlier] = [k, k - period].map(|k| &self.turns[k].end);
-                    distance(&self.held.setup, state, earlier) < tolerance * size
+                    distance(&self.held_state.setup, state, earlier) < tolerance * size
                 })
         };
         (1..=MAX_PERIOD_TURNS).find(repeats).map(|period| period as u32)
@@ -396,14 +405,20 @@ impl<'a> HeldTrajectory<'a> {
         };
         let change = |from: usize| {
             let change_at = |k: usize| {
-                distance(&self.held.setup, &self.turns[k].end, &self.turns[k + window_turns].end)
+                distance(
+                    &self.held_state.setup,
+                    &self.turns[k].end,
+                    &self.turns[k + window_turns].end,
+                )
             };
             (from..from + window_turns).map(change_at).fold(0.0, f64::max)
         };
         let previous = change(first);
         let last = change(first + window_turns);
         let ratio = (last / previous).min(1.0 - MIN_DECREASE);
-        last * ratio / (1.0 - ratio) / largest_deviation(self.held.setup.point, &self.held.state)
+        last * ratio
+            / (1.0 - ratio)
+            / largest_deviation(self.held_state.setup.point, &self.held_state.state)
     }
 
     /// Returns a motion with two frequencies, if the residual of the spectrum of yaw and pitch once
@@ -411,7 +426,7 @@ impl<'a> HeldTrajectory<'a> {
     fn find_two_frequencies(&self, max_residual: f64) -> Option<MotionKind> {
         let signal = |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end[i]).collect() };
         let line = find_strongest_line(&[signal(TUB_YAW), signal(TUB_PITCH)])?;
-        let frequency_cpm = line.frequency * self.held.setup.speed_rpm;
+        let frequency_cpm = line.frequency * self.held_state.setup.speed_rpm;
         (line.residual < max_residual).then_some(MotionKind::QuasiPeriodic { frequency_cpm })
     }
 }

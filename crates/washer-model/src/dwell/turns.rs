@@ -60,7 +60,7 @@ pub(super) fn record_turns(
         };
         lane_groups.flat_map(integrate_group).collect()
     };
-    map_in_batches(held_states, |held| (held.setup.batch_key(), false), integrate_batch)
+    map_in_batches(held_states, |held_state| (held_state.setup.batch_key(), false), integrate_batch)
 }
 
 /// The integration of turns from states with the same batch key.
@@ -91,7 +91,8 @@ fn integrate_lanes<T: Lane>(
     wanted_recorders: Recorders,
     results: &mut Vec<(Vec<TurnRecord>, Reading)>,
 ) {
-    let setups: Vec<TurnSetup<'_>> = held_states.iter().map(|held| held.setup).collect();
+    let setups: Vec<TurnSetup<'_>> =
+        held_states.iter().map(|held_state| held_state.setup).collect();
     let grid = step_grid(zero, &setups);
     let model: Nonlinear<T> = lane_model(zero, &setups);
     let mut states = [[zero; STATES]];
@@ -116,7 +117,7 @@ fn integrate_lanes<T: Lane>(
     for finished_turns in 0..turns {
         integrate_turn(&model, &grid, &mut states, Some(&mut recorder));
         let in_range = T::bits(model.in_range(&states[0]));
-        for (lane, held) in held_states.iter().enumerate() {
+        for (lane, held_state) in held_states.iter().enumerate() {
             let (records, _) = &mut results[first_result + lane];
             // A trajectory that has left the range gets no further records.
             if in_range >> lane & 1 == 1 && records.len() == finished_turns {
@@ -124,7 +125,7 @@ fn integrate_lanes<T: Lane>(
                 records.push(TurnRecord {
                     end: core::array::from_fn(|i| states[0][i].0.get(lane)),
                     peaks: recorder.peaks.lane(lane),
-                    min_gap_m: held.setup.point.clearance_m() - radial_m,
+                    min_gap_m: held_state.setup.point.clearance_m() - radial_m,
                 });
             }
         }
@@ -134,9 +135,9 @@ fn integrate_lanes<T: Lane>(
         recorder.max_radial_squared = zero;
     }
     if let Some(mut further_recorders) = recorder.further_recorders {
-        for (lane, held) in held_states.iter().enumerate() {
+        for (lane, held_state) in held_states.iter().enumerate() {
             let (records, reading) = &mut results[first_result + lane];
-            further_recorders.finish(lane, lane, held.setup.point, records.len() < turns);
+            further_recorders.finish(lane, lane, held_state.setup.point, records.len() < turns);
             *reading = core::mem::take(&mut further_recorders.readings[lane]);
         }
     }

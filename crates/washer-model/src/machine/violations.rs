@@ -95,11 +95,11 @@ impl Machine {
             if moments_kg_m2[largest] > (sum - moments_kg_m2[largest]) * (1.0 + 1e-9) {
                 let axes = 11 * (largest + 1);
                 let moment = decimal(moments_kg_m2[largest]);
-                let others = format_rounded(sum - moments_kg_m2[largest]);
+                let sum_of_others = format_rounded(sum - moments_kg_m2[largest]);
                 joint_violations.push(Violation::new(
                     format!(
                         "no rigid body has the {body}'s inertia: I{axes} = {moment} exceeds the \
-                         other two's sum, {others}"
+                         other two's sum, {sum_of_others}"
                     ),
                     [11, 22, 33].map(|axes| format!("{body}_inertia_{axes}_kg_m2")),
                     "each moment at most the sum of the other two",
@@ -187,7 +187,7 @@ impl Machine {
                     joint_violations.push(Violation::new(
                         format!(
                             "unbalance {number} is on the drum's axis and unbalances nothing, \
-                             beside others"
+                             beside sum_of_others"
                         ),
                         [format!("unbalance_{name_number}radius_m")],
                         "a distance from the axis, negative on the other side; a mass on the axis \

@@ -102,7 +102,7 @@ lane_struct! {
     Sag {
         bearings: Deflection<T>,
         /// The hinge's angles q9 and q10.
-        hinge: [N<T>; 2],
+        hinge_angles: [N<T>; 2],
     }
 }
 
@@ -111,7 +111,7 @@ impl Sag<f64> {
     pub(crate) fn new(q: &[f64; COORDINATES]) -> Self {
         let q = q.map(N);
         let bearings = Deflection::new(&q, &Tilt::tub(&q), &Tilt::shaft(&q));
-        Self { bearings, hinge: [q[HINGE_YAW], q[HINGE_PITCH]] }
+        Self { bearings, hinge_angles: [q[HINGE_YAW], q[HINGE_PITCH]] }
     }
 }
 
@@ -245,7 +245,8 @@ pub(crate) fn mass_scaled_load<T: Real>(
     let sag = sag.as_vector();
     let mut load = d;
     for i in 0..4 {
-        load[i] = tub.free[i] - (sum_of_squares * d[i] + rotor.free[i]) + speed_squared * sag[i];
+        load[i] =
+            tub.unloaded[i] - (sum_of_squares * d[i] + rotor.unloaded[i]) + speed_squared * sag[i];
     }
     let [force_y, force_z, moment_y, moment_z] = LdltFactors::new(system).solve(load);
     AxisLoad { force: [force_y, force_z], moment: [moment_y, moment_z] }

@@ -144,9 +144,10 @@ pub(crate) fn unstable_motion(
         };
         coordinates.into_iter().map(stiffness_by).sum::<f64>()
     });
-    let largest =
-        |stiffnesses: &[f64]| stiffnesses.iter().fold(0.0_f64, |largest, k| largest.max(k.abs()));
-    let scales = [largest(&stiffness[..2]), largest(&stiffness[2..])];
+    let max_stiffness = |stiffnesses: &[f64]| {
+        stiffnesses.iter().fold(0.0_f64, |max_stiffness, k| max_stiffness.max(k.abs()))
+    };
+    let scales = [max_stiffness(&stiffness[..2]), max_stiffness(&stiffness[2..])];
     let relative_stiffnesses = (0..RIGID_MOTIONS.len()).map(|k| (k, stiffness[k] / scales[k / 2]));
     let (least, _) = relative_stiffnesses
         .filter(|(_, relative)| *relative < 0.0)

@@ -11,7 +11,7 @@ use lane_ode::{Lane, N, Real};
 /// The accelerations of a half's midpoint (y, z) and axis (y, z).
 pub(crate) struct AxisResponse<T> {
     /// The accelerations without forces on the axis.
-    pub(crate) free: [N<T>; 4],
+    pub(crate) unloaded: [N<T>; 4],
     /// The accelerations per unit of force (y, z) and moment (y, z) on the axis: the lower triangle
     /// of a symmetric matrix.
     pub(crate) compliance: [[N<T>; 4]; 4],
@@ -103,7 +103,7 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
                 }
             }
         }
-        let mut free = [
+        let mut unloaded = [
             self.force[0] * self.inverse_mass - self.drift[0],
             self.force[1] * self.inverse_mass - self.drift[1],
             self.axis_drift[0],
@@ -115,13 +115,13 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
         for r in 0..R {
             for i in 0..4 {
                 let weighted = (torques_per_load[r][i] * inertia.reciprocal_pivot(r)).v();
-                free[i] += weighted * torque[r];
+                unloaded[i] += weighted * torque[r];
                 for j in 0..=i {
                     compliance[i][j] += weighted * torques_per_load[r][j];
                 }
             }
         }
-        AxisResponse { free, compliance }
+        AxisResponse { unloaded, compliance }
     }
 
     /// Computes the accelerations under a load on the axis: those of the bearing midpoint along y

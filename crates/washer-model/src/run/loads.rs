@@ -177,13 +177,13 @@ impl<T: Lane> LoadLaws<T> {
                 component.set(lane, by_coordinate.value, k, by_coordinate.slope, by_speed.slope);
             }
             if selection.force {
-                let rest = cabinet_force_at(&[0.0; STATES]);
+                let force_at_rest = cabinet_force_at(&[0.0; STATES]);
                 let [at_unit_coordinate, at_unit_speed] =
                     [coordinate, speed].map(|state| cabinet_force_at(&unit(state)));
                 for i in 0..3 {
-                    let by_coordinate = at_unit_coordinate[i] - rest[i];
-                    let by_speed = at_unit_speed[i] - rest[i];
-                    force[i].set(lane, rest[i], k, by_coordinate, by_speed);
+                    let by_coordinate = at_unit_coordinate[i] - force_at_rest[i];
+                    let by_speed = at_unit_speed[i] - force_at_rest[i];
+                    force[i].set(lane, force_at_rest[i], k, by_coordinate, by_speed);
                 }
             }
         }

@@ -307,7 +307,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
             flexure_stiffness: zero.lit(point.machine.bodies.flexure_stiffness.0),
             constants: StepConstants::splat(zero, &step_constants(point)),
             terms: RotorCoefficients::splat(zero, &point.linear.terms),
-            sag: Sag::splat(zero, &Sag::new(&point.equilibrium)).hinge,
+            sag: Sag::splat(zero, &Sag::new(&point.equilibrium)).hinge_angles,
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinSegmentLanes::splat(zero, &point.spin_segments[0]),
         }
@@ -316,7 +316,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
     fn set_point(&mut self, lane: usize, point: &Point) {
         self.flexure_stiffness.set_lane(lane, &point.machine.bodies.flexure_stiffness);
         self.constants.set_lane(lane, &step_constants(point));
-        self.sag.set_lane(lane, &Sag::new(&point.equilibrium).hinge);
+        self.sag.set_lane(lane, &Sag::new(&point.equilibrium).hinge_angles);
         self.terms.set_lane(lane, &point.linear.terms);
         self.outputs.set_lane(lane, &point.linear_outputs);
     }

@@ -61,8 +61,8 @@ pub(super) struct Snapshots<T> {
 impl<T: Lane> Snapshots<T> {
     #[inline(always)]
     pub(super) fn new(zero: N<T>) -> Self {
-        let still = Sample::constant(zero, zero);
-        Self { lanes: Default::default(), channels: [still; CHANNELS], tub: [still; 4] }
+        let zero_sample = Sample::constant(zero, zero);
+        Self { lanes: Default::default(), channels: [zero_sample; CHANNELS], tub: [zero_sample; 4] }
     }
 
     /// Begins a point's trajectory in one lane.

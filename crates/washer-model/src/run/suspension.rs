@@ -66,17 +66,17 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     };
     let tub = TubState {
         model,
-        moving: dual_coordinates(&q, &u),
-        displaced: dual_coordinates(&q, &core::array::from_fn(|i| state[i])),
+        coordinates_over_time: dual_coordinates(&q, &u),
+        deviating_coordinates: dual_coordinates(&q, &core::array::from_fn(|i| state[i])),
     };
     let mut forces = Forces::default();
     // The components of a spring's and of a damper's force are products and quotients in different
     // orders. A common order would change the last bits of stored results.
     for spring in &elements.springs {
         let (tension, line) = tub.tension(&spring.constant());
-        let share = tension / line.length;
+        let force_per_length = tension / line.length;
         for k in 0..3 {
-            forces.cabinet_n[k] += first_order_value(model, (share * line.span[k]).v());
+            forces.cabinet_n[k] += first_order_value(model, (force_per_length * line.span[k]).v());
         }
         forces.springs_n.push(first_order_value(model, tension));
     }
@@ -195,9 +195,9 @@ pub(crate) fn attachment_vectors(point: &Point, q: &[f64; COORDINATES]) -> [Vec<
 struct TubState {
     model: ModelKind,
     /// The coordinates with time derivatives.
-    moving: [N<Dual<f64>>; COORDINATES],
+    coordinates_over_time: [N<Dual<f64>>; COORDINATES],
     /// The coordinates with first-order deviations.
-    displaced: [N<Dual<f64>>; COORDINATES],
+    deviating_coordinates: [N<Dual<f64>>; COORDINATES],
 }
 
 impl TubState {
@@ -207,9 +207,9 @@ impl TubState {
         element: &impl ForceLaw<Dual<f64>>,
     ) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>) {
         let ends = element.ends();
-        let span = dual_span(&self.displaced, ends);
-        let moving = dual_span(&self.moving, ends);
-        let rate = self.velocity(dot(&moving, &moving).sqrt());
+        let span = dual_span(&self.deviating_coordinates, ends);
+        let time_dual_span = dual_span(&self.coordinates_over_time, ends);
+        let rate = self.velocity(dot(&time_dual_span, &time_dual_span).sqrt());
         let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate };
         (-element.force(&line) - element.optional_force(&line), line)
     }
@@ -218,14 +218,15 @@ impl TubState {
     fn point(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
         let both_ends = Ends { cabinet: *tub, tub: *tub };
         PointMotion {
-            displacement: dual_span(&self.displaced, &both_ends),
-            velocity: dual_span(&self.moving, &both_ends).map(|position| self.velocity(position)),
+            displacement: dual_span(&self.deviating_coordinates, &both_ends),
+            velocity: dual_span(&self.coordinates_over_time, &both_ends)
+                .map(|position| self.velocity(position)),
         }
     }
 
     /// Returns the time derivative of a number as a dual number of the model's order.
-    fn velocity(&self, moving: N<Dual<f64>>) -> N<Dual<f64>> {
-        let rate = moving.0.slope;
+    fn velocity(&self, time_dual: N<Dual<f64>>) -> N<Dual<f64>> {
+        let rate = time_dual.0.slope;
         N(match self.model {
             ModelKind::Nonlinear => Dual { value: rate, slope: 0.0 },
             // Velocities are zero at equilibrium, so that they are first-order terms.

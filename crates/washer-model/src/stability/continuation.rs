@@ -597,10 +597,10 @@ impl<'a> ResponseCurve<'a> {
         let [before, after] =
             [&self.nodes[bracket.first_node], &self.nodes[bracket.first_node + 1]];
         let is_rising = before.tangent[LOG_SPEED] > 0.0;
-        let share = bisect(|share| {
-            (interpolate_nodes(before, after, share).1[LOG_SPEED] > 0.0) == is_rising
+        let fraction = bisect(|fraction| {
+            (interpolate_nodes(before, after, fraction).1[LOG_SPEED] > 0.0) == is_rising
         });
-        let (position, slope) = interpolate_nodes(before, after, share);
+        let (position, slope) = interpolate_nodes(before, after, fraction);
         self.start_correction(position, normalize(&slope));
         self.fold_bracket = Some(bracket);
     }
@@ -666,10 +666,11 @@ impl<'a> ResponseCurve<'a> {
             if !is_within {
                 continue;
             }
-            let share =
-                bisect(|share| (interpolate_nodes(a, b, share).0[LOG_SPEED] < target) == is_rising);
+            let fraction = bisect(|fraction| {
+                (interpolate_nodes(a, b, fraction).0[LOG_SPEED] < target) == is_rising
+            });
             let interpolated = |i: usize, j: usize| {
-                (1.0 - share) * a.monodromy[i][j].0 + share * b.monodromy[i][j].0
+                (1.0 - fraction) * a.monodromy[i][j].0 + fraction * b.monodromy[i][j].0
             };
             let monodromy =
                 core::array::from_fn(|i| core::array::from_fn(|j| N(interpolated(i, j))));
@@ -686,7 +687,7 @@ impl<'a> ResponseCurve<'a> {
                 } else {
                     [bounds_rpm[1], bounds_rpm[0]]
                 },
-                state: to_state(&interpolate_nodes(a, b, share).0),
+                state: to_state(&interpolate_nodes(a, b, fraction).0),
                 factors: factor_fixed_point_equations(&monodromy),
                 is_on_curve: !self.goes_down,
             });

@@ -280,18 +280,19 @@ impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
         if let (false, Some(factors)) = (self.is_over, &self.factors) {
             let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
             let correction = factors.solve(&gap);
-            let largest = correction[..COORDINATES].iter().map(|by| by.0.abs()).fold(0.0, f64::max);
+            let max_correction =
+                correction[..COORDINATES].iter().map(|by| by.0.abs()).fold(0.0, f64::max);
             let factor = self.deflation_factor(&correction);
-            let share = factor * (self.max_step / (factor.abs() * largest)).min(1.0);
+            let step_factor = factor * (self.max_step / (factor.abs() * max_correction)).min(1.0);
             for i in 0..STATES {
-                self.state[i] += share * correction[i].0;
+                self.state[i] += step_factor * correction[i].0;
             }
             // The next correction is expected to reduce the residual by the same rate.
             let rate = if self.residual.is_finite() { residual / self.residual } else { 1.0 };
             let is_close = residual * rate.min(1.0) < LAST_TURN_TOLERANCE
                 || has_own_factors && residual < QUADRATIC_CONVERGENCE_RESIDUAL;
             // A search whose steps are still deflated by known responses has not converged.
-            self.is_last_turn = is_close && (share - 1.0).abs() < MAX_FINAL_DEFLATION;
+            self.is_last_turn = is_close && (step_factor - 1.0).abs() < MAX_FINAL_DEFLATION;
             if has_borrowed_factors {
                 self.factors = None;
             }

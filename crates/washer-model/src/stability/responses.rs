@@ -463,20 +463,20 @@ fn discard_duplicates(
     for index in 0..results.len() {
         for other_index in index + 1..results.len() {
             let SoughtResponse { guess, request, .. } = &sought_responses[index];
-            let other = &sought_responses[other_index];
-            if other.request != *request {
+            let other_response = &sought_responses[other_index];
+            if other_response.request != *request {
                 break;
             }
-            let are_followed = guess.is_followed() && other.guess.is_followed();
+            let are_followed = guess.is_followed() && other_response.guess.is_followed();
             let are_separate =
-                max_distance(&guess.state, &other.guess.state) > SEPARATE_GUESS_DISTANCE;
+                max_distance(&guess.state, &other_response.guess.state) > SEPARATE_GUESS_DISTANCE;
             let (Ok(a), Ok(b)) = (&results[index], &results[other_index]) else { continue };
             if are_followed
                 && are_separate
                 && max_distance(&a.start, &b.start) < SAME_RESPONSE_DISTANCE
             {
                 let first_distance = max_distance(&a.start, &guess.state);
-                let second_distance = max_distance(&b.start, &other.guess.state);
+                let second_distance = max_distance(&b.start, &other_response.guess.state);
                 let farther_index =
                     if first_distance > second_distance { index } else { other_index };
                 results[farther_index] = Err(ResponseError::NoResponse);
@@ -529,10 +529,10 @@ fn discard_known_responses(
         let is_same = |other: &Response| {
             (0..COORDINATES).all(|i| (other.start[i] - start[i]).abs() < SAME_RESPONSE_DISTANCE)
         };
-        let first =
+        let first_index =
             sought_responses.partition_point(|sought_response| sought_response.request < *request);
-        let last = if guess.is_followed() { index } else { results.len() };
-        let same_request = (first..last)
+        let last_index = if guess.is_followed() { index } else { results.len() };
+        let same_request = (first_index..last_index)
             .take_while(|other_index| sought_responses[*other_index].request == *request);
         let mut other_indices = same_request.filter(|other_index| *other_index != index);
         let is_known = !guess.is_on_curve

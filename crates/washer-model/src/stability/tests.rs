@@ -133,10 +133,12 @@ fn val_growth_and_amplitudes_match_an_independent_program() {
 #[test]
 fn val_edges_match_an_independent_program() {
     for case in reference_list("edges") {
-        let edges: Vec<f64> =
+        let boundaries_rpm: Vec<f64> =
             case["edges_rpm"].as_array().unwrap().iter().map(|e| e.as_f64().unwrap()).collect();
-        let test_speeds_rpm: Vec<f64> =
-            edges.iter().flat_map(|edge| [edge - 0.05, edge + 0.05]).collect();
+        let test_speeds_rpm: Vec<f64> = boundaries_rpm
+            .iter()
+            .flat_map(|boundary_rpm| [boundary_rpm - 0.05, boundary_rpm + 0.05])
+            .collect();
         let unstable: Vec<bool> = responses_of_machine(case_machine(&case), &test_speeds_rpm)
             .iter()
             .map(|r| r.kind() != StabilityKind::Stable)
@@ -148,9 +150,9 @@ fn val_edges_match_an_independent_program() {
 #[test]
 fn val_the_damping_that_closes_a_tongue_matches_an_independent_program() {
     for case in reference_list("critical") {
-        let from = if case["tongue"] == "f1+f2" { 245.0 } else { 302.0 };
-        let speeds: Vec<f64> = (0..40).map(|k| from + 0.25 * f64::from(k)).collect();
-        let largest = |difference: f64| {
+        let first_speed_rpm = if case["tongue"] == "f1+f2" { 245.0 } else { 302.0 };
+        let speeds: Vec<f64> = (0..40).map(|k| first_speed_rpm + 0.25 * f64::from(k)).collect();
+        let max_growth = |difference: f64| {
             let damping = number(&case, "damping_n_s_per_m") + difference;
             let responses = responses_of_machine(
                 machine_with(number(&case, "unbalance_mass_kg"), damping),
@@ -158,7 +160,7 @@ fn val_the_damping_that_closes_a_tongue_matches_an_independent_program() {
             );
             responses.iter().map(Response::growth_per_s).fold(f64::NEG_INFINITY, f64::max)
         };
-        let [below, above] = [largest(-0.5), largest(0.5)];
+        let [below, above] = [max_growth(-0.5), max_growth(0.5)];
         assert!(below > 0.0 && above < 0.0, "{case}: {below} {above}");
     }
 }
@@ -241,9 +243,9 @@ fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f6
 /// Returns the growth (1/s) of a small disturbance of a response in a simulation.
 fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
     // The disturbance grows by a factor of a thousand at most, so that it stays small.
-    let moved = simulated_moves(machine, response, 7.0 / response.growth_per_s());
+    let moves = simulated_moves(machine, response, 7.0 / response.growth_per_s());
     let turns_per_s = response.speed_rpm / 60.0;
-    largest_multiplier(&moved).ln() * turns_per_s
+    largest_multiplier(&moves).ln() * turns_per_s
 }
 
 /// Returns the magnitude of the largest multiplier of changes from turn to turn.
@@ -260,9 +262,10 @@ fn largest_multiplier(moves: &[[f64; COORDINATES]]) -> f64 {
     let fit_multipliers = |count: usize| {
         use faer::linalg::solvers::SolveLstsq as _;
         let rows = (late_moves.len() - count) * COORDINATES;
-        let at = |row: usize, turn: usize| late_moves[row / COORDINATES + turn][row % COORDINATES];
-        let current_displacements = Mat::from_fn(rows, count, at);
-        let next_displacements = Mat::from_fn(rows, 1, |i, _| at(i, count));
+        let displacement =
+            |row: usize, turn: usize| late_moves[row / COORDINATES + turn][row % COORDINATES];
+        let current_displacements = Mat::from_fn(rows, count, displacement);
+        let next_displacements = Mat::from_fn(rows, 1, |i, _| displacement(i, count));
         let factors = current_displacements.qr().solve_lstsq(&next_displacements);
         let relative_residual = (&current_displacements * &factors - &next_displacements).norm_l2()
             / next_displacements.norm_l2();
@@ -290,11 +293,11 @@ fn the_largest_multiplier_is_found_of_one_to_three() {
     let shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (1.0 + i as f64));
     let other_shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (i as f64 - 4.3));
     let moves = |coordinates_at: &dyn Fn(i32) -> [f64; 2]| -> Vec<[f64; COORDINATES]> {
-        let at = |k: i32| {
+        let displacements_at = |k: i32| {
             let [a, b] = coordinates_at(k);
             core::array::from_fn(|i| a * shape[i] + b * other_shape[i])
         };
-        (0..60).map(at).collect()
+        (0..60).map(displacements_at).collect()
     };
     let single = moves(&|k| [(-1.09_f64).powi(k), 0.3_f64.powi(k)]);
     assert!((largest_multiplier(&single) - 1.09).abs() < 1e-6, "{}", largest_multiplier(&single));
@@ -401,8 +404,8 @@ fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
     let capped = Settings::new(&point).held_case(250.0).unwrap().setup;
     // The steps are so short that the formula adds no damping to the capped modes.
     let setup = TurnSetup { steps: 32 * capped.steps, ..capped };
-    let near = response_at(machine_with(0.4, 140.0), 250.0).start;
-    let (start, multipliers) = find_response(&setup, near);
+    let nearby_start = response_at(machine_with(0.4, 140.0), 250.0).start;
+    let (start, multipliers) = find_response(&setup, nearby_start);
     let product = multipliers.into_iter().product::<c64>();
     let trace = Simd::one_lane(TraceIntegral { setup, start });
     let error = product.re.ln() / trace - 1.0;
@@ -587,12 +590,13 @@ fn growth_of_random_machines_agrees_with_simulations() {
         {
             let moves = simulated_moves(machine.clone(), response, 20.0);
             let size = |d: &[f64; COORDINATES]| d[4].abs().max(d[5].abs());
-            let largest = |moves: &[[f64; COORDINATES]]| moves.iter().map(size).fold(0.0, f64::max);
+            let max_size =
+                |moves: &[[f64; COORDINATES]]| moves.iter().map(size).fold(0.0, f64::max);
             // The final changes are compared with the first ones: a motion that leaves for another
             // one changes most on the way, and little at the end.
             let [begin, end] = [moves.len() / 5, moves.len() * 4 / 5];
-            let disturbance = largest(&moves[..begin]);
-            let remaining_share = largest(&moves[end..]) / disturbance;
+            let disturbance = max_size(&moves[..begin]);
+            let remaining_share = max_size(&moves[end..]) / disturbance;
             println!("machine {number}, {} rpm: {remaining_share:e} left", response.speed_rpm);
             assert!(disturbance < 1e-4, "machine {number}: {response:?}");
             assert!(remaining_share < 0.1, "machine {number}: {response:?}");
@@ -802,11 +806,11 @@ fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
     // An independent program has, for the first mode at 1200 rpm, a frequency of 65.20 per minute,
     // and 65.95 with theta frozen; the damping of the second mode at its resonance differs by 8 %.
     let point = prepared(machine_with(0.4, 140.0), 100.0);
-    let first = floquet_modes(&point, 1200.0).unwrap()[0];
-    println!("{} {}", first.frequency_rpm(), first.frozen_mode.frequency_rpm());
-    assert!((first.frequency_rpm() - 65.20).abs() < 0.01);
-    let second = floquet_modes(&point, 147.76).unwrap()[1];
-    let difference = second.damping_ratio() / second.frozen_mode.damping_ratio() - 1.0;
+    let first_mode = floquet_modes(&point, 1200.0).unwrap()[0];
+    println!("{} {}", first_mode.frequency_rpm(), first_mode.frozen_mode.frequency_rpm());
+    assert!((first_mode.frequency_rpm() - 65.20).abs() < 0.01);
+    let second_mode = floquet_modes(&point, 147.76).unwrap()[1];
+    let difference = second_mode.damping_ratio() / second_mode.frozen_mode.damping_ratio() - 1.0;
     println!("{difference}");
     assert!((difference.abs() - 0.08).abs() < 0.03, "{difference}");
 }

@@ -74,7 +74,7 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
         let mut accelerations = drum_point(&moving_q, theta, hinge_x_m, position_m)
             .map(|coordinate| coordinate.0.slope.slope);
         accelerations[1] += machine.gravity_m_per_s2;
-        let largest = with.iter().fold(0.0_f64, |largest, force| largest.max(force.abs()));
+        let max_force = with.iter().fold(0.0_f64, |max_force, force| max_force.max(force.abs()));
         for r in 0..COORDINATES {
             let shifted_q = core::array::from_fn(|i| {
                 N(Dual { value: q[i], slope: if i == r { 1.0 } else { 0.0 } })
@@ -83,7 +83,7 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
                 drum_point(&shifted_q, N(Dual { value: angle, slope: 0.0 }), hinge_x_m, position_m);
             let power: f64 = (0..3).map(|i| accelerations[i] * partial[i].0.slope).sum();
             let error = with[r] - without[r] - added.mass_kg * power;
-            max_error = max_error.max(error.abs() / largest);
+            max_error = max_error.max(error.abs() / max_force);
         }
     }
     eprintln!("a point mass at an angle: within {max_error:.1e} of the largest force");
@@ -165,8 +165,8 @@ fn slopes_of_dampers_in_two_stages_are_derivatives_of_their_force() {
         ..machine.dampers[0]
     };
     let elements = Elements::new(&machine);
-    let rest = TubMotion::new(&[N(0.0); 4], &[N(0.0); 4]);
-    let motions = elements.corner_motions(&rest);
+    let motion_at_rest = TubMotion::new(&[N(0.0); 4], &[N(0.0); 4]);
+    let motions = elements.corner_motions(&motion_at_rest);
     let force_at = |elongation_m: f64, speed: f64| {
         let mut shifted_motions = motions.clone();
         shifted_motions[0] = [shifted_motions[0][0] + elongation_m, N(speed)];

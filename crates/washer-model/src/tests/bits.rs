@@ -119,14 +119,17 @@ fn assert_same_with_any_other_points(scenarios: &[BitsScenario]) {
     let mut mixed = scenarios.to_vec();
     mixed.insert(1, failing(0.02));
     mixed.insert(5, failing(0.3));
-    let others: Vec<_> = (0..mixed.len()).filter(|i| ![1, 5].contains(i)).collect();
+    let other_points: Vec<_> = (0..mixed.len()).filter(|i| ![1, 5].contains(i)).collect();
     let with_failing = batch(Simd::best(), &mixed);
     let nonlinear = &with_failing[0];
     assert!(
         [1, 5].iter().all(|&i| nonlinear[i].len() < nonlinear[0].len()),
         "the added points fail"
     );
-    assert!(select_scenarios(&with_failing, &others) == together, "beside failing neighbours");
+    assert!(
+        select_scenarios(&with_failing, &other_points) == together,
+        "beside failing neighbours"
+    );
 }
 
 #[test]

@@ -166,8 +166,8 @@ fn heaving_machine() -> (Machine, f64) {
 /// starts at rest from the height `start_m`.
 fn heights_m(machine: Machine, start_m: f64, interval_s: f64, count: u32) -> Vec<f64> {
     let end_s = interval_s * f64::from(count) * (1.0 + 1e-9);
-    let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    let point = prepared(machine, still, end_s);
+    let zero_spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
+    let point = prepared(machine, zero_spin, end_s);
     let mut start = InitialDeviation::default();
     start.deviations[0] = start_m;
     start.deviations[2] = start_m;
@@ -238,8 +238,8 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
         );
     }
     // The amplitude tends to the free stroke.
-    let last = extremes[extremes.len() - 1];
-    assert!(last > stroke_m && last < 1.05 * stroke_m, "{last}");
+    let last_extreme = extremes[extremes.len() - 1];
+    assert!(last_extreme > stroke_m && last_extreme < 1.05 * stroke_m, "{last_extreme}");
 }
 
 #[test]
@@ -354,10 +354,10 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let large = difference(1e-3);
-    let small = difference(1e-4);
+    let small_difference = difference(1e-4);
     assert!(large > 1e-4, "{large}");
     // The difference is of second order: for a tenth of the motion it is a hundredth.
-    assert!((large / small - 100.0).abs() < 10.0, "{large} {small}");
+    assert!((large / small_difference - 100.0).abs() < 10.0, "{large} {small_difference}");
 }
 
 #[test]

@@ -99,17 +99,18 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
         let matrices =
             [(computed.mass, mass), (computed.damping, damping), (computed.stiffness, stiffness)];
         for (kind, (computed, expected)) in matrices.into_iter().enumerate() {
-            let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+            let max_magnitude = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
             let difference = computed.iter().flatten().zip(expected.iter().flatten());
             max_errors[kind] =
-                difference.fold(max_errors[kind], |m, (a, b)| m.max((a - b).abs() / largest));
+                difference.fold(max_errors[kind], |m, (a, b)| m.max((a - b).abs() / max_magnitude));
         }
         // The entries of F may be far below the weight, of which they are differences.
         let bodies = &instant.point.machine.bodies;
         let weight = bodies.gravity.0 * bodies.rotor_mass.0;
-        let largest = force.iter().fold(weight, |m, a| m.max(a.abs()));
+        let max_magnitude = force.iter().fold(weight, |m, a| m.max(a.abs()));
         let difference = computed.force.iter().zip(&force);
-        max_errors[3] = difference.fold(max_errors[3], |m, (a, b)| m.max((a - b).abs() / largest));
+        max_errors[3] =
+            difference.fold(max_errors[3], |m, (a, b)| m.max((a - b).abs() / max_magnitude));
     });
     let [m, c, k, f] = max_errors;
     eprintln!(
@@ -167,12 +168,14 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let spin_squared = instant.spin.speed.0.powi(2) + instant.spin.acceleration.0.abs();
         let scales = [1.0, 1.0 + spin_squared.sqrt(), 1.0 + spin_squared];
         // Channels are deviations from equilibrium; the radial distance is not.
-        let rest = instant.point.channels_at_rest.into_iter().chain([0.0; RADIAL_COMPONENTS]);
+        let channels_at_rest =
+            instant.point.channels_at_rest.into_iter().chain([0.0; RADIAL_COMPONENTS]);
         let computed = channels.unwrap().into_iter().chain(radial);
         let expected =
             axes.channels(&bodies, &motion).into_iter().chain(axes.radial(&bodies, &motion));
-        for ((computed, expected), rest) in computed.zip(expected).zip(rest) {
-            let order_zero = expected.value.0.value - rest;
+        for ((computed, expected), channels_at_rest) in computed.zip(expected).zip(channels_at_rest)
+        {
+            let order_zero = expected.value.0.value - channels_at_rest;
             let sampled_values = [
                 (computed.value.0, order_zero + expected.value.0.slope),
                 (computed.slope.0, expected.slope.0.value + expected.slope.0.slope),

@@ -99,10 +99,10 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
             };
             let residual_here = residual(&reciprocals);
             let column = |k: usize| {
-                let mut shifted = reciprocals.clone();
-                let step = 1e-3 * shifted[k];
-                shifted[k] += step;
-                let shifted_residual = residual(&shifted);
+                let mut shifted_reciprocals = reciprocals.clone();
+                let step = 1e-3 * shifted_reciprocals[k];
+                shifted_reciprocals[k] += step;
+                let shifted_residual = residual(&shifted_reciprocals);
                 [
                     (shifted_residual[0] - residual_here[0]) / step,
                     (shifted_residual[1] - residual_here[1]) / step,

@@ -147,10 +147,10 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         }
         let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
         for (closed_s, stop) in closed_s.iter_mut().zip(&machine.stops) {
-            let at = position([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
+            let stop_point = position([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
             let length = stop.direction_length();
             let displacement_m: f64 =
-                (0..3).map(|i| (at[i] - stop.tub_m[i]) * stop.direction[i] / length).sum();
+                (0..3).map(|i| (stop_point[i] - stop.tub_m[i]) * stop.direction[i] / length).sum();
             *closed_s += if displacement_m > stop.clearance_m { INTERVAL_S } else { 0.0 };
         }
     }

@@ -50,8 +50,10 @@ fn every_segment_lies_within_its_spin_segment() {
                 .iter()
                 .rposition(|spin_segment| spin_segment.start_s.0 <= segment.start_s);
             assert_eq!(Some(segment.spin_segment), expected, "{segment:?}");
-            let next = point.spin_segments.get(segment.spin_segment + 1);
-            assert!(next.is_none_or(|next| segment.end_s <= next.start_s.0));
+            let next_segment = point.spin_segments.get(segment.spin_segment + 1);
+            assert!(
+                next_segment.is_none_or(|next_segment| segment.end_s <= next_segment.start_s.0)
+            );
         }
         for t_s in [0.0, 0.3, 0.5, 2.3, 5.0] {
             let spin_segment =

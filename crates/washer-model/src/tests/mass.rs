@@ -63,7 +63,7 @@ fn accelerations_solve_the_equations_of_motion_of_any_machine() {
 /// Returns an arbitrary sag; mass scaling is correct for any sag.
 fn sag() -> Sag<f64> {
     let bearings = Deflection { offset: [N(-3e-6), N(1e-6)], tilt: [N(2e-5), N(-1e-5)] };
-    Sag { bearings, hinge: [N(2e-4), N(-7e-4)] }
+    Sag { bearings, hinge_angles: [N(2e-4), N(-7e-4)] }
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
             if let Some(cap) = hinge_rad_per_s {
                 // The deflection by weight does not turn with the drum, so that it rotates
                 // backwards in the shaft's frame.
-                let [sag_9, sag_10] = sag.hinge;
+                let [sag_9, sag_10] = sag.hinge_angles;
                 let rotated_sag =
                     [spin.cos * sag_9 + spin.sin * sag_10, spin.cos * sag_10 - spin.sin * sag_9];
                 let mass = N(machine.bodies.flexure_stiffness.0 / (cap * cap));

@@ -21,8 +21,8 @@ fn errors<M: LaneModel<f64>>(seed: u64) -> [f64; 2] {
         let model = M::splat(N(0.0), &point, Coupling::Springs);
         let mut random = |size: f64| size * (2.0 * rng.f64() - 1.0);
         let middle_s = 0.2 + random(0.1);
-        let rest = M::at_rest(&point);
-        let q: [f64; COORDINATES] = core::array::from_fn(|i| rest[i] + random(0.03));
+        let state_at_rest = M::at_rest(&point);
+        let q: [f64; COORDINATES] = core::array::from_fn(|i| state_at_rest[i] + random(0.03));
         let u: [f64; COORDINATES] = core::array::from_fn(|_| random(0.5));
         let a: [f64; COORDINATES] = core::array::from_fn(|_| random(20.0));
         // The outputs of a motion of constant acceleration.
@@ -42,7 +42,7 @@ fn errors<M: LaneModel<f64>>(seed: u64) -> [f64; 2] {
             core::array::from_fn(|i| if i < CHANNELS { channels[i] } else { radial[i - CHANNELS] })
         };
         let [before, now, after] = [-STEP_S, 0.0, STEP_S].map(outputs);
-        let mut largest = [0.0_f64; 2];
+        let mut max_values = [0.0_f64; 2];
         let mut difference = [0.0_f64; 2];
         for i in 0..OUTPUTS {
             let slope = (after[i].value.0 - before[i].value.0) / (2.0 * STEP_S);
@@ -51,11 +51,11 @@ fn errors<M: LaneModel<f64>>(seed: u64) -> [f64; 2] {
                 [(now[i].slope.0, slope), (now[i].curvature.0, curvature)].into_iter().enumerate()
             {
                 difference[k] = difference[k].max((value - expected).abs());
-                largest[k] = largest[k].max(expected.abs());
+                max_values[k] = max_values[k].max(expected.abs());
             }
         }
         for k in 0..2 {
-            max_errors[k] = max_errors[k].max(difference[k] / largest[k]);
+            max_errors[k] = max_errors[k].max(difference[k] / max_values[k]);
         }
     }
     max_errors

@@ -37,11 +37,11 @@ pub(crate) fn assert_matrix(
 ) -> f64 {
     let rows = reference.as_array().unwrap();
     let expected: [[f64; COORDINATES]; COORDINATES] = std::array::from_fn(|i| numbers(&rows[i]));
-    let largest = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+    let max_magnitude = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
     let mut max_error = 0.0_f64;
     for i in 0..COORDINATES {
         for j in 0..COORDINATES {
-            let error = (computed[i][j] - expected[i][j]).abs() / largest;
+            let error = (computed[i][j] - expected[i][j]).abs() / max_magnitude;
             assert!(
                 error < tolerance,
                 "{name}[{i}][{j}]: {} against {}",
@@ -83,9 +83,9 @@ fn val_accelerations_match_an_independent_right_hand_side() {
             &u,
         );
         let expected: [f64; COORDINATES] = numbers(&case["acceleration"]);
-        let largest = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        let max_magnitude = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
         for i in 0..COORDINATES {
-            let error = (computed[i].0 - expected[i]).abs() / largest;
+            let error = (computed[i].0 - expected[i]).abs() / max_magnitude;
             assert!(
                 error < 1e-9,
                 "coordinate {}: {} against {}",
@@ -129,9 +129,9 @@ fn val_linear_matrices_match_an_independent_expansion() {
             assert_matrix(name, &computed, &case[name], 1e-9);
         }
         let expected: [f64; COORDINATES] = numbers(&case["F"]);
-        let largest = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        let max_magnitude = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
         for i in 0..COORDINATES {
-            let error = (computed.force[i] - expected[i]).abs() / largest;
+            let error = (computed.force[i] - expected[i]).abs() / max_magnitude;
             assert!(error < 1e-9, "F[{i}]: {} against {}", computed.force[i], expected[i]);
         }
     }

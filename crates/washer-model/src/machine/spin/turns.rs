@@ -78,10 +78,10 @@ fn monotone_pieces(segments: &[SpinSegment], [from_s, to_s]: [f64; 2]) -> Vec<Mo
         let end_s =
             segments.get(k + 1).map_or(to_s, |next_segment| next_segment.start_s.0.min(to_s));
         let length_s = end_s - segment.start_s.0;
-        let mut edges = vec![0.0, length_s];
+        let mut boundaries_s = vec![0.0, length_s];
         let mut add_edge = |t_s: f64| {
             if 0.0 < t_s && t_s < length_s {
-                edges.push(t_s);
+                boundaries_s.push(t_s);
             }
         };
         add_edge(from_s - segment.start_s.0);
@@ -89,11 +89,11 @@ fn monotone_pieces(segments: &[SpinSegment], [from_s, to_s]: [f64; 2]) -> Vec<Mo
         if segment.wave_turns.0 == 0.0 {
             add_edge(-segment.turns_per_s.0 / (2.0 * segment.turns_per_s2.0));
         }
-        edges.sort_by(f64::total_cmp);
-        monotone_pieces.extend(edges.windows(2).map(|edge| MonotonePiece {
+        boundaries_s.sort_by(f64::total_cmp);
+        monotone_pieces.extend(boundaries_s.windows(2).map(|interval| MonotonePiece {
             segment,
-            from_s: edge[0],
-            to_s: edge[1],
+            from_s: interval[0],
+            to_s: interval[1],
         }));
     }
     monotone_pieces
@@ -212,19 +212,19 @@ mod tests {
     fn partial_turns_are_joined_to_the_adjacent_whole_turn() {
         // The drum makes one turn per second after the first turn, which takes two seconds.
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 2.0 };
-        let cuts = |window_s| whole_turn_cuts_s(&spin.segments(), window_s);
+        let turn_times_s = |window_s| whole_turn_cuts_s(&spin.segments(), window_s);
         let assert_near = |times: Vec<f64>, expected: &[f64]| {
             assert_eq!(times.len(), expected.len(), "{times:?}");
             assert!(times.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{times:?}");
         };
-        assert_near(cuts([2.5, 6.5]), &[4.0, 5.0]);
+        assert_near(turn_times_s([2.5, 6.5]), &[4.0, 5.0]);
         // A window from whole turn to whole turn has no partial turns.
-        assert_near(cuts([2.0, 5.0]), &[3.0, 4.0]);
-        assert_near(cuts([2.5, 4.5]), &[]);
-        assert_near(cuts([2.5, 3.4]), &[]);
-        assert_near(cuts([3.2, 3.4]), &[]);
-        let still = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 2.0 };
-        assert_near(whole_turn_cuts_s(&still.segments(), [0.0, 100.0]), &[]);
+        assert_near(turn_times_s([2.0, 5.0]), &[3.0, 4.0]);
+        assert_near(turn_times_s([2.5, 4.5]), &[]);
+        assert_near(turn_times_s([2.5, 3.4]), &[]);
+        assert_near(turn_times_s([3.2, 3.4]), &[]);
+        let zero_spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 2.0 };
+        assert_near(whole_turn_cuts_s(&zero_spin.segments(), [0.0, 100.0]), &[]);
     }
 
     #[test]

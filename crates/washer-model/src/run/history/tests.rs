@@ -150,10 +150,10 @@ fn linear_forces_equal_the_nonlinear_forces_to_first_order() {
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let large = difference(1e-2);
-    let small = difference(1e-3);
+    let small_difference = difference(1e-3);
     assert!(large > 1e-3, "{large}");
     // The difference is of second order: for a tenth of the motion it is a hundredth.
-    assert!((large / small - 100.0).abs() < 10.0, "{large} {small}");
+    assert!((large / small_difference - 100.0).abs() < 10.0, "{large} {small_difference}");
 }
 
 #[test]

@@ -28,17 +28,17 @@ fn ramp() -> Point {
 fn the_tangent_map_agrees_with_differences_of_nearby_runs() {
     let point = ramp();
     let at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
-    let entry = integrate(&point, STEP_S, [0.0, 1.8], &at_rest).end;
+    let entry_state = integrate(&point, STEP_S, [0.0, 1.8], &at_rest).end;
     // The interval contains the profile's kink.
     let crossing = forward_crossing([1.8, 2.2], None);
     let map = Simd::dispatch_narrow(TangentMap {
         point: &point,
         step_s: STEP_S,
         crossing: &crossing,
-        entry: &entry,
+        entry: &entry_state,
     });
     let end = |disturbance: f64, index: usize| {
-        let mut start = entry;
+        let mut start = entry_state;
         start[index] += disturbance;
         integrate(&point, STEP_S, crossing.interval_s, &start).end
     };
@@ -46,10 +46,11 @@ fn the_tangent_map_agrees_with_differences_of_nearby_runs() {
         let size = if index < COORDINATES { 1e-7 } else { 1e-5 };
         let above = end(size, index);
         let below = end(-size, index);
-        let largest = map[index].iter().fold(0.0_f64, |largest, slope| largest.max(slope.abs()));
+        let max_slope =
+            map[index].iter().fold(0.0_f64, |max_slope, slope| max_slope.max(slope.abs()));
         for i in 0..STATES {
             let slope = (above[i] - below[i]) / (2.0 * size);
-            let difference = (slope - map[index][i]).abs() / largest;
+            let difference = (slope - map[index][i]).abs() / max_slope;
             assert!(difference < 1e-6, "{index} {i}: {slope} {}", map[index][i]);
         }
     }

@@ -81,14 +81,14 @@ fn turns_do_not_depend_on_other_lanes() {
                 1 => settings.held_case(speed_rpm).unwrap().without_caps().unwrap().setup,
                 _ => settings.continuation_setup(speed_rpm).unwrap(),
             };
-            let rest = settings.point.equilibrium();
+            let equilibrium = settings.point.equilibrium();
             let size = 0.02 * numbers.f64();
             let start = core::array::from_fn(|i| {
                 let offset = size * (2.0 * numbers.f64() - 1.0);
                 if i < 2 || (4..6).contains(&i) {
-                    rest[i] + offset
+                    equilibrium[i] + offset
                 } else if i < COORDINATES {
-                    rest[i]
+                    equilibrium[i]
                 } else {
                     offset
                 }
