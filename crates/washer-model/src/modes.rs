@@ -300,8 +300,8 @@ pub(crate) fn highest_rigid_frequency_rad_per_s(
     point: &Point,
     model: &LinearPoint,
 ) -> Result<f64, ModesError> {
-    let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
-    let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &still);
+    let zero_spin = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
+    let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &zero_spin);
     let add_rigid_pairs = |matrix: &[[f64; COORDINATES]; COORDINATES]| {
         Mat::from_fn(TUB.len(), TUB.len(), |i, j| {
             let [i, k] = [TUB[i], SHAFT[i]];

@@ -53,17 +53,18 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
         m.drum.mass_kg * drum_point(m.drum.centre_x_m, 0.0, 0.0)[1],
     ];
     let height = |u: &Unbalance| u.mass_kg * drum_point(u.x_m, u.radius_m, u.angle_deg)[1];
-    let unbalance_moments = m.unbalances().map(height);
-    let mut energy = m.gravity_m_per_s2 * heights.into_iter().chain(unbalance_moments).sum::<f64>();
+    let unbalance_mass_moments = m.unbalances().map(height);
+    let mut energy =
+        m.gravity_m_per_s2 * heights.into_iter().chain(unbalance_mass_moments).sum::<f64>();
     for s in &m.springs {
-        let free = s.free_length_m.unwrap_or_else(|| distance(s.cabinet_m, s.tub_m));
-        let elongation = distance(position(p_t, &tub, s.tub_m), s.cabinet_m) - free;
+        let free_length_m = s.free_length_m.unwrap_or_else(|| distance(s.cabinet_m, s.tub_m));
+        let elongation = distance(position(p_t, &tub, s.tub_m), s.cabinet_m) - free_length_m;
         energy += 0.5 * s.stiffness_n_per_m * elongation.powi(2);
         energy += 0.25 * s.cubic_n_per_m3 * elongation.powi(4);
     }
-    let displacement = |at: PlainVector| -> PlainVector {
-        let moved = position(p_t, &tub, at);
-        std::array::from_fn(|i| moved[i] - at[i])
+    let displacement = |tub_point: PlainVector| -> PlainVector {
+        let cabinet_point = position(p_t, &tub, tub_point);
+        std::array::from_fn(|i| cabinet_point[i] - tub_point[i])
     };
     for s in &m.stops {
         // The integral of (depth + w) / 2 with w = sqrt(depth^2 + softness^2).
@@ -110,7 +111,7 @@ fn losses_w(
     q: &[f64; COORDINATES],
     u: &[f64; COORDINATES],
 ) -> f64 {
-    let rest = axes(at_rest[4], at_rest[5]);
+    let axes_at_rest = axes(at_rest[4], at_rest[5]);
     let tub = axes(q[4], q[5]);
     let tub_point = |point: PlainVector| position([0.0, q[0], q[1]], &tub, point);
     // The tub's angular velocity: yaw rate about c2, pitch rate about t3.
@@ -127,7 +128,8 @@ fn losses_w(
     let mut losses = 0.0;
     for d in &m.dampers {
         let end = tub_point(d.tub_m);
-        let rest_m = distance(position([0.0, at_rest[0], at_rest[1]], &rest, d.tub_m), d.cabinet_m);
+        let rest_m =
+            distance(position([0.0, at_rest[0], at_rest[1]], &axes_at_rest, d.tub_m), d.cabinet_m);
         let v =
             component_along(velocity(d.tub_m), std::array::from_fn(|i| end[i] - d.cabinet_m[i]));
         losses += d.damping_n_s_per_m * v * v;
@@ -135,8 +137,8 @@ fn losses_w(
         losses += engagement(d, distance(end, d.cabinet_m) - rest_m) * stage * v * v;
     }
     for s in &m.stops {
-        let moved = tub_point(s.tub_m);
-        let depth = depth_m(s, std::array::from_fn(|i| moved[i] - s.tub_m[i]));
+        let cabinet_point = tub_point(s.tub_m);
+        let depth = depth_m(s, std::array::from_fn(|i| cabinet_point[i] - s.tub_m[i]));
         let v = component_along(velocity(s.tub_m), s.direction);
         let contact = 0.5 * (1.0 + depth / depth.hypot(s.softness_m));
         losses += s.damping_n_s_per_m * contact * v * v;
@@ -160,8 +162,8 @@ fn engagement(damper: &Damper, elongation_m: f64) -> f64 {
 
 /// Computes the kinetic energy (J) without spin, u M u / 2.
 fn kinetic_j(machine: &Coefficients<f64>, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 {
-    let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
-    let mass = mass_matrix(machine, &still, q);
+    let zero_spin = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
+    let mass = mass_matrix(machine, &zero_spin, q);
     let row_sum = |i: usize| (0..COORDINATES).map(|j| u[i] * mass[i][j] * u[j]).sum::<f64>();
     0.5 * (0..COORDINATES).map(row_sum).sum::<f64>()
 }
@@ -173,8 +175,8 @@ fn history_from_initial_velocity(
     step_s: f64,
     interval_s: f64,
 ) -> Vec<InstantOutputs> {
-    let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    let point = prepared(machine.clone(), still, end_s);
+    let zero_spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
+    let point = prepared(machine.clone(), zero_spin, end_s);
     // Velocities of 0.1 and 0.15 m/s, 0.5 and -0.4 rad/s give motions of some 20 mm and 40 mrad.
     let mut start = InitialDeviation::default();
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
@@ -205,8 +207,8 @@ fn energies_j(step_s: f64) -> Vec<f64> {
 }
 
 fn equilibrium(machine: &Machine) -> [f64; COORDINATES] {
-    let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    prepared(machine.clone(), still, 1.0).equilibrium
+    let zero_spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
+    prepared(machine.clone(), zero_spin, 1.0).equilibrium
 }
 
 #[test]
@@ -262,8 +264,8 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
     let max_depth_m = |stop: &BumpStop| {
         let depth = |instant: &InstantOutputs| {
             let q = &instant.deviations;
-            let moved = position([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
-            depth_m(stop, std::array::from_fn(|i| moved[i] - stop.tub_m[i]))
+            let cabinet_point = position([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
+            depth_m(stop, std::array::from_fn(|i| cabinet_point[i] - stop.tub_m[i]))
         };
         instants.iter().map(depth).fold(f64::NEG_INFINITY, f64::max)
     };

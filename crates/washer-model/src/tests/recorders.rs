@@ -177,8 +177,8 @@ fn at_rest_the_cabinet_carries_the_weight() {
     let weight_n = machine.gravity_m_per_s2
         * (machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg);
     let timing = Timing { end_s: 0.02, window_s: [0.0, 0.02], checkpoints: 0 };
-    let still = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
-    let point = prepare(Simd::best(), &[(machine, still)], &timing).remove(0).unwrap();
+    let zero_spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
+    let point = prepare(Simd::best(), &[(machine, zero_spin)], &timing).remove(0).unwrap();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let (_, readings) =
             simulate_with(Simd::best(), model, &Method::rk4(2e-4), &[&point], ALL_RECORDERS);
