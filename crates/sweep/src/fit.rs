@@ -1,4 +1,4 @@
-//! `sweep fit`: the numbers with which the model follows a measurement, their errors, and the
+//! `sweep fit`: fits parameters of the machine to measurements, and computes their errors and the
 //! verdict of the fitted machine.
 //!
 //! `measured`, `pulses` and `speed` read a measurement. `model` compares it with the model and its
@@ -46,12 +46,13 @@ pub(crate) use report::FitReport;
 use search::{Descent, DescentEnd, MAX_EVALUATIONS, descend};
 use statistics::Statistics;
 
-/// The range of further starts without a given range, as parts of the first start. Basis: a data
-/// sheet is seldom wrong by more. Doubling the width tries more distant minima with fewer starts
-/// near the first.
+/// The range of additional starting values of a parameter without a given range, relative to its
+/// first starting value. Basis: a data sheet is seldom wrong by more. Doubling the width tries more
+/// distant minima with fewer starts near the first.
 const START_RANGE: [f64; 2] = [0.3, 1.7];
-/// The greatest number of starts from which a descent begins: those with the least cost. Basis: the
-/// test data have two minima. Doubling it doubles the time of a fit with `--starts`.
+/// The greatest number of starting points from which a descent begins. Those with the least cost
+/// are taken. Basis: the test data have two minima. Doubling it doubles the time of a fit with
+/// `--starts`.
 const MAX_DESCENTS: usize = 3;
 /// The seed of all draws.
 const SEED: u64 = 1;
@@ -79,7 +80,7 @@ pub struct FitOptions {
     /// Take the clock of every file as it is, instead of fitting a shift of it
     #[arg(long)]
     pub no_shift: bool,
-    /// Starts that are looked at for further minima
+    /// Number of starting points of the search
     #[arg(long, value_name = "N", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub starts: u32,
@@ -91,7 +92,7 @@ pub struct FitOptions {
     /// All others have those of their kind, or with `none` are taken as exact
     #[arg(long, value_name = "NAME=TOLERANCE[%],...", value_delimiter = ',')]
     pub known: Vec<String>,
-    /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for none
+    /// Number of samples of the fitted distribution, for the verdict's probability; 0 for none
     #[arg(long, value_name = "N", default_value_t = 64)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=100_000))]
     pub draws: u32,
@@ -121,14 +122,14 @@ impl FitOptions {
 pub(crate) struct Fitted<'a> {
     pub(crate) problem: Problem<'a>,
     pub(crate) x: Vec<f64>,
-    against: Vec<SignalComparison>,
+    comparisons: Vec<SignalComparison>,
     pub(crate) report: FitReport,
     /// The stored evaluations, which are deleted once the machine file is written.
     pub(crate) evaluations: Option<Evaluations>,
 }
 
 /// The context of a fit: cancellation, progress and stored evaluations.
-pub(crate) struct FitWork<'a> {
+pub(crate) struct FitContext<'a> {
     /// The cancellation. The result of a cancelled fit means nothing.
     pub(crate) cancel: Cancel<'a>,
     /// A function that is called after every evaluation with the number of evaluations.
@@ -146,29 +147,32 @@ pub(crate) struct FitWork<'a> {
 pub(crate) fn case(
     grid: &WasherGridInput,
     constants: &[String],
-    mut measured: Measurement,
+    mut measurement: Measurement,
 ) -> Result<FitCase, Error> {
-    let (plan, _) = grid.load_point(&[&middle(grid, constants)?, constants].concat())?;
-    measured.count_from_first_row(plan.end_s);
-    let smoothed = measured.smoothed_spin();
-    Ok(FitCase { plan, measured, smoothed })
+    let (plan, _) = grid.load_point(&[&middle_constants(grid, constants)?, constants].concat())?;
+    measurement.count_from_first_row(plan.end_s);
+    let smoothed_spin = measurement.smooth_spin();
+    Ok(FitCase { plan, measurement, smoothed_spin })
 }
 
 /// Returns the middle value of every axis that has several values and no constant, as NAME=VALUE.
-fn middle(grid: &WasherGridInput, constants: &[String]) -> Result<Vec<String>, Diagnostics> {
+fn middle_constants(
+    grid: &WasherGridInput,
+    constants: &[String],
+) -> Result<Vec<String>, Diagnostics> {
     let plan = grid.load()?;
     let is_given =
         |name: &str| constants.iter().any(|constant| constant.split('=').next() == Some(name));
-    let several =
+    let varied_axes =
         plan.axes.iter().filter(|axis| axis.values.len() > 1 && !is_given(&axis.parameter.name));
-    let value = |axis: &crate::plan::Axis| {
+    let middle_constant = |axis: &crate::plan::Axis| {
         let [from, to] = axis.values.extremes();
         format!("{}={}", axis.parameter.name, 0.5 * (from + to))
     };
-    Ok(several.map(value).collect())
+    Ok(varied_axes.map(middle_constant).collect())
 }
 
-/// Reads the free parameters.
+/// Reads the free parameters of `--free` and `--own`.
 fn free_parameters(
     options: &FitOptions,
     cases: &[FitCase],
@@ -180,8 +184,9 @@ fn free_parameters(
     for (text, option, cases) in shared.chain(own) {
         let location = Location::new(mistakes.add(option, text.as_str()), 0..text.len());
         for (k, case) in cases.iter().enumerate() {
-            let known: &[FreeParameter] = if cases.len() == 1 { &free } else { &[] };
-            let Some(read) = free_parameter(text, case, known, (&location, &mistakes)) else {
+            let earlier_parameters: &[FreeParameter] = if cases.len() == 1 { &free } else { &[] };
+            let Some(read) = free_parameter(text, case, earlier_parameters, (&location, &mistakes))
+            else {
                 break;
             };
             free.push(FreeParameter { case: (option == "--own").then_some(k), ..read });
@@ -194,7 +199,7 @@ fn free_parameters(
 fn free_parameter(
     text: &str,
     case: &FitCase,
-    known: &[FreeParameter],
+    earlier_parameters: &[FreeParameter],
     (location, mistakes): (&Location, &Mistakes),
 ) -> Option<FreeParameter> {
     let refuse = |title: String, expected: &str| mistakes.refuse(location, title, expected);
@@ -210,14 +215,15 @@ fn free_parameter(
             return refuse(format!("`{name}` is no number of the machine"), "expected another");
         }
         Err(error) => {
-            let known = MachineParameter::all(machine, spin);
+            let parameters = MachineParameter::all(machine, spin);
             let title = format!("`{name}` cannot be fitted: {error}");
             let refusal = Diagnostic::new(title).at(location, "expected a parameter");
-            mistakes.push(refusal.nearest(name, known.iter().map(|known| known.name())));
+            mistakes
+                .push(refusal.nearest(name, parameters.iter().map(|parameter| parameter.name())));
             return None;
         }
     };
-    if known.iter().any(|free| free.parameter == parameter) {
+    if earlier_parameters.iter().any(|free| free.parameter == parameter) {
         return refuse(format!("`{name}` is free twice"), "expected each once");
     }
     let allowed = parameter.range().bounds();
@@ -238,8 +244,8 @@ fn free_parameter(
     };
     let Some(start) = start else {
         let expected = "expected a range, NAME=FROM:TO, or a value by --set";
-        let is = if value.is_some() { "is 0" } else { "differs from part to part" };
-        return refuse(format!("`{name}` {is}: there is no value to start from"), expected);
+        let reason = if value.is_some() { "is 0" } else { "differs from part to part" };
+        return refuse(format!("`{name}` {reason}: there is no value to start from"), expected);
     };
     Some(FreeParameter { parameter, range, start, case: None })
 }
@@ -252,9 +258,9 @@ fn free_parameter(
 pub(crate) fn fit<'a>(
     cases: Vec<FitCase>,
     options: &FitOptions,
-    work: &FitWork<'a>,
+    context: &FitContext<'a>,
 ) -> Result<Option<Fitted<'a>>, Error> {
-    match run_fit(cases, options, work) {
+    match run_fit(cases, options, context) {
         Ok(fitted) => Ok(Some(fitted)),
         Err(DescentEnd::Stopped) => Ok(None),
         Err(DescentEnd::Refused(error)) => Err(error),
@@ -264,17 +270,17 @@ pub(crate) fn fit<'a>(
 fn run_fit<'a>(
     cases: Vec<FitCase>,
     options: &FitOptions,
-    work: &FitWork<'a>,
+    context: &FitContext<'a>,
 ) -> Result<Fitted<'a>, DescentEnd> {
     let free = free_parameters(options, &cases)?;
-    let known = FixedNumbers::read(&options.known, &cases[0], &free)?;
+    let fixed_numbers = FixedNumbers::read(&options.known, &cases[0], &free)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
     let model = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
     let simd = simd_from_environment()?;
-    let with_shift = !options.no_shift;
-    let cancel = work.cancel;
-    let mut problem = Problem { cases, free, model, with_shift, method, simd, cancel };
-    let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
+    let fits_shift = !options.no_shift;
+    let cancel = context.cancel;
+    let mut problem = Problem { cases, free, model, fits_shift, method, simd, cancel };
+    let samples: usize = problem.cases.iter().map(|case| case.measurement.count()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
     if unknowns >= samples {
         let expected = "expected more samples, or fewer `--free`";
@@ -286,20 +292,22 @@ fn run_fit<'a>(
         if rpm.abs() > REST_SPEED_RATIO * case.greatest_rpm() {
             let unknown = "where its unbalance was then is not known: expected the record from \
                            rest on";
-            let message = format!("{} begins at {rpm:.0} rpm, and {unknown}", case.measured.name);
+            let message =
+                format!("{} begins at {rpm:.0} rpm, and {unknown}", case.measurement.name);
             return Err(Error::Refused(message).into());
         }
     }
-    let open = |output| Evaluations::open(output, &problem, work.fresh);
-    let stored = work.output.map(open).transpose()?;
+    let open_evaluations = |output| Evaluations::open(output, &problem, context.fresh);
+    let stored_evaluations = context.output.map(open_evaluations).transpose()?;
     let evaluations_made = AtomicUsize::new(0);
-    // A search in a wrong unit takes long and comes to nothing.
-    let mut suspicions = units::suspicions(&problem)?;
-    let is_suspect = suspicions.iter().any(Option::is_some);
+    // A fit to data in a wrong unit takes long and does not converge, so it is tried with few
+    // evaluations first.
+    let mut unit_suspicions = units::find_suspicions(&problem)?;
+    let is_suspect = unit_suspicions.iter().any(Option::is_some);
     let search = MinimumSearch {
         problem: &problem,
-        stored: stored.as_ref(),
-        work,
+        stored: stored_evaluations.as_ref(),
+        context,
         evaluations_made: &evaluations_made,
         max_evaluations: if is_suspect { units::TRIAL_EVALUATIONS } else { MAX_EVALUATIONS },
     };
@@ -311,9 +319,9 @@ fn run_fit<'a>(
     if is_suspect && minima.as_ref().is_ok_and(is_explained) {
         minima = MinimumSearch { max_evaluations: MAX_EVALUATIONS, ..search }.minima(starts);
     }
-    stored.as_ref().map_or(Ok(()), Evaluations::write)?;
+    stored_evaluations.as_ref().map_or(Ok(()), Evaluations::write)?;
     let mut minima = minima?;
-    let mut best = minima.first().cloned().ok_or_else(no_answer)?;
+    let mut best = minima.first().cloned().ok_or_else(failed_start_error)?;
     let mut step_effect = None;
     // An integration step that is too long for the corners of forces changes the fitted
     // parameters; then the step is halved.
@@ -322,54 +330,61 @@ fn run_fit<'a>(
             break;
         }
         let step_s = problem.method.step_s;
-        let against = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
+        let comparisons = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
         problem.method = Method::rk4(0.5 * step_s);
-        let finer = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
-        let bread = algebra::inverse(&best.summary.normal);
-        let changes = effect(&bread, &best.summary, &against, &finer);
+        let finer_comparisons = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
+        let inverse_normal = algebra::inverse(&best.equations.normal);
+        let changes = standardised_changes(
+            &inverse_normal,
+            &best.equations,
+            &comparisons,
+            &finer_comparisons,
+        );
         let greatest_change = changes.into_iter().fold(0.0, f64::max);
         step_effect = Some(greatest_change);
         if greatest_change < MAX_STEP_EFFECT {
             problem.method = Method::rk4(step_s);
             break;
         }
-        let search = MinimumSearch::further(&problem, work, &evaluations_made);
-        best = search.from(&best.x)?.ok_or_else(no_answer)?;
+        let search = MinimumSearch::further(&problem, context, &evaluations_made);
+        best = search.from(&best.x)?.ok_or_else(failed_start_error)?;
         minima[0] = best.clone();
     }
     let evaluations = evaluations_made.load(Ordering::Relaxed);
-    let against = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
+    let comparisons = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
     // A wrong unit may change the numbers so much that only the start shows the unit.
-    let at_start = problem.compare(&problem.start()).unwrap_or_else(|| against.clone());
-    let mut statistics = Statistics::at_end(&problem, &against, &best.summary);
-    let by_tachometer = covariance_by_tachometer(&problem, &best, &against);
+    let start_comparisons =
+        problem.compare(&problem.start()).unwrap_or_else(|| comparisons.clone());
+    let mut statistics = Statistics::at_end(&problem, &comparisons, &best.equations);
+    let by_tachometer = covariance_by_tachometer(&problem, &best, &comparisons);
     statistics::add(&mut statistics.covariance, &by_tachometer, 1.0);
     if problem.model == ModelKind::Linear {
         // The numbers may compensate for the terms that the linear model lacks, without a residual.
         problem.model = ModelKind::Nonlinear;
-        statistics.bias = problem
-            .compare(&best.x)
-            .map(|nonlinear| effect(&statistics.covariance, &best.summary, &against, &nonlinear));
+        statistics.bias = problem.compare(&best.x).map(|nonlinear| {
+            standardised_changes(&statistics.covariance, &best.equations, &comparisons, &nonlinear)
+        });
         problem.model = ModelKind::Linear;
     }
     let mut resampled = None;
     if options.bootstrap > 0 && best.is_settled {
-        resampled = Some(bootstrap(&mut problem, &best.x, &against, options.bootstrap, work)?);
+        resampled =
+            Some(bootstrap(&mut problem, &best.x, &comparisons, options.bootstrap, context)?);
     }
     if best.is_settled && statistics.objection(&problem).is_none() {
-        let variances = statistics.variances(&best.summary);
+        let variances = statistics.variances(&best.equations);
         statistics.influences =
-            known.influences(&problem, &best.x, &against, &best.summary, &variances);
+            fixed_numbers.influences(&problem, &best.x, &comparisons, &best.equations, &variances);
     }
-    if statistics.unexplained().is_none() {
-        suspicions.fill(None);
+    if statistics.worst_explained().is_none() {
+        unit_suspicions.fill(None);
     }
     let report_data = report::ReportData {
         problem: &problem,
-        suspicions: &suspicions,
+        unit_suspicions: &unit_suspicions,
         minima: &minima,
-        against: &against,
-        at_start: &at_start,
+        comparisons: &comparisons,
+        start_comparisons: &start_comparisons,
         statistics: &statistics,
         evaluations,
         step_effect,
@@ -380,60 +395,71 @@ fn run_fit<'a>(
     if cancel.is_requested() {
         return Err(DescentEnd::Stopped);
     }
-    Ok(Fitted { problem, x: best.x, against, report, evaluations: stored })
+    Ok(Fitted { problem, x: best.x, comparisons, report, evaluations: stored_evaluations })
 }
 
 /// Returns the error of a start at which the model fails.
-fn no_answer() -> Error {
+fn failed_start_error() -> Error {
     let message = "the model does not get through the record at the starting values: expected a \
                    start from which it does (`--set NAME=VALUE`)";
     Error::Refused(message.to_owned())
 }
 
-/// Returns the change of each unknown by another model, in standard errors.
-fn effect(
+/// Returns the change of each unknown, in standard errors, if another model replaces that of
+/// `comparisons`.
+fn standardised_changes(
     covariance: &[Vec<f64>],
-    summary: &NormalEquations,
+    equations: &NormalEquations,
     comparisons: &[SignalComparison],
-    other: &[SignalComparison],
+    other_comparisons: &[SignalComparison],
 ) -> Vec<f64> {
-    let mut pull = vec![0.0; covariance.len()];
-    for ((model, other), sigma) in comparisons.iter().zip(other).zip(&summary.sigma) {
-        let pairs = model.residual.iter().zip(&other.residual);
-        let difference: Vec<f64> = pairs.map(|(model, other)| model - other).collect();
-        for (pull, slope) in pull.iter_mut().zip(&model.slopes) {
-            *pull -= algebra::dot(slope, &difference) / (sigma * sigma);
+    let mut rhs = vec![0.0; covariance.len()];
+    for ((comparison, other), sigma) in
+        comparisons.iter().zip(other_comparisons).zip(&equations.sigma)
+    {
+        let residual_pairs = comparison.residual.iter().zip(&other.residual);
+        let difference: Vec<f64> =
+            residual_pairs.map(|(residual, other)| residual - other).collect();
+        for (rhs, slope) in rhs.iter_mut().zip(&comparison.slopes) {
+            *rhs -= algebra::dot(slope, &difference) / (sigma * sigma);
         }
     }
-    let bread = algebra::inverse(&summary.normal);
-    let standardised = |k: usize| {
+    let inverse_normal = algebra::inverse(&equations.normal);
+    let standardised_change = |k: usize| {
         let variance = covariance[k][k];
-        let change = algebra::dot(&bread[k], &pull);
+        let change = algebra::dot(&inverse_normal[k], &rhs);
         if variance > 0.0 { change.abs() / variance.sqrt() } else { 0.0 }
     };
-    (0..pull.len()).map(standardised).collect()
+    (0..rhs.len()).map(standardised_change).collect()
 }
 
 /// Computes the part of the unknowns' covariance that is due to the noise of the tachometers.
 fn covariance_by_tachometer(
     problem: &Problem<'_>,
     best: &Descent,
-    against: &[SignalComparison],
+    comparisons: &[SignalComparison],
 ) -> Vec<Vec<f64>> {
     let n = problem.unknowns();
-    let bread = algebra::inverse(&best.summary.normal);
+    let inverse_normal = algebra::inverse(&best.equations.normal);
     let mut covariance = vec![vec![0.0; n]; n];
-    for (case, one_case) in problem.cases.iter().enumerate() {
-        let drawn =
-            one_case.smoothed.as_ref().map(|smoothed| &smoothed.drawn[..]).unwrap_or_default();
-        let sigma = &best.summary.sigma[..];
-        let pulls = problem.pulls(case, &best.x, (against, sigma), drawn.len(), |k, _, spin| {
-            *spin = drawn[k].clone();
-        });
-        let pulls: Vec<Vec<f64>> = pulls.into_iter().flatten().collect();
-        for pull in &pulls {
-            let changes: Vec<f64> = bread.iter().map(|row| algebra::dot(row, pull)).collect();
-            algebra::add_outer(&mut covariance, &changes, 1.0 / pulls.len() as f64);
+    for (case, fit_case) in problem.cases.iter().enumerate() {
+        let random_spins =
+            fit_case.smoothed_spin.as_ref().map(|spin| &spin.random_spins[..]).unwrap_or_default();
+        let sigma = &best.equations.sigma[..];
+        let right_sides = problem.right_sides(
+            case,
+            &best.x,
+            (comparisons, sigma),
+            random_spins.len(),
+            |k, _, spin| {
+                *spin = random_spins[k].clone();
+            },
+        );
+        let right_sides: Vec<Vec<f64>> = right_sides.into_iter().flatten().collect();
+        for rhs in &right_sides {
+            let changes: Vec<f64> =
+                inverse_normal.iter().map(|row| algebra::dot(row, rhs)).collect();
+            algebra::add_outer(&mut covariance, &changes, 1.0 / right_sides.len() as f64);
         }
     }
     covariance
@@ -444,41 +470,43 @@ fn covariance_by_tachometer(
 fn bootstrap(
     problem: &mut Problem<'_>,
     x: &[f64],
-    against: &[SignalComparison],
+    comparisons: &[SignalComparison],
     count: u32,
-    work: &FitWork<'_>,
+    context: &FitContext<'_>,
 ) -> Result<Vec<Vec<f64>>, DescentEnd> {
     /// The number of samples in a block of the block bootstrap. Basis: residuals of the test data
     /// are correlated over some ten samples. Doubling it preserves slower correlations, but leaves
     /// fewer blocks.
     const BLOCK_SAMPLES: usize = 100;
-    let measured = problem.cases.clone();
-    let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
-    let mut drawn = 0;
+    let original_cases = problem.cases.clone();
+    let generator = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
+    let mut draw_count = 0;
     let mut fits = Vec::new();
     for _ in 0..count {
-        for one in against {
-            let residual = &one.residual;
+        for comparison in comparisons {
+            let residual = &comparison.residual;
             let mut resampled = Vec::with_capacity(residual.len() + BLOCK_SAMPLES);
             while resampled.len() < residual.len() {
-                let place = draw.position(drawn, 0).unwrap_or(0.5);
-                drawn += 1;
-                let first = (place * residual.len() as f64) as usize;
-                resampled
-                    .extend((first..first + BLOCK_SAMPLES).map(|i| residual[i % residual.len()]));
+                let fraction = generator.position(draw_count, 0).unwrap_or(0.5);
+                draw_count += 1;
+                let first_sample = (fraction * residual.len() as f64) as usize;
+                resampled.extend(
+                    (first_sample..first_sample + BLOCK_SAMPLES)
+                        .map(|i| residual[i % residual.len()]),
+                );
             }
-            let signal = &mut problem.cases[one.case].measured.signals[one.signal];
+            let signal = &mut problem.cases[comparison.case].measurement.signals[comparison.signal];
             let rows: Vec<usize> = signal.samples().map(|(row, _)| row).collect();
             for (row, residual) in rows.into_iter().zip(resampled) {
-                signal.values[row] = one.model[row] + one.offset + residual;
+                signal.values[row] = comparison.model[row] + comparison.offset + residual;
             }
         }
         let evaluations_made = AtomicUsize::new(0);
-        let search = MinimumSearch::further(problem, work, &evaluations_made);
+        let search = MinimumSearch::further(problem, context, &evaluations_made);
         let refit = search.from(x)?.filter(|refit| refit.is_settled);
         fits.extend(refit.map(|refit| refit.x[..problem.free.len()].to_vec()));
     }
-    problem.cases = measured;
+    problem.cases = original_cases;
     Ok(fits)
 }
 
@@ -486,7 +514,7 @@ fn bootstrap(
 struct MinimumSearch<'a> {
     problem: &'a Problem<'a>,
     stored: Option<&'a Evaluations>,
-    work: &'a FitWork<'a>,
+    context: &'a FitContext<'a>,
     /// The number of evaluations so far.
     evaluations_made: &'a AtomicUsize,
     /// The greatest number of evaluations of a descent.
@@ -497,10 +525,10 @@ impl<'a> MinimumSearch<'a> {
     /// Returns a search whose evaluations are not stored.
     fn further(
         problem: &'a Problem<'a>,
-        work: &'a FitWork<'a>,
+        context: &'a FitContext<'a>,
         evaluations_made: &'a AtomicUsize,
     ) -> Self {
-        Self { problem, stored: None, work, evaluations_made, max_evaluations: MAX_EVALUATIONS }
+        Self { problem, stored: None, context, evaluations_made, max_evaluations: MAX_EVALUATIONS }
     }
 
     /// Computes the normal equations at a point, or reads stored ones.
@@ -510,43 +538,49 @@ impl<'a> MinimumSearch<'a> {
             if self.problem.cancel.is_requested() {
                 return Err(DescentEnd::Stopped);
             }
-            Ok(comparisons.map(|against| self.problem.normal_equations(&against)))
+            Ok(comparisons.map(|comparisons| self.problem.normal_equations(&comparisons)))
         };
-        let equations = self.stored.map_or_else(find, |stored| stored.answer(x, find))?;
-        (self.work.count_evaluations)(1 + self.evaluations_made.fetch_add(1, Ordering::Relaxed));
+        let equations = self.stored.map_or_else(find, |stored| stored.find_or_compute(x, find))?;
+        (self.context.count_evaluations)(1 + self.evaluations_made.fetch_add(1, Ordering::Relaxed));
         Ok(equations)
     }
 
-    /// Descends from a start.
+    /// Runs a descent from a starting point, and returns its end; `None` if the model fails at the
+    /// start.
     fn from(&self, start: &[f64]) -> Result<Option<Descent>, DescentEnd> {
         let ranges: Vec<[f64; 2]> =
             (0..self.problem.unknowns()).map(|k| self.problem.range(k)).collect();
         descend(start, &ranges, self.max_evaluations, &|x| self.evaluate(x))
     }
 
-    /// Finds the minima from a number of starts, the least first.
-    fn minima(&self, starts: u64) -> Result<Vec<Descent>, DescentEnd> {
+    /// Finds the distinct minima of descents from `start_count` starting points, and returns them
+    /// in ascending order of cost.
+    fn minima(&self, start_count: u64) -> Result<Vec<Descent>, DescentEnd> {
         let start = self.problem.start();
         let without_influence = |equations: &NormalEquations| {
-            let has_none = |k: &usize| equations.normal[*k][*k] == 0.0;
-            let numbers = (0..self.problem.free.len()).filter(has_none);
-            let names: Vec<&str> = numbers.map(|k| self.problem.free[k].parameter.name()).collect();
+            let has_no_influence = |k: &usize| equations.normal[*k][*k] == 0.0;
+            let parameters = (0..self.problem.free.len()).filter(has_no_influence);
+            let names: Vec<&str> =
+                parameters.map(|k| self.problem.free[k].parameter.name()).collect();
             (!names.is_empty()).then(|| names.join(", "))
         };
-        let no_influence = |names: &str| {
+        let no_influence_error = |names: &str| {
             let expected = "expected another channel, another start (`--set NAME=VALUE`), or to \
                             leave it out of `--free`";
             Error::Refused(format!("the measurement does not depend on {names}: {expected}"))
         };
         let idle_at_start = self.evaluate(&start)?.as_ref().and_then(without_influence);
-        if let (Some(names), 1) = (&idle_at_start, starts) {
-            return Err(no_influence(names).into());
+        if let (Some(names), 1) = (&idle_at_start, start_count) {
+            return Err(no_influence_error(names).into());
         }
-        let mut chosen = vec![start.clone()];
-        if starts > 1 {
-            let design =
-                Design::Spread { rule: DesignRule::LatinHypercube, points: starts - 1, seed: SEED };
-            let place = |point: u64, k: usize| {
+        let mut start_points = vec![start.clone()];
+        if start_count > 1 {
+            let design = Design::Spread {
+                rule: DesignRule::LatinHypercube,
+                points: start_count - 1,
+                seed: SEED,
+            };
+            let draw_start = |point: u64, k: usize| {
                 let FreeParameter { range, start, .. } = &self.problem.free[k];
                 let range_of_starts = START_RANGE.map(|share| share * start);
                 let is_bounded = range.iter().all(|end| end.is_finite());
@@ -557,28 +591,30 @@ impl<'a> MinimumSearch<'a> {
                 };
                 from + design.position(point, k).unwrap_or(0.5) * (to - from)
             };
-            let sets: Vec<Vec<f64>> = (0..starts - 1)
+            let candidates: Vec<Vec<f64>> = (0..start_count - 1)
                 .map(|point| {
                     let mut x = start.clone();
-                    (0..self.problem.free.len()).for_each(|k| x[k] = place(point, k));
+                    (0..self.problem.free.len()).for_each(|k| x[k] = draw_start(point, k));
                     x
                 })
                 .collect();
-            let costs = self.problem.costs(&sets);
-            let mut order: Vec<usize> = (0..sets.len()).filter(|&k| costs[k].is_finite()).collect();
-            order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-            chosen.extend(order.into_iter().take(MAX_DESCENTS - 1).map(|k| sets[k].clone()));
+            let costs = self.problem.costs(&candidates);
+            let mut by_cost: Vec<usize> =
+                (0..candidates.len()).filter(|&k| costs[k].is_finite()).collect();
+            by_cost.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+            start_points
+                .extend(by_cost.into_iter().take(MAX_DESCENTS - 1).map(|k| candidates[k].clone()));
         }
-        let ended: Vec<_> = chosen.par_iter().map(|start| self.from(start)).collect();
+        let descents: Vec<_> = start_points.par_iter().map(|start| self.from(start)).collect();
         let mut minima: Vec<Descent> = Vec::new();
-        for descent in ended {
+        for descent in descents {
             minima.extend(descent?);
         }
-        minima.sort_by(|a, b| a.summary.cost.total_cmp(&b.summary.cost));
-        // All numbers may have an influence at another start.
-        let is_idle = |minimum: &Descent| without_influence(&minimum.summary).is_some();
+        minima.sort_by(|a, b| a.equations.cost.total_cmp(&b.equations.cost));
+        // A parameter without influence at the first start may have one at the end of a descent.
+        let is_idle = |minimum: &Descent| without_influence(&minimum.equations).is_some();
         if let Some(names) = idle_at_start.filter(|_| minima.iter().all(is_idle)) {
-            return Err(no_influence(&names).into());
+            return Err(no_influence_error(&names).into());
         }
         let mut distinct: Vec<Descent> = Vec::new();
         for minimum in minima {
@@ -591,9 +627,9 @@ impl<'a> MinimumSearch<'a> {
 
     /// Whether two descents ended in one minimum: within a few standard errors, or a thousandth.
     fn is_same(&self, a: &Descent, b: &Descent) -> bool {
-        let bread = algebra::inverse(&a.summary.normal);
+        let inverse_normal = algebra::inverse(&a.equations.normal);
         (0..self.problem.free.len()).all(|k| {
-            let tolerance = (5.0 * bread[k][k].max(0.0).sqrt()).max(1e-3 * a.x[k].abs());
+            let tolerance = (5.0 * inverse_normal[k][k].max(0.0).sqrt()).max(1e-3 * a.x[k].abs());
             (a.x[k] - b.x[k]).abs() <= tolerance
         })
     }
@@ -615,11 +651,11 @@ fn draws(problem: &Problem<'_>, x: &[f64], covariance: &[Vec<f64>], count: u64) 
     let (unit, scale) = algebra::scaled(covariance);
     let eigen = Symmetric::from_matrix(&unit);
     let draw = |point: u64| {
-        let even: Vec<f64> = (0..scale.len()).map(|k| normal(point, k)).collect();
-        let moved = eigen.apply(&even, |value| value.max(0.0).sqrt());
+        let standard_normal: Vec<f64> = (0..scale.len()).map(|k| normal(point, k)).collect();
+        let correlated = eigen.apply(&standard_normal, |value| value.max(0.0).sqrt());
         let value = |k: usize| {
             let [from, to] = problem.range(k);
-            (x[k] + scale[k] * moved[k]).clamp(from, to)
+            (x[k] + scale[k] * correlated[k]).clamp(from, to)
         };
         (0..scale.len()).map(value).collect()
     };

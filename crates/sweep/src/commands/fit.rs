@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::config::{self, WasherGridInput};
-use crate::fit::{self, Evaluations, FitOptions, FitWork, Measurement};
+use crate::fit::{self, Evaluations, FitContext, FitOptions, Measurement};
 use lane_ode::Cancel;
 use sweep_engine::commands::grid::{GridArgs, resume_command};
 use sweep_engine::{Error, ExecutionArgs, Exit, Interrupt, Progress, show, tell, threads};
@@ -19,7 +19,7 @@ pub struct FitArgs {
     /// Measured run: a CSV or Parquet file of time_s, perhaps speed_rpm, and channels with their
     /// units; after @ constants of its own
     #[arg(value_name = "FILE[@NAME=VALUE,...]", required = true)]
-    measured: Vec<String>,
+    measurement: Vec<String>,
     /// A column of the files and what it holds, as 'Acc front [g]=tub_front_y_m_per_s2'; over
     /// [columns] of the grid file; may be repeated
     #[arg(long = "column", value_name = "HEADER=NAME", value_parser = header_and_name)]
@@ -64,18 +64,19 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let grid: WasherGridInput = args.grid.input().with_fixed(&args.grid.at);
     let mut cases = Vec::new();
     let columns = [args.columns.clone(), grid.load()?.aside.columns].concat();
-    for text in &args.measured {
+    for text in &args.measurement {
         let (path, constants) = parted(text);
-        let measured = Measurement::read(path, &columns)?;
-        measured.notes.iter().for_each(|note| tell(&format!("{}: {note}", measured.name)));
-        cases.push(fit::case(&grid, &constants, measured)?);
+        let measurement = Measurement::read(path, &columns)?;
+        measurement.notes.iter().for_each(|note| tell(&format!("{}: {note}", measurement.name)));
+        cases.push(fit::case(&grid, &constants, measurement)?);
     }
     for (header, _) in &args.columns {
-        let has =
-            |case: &fit::FitCase| case.measured.headers.iter().any(|own| own.starts_with(header));
+        let has = |case: &fit::FitCase| {
+            case.measurement.headers.iter().any(|own| own.starts_with(header))
+        };
         if !cases.iter().any(has) {
             let all: Vec<&String> =
-                cases.iter().flat_map(|case| &case.measured.headers).take(20).collect();
+                cases.iter().flat_map(|case| &case.measurement.headers).take(20).collect();
             let expected = format!("one of the files' columns, as in {all:?}");
             return Err(Error::option("--column", header, expected));
         }
@@ -88,14 +89,15 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let begun = begun.collect::<Result<Vec<_>, _>>()?;
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let progress = Progress::for_search(args.execution.progress, 0, "", 0);
-    let seen = |made: usize| progress.show_search(0, made as u64);
+    let report_progress = |made: usize| progress.show_search(0, made as u64);
     let cancel = Cancel::Flag(interrupt.flag());
     let output = args.out.as_deref();
-    let work = FitWork { cancel, count_evaluations: &seen, output, fresh: args.fresh };
+    let context =
+        FitContext { cancel, count_evaluations: &report_progress, output, fresh: args.fresh };
     let threads = threads::count(args.execution.threads, &threads::process)?;
-    let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
+    let fitted = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &context))?;
     progress.finish();
-    let Some(mut fitted) = found else {
+    let Some(mut fitted) = fitted else {
         let kept = "with --out, what was found out is kept";
         tell(&format!("interrupted: {kept}\n     go on  {}", resume_command()));
         return Ok(Exit::interrupted(interrupt.signal()));
@@ -104,7 +106,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
         let (machine, _) = fitted.problem.machine(0, &fitted.x);
         let text = config::machine_file(&machine, &fitted.problem.written());
         out.finish(
-            format!("{OWN_FILE}fitted to {:?}\n{text}", args.measured.join(" ")).as_bytes(),
+            format!("{OWN_FILE}fitted to {:?}\n{text}", args.measurement.join(" ")).as_bytes(),
         )?;
         tell(&format!("wrote {}", path.display()));
         if let Some(note) = fitted.evaluations.take().and_then(Evaluations::complete) {

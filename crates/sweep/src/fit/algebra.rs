@@ -54,12 +54,12 @@ impl Symmetric {
     /// Returns the product of a function of the matrix, which is that of its eigenvalues, and a
     /// vector.
     pub(crate) fn apply(&self, x: &[f64], f: impl Fn(f64) -> f64) -> Vec<f64> {
-        let mut out = vec![0.0; x.len()];
+        let mut product = vec![0.0; x.len()];
         for (value, vector) in self.values.iter().zip(&self.vectors) {
             let component = f(*value) * dot(vector, x);
-            out.iter_mut().zip(vector).for_each(|(out, v)| *out += component * v);
+            product.iter_mut().zip(vector).for_each(|(product, v)| *product += component * v);
         }
-        out
+        product
     }
 }
 

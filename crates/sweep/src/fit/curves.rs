@@ -19,33 +19,33 @@ impl Fitted<'_> {
     /// fitted again to first order.
     fn profiles(&self) -> Value {
         let Problem { free, .. } = &self.problem;
-        let summary = self.problem.normal_equations(&self.against);
-        let bread = inverse(&summary.normal);
+        let equations = self.problem.normal_equations(&self.comparisons);
+        let inverse_normal = inverse(&equations.normal);
         let deviations: Vec<f64> =
             (-PROFILE_REACH..=PROFILE_REACH).map(|k| 0.5 * f64::from(k)).collect();
-        let set = |k: usize, deviation: f64| -> Vec<f64> {
-            let step = deviation / bread[k][k].max(f64::MIN_POSITIVE).sqrt();
+        let values_at_deviation = |k: usize, deviation: f64| -> Vec<f64> {
+            let step = deviation / inverse_normal[k][k].max(f64::MIN_POSITIVE).sqrt();
             (0..self.x.len())
                 .map(|j| {
                     let [from, to] = self.problem.range(j);
-                    (self.x[j] + step * bread[k][j]).clamp(from, to)
+                    (self.x[j] + step * inverse_normal[k][j]).clamp(from, to)
                 })
                 .collect()
         };
-        let sets: Vec<Vec<f64>> = (0..free.len())
+        let value_sets: Vec<Vec<f64>> = (0..free.len())
             .flat_map(|k| deviations.iter().map(move |deviation| (k, *deviation)))
-            .map(|(k, deviation)| set(k, deviation))
+            .map(|(k, deviation)| values_at_deviation(k, deviation))
             .collect();
-        let costs = self.problem.costs(&sets);
+        let costs = self.problem.costs(&value_sets);
         let profile = |k: usize| {
-            let points = k * deviations.len()..(k + 1) * deviations.len();
-            let rises: Vec<f64> =
-                costs[points.clone()].iter().map(|cost| cost - summary.cost).collect();
+            let indices = k * deviations.len()..(k + 1) * deviations.len();
+            let cost_increases: Vec<f64> =
+                costs[indices.clone()].iter().map(|cost| cost - equations.cost).collect();
             json!({
                 "name": free[k].parameter.name(),
-                "values": sets[points].iter().map(|set| set[k]).collect::<Vec<_>>(),
+                "values": value_sets[indices].iter().map(|values| values[k]).collect::<Vec<_>>(),
                 "deviations": deviations,
-                "cost_above": rises,
+                "cost_above": cost_increases,
             })
         };
         (0..free.len()).map(profile).collect()
@@ -54,57 +54,58 @@ impl Fitted<'_> {
     /// Computes the spectra of a case's measurement and of its residual; missing samples count as
     /// zero.
     fn spectra(&self, case: usize) -> Value {
-        let measured = &self.problem.cases[case].measured;
-        let step_s = usual_step(&measured.time_s).unwrap_or(1.0);
-        let mut hz = Vec::new();
+        let measurement = &self.problem.cases[case].measurement;
+        let step_s = usual_step(&measurement.time_s).unwrap_or(1.0);
+        let mut frequencies_hz = Vec::new();
         let mut column = |comparison: &SignalComparison| {
-            let signal = &measured.signals[comparison.signal];
+            let signal = &measurement.signals[comparison.signal];
             let mut spectral_density = |values: &[f64]| {
-                let mut all = vec![0.0; measured.time_s.len()];
-                signal.samples().zip(values).for_each(|((row, _), value)| all[row] = *value);
+                let mut with_zeros = vec![0.0; measurement.time_s.len()];
+                signal.samples().zip(values).for_each(|((row, _), value)| with_zeros[row] = *value);
                 let density;
-                (hz, density) = spectrum(&all, step_s);
+                (frequencies_hz, density) = spectrum(&with_zeros, step_s);
                 density
             };
             json!({
                 "name": signal.quantity.column(),
                 "unit": signal.quantity.units().0,
-                "measured": spectral_density(&signal.swing()),
+                "measured": spectral_density(&signal.centred_values()),
                 "residual": spectral_density(&comparison.residual),
             })
         };
-        let comparisons = self.against.iter().filter(|comparison| comparison.case == case);
+        let comparisons = self.comparisons.iter().filter(|comparison| comparison.case == case);
         let columns: Vec<Value> = comparisons.map(&mut column).collect();
-        json!({ "hz": hz, "columns": columns })
+        json!({ "hz": frequencies_hz, "columns": columns })
     }
 
     /// Returns the curves of a case.
     pub(crate) fn curves(&self, case: usize) -> Table {
         let fit_case = &self.problem.cases[case];
-        let measured = &fit_case.measured;
+        let measurement = &fit_case.measurement;
         let mut table = Table::new(crate::identity::BUILD);
-        let times = &measured.time_s;
+        let times = &measurement.time_s;
         table.numbers("time_s", "s", "time since the start", times.iter().copied().map(Some));
         let shift_s = self.problem.shift_s(case, &self.x);
         let speeds = fit_case.spin().speeds_rpm(times.iter().map(|time| time + shift_s)).map(Some);
         table.numbers("speed_rpm", "rpm", "spin of the shaft, smoothed if measured", speeds);
-        for comparison in self.against.iter().filter(|comparison| comparison.case == case) {
+        for comparison in self.comparisons.iter().filter(|comparison| comparison.case == case) {
             let SignalComparison { signal, offset, model, .. } = comparison;
-            let signal = &measured.signals[*signal];
+            let signal = &measurement.signals[*signal];
             let name = signal.quantity.column();
             let (unit, _) = signal.quantity.units();
-            let known = |value: f64| (!value.is_nan()).then_some(value);
-            let mut add =
+            let finite_value = |value: f64| (!value.is_nan()).then_some(value);
+            let mut add_column =
                 |prefix: &str, description: &str, values: &mut dyn Iterator<Item = Option<f64>>| {
                     table.numbers(&format!("{prefix}_{name}"), &unit, description, values);
                 };
             let values = signal.values.iter().copied();
-            add("measured", "as measured", &mut values.clone().map(known));
+            add_column("measured", "as measured", &mut values.clone().map(finite_value));
             let with_offset = || model.iter().map(|model| model + offset);
-            add("model", "the fitted model, with the offset", &mut with_offset().map(Some));
-            let residual =
-                values.zip(with_offset()).map(|(measured, model)| known(measured - model));
-            add("residual", "measured less model", &mut { residual });
+            add_column("model", "the fitted model, with the offset", &mut with_offset().map(Some));
+            let residual = values
+                .zip(with_offset())
+                .map(|(measurement, model)| finite_value(measurement - model));
+            add_column("residual", "measured less model", &mut { residual });
         }
         let mut plan = fit_case.plan.clone();
         plan.model.machine = self.problem.machine(case, &self.x).0;

@@ -18,7 +18,7 @@ use super::model::{NormalEquations, Problem};
 
 /// The time of an evaluation that is written at once. Basis: a write takes some milliseconds.
 /// Doubling it doubles the computing time that a killed process may lose.
-const COSTLY: Duration = Duration::from_millis(100);
+const MIN_TIME_OF_IMMEDIATE_WRITE: Duration = Duration::from_millis(100);
 
 /// The evaluations of a problem, in the store.
 #[derive(Debug)]
@@ -57,26 +57,26 @@ impl Evaluations {
     ///
     /// # Errors
     /// Returns the errors of `find` and of the file system.
-    pub(crate) fn answer<E: From<StoreError>>(
+    pub(crate) fn find_or_compute<E: From<StoreError>>(
         &self,
         x: &[f64],
         find: impl FnOnce() -> Result<Option<NormalEquations>, E>,
     ) -> Result<Option<NormalEquations>, E> {
         let key: TrialKey = x.iter().map(|x| x.to_bits()).collect();
         if let Some(cells) = lock(&self.trials).find_response(&key) {
-            return Ok(self.summary(cells));
+            return Ok(self.from_cells(cells));
         }
-        let began = Instant::now();
-        let equations = find()?;
-        let is_costly = began.elapsed() >= COSTLY;
-        let cells = self.cells(equations.as_ref());
+        let start_time = Instant::now();
+        let from_cells = find()?;
+        let is_costly = start_time.elapsed() >= MIN_TIME_OF_IMMEDIATE_WRITE;
+        let cells = self.cells(from_cells.as_ref());
         let mut trials = lock(&self.trials);
         trials.add(key, cells)?;
         if is_costly || trials.is_due() {
             trials.write()?;
         }
         drop(trials);
-        Ok(equations)
+        Ok(from_cells)
     }
 
     /// Writes the evaluations that are only in memory.
@@ -94,26 +94,26 @@ impl Evaluations {
     }
 
     /// Returns the cells of normal equations, in the order of [`columns`].
-    fn cells(&self, summary: Option<&NormalEquations>) -> RowCells {
-        let Some(NormalEquations { cost, sigma, normal, pull }) = summary else {
+    fn cells(&self, from_cells: Option<&NormalEquations>) -> RowCells {
+        let Some(NormalEquations { cost, sigma, normal, rhs }) = from_cells else {
             return vec![None; 1 + self.signals + (self.unknowns + 1) * self.unknowns];
         };
-        let numbers = std::iter::once(cost).chain(sigma).chain(normal.iter().flatten()).chain(pull);
+        let numbers = std::iter::once(cost).chain(sigma).chain(normal.iter().flatten()).chain(rhs);
         numbers.map(|number| Some(number.to_bits())).collect()
     }
 
     /// Returns the normal equations that some cells hold; `None` for a failed evaluation.
-    fn summary(&self, cells: &RowCells) -> Option<NormalEquations> {
+    fn from_cells(&self, cells: &RowCells) -> Option<NormalEquations> {
         let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
         let numbers = numbers?;
         let (cost, rest) = numbers.split_first()?;
         let (sigma, rest) = rest.split_at_checked(self.signals)?;
-        let (normal, pull) = rest.split_at_checked(self.unknowns * self.unknowns)?;
+        let (normal, rhs) = rest.split_at_checked(self.unknowns * self.unknowns)?;
         Some(NormalEquations {
             cost: *cost,
             sigma: sigma.to_vec(),
             normal: normal.chunks(self.unknowns.max(1)).map(<[f64]>::to_vec).collect(),
-            pull: pull.to_vec(),
+            rhs: rhs.to_vec(),
         })
     }
 }
@@ -127,26 +127,28 @@ fn columns(problem: &Problem<'_>) -> TrialColumns {
             None => parameter.name().to_owned(),
             Some(case) => format!("file_{}_{}", case + 1, parameter.name()),
         };
-        let about = parameter.description();
-        keys.push(DeclaredColumn::new(name, parameter.unit(), about, CellType::Axis));
+        let description = parameter.description();
+        keys.push(DeclaredColumn::new(name, parameter.unit(), description, CellType::Axis));
     }
-    if problem.with_shift {
-        let about = "shift of the file's clock";
-        let shift =
-            |case| DeclaredColumn::new(format!("file_{case}_shift_s"), "s", about, CellType::Axis);
+    if problem.fits_shift {
+        let description = "shift of the file's clock";
+        let shift = |case| {
+            DeclaredColumn::new(format!("file_{case}_shift_s"), "s", description, CellType::Axis)
+        };
         keys.extend((1..=problem.cases.len()).map(shift));
     }
     let unknowns = 1..=problem.unknowns();
-    let number =
-        |name: String, about: &str| DeclaredColumn::new(name, "1", about, CellType::Measured);
+    let number = |name: String, description: &str| {
+        DeclaredColumn::new(name, "1", description, CellType::Measured)
+    };
     let mut responses = vec![number("cost".to_owned(), "twice the negative log-likelihood")];
     for signal in 1..=problem.signals().count() {
         responses.push(number(format!("noise_{signal}"), "noise of a signal, in its unit"));
     }
     for row in unknowns.clone() {
         for column in unknowns.clone() {
-            let about = "entry of the normal matrix J'WJ";
-            responses.push(number(format!("normal_{row}_{column}"), about));
+            let description = "entry of the normal matrix J'WJ";
+            responses.push(number(format!("normal_{row}_{column}"), description));
         }
     }
     for row in unknowns {
@@ -157,20 +159,20 @@ fn columns(problem: &Problem<'_>) -> TrialColumns {
 
 /// Returns the job of a problem: the plans of its cases, and a hash of the measurements.
 fn job<'a>(problem: &'a Problem<'_>) -> Job<'a> {
-    let mut measured = blake3::Hasher::new();
+    let mut measurement = blake3::Hasher::new();
     for case in &problem.cases {
-        measured.update(format!("{:?}", case.measured).as_bytes());
+        measurement.update(format!("{:?}", case.measurement).as_bytes());
     }
-    let Problem { free, model, with_shift, method, .. } = problem;
+    let Problem { free, model, fits_shift, method, .. } = problem;
     let mut job = Job::new(&problem.cases[0].plan);
     job.layout.kind = FileKind::Own;
     let plans = problem.cases.iter().map(|case| case.plan.to_json());
     job.plan["fit"] = json!({
         "cases": plans.collect::<Vec<_>>(),
-        "measured": measured.finalize().to_hex().as_str(),
+        "measured": measurement.finalize().to_hex().as_str(),
         "free": free.iter().map(|free| format!("{free:?}")).collect::<Vec<_>>(),
         "model": model.name(),
-        "shift": with_shift,
+        "shift": fits_shift,
         "method": format!("{method:?}"),
     });
     job

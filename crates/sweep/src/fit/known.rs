@@ -115,7 +115,7 @@ pub(crate) struct FixedInfluence {
     /// The mean change of each unknown by that error, with the errors of other fixed numbers that
     /// the record leaves open together with it: what knowing the number would take off the
     /// unknowns' errors.
-    pub(crate) moves: Vec<f64>,
+    pub(crate) effects: Vec<f64>,
 }
 
 /// Errors of all fixed numbers together, of one standard deviation, that are independent of those
@@ -125,7 +125,7 @@ pub(crate) struct Direction {
     /// The changes of numbers of the machine.
     pub(crate) changes: Vec<(MachineParameter, f64)>,
     /// The change of each unknown.
-    pub(crate) moves: Vec<f64>,
+    pub(crate) effects: Vec<f64>,
 }
 
 /// The effects of all fixed numbers.
@@ -153,7 +153,7 @@ impl FixedNumbers {
     /// # Errors
     /// Returns every mistake in the tolerances.
     pub(super) fn read(
-        given: &[String],
+        options: &[String],
         case: &FitCase,
         free: &[FreeParameter],
     ) -> Result<Self, Diagnostics> {
@@ -161,7 +161,7 @@ impl FixedNumbers {
         let mut parameters: Vec<(MachineParameter, FixedTolerance)> = Vec::new();
         let mut gain: Option<FixedTolerance> = None;
         let is_none = |text: &&String| text.trim() == NONE;
-        for text in given.iter().filter(|text| !is_none(text)) {
+        for text in options.iter().filter(|text| !is_none(text)) {
             let location = Location::new(mistakes.add("--known", text.as_str()), 0..text.len());
             let refuse = |title: String| {
                 let expected = "expected NAME=2% or NAME=0.01 in its unit, gain=3% or none";
@@ -195,13 +195,13 @@ impl FixedNumbers {
                 },
             }
         }
-        let with_defaults = !given.iter().any(|text| is_none(&text));
+        let with_defaults = !options.iter().any(|text| is_none(&text));
         let default_gain = if with_defaults { GAIN_RATIO } else { 0.0 };
-        let known = Self {
+        let fixed_numbers = Self {
             numbers: fixed_numbers(case, free, &parameters, with_defaults),
             gain_ratio: gain.map_or(default_gain, |gain| gain.deviation(1.0)),
         };
-        mistakes.finish(Some(known))
+        mistakes.finish(Some(fixed_numbers))
     }
 
     /// Computes the dependence of the unknowns on the fixed numbers, on all threads of the current
@@ -210,70 +210,77 @@ impl FixedNumbers {
         &self,
         problem: &Problem<'_>,
         x: &[f64],
-        against: &[SignalComparison],
-        summary: &NormalEquations,
+        comparisons: &[SignalComparison],
+        equations: &NormalEquations,
         variances: &[f64],
     ) -> FixedInfluences {
-        let gains = if self.gain_ratio > 0.0 { against.len() } else { 0 };
-        let samples: usize = against.iter().map(|one| one.residual.len()).sum();
-        let stride = (samples * (self.numbers.len() + gains)).div_ceil(MAX_VALUES).max(1);
-        let mut errors = self.machine_errors(problem, x, against, summary, stride);
-        if gains > 0 {
-            errors.extend(self.gain_errors(problem, against, summary, stride));
+        let gain_count = if self.gain_ratio > 0.0 { comparisons.len() } else { 0 };
+        let samples: usize = comparisons.iter().map(|comparison| comparison.residual.len()).sum();
+        let stride = (samples * (self.numbers.len() + gain_count)).div_ceil(MAX_VALUES).max(1);
+        let mut errors = self.machine_errors(problem, x, comparisons, equations, stride);
+        if gain_count > 0 {
+            errors.extend(self.gain_errors(problem, comparisons, equations, stride));
         }
-        let bread = inverse(&summary.normal);
+        let inverse_normal = inverse(&equations.normal);
         for FixedError { influence, .. } in &mut errors {
-            influence.moves = bread.iter().map(|row| dot(row, &influence.moves)).collect();
+            influence.effects =
+                inverse_normal.iter().map(|row| dot(row, &influence.effects)).collect();
         }
-        let Posterior { covariance: open, mean } = posterior(&errors, against, variances, stride);
-        let mut moment = open.clone();
-        add_outer(&mut moment, &mean, 1.0);
+        let Posterior { covariance: posterior_covariance, mean } =
+            compute_posterior(&errors, comparisons, variances, stride);
+        let mut second_moment = posterior_covariance.clone();
+        add_outer(&mut second_moment, &mean, 1.0);
         let unknowns = problem.unknowns();
         // The product of B and a vector of errors in standard deviations.
-        let moved = |by: &[f64]| -> Vec<f64> {
-            let mut moved = vec![0.0; unknowns];
+        let effect_on_unknowns = |by: &[f64]| -> Vec<f64> {
+            let mut effect_on_unknowns = vec![0.0; unknowns];
             for (FixedError { influence, .. }, by) in errors.iter().zip(by) {
-                moved
+                effect_on_unknowns
                     .iter_mut()
-                    .zip(&influence.moves)
+                    .zip(&influence.effects)
                     .for_each(|(sum, move_by)| *sum += by * move_by);
             }
-            moved
+            effect_on_unknowns
         };
-        let together: Vec<Vec<f64>> = moment.iter().map(|row| moved(row)).collect();
+        let total_changes: Vec<Vec<f64>> =
+            second_moment.iter().map(|row| effect_on_unknowns(row)).collect();
         let mut covariance = vec![vec![0.0; unknowns]; unknowns];
-        for (FixedError { influence, .. }, together) in errors.iter().zip(&together) {
-            for (row, by) in covariance.iter_mut().zip(&influence.moves) {
-                row.iter_mut().zip(together).for_each(|(sum, together)| *sum += by * together);
+        for (FixedError { influence, .. }, total_changes) in errors.iter().zip(&total_changes) {
+            for (row, by) in covariance.iter_mut().zip(&influence.effects) {
+                row.iter_mut().zip(total_changes).for_each(|(sum, change)| *sum += by * change);
             }
         }
-        let strength = |moves: &[f64]| {
-            let moves = moves.iter().enumerate();
-            moves.fold(0.0_f64, |most, (k, by)| most.max(by * by / bread[k][k].max(1e-300)))
+        let strength = |effects: &[f64]| {
+            let effects = effects.iter().enumerate();
+            effects
+                .fold(0.0_f64, |most, (k, by)| most.max(by * by / inverse_normal[k][k].max(1e-300)))
         };
-        let eigen = Symmetric::from_matrix(&moment);
+        let eigen = Symmetric::from_matrix(&second_moment);
         let direction = |(value, vector): (&f64, &Vec<f64>)| {
             let size = value.max(0.0).sqrt();
-            let errors_by: Vec<f64> = vector.iter().map(|entry| size * entry).collect();
-            let changes = errors.iter().zip(&errors_by).filter_map(|(error, by)| {
+            let error_components: Vec<f64> = vector.iter().map(|entry| size * entry).collect();
+            let changes = errors.iter().zip(&error_components).filter_map(|(error, by)| {
                 let parameter = error.influence.parameter.clone()?;
                 Some((parameter, by * error.influence.tolerance))
             });
-            Direction { changes: changes.collect(), moves: moved(&errors_by) }
+            Direction { changes: changes.collect(), effects: effect_on_unknowns(&error_components) }
         };
         let mut directions: Vec<Direction> =
             eigen.values.iter().zip(&eigen.vectors).map(direction).collect();
-        directions.sort_by(|a, b| strength(&b.moves).total_cmp(&strength(&a.moves)));
-        let by_error: Vec<Vec<f64>> = open.iter().map(|row| moved(row)).collect();
+        directions.sort_by(|a, b| strength(&b.effects).total_cmp(&strength(&a.effects)));
+        let changes_by_error: Vec<Vec<f64>> =
+            posterior_covariance.iter().map(|row| effect_on_unknowns(row)).collect();
         let mut numbers: Vec<FixedInfluence> =
             errors.into_iter().map(|error| error.influence).collect();
         for (k, influence) in numbers.iter_mut().enumerate() {
-            let ratio = open[k][k].max(0.0).sqrt();
+            let ratio = posterior_covariance[k][k].max(0.0).sqrt();
             influence.error = ratio * influence.tolerance;
-            let moves = influence.moves.iter_mut().zip(&by_error[k]);
-            moves.for_each(|(by, moved)| *by = if ratio > 0.0 { moved / ratio } else { 0.0 });
+            let effects = influence.effects.iter_mut().zip(&changes_by_error[k]);
+            effects.for_each(|(by, effect_on_unknowns)| {
+                *by = if ratio > 0.0 { effect_on_unknowns / ratio } else { 0.0 }
+            });
         }
-        numbers.sort_by(|a, b| strength(&b.moves).total_cmp(&strength(&a.moves)));
+        numbers.sort_by(|a, b| strength(&b.effects).total_cmp(&strength(&a.effects)));
         FixedInfluences { numbers, covariance, directions }
     }
 
@@ -284,8 +291,8 @@ impl FixedNumbers {
         &self,
         problem: &Problem<'_>,
         x: &[f64],
-        against: &[SignalComparison],
-        summary: &NormalEquations,
+        comparisons: &[SignalComparison],
+        equations: &NormalEquations,
         stride: usize,
     ) -> Vec<FixedError> {
         let error = |(parameter, tolerance): &(MachineParameter, f64)| FixedError {
@@ -295,11 +302,11 @@ impl FixedNumbers {
                 tolerance: *tolerance,
                 error: *tolerance,
                 parameter: Some(parameter.clone()),
-                moves: vec![0.0; x.len()],
+                effects: vec![0.0; x.len()],
             },
-            change: against
+            change: comparisons
                 .iter()
-                .map(|one| vec![0.0; one.residual.len().div_ceil(stride)])
+                .map(|comparison| vec![0.0; comparison.residual.len().div_ceil(stride)])
                 .collect(),
         };
         let mut errors: Vec<FixedError> = self.numbers.iter().map(error).collect();
@@ -307,33 +314,33 @@ impl FixedNumbers {
             // A number at an end of its range can change in one direction only.
             let signed_step = |k: usize| {
                 let (mut machine, mut spin) = problem.machine(case, x);
-                change(&self.numbers[k], STEP_TOLERANCES, &mut machine, &mut spin);
+                apply_change(&self.numbers[k], STEP_TOLERANCES, &mut machine, &mut spin);
                 if machine.violations().is_empty() { STEP_TOLERANCES } else { -STEP_TOLERANCES }
             };
             let steps: Vec<f64> = (0..self.numbers.len()).map(signed_step).collect();
             let case_signals: Vec<usize> =
-                (0..against.len()).filter(|&signal| against[signal].case == case).collect();
+                (0..comparisons.len()).filter(|&signal| comparisons[signal].case == case).collect();
             let reduce = |changes: Vec<Vec<f64>>| {
-                let mut pull = vec![0.0; x.len()];
+                let mut rhs = vec![0.0; x.len()];
                 let mut thinned = Vec::with_capacity(changes.len());
                 for (change, &signal) in changes.into_iter().zip(&case_signals) {
                     let change = centred(change).0;
-                    let variance = summary.sigma[signal] * summary.sigma[signal];
-                    for (pull, slope) in pull.iter_mut().zip(&against[signal].slopes) {
-                        *pull += dot(slope, &change) / variance;
+                    let variance = equations.sigma[signal] * equations.sigma[signal];
+                    for (rhs, slope) in rhs.iter_mut().zip(&comparisons[signal].slopes) {
+                        *rhs += dot(slope, &change) / variance;
                     }
                     thinned.push(change.into_iter().step_by(stride).collect::<Vec<f64>>());
                 }
-                (pull, thinned)
+                (rhs, thinned)
             };
             let apply = |k: usize, machine: &mut Machine, spin: &mut Spin| {
-                change(&self.numbers[k], steps[k], machine, spin);
+                apply_change(&self.numbers[k], steps[k], machine, spin);
             };
-            let effects = problem.changes(case, x, against, (steps.len(), apply), reduce);
+            let effects = problem.changes(case, x, comparisons, (steps.len(), apply), reduce);
             for ((error, effect), step) in errors.iter_mut().zip(effects).zip(&steps) {
-                let Some((pull, changes)) = effect else { continue };
-                let moves = error.influence.moves.iter_mut().zip(pull);
-                moves.for_each(|(sum, pull)| *sum += pull / step);
+                let Some((rhs, changes)) = effect else { continue };
+                let effects = error.influence.effects.iter_mut().zip(rhs);
+                effects.for_each(|(sum, rhs)| *sum += rhs / step);
                 for (change, &signal) in changes.into_iter().zip(&case_signals) {
                     error.change[signal] = change.into_iter().map(|value| value / step).collect();
                 }
@@ -347,31 +354,37 @@ impl FixedNumbers {
     fn gain_errors(
         &self,
         problem: &Problem<'_>,
-        against: &[SignalComparison],
-        summary: &NormalEquations,
+        comparisons: &[SignalComparison],
+        equations: &NormalEquations,
         stride: usize,
     ) -> Vec<FixedError> {
-        let error =
-            |(k, ((.., signal), one)): (usize, ((usize, usize, &Signal), &SignalComparison))| {
-                let variance = summary.sigma[k] * summary.sigma[k];
-                let motion = signal.samples().map(|(row, _)| self.gain_ratio * one.model[row]);
-                let motion = centred(motion.collect()).0;
-                let mut change: Vec<Vec<f64>> = against
+        let error = |(k, ((.., signal), comparison)): (
+            usize,
+            ((usize, usize, &Signal), &SignalComparison),
+        )| {
+            let variance = equations.sigma[k] * equations.sigma[k];
+            let motion = signal.samples().map(|(row, _)| self.gain_ratio * comparison.model[row]);
+            let motion = centred(motion.collect()).0;
+            let mut change: Vec<Vec<f64>> = comparisons
+                .iter()
+                .map(|comparison| vec![0.0; comparison.residual.len().div_ceil(stride)])
+                .collect();
+            change[k] = motion.iter().copied().step_by(stride).collect();
+            let influence = FixedInfluence {
+                name: format!("{GAIN} of {}", signal.quantity.column()),
+                unit: "",
+                tolerance: self.gain_ratio,
+                error: self.gain_ratio,
+                parameter: None,
+                effects: comparison
+                    .slopes
                     .iter()
-                    .map(|one| vec![0.0; one.residual.len().div_ceil(stride)])
-                    .collect();
-                change[k] = motion.iter().copied().step_by(stride).collect();
-                let influence = FixedInfluence {
-                    name: format!("{GAIN} of {}", signal.quantity.column()),
-                    unit: "",
-                    tolerance: self.gain_ratio,
-                    error: self.gain_ratio,
-                    parameter: None,
-                    moves: one.slopes.iter().map(|slope| dot(slope, &motion) / variance).collect(),
-                };
-                FixedError { influence, change }
+                    .map(|slope| dot(slope, &motion) / variance)
+                    .collect(),
             };
-        problem.signals().zip(against).enumerate().map(error).collect()
+            FixedError { influence, change }
+        };
+        problem.signals().zip(comparisons).enumerate().map(error).collect()
     }
 }
 
@@ -382,52 +395,53 @@ struct Posterior {
 }
 
 /// Computes the errors of fixed numbers after the record.
-fn posterior(
+fn compute_posterior(
     errors: &[FixedError],
-    against: &[SignalComparison],
+    comparisons: &[SignalComparison],
     variances: &[f64],
     stride: usize,
 ) -> Posterior {
     let weights: Vec<f64> =
         variances.iter().map(|variance| (stride as f64 / variance).sqrt()).collect();
-    let residual: Vec<f64> = against
+    let residual: Vec<f64> = comparisons
         .iter()
         .zip(&weights)
-        .flat_map(|(one, weight)| {
-            one.residual.iter().step_by(stride).map(move |residual| weight * residual)
+        .flat_map(|(comparison, weight)| {
+            comparison.residual.iter().step_by(stride).map(move |residual| weight * residual)
         })
         .collect();
     // The part of each change for which the unknowns do not compensate.
     let uncompensated = |error: &FixedError| -> Vec<f64> {
-        let mut part = Vec::with_capacity(residual.len());
-        for ((change, one), weight) in error.change.iter().zip(against).zip(&weights) {
+        let mut samples = Vec::with_capacity(residual.len());
+        for ((change, comparison), weight) in error.change.iter().zip(comparisons).zip(&weights) {
             let mut change = change.clone();
-            for (slope, by) in one.slopes.iter().zip(&error.influence.moves) {
+            for (slope, by) in comparison.slopes.iter().zip(&error.influence.effects) {
                 let slope = slope.iter().step_by(stride);
                 change.iter_mut().zip(slope).for_each(|(change, slope)| *change -= by * slope);
             }
-            part.extend(change.iter().map(|change| weight * change));
+            samples.extend(change.iter().map(|change| weight * change));
         }
-        part
+        samples
     };
-    let parts: Vec<Vec<f64>> = errors.iter().map(uncompensated).collect();
+    let uncompensated_parts: Vec<Vec<f64>> = errors.iter().map(uncompensated).collect();
     let mut information = vec![vec![0.0; errors.len()]; errors.len()];
     for i in 0..errors.len() {
         for j in 0..=i {
-            let product = dot(&parts[i], &parts[j]);
+            let product = dot(&uncompensated_parts[i], &uncompensated_parts[j]);
             information[i][j] = product;
             information[j][i] = product;
         }
         information[i][i] += 1.0;
     }
     let covariance = inverse(&information);
-    let scores: Vec<f64> = parts.iter().map(|part| dot(part, &residual)).collect();
+    let scores: Vec<f64> =
+        uncompensated_parts.iter().map(|samples| dot(samples, &residual)).collect();
     let mean = covariance.iter().map(|row| dot(row, &scores)).collect();
     Posterior { covariance, mean }
 }
 
 /// Changes a number by a multiple of its tolerance.
-fn change(
+fn apply_change(
     (parameter, tolerance): &(MachineParameter, f64),
     count: f64,
     machine: &mut Machine,
@@ -455,9 +469,9 @@ fn single_numbers(
     if !is_fixed_kind(&parameter) {
         return Err(format!("`{name}` is no number of the machine"));
     }
-    let parts = parameter.single_names(machine);
+    let single_names = parameter.single_names(machine);
     let is_free = |free: &FreeParameter| {
-        free.parameter.single_names(machine).iter().any(|name| parts.contains(name))
+        free.parameter.single_names(machine).iter().any(|name| single_names.contains(name))
     };
     if free.iter().any(is_free) {
         return Err(format!("`{name}` is free: only fixed numbers have a tolerance"));
@@ -465,12 +479,12 @@ fn single_numbers(
     if let Some(value) = parameter.get(machine, spin) {
         return Ok(vec![(parameter, value)]);
     }
-    let part = |part: &std::borrow::Cow<'static, str>| {
-        let parameter = MachineParameter::find(part, machine, spin).ok()?;
+    let read_single = |name: &std::borrow::Cow<'static, str>| {
+        let parameter = MachineParameter::find(name, machine, spin).ok()?;
         let value = parameter.get(machine, spin)?;
         Some((parameter, value))
     };
-    let numbers: Vec<_> = parts.iter().filter_map(part).collect();
+    let numbers: Vec<_> = single_names.iter().filter_map(read_single).collect();
     match numbers.is_empty() {
         true => Err(format!("`{name}` has no value here")),
         false => Ok(numbers),
@@ -492,14 +506,18 @@ fn fixed_numbers(
 ) -> Vec<(MachineParameter, f64)> {
     let machine = &case.plan.model.machine;
     let spin = case.spin();
-    let parts = |parameter: &MachineParameter| parameter.single_names(machine);
-    let mut taken: Vec<_> = free.iter().flat_map(|free| parts(&free.parameter)).collect();
+    let single_names = |parameter: &MachineParameter| parameter.single_names(machine);
+    let mut free_names: Vec<_> =
+        free.iter().flat_map(|free| single_names(&free.parameter)).collect();
     let mut numbers = Vec::new();
     // The last tolerance of a number holds.
     let given = given.iter().rev().map(|(parameter, tolerance)| (parameter.clone(), *tolerance));
-    let all = || MachineParameter::all(machine, spin).into_iter().filter(is_fixed_kind);
-    let shared = all().filter(|parameter| parameter.target().has_several_numbers());
-    let single = all().filter(|parameter| !parameter.target().has_several_numbers());
+    let fixed_parameters =
+        || MachineParameter::all(machine, spin).into_iter().filter(is_fixed_kind);
+    let with_several_numbers =
+        fixed_parameters().filter(|parameter| parameter.target().has_several_numbers());
+    let with_single_number =
+        fixed_parameters().filter(|parameter| !parameter.target().has_several_numbers());
     // A number with its default value, such as 0, belongs to a part that the machine does not have.
     let is_present = |parameter: &MachineParameter| {
         parameter.default_value().is_none_or(|value| parameter.get(machine, spin) != Some(value))
@@ -508,15 +526,19 @@ fn fixed_numbers(
         let tolerance = FixedTolerance::by_kind(parameter.name(), parameter.unit());
         (parameter, tolerance)
     };
-    let defaults = shared.chain(single).filter(is_present).map(by_kind).filter(|_| with_defaults);
+    let defaults = with_several_numbers
+        .chain(with_single_number)
+        .filter(is_present)
+        .map(by_kind)
+        .filter(|_| with_defaults);
     for (parameter, tolerance) in given.chain(defaults) {
-        let names = parts(&parameter);
-        if names.iter().any(|part| taken.contains(part)) {
+        let names = single_names(&parameter);
+        if names.iter().any(|part| free_names.contains(part)) {
             continue;
         }
         let Some(value) = parameter.get(machine, spin) else { continue };
         let size = tolerance.deviation(value);
-        taken.extend(names);
+        free_names.extend(names);
         if size > 0.0 {
             numbers.push((parameter, size));
         }

@@ -13,9 +13,9 @@ use sweep_results::nearest;
 use washer_model::Channel;
 
 /// Fewest samples of a column: fewer say nothing of their noise.
-const FEWEST: usize = 16;
+const MIN_SAMPLES: usize = 16;
 /// The beginning of the names of the nonlinear model's channels in a file of `sweep trace`.
-const TRACED: &str = "nonlinear_";
+const TRACE_PREFIX: &str = "nonlinear_";
 /// Rows that are usually farther apart (s) show no turn of a drum.
 pub(super) const SLOWEST_S: f64 = 0.2;
 /// The longest run that is simulated (s). Basis: a wash takes an hour, its longest spin a quarter
@@ -49,10 +49,10 @@ pub(crate) enum SignalQuantity {
 impl SignalQuantity {
     /// Returns every quantity that can be measured.
     fn all() -> impl Iterator<Item = Self> {
-        let motions = Channel::ALL
+        let motion_quantities = Channel::ALL
             .into_iter()
             .flat_map(|channel| (0..3).map(move |order| Self::Motion(channel, order)));
-        motions.chain((0..3).map(Self::CabinetForce))
+        motion_quantities.chain((0..3).map(Self::CabinetForce))
     }
 
     /// Returns the unit, and the one in which it is measured by mistake, with that one's size.
@@ -61,13 +61,13 @@ impl SignalQuantity {
         const G: f64 = 9.806_65;
         let Self::Motion(channel, order) = self else { return ("N".to_owned(), None) };
         let unit = channel.unit();
-        let mistaken = match (unit, order) {
+        let unit_by_mistake = match (unit, order) {
             ("rad", 0) => Some(("degrees", 180.0 / std::f64::consts::PI)),
             ("rad", _) => Some(("degrees per s", 180.0 / std::f64::consts::PI)),
             (_, 2) => Some(("g", 1.0 / G)),
             _ => Some(("mm", 1e3)),
         };
-        (format!("{unit}{}", ["", "/s", "/s^2"][order]), mistaken)
+        (format!("{unit}{}", ["", "/s", "/s^2"][order]), unit_by_mistake)
     }
 
     /// Returns the name of the column.
@@ -84,11 +84,11 @@ impl SignalQuantity {
 
     /// Returns the quantity of a column of this name. A place or an angle may go without its unit.
     fn named(name: &str) -> Option<Self> {
-        let is = |quantity: &Self| match quantity {
+        let has_name = |quantity: &Self| match quantity {
             Self::Motion(channel, 0) if channel.name() == name => true,
             _ => quantity.column() == name,
         };
-        Self::all().find(is)
+        Self::all().find(has_name)
     }
 }
 
@@ -107,7 +107,7 @@ impl Signal {
     }
 
     /// Returns the samples less their mean.
-    pub(crate) fn swing(&self) -> Vec<f64> {
+    pub(crate) fn centred_values(&self) -> Vec<f64> {
         centred(self.samples().map(|(_, value)| value).collect()).0
     }
 }
@@ -140,32 +140,32 @@ pub(crate) struct Measurement {
 }
 
 impl Measurement {
-    /// Reads a file. `renamed` are headers of its columns with the names of what they hold.
+    /// Reads a file. `new_names` are headers of its columns with the names of what they hold.
     ///
     /// # Errors
     /// Every mistake in it, with its place.
-    pub(crate) fn read(path: &Path, renamed: &[(String, String)]) -> Result<Self, Diagnostics> {
+    pub(crate) fn read(path: &Path, new_names: &[(String, String)]) -> Result<Self, Diagnostics> {
         let report = Report::default();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let names = Names { known: &known, renamed };
+        let names = Names { known: &known_name, renamed: new_names };
         let table = NumberTable::read(path, &names, &report);
-        let found = table.map(|table| judged(name, table, &report));
-        report.finish(found)
+        let measurement = table.map(|table| check_table(name, table, &report));
+        report.finish(measurement)
     }
 
-    /// Returns a measurement in memory; `renamed` as of [`Self::read`].
+    /// Returns a measurement in memory; `new_names` as of [`Self::read`].
     ///
     /// # Errors
     /// As [`Self::read`].
     pub(crate) fn from_columns(
         columns: Vec<(String, Vec<f64>)>,
-        renamed: &[(String, String)],
+        new_names: &[(String, String)],
     ) -> Result<Self, Diagnostics> {
         let report = Report::default();
-        let names = Names { known: &known, renamed };
+        let names = Names { known: &known_name, renamed: new_names };
         let table = NumberTable::from_columns("table", columns, &names, &report);
-        let measured = judged("table".to_owned(), table, &report);
-        report.finish(Some(measured))
+        let measurement = check_table("table".to_owned(), table, &report);
+        report.finish(Some(measurement))
     }
 
     /// Counts times from the first row if the clock does not start with the run, like one of
@@ -179,7 +179,7 @@ impl Measurement {
             self.time_s.iter_mut().for_each(|time_s| *time_s -= first_s);
             let edges = self.pulses.iter_mut().flat_map(|pulses| &mut pulses.edges_s);
             edges.for_each(|edge_s| *edge_s -= first_s);
-            self.gaps_s = gaps(&self.time_s);
+            self.gaps_s = find_gaps(&self.time_s);
             self.clock_start_s = Some(first_s);
         }
     }
@@ -202,16 +202,16 @@ impl Measurement {
     }
 
     /// Fits the spin to the tachometer, if there is one.
-    pub(super) fn smoothed_spin(&self) -> Option<SmoothedSpin> {
+    pub(super) fn smooth_spin(&self) -> Option<SmoothedSpin> {
         match &self.pulses {
-            Some(pulses) => pulses.smoothed(),
-            None => speed::smoothed(&self.time_s, self.speed_rpm.as_ref()?),
+            Some(pulses) => pulses.smooth_spin(),
+            None => speed::smooth_spin(&self.time_s, self.speed_rpm.as_ref()?),
         }
     }
 
     /// Whether a column may have this name.
     pub(crate) fn is_name(name: &str) -> bool {
-        known(name).is_some()
+        known_name(name).is_some()
     }
 
     /// Samples of all columns together.
@@ -221,8 +221,8 @@ impl Measurement {
 }
 
 /// Returns the name of a quantity that a header names, and its unit.
-fn known(header: &str) -> Option<(String, String)> {
-    let name = header.strip_prefix(TRACED).unwrap_or(header);
+fn known_name(header: &str) -> Option<(String, String)> {
+    let name = header.strip_prefix(TRACE_PREFIX).unwrap_or(header);
     let [name, unit] = match name {
         "time_s" | "time" | "timestamp" | "t_s" | "zeit" | "zeit_s" => {
             ["time_s", "s"].map(str::to_owned)
@@ -254,21 +254,22 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
 }
 
 /// Reads the table as a measurement and reports what is wrong with it.
-fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement {
+fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measurement {
     let clock = table.columns.iter_mut().find(|column| column.name.value == "time_s");
     let passes_midnight = clock.is_some_and(|clock| continue_past_midnight(&mut clock.values));
     let clock = table.columns.iter().find(|column| column.name.value == "time_s");
-    let early = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
+    let first_row = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
     // A file of `sweep trace` counts as a measurement of its nonlinear motion.
-    let is_trace = table.columns.iter().any(|column| column.header.starts_with(TRACED));
+    let is_trace = table.columns.iter().any(|column| column.header.starts_with(TRACE_PREFIX));
     let mut notes = if is_trace { Vec::new() } else { table.notes() };
     if passes_midnight {
         notes
             .push("its clock passes midnight: times after it are those of the next day".to_owned());
     }
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();
-    let mut measured = Measurement { name, early, notes, headers, ..Measurement::default() };
-    let mut seen: Vec<&str> = Vec::new();
+    let mut measurement =
+        Measurement { name, early: first_row, notes, headers, ..Measurement::default() };
+    let mut known_names: Vec<&str> = Vec::new();
     let mut pulse_columns: Vec<(&ListColumn, (PulseSignal, u32))> = Vec::new();
     for column in &table.columns {
         if !column.is_known {
@@ -278,12 +279,12 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
         }
         let name = column.name.value.as_str();
         let at = &column.name.location;
-        if seen.contains(&name) {
+        if known_names.contains(&name) {
             let title = format!("the column `{name}` is given twice");
             report.push(Diagnostic::new(title).at(at, "expected each column once"));
             continue;
         }
-        seen.push(name);
+        known_names.push(name);
         if let Some(row) = column.values.iter().position(|value| value.is_infinite()) {
             report.push_with(|sources| {
                 let title = format!("`{name}` is infinite in row {}", row + 1);
@@ -291,37 +292,41 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
                 Diagnostic::new(title).at(&table.place(sources, column.place, row), expected)
             });
         }
-        let values = &column.values[early..];
+        let values = &column.values[first_row..];
         let samples = values.iter().filter(|value| !value.is_nan()).count();
         match (name, SignalQuantity::named(name)) {
             ("time_s", _) => {
-                measured.time_s = values.to_vec();
-                measured.first_clock_time = clock_time(&table, column, early, report);
-                times(&table, column, report);
+                measurement.time_s = values.to_vec();
+                measurement.first_clock_time = clock_time(&table, column, first_row, report);
+                check_times(&table, column, report);
             }
-            ("speed_rpm", _) => measured.speed_rpm = Some(values.to_vec()),
-            (_, Some(_)) if samples >= FEWEST && is_still(values) => {
+            ("speed_rpm", _) => measurement.speed_rpm = Some(values.to_vec()),
+            (_, Some(_)) if samples >= MIN_SAMPLES && is_still(values) => {
                 let title = format!("the column `{name}` never changes");
                 report.push(Diagnostic::new(title).at(at, "expected what a sensor measured"));
             }
-            (_, Some(quantity)) if samples >= FEWEST => {
-                measured.signals.push(Signal { quantity, values: values.to_vec() });
+            (_, Some(quantity)) if samples >= MIN_SAMPLES => {
+                measurement.signals.push(Signal { quantity, values: values.to_vec() });
             }
             (_, Some(_)) => {
                 let title = format!("the column `{name}` has {samples} samples");
-                report.push(Diagnostic::new(title).at(at, format!("expected {FEWEST} at least")));
+                report.push(
+                    Diagnostic::new(title).at(at, format!("expected {MIN_SAMPLES} at least")),
+                );
             }
             (_, None) => {
                 pulse_columns.extend(PulseSignal::from_name(name).map(|kind| (column, kind)));
             }
         }
     }
-    let whole = report.is_clean();
-    let missing =
-        [("time_s", !seen.contains(&"time_s")), ("any channel", measured.signals.is_empty())];
+    let is_complete = report.is_clean();
+    let missing = [
+        ("time_s", !known_names.contains(&"time_s")),
+        ("any channel", measurement.signals.is_empty()),
+    ];
     for (name, is_missing) in missing {
-        if whole && is_missing {
-            let title = format!("{} has no column of {name}", measured.name);
+        if is_complete && is_missing {
+            let title = format!("{} has no column of {name}", measurement.name);
             let help = "expected time_s, and channels of `sweep trace` with their units, as in \
                         tub_front_y_m_per_s2";
             let refusal = Diagnostic::new(title).help(help);
@@ -338,15 +343,15 @@ fn judged(name: String, mut table: NumberTable, report: &Report) -> Measurement 
     }
     for (column, kind) in pulse_columns {
         if report.is_clean() {
-            read_pulses(&mut measured, &table, column, kind, report);
+            read_pulses(&mut measurement, &table, column, kind, report);
         }
     }
-    leave_out_drop_outs(&mut measured, |row| {
+    leave_out_drop_outs(&mut measurement, |row| {
         let clock = table.columns.iter().find(|column| column.name.value == "time_s");
-        clock.and_then(|clock| clock_time(&table, clock, early + row, report))
+        clock.and_then(|clock| clock_time(&table, clock, first_row + row, report))
     });
-    measured.gaps_s = gaps(&measured.time_s);
-    measured
+    measurement.gaps_s = find_gaps(&measurement.time_s);
+    measurement
 }
 
 /// Adds a day to the times after each midnight, where a clock falls by a day less at most a run.
@@ -377,48 +382,52 @@ fn clock_time(
 }
 
 /// Removes drop-outs from the speeds, with a note. `clock_time` returns the clock time of a row.
-fn leave_out_drop_outs(measured: &mut Measurement, clock_time: impl Fn(usize) -> Option<String>) {
-    let Some(speed_rpm) = &mut measured.speed_rpm else { return };
-    let rows = drop_outs(&measured.time_s, speed_rpm);
-    let Some(first) = rows.first() else { return };
-    let at = clock_time(*first).unwrap_or_else(|| format!("{} s", measured.time_s[*first]));
+fn leave_out_drop_outs(
+    measurement: &mut Measurement,
+    clock_time: impl Fn(usize) -> Option<String>,
+) {
+    let Some(speed_rpm) = &mut measurement.speed_rpm else { return };
+    let rows = find_drop_outs(&measurement.time_s, speed_rpm);
+    let Some(first_row) = rows.first() else { return };
+    let first_time =
+        clock_time(*first_row).unwrap_or_else(|| format!("{} s", measurement.time_s[*first_row]));
     let samples = counted(rows.len(), "sample");
-    let [drop, first] = if rows.len() == 1 { ["drops", ""] } else { ["drop", "the first "] };
-    let note = format!("{samples} of speed_rpm {drop} to zero, {first}at {at}: left out");
-    measured.notes.push(note);
+    let [verb, prefix] = if rows.len() == 1 { ["drops", ""] } else { ["drop", "the first "] };
+    let note = format!("{samples} of speed_rpm {verb} to zero, {prefix}at {first_time}: left out");
+    measurement.notes.push(note);
     rows.into_iter().for_each(|row| speed_rpm[row] = f64::NAN);
 }
 
 /// Returns the rows of a tachometer's drop-outs: zeros between two speeds between which no drum
 /// could have stopped and started again in time. At a standstill speeds approach zero instead.
-fn drop_outs(time_s: &[f64], speed_rpm: &[f64]) -> Vec<usize> {
+fn find_drop_outs(time_s: &[f64], speed_rpm: &[f64]) -> Vec<usize> {
     let is_running = |row: &usize| !speed_rpm[*row].is_nan() && speed_rpm[*row] != 0.0;
     let rows = 0..time_s.len().min(speed_rpm.len());
     let running: Vec<usize> = rows.filter(is_running).collect();
     let steps = running.windows(2).map(|pair| (speed_rpm[pair[1]] - speed_rpm[pair[0]]).abs());
     let step_rpm = quantile(steps.filter(|step| *step > 0.0), 0.5).unwrap_or_default();
-    let mut found = Vec::new();
+    let mut zero_rows = Vec::new();
     for pair in running.windows(2) {
         let [before, after] = [pair[0], pair[1]];
         let change_rpm = speed_rpm[before].abs() + speed_rpm[after].abs();
         let possible_rpm = GREATEST_ACCELERATION_RPM_PER_S * (time_s[after] - time_s[before]);
         if change_rpm > possible_rpm + NOISE_STEPS * step_rpm {
-            found.extend((before + 1..after).filter(|row| speed_rpm[*row] == 0.0));
+            zero_rows.extend((before + 1..after).filter(|row| speed_rpm[*row] == 0.0));
         }
     }
-    found
+    zero_rows
 }
 
 /// Reads a column of pulses as the tachometer and reports what is wrong with it.
 fn read_pulses(
-    measured: &mut Measurement,
+    measurement: &mut Measurement,
     table: &NumberTable,
     column: &ListColumn,
     kind: (PulseSignal, u32),
     report: &Report,
 ) {
     let name = &column.name.value;
-    if measured.speed_rpm.is_some() || measured.pulses.is_some() {
+    if measurement.speed_rpm.is_some() || measurement.pulses.is_some() {
         let title = format!("the column `{name}` is a second tachometer");
         let expected = "expected speed_rpm or one column of pulses";
         report.push(Diagnostic::new(title).at(&column.name.location, expected));
@@ -427,9 +436,9 @@ fn read_pulses(
     let counted_name = name.replace("pulses", "count");
     let voltage_name = name.replace("count_per_row", "pulses").replace("count", "pulses");
     let (title, expected, row) =
-        match Pulses::read(&measured.time_s, &column.values[measured.early..], kind) {
+        match Pulses::read(&measurement.time_s, &column.values[measurement.early..], kind) {
             Ok(pulses) => {
-                measured.pulses = Some(pulses);
+                measurement.pulses = Some(pulses);
                 return;
             }
             Err(PulseError::FewPulses(count)) => (
@@ -453,7 +462,7 @@ fn read_pulses(
                 Some(row),
             ),
             Err(PulseError::Falling(row)) => (
-                format!("the count `{name}` falls in row {}", measured.early + row + 1),
+                format!("the count `{name}` falls in row {}", measurement.early + row + 1),
                 format!(
                     "expected a count that rises, or starts again at 0 after 65536 or 4294967296; \
                      the column of a voltage is `{voltage_name}`"
@@ -461,54 +470,56 @@ fn read_pulses(
                 Some(row),
             ),
             Err(PulseError::Missing(row)) => (
-                format!("`{name}` has no number in row {}", measured.early + row + 1),
+                format!("`{name}` has no number in row {}", measurement.early + row + 1),
                 "expected the number of pulses since the previous row in each row".to_owned(),
                 Some(row),
             ),
         };
     report.push_with(|sources| {
-        let place = match row {
-            Some(row) => table.place(sources, column.place, measured.early + row),
+        let location = match row {
+            Some(row) => table.place(sources, column.place, measurement.early + row),
             None => column.name.location.clone(),
         };
-        Diagnostic::new(title).at(&place, expected)
+        Diagnostic::new(title).at(&location, expected)
     });
 }
 
 /// Whether all samples are one number.
 fn is_still(values: &[f64]) -> bool {
-    let mut known = values.iter().filter(|value| !value.is_nan());
-    let first = known.next();
-    known.all(|value| Some(value) == first)
+    let mut samples = values.iter().filter(|value| !value.is_nan());
+    let first = samples.next();
+    samples.all(|value| Some(value) == first)
 }
 
 /// Judges the column of times. Of each mistake the first row is shown: often all rows have it.
-fn times(table: &NumberTable, column: &ListColumn, report: &Report) {
+fn check_times(table: &NumberTable, column: &ListColumn, report: &Report) {
     let values = &column.values;
-    let mut last = f64::NEG_INFINITY;
-    let mut seen = [false; 4];
-    let usual = usual_step(values).unwrap_or_default();
+    let mut last_s = f64::NEG_INFINITY;
+    let mut reported = [false; 4];
+    let usual_step_s = usual_step(values).unwrap_or_default();
     for (row, &time_s) in values.iter().enumerate() {
-        let (mistake, said) = match time_s {
+        let (mistake, description) = match time_s {
             _ if time_s.is_nan() => (0, "a row without its time".to_owned()),
-            _ if time_s == last => (3, format!("two rows have the same time, {time_s} s")),
-            _ if time_s < last => (1, format!("time goes back: {time_s} s after {last} s")),
-            _ if usual > SLOWEST_S => (2, format!("rows are {usual} s apart: are these ms?")),
+            _ if time_s == last_s => (3, format!("two rows have the same time, {time_s} s")),
+            _ if time_s < last_s => (1, format!("time goes back: {time_s} s after {last_s} s")),
+            _ if usual_step_s > SLOWEST_S => {
+                (2, format!("rows are {usual_step_s} s apart: are these ms?"))
+            }
             _ => {
-                last = time_s;
+                last_s = time_s;
                 continue;
             }
         };
-        last = last.max(time_s);
-        if std::mem::replace(&mut seen[mistake], true) {
+        last_s = last_s.max(time_s);
+        if std::mem::replace(&mut reported[mistake], true) {
             continue;
         }
         report.push_with(|sources| {
             let expected = "expected times in s that rise from row to row, 0 where the run begins";
-            Diagnostic::new(said).at(&table.place(sources, column.place, row), expected)
+            Diagnostic::new(description).at(&table.place(sources, column.place, row), expected)
         });
     }
-    if seen == [false; 4] {
+    if reported == [false; 4] {
         refuse_long_run(table, column, report);
     }
 }
@@ -516,15 +527,17 @@ fn times(table: &NumberTable, column: &ListColumn, report: &Report) {
 /// Refuses a record of a longer run than is simulated, at the row after its longest gap.
 fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
     let values = &column.values;
-    let begin = values.partition_point(|time_s| *time_s < 0.0);
-    let times = &values[begin..];
+    let run_start = values.partition_point(|time_s| *time_s < 0.0);
+    let times = &values[run_start..];
     let Some((first_s, last_s)) = times.first().zip(times.last()) else { return };
     let length_s = last_s - first_s;
     if length_s <= LONGEST_RUN_S {
         return;
     }
     let gap_s = |row: usize| times[row] - times[row - 1];
-    let Some(row) = (1..times.len()).max_by(|a, b| gap_s(*a).total_cmp(&gap_s(*b))) else { return };
+    let Some(row) = (1..times.len()).max_by(|a, b| gap_s(*a).total_cmp(&gap_s(*b))) else {
+        return;
+    };
     // Two such records may be joined: half of the length is not needed for a gap to be the cause.
     let title = if gap_s(row) > 0.1 * length_s {
         format!("time jumps by {} s, from {} to {} s", gap_s(row), times[row - 1], times[row])
@@ -536,7 +549,7 @@ fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
             "expected a run of at most {LONGEST_RUN_S} s: remove stray rows, cut the record, or \
              convert its times to s"
         );
-        Diagnostic::new(title).at(&table.place(sources, column.place, begin + row), expected)
+        Diagnostic::new(title).at(&table.place(sources, column.place, run_start + row), expected)
     });
 }
 
@@ -546,9 +559,9 @@ pub(super) fn usual_step(time_s: &[f64]) -> Option<f64> {
 }
 
 /// Stretches of time without rows: longer than twenty of the usual distance.
-fn gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
-    let Some(usual) = usual_step(time_s) else { return Vec::new() };
-    let gaps = time_s.windows(2).filter(|pair| pair[1] - pair[0] > 20.0 * usual);
+fn find_gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
+    let Some(usual_step_s) = usual_step(time_s) else { return Vec::new() };
+    let gaps = time_s.windows(2).filter(|pair| pair[1] - pair[0] > 20.0 * usual_step_s);
     gaps.map(|pair| [pair[0], pair[1]]).collect()
 }
 
@@ -556,7 +569,7 @@ fn gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
 mod tests {
     use super::*;
 
-    fn refused(text: &str) -> String {
+    fn refusal_text(text: &str) -> String {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
         std::fs::write(&path, text).unwrap();
@@ -580,15 +593,15 @@ mod tests {
         let column = |name: &str| {
             (name.to_owned(), (0..20).map(|k| 0.01 * f64::from(k)).collect::<Vec<f64>>())
         };
-        let measured = Measurement::from_columns(names.map(column).to_vec(), &[]).unwrap();
+        let measurement = Measurement::from_columns(names.map(column).to_vec(), &[]).unwrap();
         let columns: Vec<String> =
-            measured.signals.iter().map(|signal| signal.quantity.column()).collect();
+            measurement.signals.iter().map(|signal| signal.quantity.column()).collect();
         assert_eq!(columns, ["tub_yaw_rad"]);
     }
 
     #[test]
     fn mistakes_have_their_places() {
-        let text = refused("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n0.05,5\n");
+        let text = refusal_text("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n0.05,5\n");
         for said in [
             "does not name a channel",
             "did you mean `tub_front_y_m",
@@ -599,37 +612,43 @@ mod tests {
             assert!(text.contains(said), "{said}: {text}");
         }
         assert!(text.contains(":4:") && text.contains(":5:"), "{text}");
-        assert!(refused("time_s,tub_yaw_rad\n0,1\n1,\n").contains("has 1 samples"));
-        assert!(refused("tub_yaw_rad\n1\n").contains("has 1 samples"));
+        assert!(refusal_text("time_s,tub_yaw_rad\n0,1\n1,\n").contains("has 1 samples"));
+        assert!(refusal_text("tub_yaw_rad\n1\n").contains("has 1 samples"));
         let rows: String = (0..20).map(|k| format!("{k},\n")).collect();
-        assert!(refused(&format!("time_s,tub_yaw\n{rows}")).contains("has 0 samples"));
-        assert!(refused("time_s\n0.1\n0.2\n").contains("no column of any channel"));
-        assert!(refused("time_s,tub_yaw\n0,inf\n").contains("is infinite"));
+        assert!(refusal_text(&format!("time_s,tub_yaw\n{rows}")).contains("has 0 samples"));
+        assert!(refusal_text("time_s\n0.1\n0.2\n").contains("no column of any channel"));
+        assert!(refusal_text("time_s,tub_yaw\n0,inf\n").contains("is infinite"));
         let rows: String = (0..20).map(|k| format!("{},1\n", 0.01 * f64::from(k))).collect();
-        assert!(refused(&format!("time_s,tub_yaw\n{rows}")).contains("never changes"));
+        assert!(refusal_text(&format!("time_s,tub_yaw\n{rows}")).contains("never changes"));
         // Milliseconds: once, not once a row.
         let rows: String = (0..20).map(|k| format!("{},{k}\n", 2 * k)).collect();
-        let text = refused(&format!("time_s,tub_yaw\n{rows}"));
+        let text = refusal_text(&format!("time_s,tub_yaw\n{rows}"));
         assert_eq!(text.matches("rows are 2 s apart: are these ms?").count(), 1, "{text}");
     }
 
     #[test]
     fn a_run_that_is_too_long_to_simulate_is_refused_at_its_longest_gap() {
-        let file = |times: &mut dyn Iterator<Item = f64>| -> String {
+        let file_text = |times: &mut dyn Iterator<Item = f64>| -> String {
             let rows = times.enumerate().map(|(k, time_s)| format!("{time_s},{k}\n"));
             "time_s,tub_yaw\n".to_owned() + &rows.collect::<String>()
         };
-        let steady = || (0..200).map(|k| 0.01 * f64::from(k));
-        let stray = file(&mut steady().chain([1e5]));
-        let text = refused(&stray);
+        let steady_times = || (0..200).map(|k| 0.01 * f64::from(k));
+        let with_stray_time = file_text(&mut steady_times().chain([1e5]));
+        let text = refusal_text(&with_stray_time);
         assert!(text.contains("time jumps by 99998.01 s, from 1.99 to 100000 s"), "{text}");
         assert!(text.contains(":202:1") && text.contains("at most 3600 s"), "{text}");
-        let gap = file(&mut steady().chain(steady().map(|time_s| 1e4 + time_s)));
-        assert!(refused(&gap).contains(":202:1"), "{}", refused(&gap));
-        let first = file(&mut [0.0].into_iter().chain(steady().map(|time_s| 1.7e9 + time_s)));
-        assert!(refused(&first).contains(":3:1"), "{}", refused(&first));
-        let milliseconds = file(&mut (0..40_000).map(|k| 0.1 * f64::from(k)));
-        let text = refused(&milliseconds);
+        let with_gap =
+            file_text(&mut steady_times().chain(steady_times().map(|time_s| 1e4 + time_s)));
+        assert!(refusal_text(&with_gap).contains(":202:1"), "{}", refusal_text(&with_gap));
+        let with_epoch_time =
+            file_text(&mut [0.0].into_iter().chain(steady_times().map(|time_s| 1.7e9 + time_s)));
+        assert!(
+            refusal_text(&with_epoch_time).contains(":3:1"),
+            "{}",
+            refusal_text(&with_epoch_time)
+        );
+        let in_milliseconds = file_text(&mut (0..40_000).map(|k| 0.1 * f64::from(k)));
+        let text = refusal_text(&in_milliseconds);
         assert!(text.contains("s long: are these ms?") && text.lines().count() < 12, "{text}");
     }
 
@@ -644,9 +663,9 @@ mod tests {
             if with_tachometer {
                 columns.push(column("speed_rpm", &|t| first_rpm + 20.0 * t));
             }
-            let mut measured = Measurement::from_columns(columns, &[]).unwrap();
-            measured.count_from_first_row(24.0);
-            measured
+            let mut measurement = Measurement::from_columns(columns, &[]).unwrap();
+            measurement.count_from_first_row(24.0);
+            measurement
         };
         for (first_s, first_rpm, with_tachometer, is_clock) in [
             (1.7e9, 0.0, true, true),
@@ -660,11 +679,14 @@ mod tests {
             (15.0, 0.0, false, false),
             (0.5, 0.0, true, false),
         ] {
-            let measured = record(first_s, first_rpm, with_tachometer);
-            let said = format!("{first_s} {first_rpm} {with_tachometer}");
-            assert_eq!(measured.clock_start_s, is_clock.then_some(first_s), "{said}");
-            assert!((measured.time_s[0] == 0.0) == is_clock, "{said}");
-            assert!((measured.time_s[99] - measured.time_s[0] - 9.9).abs() < 1e-6, "{said}");
+            let measurement = record(first_s, first_rpm, with_tachometer);
+            let description = format!("{first_s} {first_rpm} {with_tachometer}");
+            assert_eq!(measurement.clock_start_s, is_clock.then_some(first_s), "{description}");
+            assert!((measurement.time_s[0] == 0.0) == is_clock, "{description}");
+            assert!(
+                (measurement.time_s[99] - measurement.time_s[0] - 9.9).abs() < 1e-6,
+                "{description}"
+            );
         }
     }
 
@@ -676,23 +698,24 @@ mod tests {
             (0..20).map(|k| format!("{};{};{};21,5\n", 20 * k, k % 5, 100 * k)).collect();
         let text = format!("Bench 3;\nTime;Acc front;Drum;Temp\nms;g;Hz;\u{b0}C\n{rows}");
         std::fs::write(&path, &text).unwrap();
-        let renamed = [("Acc front", "tub_front_y_m_per_s2"), ("Drum", "speed_rpm")];
-        let renamed = renamed.map(|(header, name)| (header.to_owned(), name.to_owned()));
-        let measured = Measurement::read(&path, &renamed).unwrap();
-        assert_eq!(measured.time_s[19], 0.38);
-        assert_eq!(measured.speed_rpm.expect("it is there")[2], 12_000.0);
-        let columns: Vec<String> = measured.signals.iter().map(|it| it.quantity.column()).collect();
+        let new_names = [("Acc front", "tub_front_y_m_per_s2"), ("Drum", "speed_rpm")];
+        let new_names = new_names.map(|(header, name)| (header.to_owned(), name.to_owned()));
+        let measurement = Measurement::read(&path, &new_names).unwrap();
+        assert_eq!(measurement.time_s[19], 0.38);
+        assert_eq!(measurement.speed_rpm.expect("it is there")[2], 12_000.0);
+        let columns: Vec<String> =
+            measurement.signals.iter().map(|it| it.quantity.column()).collect();
         assert_eq!(columns, ["tub_front_y_m_per_s2"]);
-        assert_eq!(measured.signals[0].values[4], 4.0 * 9.80665);
-        assert!(measured.notes.join(";").contains("left out the column `Temp`"));
+        assert_eq!(measurement.signals[0].values[4], 4.0 * 9.80665);
+        assert!(measurement.notes.join(";").contains("left out the column `Temp`"));
         // Times of a clock are seconds since midnight.
         let rows: String = (0..20).map(|k| format!("12:00:0{}.{},{k}\n", k / 10, k % 10)).collect();
         std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
         let clock = Measurement::read(&path, &[]).unwrap();
         assert_eq!((clock.time_s[0], clock.time_s[19]), (43_200.0, 43_201.9));
-        let start = |mut measured: Measurement| {
-            measured.count_from_first_row(24.0);
-            measured.clock_start()
+        let start = |mut measurement: Measurement| {
+            measurement.count_from_first_row(24.0);
+            measurement.clock_start()
         };
         assert_eq!(start(clock).as_deref(), Some("12:00:00.0"));
         let rows: String =
@@ -701,8 +724,11 @@ mod tests {
         assert_eq!(start(Measurement::read(&path, &[]).unwrap()).as_deref(), Some("43200 s"));
         std::fs::write(&path, &text).unwrap();
         // Without the user's names nothing is measured, and what to do is said.
-        let refused = Measurement::read(&path, &[]).unwrap_err().to_string();
-        assert!(refused.contains("--column 'Acc front=tub_front_y_m_per_s2'"), "{refused}");
+        let refusal_text = Measurement::read(&path, &[]).unwrap_err().to_string();
+        assert!(
+            refusal_text.contains("--column 'Acc front=tub_front_y_m_per_s2'"),
+            "{refusal_text}"
+        );
     }
 
     #[test]
@@ -722,40 +748,41 @@ mod tests {
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
-        let read = |columns: &str, period: u32, further: &str| {
+        let read_record = |columns: &str, period: u32, further_cells: &str| {
             let volts = |k: u32| if k % period < period / 2 { 0.1 } else { 4.9 };
             let rows: String = (0..80)
-                .map(|k| format!("{},{k},{}{further}\n", 0.01 * f64::from(k), volts(k)))
+                .map(|k| format!("{},{k},{}{further_cells}\n", 0.01 * f64::from(k), volts(k)))
                 .collect();
             std::fs::write(&path, format!("{columns}\n{rows}")).unwrap();
-            let renamed = [("Tacho".to_owned(), "tacho_12_pulses".to_owned())];
-            Measurement::read(&path, &renamed)
+            let new_names = [("Tacho".to_owned(), "tacho_12_pulses".to_owned())];
+            Measurement::read(&path, &new_names)
         };
-        let measured = read("Time,tub_yaw,Tacho [V]", 10, "").unwrap();
-        let spin = measured.smoothed_spin().unwrap().spin;
+        let measurement = read_record("Time,tub_yaw,Tacho [V]", 10, "").unwrap();
+        let spin = measurement.smooth_spin().unwrap().spin;
         let speeds: Vec<f64> = spin.speeds_rpm([0.0, 0.3, 0.7]).collect();
         assert!(speeds.iter().all(|speed| (speed - 50.0).abs() < 1e-6), "{speeds:?}");
-        assert!(!measured.begins_at_rest());
-        let wrong =
-            |columns, period, further| read(columns, period, further).unwrap_err().to_string();
-        let text = wrong("Time,tub_yaw,Tacho,rpm", 10, ",50");
+        assert!(!measurement.begins_at_rest());
+        let read_error = |columns, period, further_cells| {
+            read_record(columns, period, further_cells).unwrap_err().to_string()
+        };
+        let text = read_error("Time,tub_yaw,Tacho,rpm", 10, ",50");
         assert!(text.contains("`tacho_12_pulses` is a second tachometer"), "{text}");
-        let text = wrong("Time,tub_yaw,tacho_pulses", 40, "");
+        let text = read_error("Time,tub_yaw,tacho_pulses", 40, "");
         assert!(text.contains("has 2 pulses") && text.contains("three at least"), "{text}");
-        let text = wrong("Time,tub_yaw,tacho_pulses", 2, "");
+        let text = read_error("Time,tub_yaw,tacho_pulses", 2, "");
         assert!(text.contains("half of the sampling rate") && text.contains(":5:"), "{text}");
     }
 
     #[test]
     fn instants_of_pandas_count_from_the_first_row() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/fit");
-        let renamed = [("Acc front".to_owned(), "tub_front_y_m_per_s2".to_owned())];
-        let measured = Measurement::read(&folder.join("pandas_datetime.parquet"), &renamed);
-        let mut measured = measured.unwrap();
-        assert!(measured.notes.join(";").contains("left out the column `logged_at`"));
-        measured.count_from_first_row(24.0);
-        assert_eq!(measured.clock_start().as_deref(), Some("2026-03-01 12:34:56.789"));
-        for (k, time_s) in measured.time_s.iter().enumerate() {
+        let new_names = [("Acc front".to_owned(), "tub_front_y_m_per_s2".to_owned())];
+        let measurement = Measurement::read(&folder.join("pandas_datetime.parquet"), &new_names);
+        let mut measurement = measurement.unwrap();
+        assert!(measurement.notes.join(";").contains("left out the column `logged_at`"));
+        measurement.count_from_first_row(24.0);
+        assert_eq!(measurement.clock_start().as_deref(), Some("2026-03-01 12:34:56.789"));
+        for (k, time_s) in measurement.time_s.iter().enumerate() {
             assert!((time_s - 0.01 * k as f64).abs() < 5e-7, "{k}: {time_s}");
         }
     }
@@ -764,28 +791,28 @@ mod tests {
     fn a_tachometer_by_a_count_is_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
-        let read = |header: &str, count: &dyn Fn(u32) -> u32| {
+        let read_record = |header: &str, count: &dyn Fn(u32) -> u32| {
             let rows: String =
                 (0..400).map(|k| format!("{},{k},{}\n", 0.01 * f64::from(k), count(k))).collect();
             std::fs::write(&path, format!("Time,tub_yaw,{header}\n{rows}")).unwrap();
-            let renamed = [("Pulses".to_owned(), "tacho_60_count".to_owned())];
-            Measurement::read(&path, &renamed)
+            let new_names = [("Pulses".to_owned(), "tacho_60_count".to_owned())];
+            Measurement::read(&path, &new_names)
         };
         // 240 rpm are 2.4 pulses a row.
-        let total = |k: u32| 12 * k / 5;
+        let total_count = |k: u32| 12 * k / 5;
         for (header, count) in [
-            ("Pulses", &total as &dyn Fn(u32) -> u32),
-            ("tacho_60_count_per_row", &|k| total(k + 1) - total(k)),
+            ("Pulses", &total_count as &dyn Fn(u32) -> u32),
+            ("tacho_60_count_per_row", &|k| total_count(k + 1) - total_count(k)),
         ] {
-            let measured = read(header, count).unwrap();
-            let spin = measured.smoothed_spin().unwrap().spin;
+            let measurement = read_record(header, count).unwrap();
+            let spin = measurement.smooth_spin().unwrap().spin;
             let speeds: Vec<f64> = spin.speeds_rpm([0.5, 2.0, 3.5]).collect();
             assert!(speeds.iter().all(|speed| (speed - 240.0).abs() < 2.0), "{speeds:?}");
         }
-        let text = read("Pulses", &|k| k % 100).unwrap_err().to_string();
+        let text = read_record("Pulses", &|k| k % 100).unwrap_err().to_string();
         assert!(text.contains("`tacho_60_count` falls in row 101") && text.contains(":102:"));
         assert!(text.contains("the column of a voltage is `tacho_60_pulses`"), "{text}");
-        let text = read("tacho_60_pulses", &total).unwrap_err().to_string();
+        let text = read_record("tacho_60_pulses", &total_count).unwrap_err().to_string();
         assert!(text.contains("the column of a counter is `tacho_60_count`"), "{text}");
     }
 
@@ -793,25 +820,29 @@ mod tests {
     fn a_clock_that_passes_midnight_goes_on() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
-        let clock = |k: u32| match k {
+        let clock_time = |k: u32| match k {
             0..10 => format!("23:59:59.{k}"),
             _ => format!("00:00:0{}.{}", k / 10 - 1, k % 10),
         };
         let seconds = |k: u32| format!("{}", (863_990 + k) % 864_000 / 10);
         let day_seconds = |k: u32| format!("{}.{}", seconds(k), k % 10);
-        for time in [&clock as &dyn Fn(u32) -> String, &day_seconds] {
+        for time in [&clock_time as &dyn Fn(u32) -> String, &day_seconds] {
             let rows: String = (0..40).map(|k| format!("{},{k}\n", time(k))).collect();
             std::fs::write(&path, format!("Time,tub_yaw\n{rows}")).unwrap();
-            let mut measured = Measurement::read(&path, &[]).unwrap();
-            assert!(measured.notes.join(";").contains("passes midnight"), "{:?}", measured.notes);
-            measured.count_from_first_row(24.0);
-            for (k, time_s) in measured.time_s.iter().enumerate() {
+            let mut measurement = Measurement::read(&path, &[]).unwrap();
+            assert!(
+                measurement.notes.join(";").contains("passes midnight"),
+                "{:?}",
+                measurement.notes
+            );
+            measurement.count_from_first_row(24.0);
+            for (k, time_s) in measurement.time_s.iter().enumerate() {
                 assert!((time_s - 0.1 * k as f64).abs() < 1e-9, "{k}: {time_s}");
             }
         }
         // A fall by less, and one by more than a day, are mistakes.
         for first_s in [80_000, 100_000] {
-            let text = refused(&format!("time_s,tub_yaw\n{first_s},1\n0,2\n"));
+            let text = refusal_text(&format!("time_s,tub_yaw\n{first_s},1\n0,2\n"));
             assert!(text.contains(&format!("time goes back: 0 s after {first_s} s")), "{text}");
         }
     }
@@ -819,7 +850,7 @@ mod tests {
     #[test]
     fn drop_outs_of_the_tachometer_are_left_out_and_a_standstill_is_not() {
         // A wash in both directions with a wait, then a spin.
-        let course = |t: f64| match t {
+        let true_speed = |t: f64| match t {
             t if t < 1.0 => 50.0 * t,
             t if t < 2.0 => 50.0 * (2.0 - t),
             t if t < 4.0 => 0.0,
@@ -827,11 +858,11 @@ mod tests {
             t if t < 6.0 => -50.0 * (6.0 - t),
             t => 30.0 * (t - 6.0),
         };
-        let measured = |step_s: f64, digit_rpm: f64, zeros: &[usize]| {
+        let record_with_zeros = |step_s: f64, digit_rpm: f64, zeros: &[usize]| {
             let times: Vec<f64> =
                 (0..(12.0 / step_s) as u32).map(|k| step_s * f64::from(k)).collect();
             let mut speeds: Vec<f64> =
-                times.iter().map(|t| (course(*t) / digit_rpm).round() * digit_rpm).collect();
+                times.iter().map(|t| (true_speed(*t) / digit_rpm).round() * digit_rpm).collect();
             zeros.iter().for_each(|row| speeds[*row] = 0.0);
             let yaw = times.iter().map(|t| t.sin()).collect();
             let columns = [("time_s", times), ("speed_rpm", speeds), ("tub_yaw", yaw)];
@@ -839,18 +870,23 @@ mod tests {
             Measurement::from_columns(columns.to_vec(), &[]).unwrap()
         };
         for (step_s, digit_rpm) in [(0.001, 1e-3), (0.001, 5.0), (0.02, 1.0), (0.1, 1e-3)] {
-            let whole = measured(step_s, digit_rpm, &[]);
-            assert!(whole.notes.is_empty(), "{step_s} {digit_rpm}: {:?}", whole.notes);
-            assert!(whole.speed_rpm.unwrap().iter().all(|speed| !speed.is_nan()));
+            let without_zeros = record_with_zeros(step_s, digit_rpm, &[]);
+            assert!(
+                without_zeros.notes.is_empty(),
+                "{step_s} {digit_rpm}: {:?}",
+                without_zeros.notes
+            );
+            assert!(without_zeros.speed_rpm.unwrap().iter().all(|speed| !speed.is_nan()));
         }
-        let with_zeros = measured(0.02, 1.0, &[40, 520, 550, 551]);
+        let with_zeros = record_with_zeros(0.02, 1.0, &[40, 520, 550, 551]);
         let note = "4 samples of speed_rpm drop to zero, the first at 0.8 s: left out";
         assert_eq!(with_zeros.notes, [note]);
         let speeds = with_zeros.speed_rpm.unwrap();
-        let missing: Vec<usize> = (0..speeds.len()).filter(|row| speeds[*row].is_nan()).collect();
-        assert_eq!(missing, [40, 520, 550, 551]);
-        let one = measured(0.02, 1.0, &[520]).notes;
-        assert_eq!(one, ["1 sample of speed_rpm drops to zero, at 10.4 s: left out"]);
+        let missing_rows: Vec<usize> =
+            (0..speeds.len()).filter(|row| speeds[*row].is_nan()).collect();
+        assert_eq!(missing_rows, [40, 520, 550, 551]);
+        let notes = record_with_zeros(0.02, 1.0, &[520]).notes;
+        assert_eq!(notes, ["1 sample of speed_rpm drops to zero, at 10.4 s: left out"]);
     }
 
     #[test]
@@ -860,9 +896,9 @@ mod tests {
             let named = |(name, by): (&str, f64)| (name.to_owned(), numbers(by));
             [("time_s", 0.01), ("tub_yaw", 1.0), ("speed_rpm", 2.0)].map(named).to_vec()
         };
-        let [whole, early] =
+        let [full_record, early_record] =
             [0, -30].map(|from| Measurement::from_columns(columns(from), &[]).unwrap());
-        assert_eq!(early, Measurement { early: 30, ..whole });
+        assert_eq!(early_record, Measurement { early: 30, ..full_record });
     }
 
     #[test]
@@ -873,9 +909,9 @@ mod tests {
         };
         let (time_s, yaw) = (0..40).map(row).unzip();
         let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw)];
-        let measured = Measurement::from_columns(columns, &[]).unwrap();
-        assert_eq!(measured.count(), 26);
-        assert_eq!(measured.gaps_s.len(), 1);
-        assert!((measured.gaps_s[0][1] - 5.1).abs() < 1e-12);
+        let measurement = Measurement::from_columns(columns, &[]).unwrap();
+        assert_eq!(measurement.count(), 26);
+        assert_eq!(measurement.gaps_s.len(), 1);
+        assert!((measurement.gaps_s[0][1] - 5.1).abs() < 1e-12);
     }
 }

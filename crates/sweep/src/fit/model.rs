@@ -36,20 +36,22 @@ const DIFFERENCE_S: f64 = 1e-5;
 pub(crate) struct FitCase {
     /// The grid with this run's own constants.
     pub(crate) plan: Plan,
-    pub(crate) measured: Measurement,
+    pub(crate) measurement: Measurement,
     /// The spin, if it was measured.
-    pub(crate) smoothed: Option<SmoothedSpin>,
+    pub(crate) smoothed_spin: Option<SmoothedSpin>,
 }
 
 impl FitCase {
     /// Returns the spin of the run.
     pub(crate) fn spin(&self) -> &Spin {
-        self.smoothed.as_ref().map_or(&self.plan.model.spin, |smoothed| &smoothed.spin)
+        self.smoothed_spin
+            .as_ref()
+            .map_or(&self.plan.model.spin, |smoothed_spin| &smoothed_spin.spin)
     }
 
     /// Returns the measured spin at time 0 (rpm).
     pub(crate) fn first_rpm(&self) -> Option<f64> {
-        self.smoothed.as_ref()?.spin.speeds_rpm([0.0]).next()
+        self.smoothed_spin.as_ref()?.spin.speeds_rpm([0.0]).next()
     }
 
     /// Returns the run's greatest speed (rpm).
@@ -59,13 +61,13 @@ impl FitCase {
 
     /// Returns the number of samples of a signal in a second, on average.
     pub(crate) fn rate_hz(&self, signal: &Signal) -> f64 {
-        let times = &self.measured.time_s;
+        let times = &self.measurement.time_s;
         signal.samples().count() as f64 / (times[times.len() - 1] - times[0])
     }
 
     /// Returns the end of the run (s), which is later than the record by the greatest shift.
     fn end_s(&self) -> f64 {
-        self.measured.time_s.last().copied().unwrap_or_default() + MAX_SHIFT_S
+        self.measurement.time_s.last().copied().unwrap_or_default() + MAX_SHIFT_S
     }
 }
 
@@ -93,7 +95,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) cases: Vec<FitCase>,
     pub(crate) free: Vec<FreeParameter>,
     pub(crate) model: ModelKind,
-    pub(crate) with_shift: bool,
+    pub(crate) fits_shift: bool,
     pub(crate) method: Method,
     pub(crate) simd: Simd,
     /// The cancellation, after which results are meaningless.
@@ -128,7 +130,7 @@ pub(crate) struct NormalEquations {
     /// The normal matrix J' W J, with the Jacobian J and the weights W.
     pub(crate) normal: Vec<Vec<f64>>,
     /// The right side J' W r, with the residual r.
-    pub(crate) pull: Vec<f64>,
+    pub(crate) rhs: Vec<f64>,
 }
 
 impl Problem<'_> {
@@ -152,7 +154,7 @@ impl Problem<'_> {
 
     /// Returns the number of unknowns.
     pub(crate) fn unknowns(&self) -> usize {
-        self.free.len() + if self.with_shift { self.cases.len() } else { 0 }
+        self.free.len() + if self.fits_shift { self.cases.len() } else { 0 }
     }
 
     /// Returns the range of an unknown.
@@ -169,13 +171,13 @@ impl Problem<'_> {
     /// Iterates over the signals of all cases, in order.
     pub(crate) fn signals(&self) -> impl Iterator<Item = (usize, usize, &Signal)> {
         self.cases.iter().enumerate().flat_map(|(c, case)| {
-            case.measured.signals.iter().enumerate().map(move |(s, signal)| (c, s, signal))
+            case.measurement.signals.iter().enumerate().map(move |(s, signal)| (c, s, signal))
         })
     }
 
     /// Returns the shift of a case's clock (s).
     pub(crate) fn shift_s(&self, case: usize, x: &[f64]) -> f64 {
-        if self.with_shift { x[self.free.len() + case] } else { 0.0 }
+        if self.fits_shift { x[self.free.len() + case] } else { 0.0 }
     }
 
     /// Returns the machine and the spin of a case.
@@ -194,16 +196,16 @@ impl Problem<'_> {
         let mut written = plan.written.clone();
         for free in self.free.iter().filter(|free| free.belongs_to(0)) {
             let files = self.cases.iter().enumerate().filter(|(case, _)| free.belongs_to(*case));
-            let files: Vec<&str> = files.map(|(_, case)| &*case.measured.name).collect();
-            let from = format!("fit to {}", files.join(", "));
-            let parts = free.parameter.single_names(&plan.model.machine).into_iter();
-            written.0.extend(parts.map(|part| (part.into_owned(), from.clone())));
+            let files: Vec<&str> = files.map(|(_, case)| &*case.measurement.name).collect();
+            let source = format!("fit to {}", files.join(", "));
+            let single_names = free.parameter.single_names(&plan.model.machine).into_iter();
+            written.0.extend(single_names.map(|part| (part.into_owned(), source.clone())));
         }
         written
     }
 
     /// Whether an unknown matters to a case.
-    fn matters(&self, unknown: usize, case: usize) -> bool {
+    fn affects_case(&self, unknown: usize, case: usize) -> bool {
         match self.free.get(unknown) {
             Some(free) => free.belongs_to(case),
             None => unknown - self.free.len() == case,
@@ -221,7 +223,7 @@ impl Problem<'_> {
     }
 
     /// Returns the run of a case at some unknowns.
-    fn run(&self, case: usize, x: &[f64]) -> CaseRun {
+    fn machine_and_shift(&self, case: usize, x: &[f64]) -> CaseRun {
         let (machine, spin) = self.machine(case, x);
         (machine, spin, self.shift_s(case, x))
     }
@@ -233,17 +235,17 @@ impl Problem<'_> {
         &self,
         case: usize,
         count: usize,
-        run: impl Fn(usize) -> CaseRun + Sync,
+        machine_and_shift: impl Fn(usize) -> CaseRun + Sync,
         reduce: impl Fn(Vec<Vec<f64>>) -> T + Sync,
     ) -> Vec<Option<T>> {
-        let measured = &self.cases[case].measured;
+        let measurement = &self.cases[case].measurement;
         let end_s = self.cases[case].end_s();
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
         let recorders = Recorders { snapshots: true, ..Recorders::default() };
         let group_values = |group: &[usize]| {
-            let runs = group.iter().map(|&k| run(k)).enumerate();
-            let possible = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
-            let (shifts, machines): (Vec<(usize, f64)>, Vec<(Machine, Spin)>) = possible
+            let runs = group.iter().map(|&k| machine_and_shift(k)).enumerate();
+            let valid_runs = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
+            let (shifts, machines): (Vec<(usize, f64)>, Vec<(Machine, Spin)>) = valid_runs
                 .map(|(place, (machine, spin, shift_s))| ((place, shift_s), (machine, spin)))
                 .unzip();
             let points: Vec<(usize, Point)> = shifts
@@ -251,36 +253,42 @@ impl Problem<'_> {
                 .zip(prepare(self.simd, &machines, &timing))
                 .filter_map(|((place, shift_s), point)| {
                     let instants: Arc<[f64]> =
-                        measured.time_s.iter().map(|time| (time + shift_s).max(0.0)).collect();
+                        measurement.time_s.iter().map(|time| (time + shift_s).max(0.0)).collect();
                     Some((place, point.ok()?.with_snapshots_at(instants)))
                 })
                 .collect();
-            let all: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
+            let point_references: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
             let model = self.model;
-            let ended =
-                simulate_until(self.simd, model, &self.method, &all, recorders, self.cancel);
-            let extras = ended.map_or_else(Vec::new, |(_, extras)| extras);
+            let simulated = simulate_until(
+                self.simd,
+                model,
+                &self.method,
+                &point_references,
+                recorders,
+                self.cancel,
+            );
+            let extras = simulated.map_or_else(Vec::new, |(_, extras)| extras);
             let mut results: Vec<Option<T>> = group.iter().map(|_| None).collect();
             for ((place, point), extra) in points.iter().zip(extras) {
-                let shots = extra.snapshots;
-                if shots.len() < measured.time_s.len() {
+                let snapshots = extra.snapshots;
+                if snapshots.len() < measurement.time_s.len() {
                     continue;
                 }
                 let values = |signal: &Signal| -> Vec<f64> {
-                    shots.iter().map(|shot| self.value(shot, signal, point)).collect()
+                    snapshots.iter().map(|shot| self.value(shot, signal, point)).collect()
                 };
-                results[*place] = Some(reduce(measured.signals.iter().map(values).collect()));
+                results[*place] = Some(reduce(measurement.signals.iter().map(values).collect()));
             }
             results
         };
-        let places: Vec<usize> = (0..count).collect();
-        places.par_chunks(self.simd.lanes().max(2)).flat_map_iter(group_values).collect()
+        let indices: Vec<usize> = (0..count).collect();
+        indices.par_chunks(self.simd.lanes().max(2)).flat_map_iter(group_values).collect()
     }
 
-    fn value(&self, shot: &Snapshot, signal: &Signal, point: &Point) -> f64 {
+    fn value(&self, snapshot: &Snapshot, signal: &Signal, point: &Point) -> f64 {
         match signal.quantity {
-            SignalQuantity::Motion(channel, order) => shot.channels[channel.index()][order],
-            SignalQuantity::CabinetForce(axis) => shot.cabinet_force_n(point, self.model)[axis],
+            SignalQuantity::Motion(channel, order) => snapshot.channels[channel.index()][order],
+            SignalQuantity::CabinetForce(axis) => snapshot.cabinet_force_n(point, self.model)[axis],
         }
     }
 
@@ -289,36 +297,42 @@ impl Problem<'_> {
         let unknowns = self.unknowns();
         let steps: Vec<f64> = (0..unknowns).map(|k| self.difference_step(k, x)).collect();
         // A run with each unknown that matters to the case shifted, then the run at the point.
-        let in_case = |case: usize| {
-            let varied: Vec<usize> = (0..unknowns).filter(|&k| self.matters(k, case)).collect();
-            let run = |place: usize| {
+        let simulate_case = |case: usize| {
+            let varied_unknowns: Vec<usize> =
+                (0..unknowns).filter(|&k| self.affects_case(k, case)).collect();
+            let machine_and_shift = |index: usize| {
                 let mut x = x.to_vec();
-                if let Some(&k) = varied.get(place) {
+                if let Some(&k) = varied_unknowns.get(index) {
                     x[k] += steps[k];
                 }
-                self.run(case, &x)
+                self.machine_and_shift(case, &x)
             };
-            let mut simulated = self.simulate_signals(case, varied.len() + 1, run, |values| values);
+            let mut simulated = self.simulate_signals(
+                case,
+                varied_unknowns.len() + 1,
+                machine_and_shift,
+                |values| values,
+            );
             let signals = simulated.pop()??;
             let mut shifted = vec![None; unknowns];
-            for (&k, values) in varied.iter().zip(simulated) {
+            for (&k, values) in varied_unknowns.iter().zip(simulated) {
                 shifted[k] = Some(values?);
             }
             Some((signals, shifted))
         };
-        let simulated = (0..self.cases.len()).into_par_iter().map(in_case);
+        let simulated = (0..self.cases.len()).into_par_iter().map(simulate_case);
         let simulated: Vec<_> = simulated.collect::<Option<_>>()?;
         let compare_signal = |(case, s, signal): (usize, usize, &Signal)| {
             let (signals, shifted) = &simulated[case];
             let model = signals[s].clone();
             let slope = |shifted: &Option<Vec<Vec<f64>>>, step: f64| -> Vec<f64> {
                 let Some(shifted) = shifted else { return Vec::new() };
-                let by = |(row, _)| (shifted[s][row] - model[row]) / step;
-                centred(signal.samples().map(by).collect()).0
+                let slope_at = |(row, _)| (shifted[s][row] - model[row]) / step;
+                centred(signal.samples().map(slope_at).collect()).0
             };
             let slopes = shifted.iter().zip(&steps).map(|(shifted, step)| slope(shifted, *step));
             let slopes = slopes.collect();
-            let difference = signal.samples().map(|(row, measured)| measured - model[row]);
+            let difference = signal.samples().map(|(row, measurement)| measurement - model[row]);
             let (residual, offset) = centred(difference.collect());
             SignalComparison { case, signal: s, model, offset, residual, slopes }
         };
@@ -326,67 +340,68 @@ impl Problem<'_> {
     }
 
     /// Computes the differences that each of `count` changes of a case's machine and spin makes to
-    /// its signals at their samples, and reduces them; `None` for a run that fails. `against` is
-    /// the comparison without a change.
+    /// its signals at their samples, and reduces them; `None` for a run that fails. `comparisons`
+    /// is the comparison without a change.
     pub(crate) fn changes<T: Send>(
         &self,
         case: usize,
         x: &[f64],
-        against: &[SignalComparison],
+        comparisons: &[SignalComparison],
         (count, change): (usize, impl Fn(usize, &mut Machine, &mut Spin) + Sync),
         reduce: impl Fn(Vec<Vec<f64>>) -> T + Sync,
     ) -> Vec<Option<T>> {
-        let run = |k: usize| {
-            let (mut machine, mut spin, shift_s) = self.run(case, x);
+        let machine_and_shift = |k: usize| {
+            let (mut machine, mut spin, shift_s) = self.machine_and_shift(case, x);
             change(k, &mut machine, &mut spin);
             (machine, spin, shift_s)
         };
-        let own: Vec<&SignalComparison> = against.iter().filter(|one| one.case == case).collect();
-        let reduced = |values: Vec<Vec<f64>>| {
-            let change = |(values, one): (&Vec<f64>, &&SignalComparison)| -> Vec<f64> {
-                let signal = &self.cases[case].measured.signals[one.signal];
-                signal.samples().map(|(row, _)| values[row] - one.model[row]).collect()
+        let case_comparisons: Vec<&SignalComparison> =
+            comparisons.iter().filter(|comparison| comparison.case == case).collect();
+        let reduce_changes = |values: Vec<Vec<f64>>| {
+            let change = |(values, comparison): (&Vec<f64>, &&SignalComparison)| -> Vec<f64> {
+                let signal = &self.cases[case].measurement.signals[comparison.signal];
+                signal.samples().map(|(row, _)| values[row] - comparison.model[row]).collect()
             };
-            reduce(values.iter().zip(&own).map(change).collect())
+            reduce(values.iter().zip(&case_comparisons).map(change).collect())
         };
-        self.simulate_signals(case, count, run, reduced)
+        self.simulate_signals(case, count, machine_and_shift, reduce_changes)
     }
 
     /// Computes for each of `count` changes of a case's machine and spin the change of the normal
-    /// equations' right side; `None` for a run that fails. `against` is the comparison without a
-    /// change, and `sigma` the noise of each signal.
-    pub(crate) fn pulls(
+    /// equations' right side; `None` for a run that fails. `comparisons` is the comparison
+    /// without a change, and `sigma` the noise of each signal.
+    pub(crate) fn right_sides(
         &self,
         case: usize,
         x: &[f64],
-        (against, sigma): (&[SignalComparison], &[f64]),
+        (comparisons, sigma): (&[SignalComparison], &[f64]),
         count: usize,
         change: impl Fn(usize, &mut Machine, &mut Spin) + Sync,
     ) -> Vec<Option<Vec<f64>>> {
-        let own: Vec<(&SignalComparison, f64)> = against
+        let case_comparisons: Vec<(&SignalComparison, f64)> = comparisons
             .iter()
             .zip(sigma)
-            .filter(|(one, _)| one.case == case)
-            .map(|(one, sigma)| (one, *sigma))
+            .filter(|(comparison, _)| comparison.case == case)
+            .map(|(comparison, sigma)| (comparison, *sigma))
             .collect();
-        let pull = |changes: Vec<Vec<f64>>| {
-            let mut pull = vec![0.0; self.unknowns()];
-            for (change, (one, sigma)) in changes.iter().zip(&own) {
-                for (pull, slope) in pull.iter_mut().zip(&one.slopes) {
-                    *pull += dot(slope, change) / (sigma * sigma);
+        let rhs_change = |changes: Vec<Vec<f64>>| {
+            let mut rhs_change = vec![0.0; self.unknowns()];
+            for (change, (comparison, sigma)) in changes.iter().zip(&case_comparisons) {
+                for (rhs_change, slope) in rhs_change.iter_mut().zip(&comparison.slopes) {
+                    *rhs_change += dot(slope, change) / (sigma * sigma);
                 }
             }
-            pull
+            rhs_change
         };
-        self.changes(case, x, against, (count, change), pull)
+        self.changes(case, x, comparisons, (count, change), rhs_change)
     }
 
     /// Computes the costs of many sets of unknowns, without derivatives. The cost of a run that
     /// fails is infinite.
-    pub(crate) fn costs(&self, sets: &[Vec<f64>]) -> Vec<f64> {
-        let in_case = |case: usize| {
+    pub(crate) fn costs(&self, unknowns: &[Vec<f64>]) -> Vec<f64> {
+        let case_costs = |case: usize| {
             let cost = |models: Vec<Vec<f64>>| -> f64 {
-                let signals = self.cases[case].measured.signals.iter().zip(models);
+                let signals = self.cases[case].measurement.signals.iter().zip(models);
                 let signal_cost = |(signal, model): (&Signal, Vec<f64>)| {
                     let difference = signal.samples().map(|(row, value)| value - model[row]);
                     let (residual, _) = centred(difference.collect());
@@ -394,12 +409,17 @@ impl Problem<'_> {
                 };
                 signals.map(signal_cost).sum()
             };
-            self.simulate_signals(case, sets.len(), |k| self.run(case, &sets[k]), cost)
+            self.simulate_signals(
+                case,
+                unknowns.len(),
+                |k| self.machine_and_shift(case, &unknowns[k]),
+                cost,
+            )
         };
-        let parts: Vec<_> = (0..self.cases.len()).into_par_iter().map(in_case).collect();
-        let mut costs = vec![0.0; sets.len()];
-        for part in parts {
-            for (sum, cost) in costs.iter_mut().zip(part) {
+        let costs_by_case: Vec<_> = (0..self.cases.len()).into_par_iter().map(case_costs).collect();
+        let mut costs = vec![0.0; unknowns.len()];
+        for case_costs in costs_by_case {
+            for (sum, cost) in costs.iter_mut().zip(case_costs) {
                 *sum += cost.unwrap_or(f64::INFINITY);
             }
         }
@@ -407,38 +427,38 @@ impl Problem<'_> {
     }
 
     /// Computes the cost and the normal equations of a comparison.
-    pub(crate) fn normal_equations(&self, against: &[SignalComparison]) -> NormalEquations {
+    pub(crate) fn normal_equations(&self, comparisons: &[SignalComparison]) -> NormalEquations {
         let n = self.unknowns();
-        let mut summary = NormalEquations {
+        let mut equations = NormalEquations {
             cost: 0.0,
             sigma: Vec::new(),
             normal: vec![vec![0.0; n]; n],
-            pull: vec![0.0; n],
+            rhs: vec![0.0; n],
         };
-        for ((.., signal), against) in self.signals().zip(against) {
-            let (cost, sigma) = likelihood(&against.residual, signal);
-            summary.cost += cost;
-            summary.sigma.push(sigma);
+        for ((.., signal), comparisons) in self.signals().zip(comparisons) {
+            let (cost, sigma) = likelihood(&comparisons.residual, signal);
+            equations.cost += cost;
+            equations.sigma.push(sigma);
             let weight = 1.0 / (sigma * sigma);
             for i in 0..n {
-                summary.pull[i] += weight * dot(&against.slopes[i], &against.residual);
+                equations.rhs[i] += weight * dot(&comparisons.slopes[i], &comparisons.residual);
                 for j in 0..=i {
-                    let product = weight * dot(&against.slopes[i], &against.slopes[j]);
-                    summary.normal[i][j] += product;
+                    let product = weight * dot(&comparisons.slopes[i], &comparisons.slopes[j]);
+                    equations.normal[i][j] += product;
                     if i != j {
-                        summary.normal[j][i] += product;
+                        equations.normal[j][i] += product;
                     }
                 }
             }
         }
-        summary
+        equations
     }
 }
 
 /// Returns the part of the cost of a signal, and the standard deviation of its noise, which is that
 /// of the residual, and at least a millionth of the signal's.
 fn likelihood(residual: &[f64], signal: &Signal) -> (f64, f64) {
-    let swing = signal.swing();
+    let swing = signal.centred_values();
     let count = residual.len() as f64;
     let least_square = 1e-12 * dot(&swing, &swing) + f64::MIN_POSITIVE;
     let mean_square = (dot(residual, residual) + least_square) / count;

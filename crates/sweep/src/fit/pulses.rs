@@ -3,7 +3,7 @@
 
 use washer_model::Spin;
 
-use super::speed::{SmoothedSpin, smoothed};
+use super::speed::{SmoothedSpin, smooth_spin};
 
 /// The least number of pulses, or of readings of a counter, that give a course of the speed. Basis:
 /// three give two speeds. Doubling it refuses records of a few turns.
@@ -96,11 +96,11 @@ impl Pulses {
                 if let Some(row) = signal.iter().position(|pulses| *pulses < 0.0) {
                     return Err(PulseError::Falling(row));
                 }
-                let add = |sum: &mut f64, pulses: &f64| {
+                let add_pulses = |sum: &mut f64, pulses: &f64| {
                     *sum += pulses;
                     Some(*sum)
                 };
-                let count: Vec<f64> = signal.iter().scan(0.0, add).collect();
+                let count: Vec<f64> = signal.iter().scan(0.0, add_pulses).collect();
                 Self::from_count(time_s, &count, per_turn)
             }
         }
@@ -113,22 +113,23 @@ impl Pulses {
             voltage.iter().copied().enumerate().filter(|(_, value)| !value.is_nan()).collect();
         let lowest = samples.iter().fold(f64::INFINITY, |low, (_, value)| low.min(*value));
         let highest = samples.iter().fold(f64::NEG_INFINITY, |high, (_, value)| high.max(*value));
-        let [quarter, half] = [0.25, 0.5].map(|part| lowest + part * (highest - lowest));
+        let [quarter_level, half_level] =
+            [0.25, 0.5].map(|fraction| lowest + fraction * (highest - lowest));
         let mut edges_s = Vec::new();
         let mut last_sample = None;
         let mut is_low = false;
         for (sample, pair) in samples.windows(2).enumerate() {
             let (row, value) = pair[0];
             let (next_row, next_value) = pair[1];
-            is_low |= value <= quarter;
-            if !is_low || value >= half || next_value < half {
+            is_low |= value <= quarter_level;
+            if !is_low || value >= half_level || next_value < half_level {
                 continue;
             }
             if last_sample.is_some_and(|last| sample - last < MIN_ROWS_PER_PULSE) {
                 return Err(PulseError::Fast(next_row));
             }
-            let part = (half - value) / (next_value - value);
-            edges_s.push(time_s[row] + part * (time_s[next_row] - time_s[row]));
+            let fraction = (half_level - value) / (next_value - value);
+            edges_s.push(time_s[row] + fraction * (time_s[next_row] - time_s[row]));
             last_sample = Some(sample);
             is_low = false;
         }
@@ -197,19 +198,19 @@ impl Pulses {
     /// speeds, and the greatest speed.
     pub(super) fn first_and_greatest_rpm(&self, first_s: f64) -> [f64; 2] {
         let (times_s, speeds) = self.speeds();
-        let slope = (speeds[1] - speeds[0]) / (times_s[1] - times_s[0]);
-        let first_rpm = speeds[0] - slope * (times_s[0] - first_s);
+        let rpm_per_s = (speeds[1] - speeds[0]) / (times_s[1] - times_s[0]);
+        let first_rpm = speeds[0] - rpm_per_s * (times_s[0] - first_s);
         [first_rpm.max(0.0), speeds.into_iter().fold(0.0, f64::max)]
     }
 
     /// Fits the spin. Before the first speed and after the last one it continues down to a
     /// standstill.
-    pub(super) fn smoothed(&self) -> Option<SmoothedSpin> {
+    pub(super) fn smooth_spin(&self) -> Option<SmoothedSpin> {
         let (times_s, speeds) = self.speeds();
-        let mut smoothed = smoothed(&times_s, &speeds)?;
-        continue_to_rest(&mut smoothed.spin);
-        smoothed.drawn.iter_mut().for_each(continue_to_rest);
-        Some(smoothed)
+        let mut smoothed_spin = smooth_spin(&times_s, &speeds)?;
+        continue_to_rest(&mut smoothed_spin.spin);
+        smoothed_spin.random_spins.iter_mut().for_each(continue_to_rest);
+        Some(smoothed_spin)
     }
 }
 
@@ -250,25 +251,27 @@ mod tests {
     #[test]
     fn the_spin_by_pulses_keeps_the_drums_angle() {
         let time_s: Vec<f64> = (0..26_000).map(|k| 0.001 * f64::from(k)).collect();
-        let mark = |t: f64| if (turns(t) + 0.7).fract() < 0.1 { 1.0 } else { 0.0 };
-        let teeth = |t: f64| {
+        let one_pulse_voltage = |t: f64| if (turns(t) + 0.7).fract() < 0.1 { 1.0 } else { 0.0 };
+        let twelve_teeth_voltage = |t: f64| {
             let volts = 2.5 + 2.4 * (std::f64::consts::TAU * 12.0 * turns(t)).sin();
             if (1000.0 * t) as u32 % 7 == 3 { f64::NAN } else { volts }
         };
-        for (per_turn, signal) in [(1, &mark as &dyn Fn(f64) -> f64), (12, &teeth)] {
+        for (per_turn, signal) in
+            [(1, &one_pulse_voltage as &dyn Fn(f64) -> f64), (12, &twelve_teeth_voltage)]
+        {
             let signal: Vec<f64> = time_s.iter().map(|t| signal(*t)).collect();
             let signal_kind = (PulseSignal::Voltage, per_turn);
             let pulses = Pulses::read(&time_s, &signal, signal_kind).unwrap();
             let [first_rpm, greatest_rpm] = pulses.first_and_greatest_rpm(0.0);
             assert!(first_rpm < 5.0 && (greatest_rpm - 350.0).abs() < 7.0, "{pulses:?}");
-            let found = pulses.smoothed().unwrap();
+            let smoothed = pulses.smooth_spin().unwrap();
             let mut angle = 0.0;
-            let mut worst = 0.0_f64;
-            for (t, speed) in time_s.iter().zip(found.spin.speeds_rpm(time_s.iter().copied())) {
-                worst = worst.max((angle - turns(*t)).abs());
+            let mut greatest_error = 0.0_f64;
+            for (t, speed) in time_s.iter().zip(smoothed.spin.speeds_rpm(time_s.iter().copied())) {
+                greatest_error = greatest_error.max((angle - turns(*t)).abs());
                 angle += speed / 60.0 * 0.001;
             }
-            assert!(worst < 0.02, "{per_turn}: {worst} {:?}", found.spin);
+            assert!(greatest_error < 0.02, "{per_turn}: {greatest_error} {:?}", smoothed.spin);
         }
     }
 
@@ -278,13 +281,14 @@ mod tests {
         let signal = |period: usize, rows: usize| -> Vec<f64> {
             (0..40).map(|k| if k < rows && k % period == period - 1 { 1.0 } else { 0.0 }).collect()
         };
-        let read = |signal: &[f64]| Pulses::read(&time_s, signal, (PulseSignal::Voltage, 1));
-        assert_eq!(read(&signal(4, 8)), Err(PulseError::FewPulses(2)));
-        assert_eq!(read(&[1.0; 40]), Err(PulseError::FewPulses(0)));
+        let read_voltage =
+            |signal: &[f64]| Pulses::read(&time_s, signal, (PulseSignal::Voltage, 1));
+        assert_eq!(read_voltage(&signal(4, 8)), Err(PulseError::FewPulses(2)));
+        assert_eq!(read_voltage(&[1.0; 40]), Err(PulseError::FewPulses(0)));
         let count: Vec<f64> = (0..40).map(f64::from).collect();
-        assert_eq!(read(&count), Err(PulseError::FewPulses(1)));
-        assert_eq!(read(&signal(2, 40)), Err(PulseError::Fast(3)));
-        let pulses = read(&signal(4, 40)).unwrap();
+        assert_eq!(read_voltage(&count), Err(PulseError::FewPulses(1)));
+        assert_eq!(read_voltage(&signal(2, 40)), Err(PulseError::Fast(3)));
+        let pulses = read_voltage(&signal(4, 40)).unwrap();
         assert!((pulses.edges_s[0] - 0.025).abs() < 1e-12, "{pulses:?}");
         assert!(pulses.speeds().1.iter().all(|speed| (speed - 1500.0).abs() < 1e-6), "{pulses:?}");
     }
@@ -292,7 +296,7 @@ mod tests {
     /// Returns the greatest difference between the angle of the spin by a signal and the drum's
     /// (turns).
     fn angle_error(time_s: &[f64], signal: &[f64], kind: (PulseSignal, u32)) -> f64 {
-        let spin = Pulses::read(time_s, signal, kind).unwrap().smoothed().unwrap().spin;
+        let spin = Pulses::read(time_s, signal, kind).unwrap().smooth_spin().unwrap().spin;
         let mut angle = 0.0;
         let mut last_s = 0.0;
         let mut greatest_error = 0.0_f64;
@@ -333,20 +337,26 @@ mod tests {
     #[test]
     fn counts_that_fall_or_are_few_are_refused() {
         let time_s: Vec<f64> = (0..40).map(|k| 0.01 * f64::from(k)).collect();
-        let read = |kind: PulseSignal, signal: &dyn Fn(u32) -> f64| {
+        let read_signal = |kind: PulseSignal, signal: &dyn Fn(u32) -> f64| {
             let signal: Vec<f64> = (0..40).map(signal).collect();
             Pulses::read(&time_s, &signal, (kind, 1))
         };
         let sawtooth = |k: u32| f64::from(k % 10);
-        assert_eq!(read(PulseSignal::Count, &sawtooth), Err(PulseError::Falling(10)));
+        assert_eq!(read_signal(PulseSignal::Count, &sawtooth), Err(PulseError::Falling(10)));
         // A reset, which no overflow explains.
-        let reset = |k: u32| if k < 20 { 40_000.0 + f64::from(k) } else { f64::from(k) };
-        assert_eq!(read(PulseSignal::Count, &reset), Err(PulseError::Falling(20)));
-        let step = |k: u32| if k < 20 { 0.0 } else { 1.0 };
-        assert_eq!(read(PulseSignal::Count, &step), Err(PulseError::FewReadings(1)));
-        let negative = |k: u32| if k == 3 { -1.0 } else { 1.0 };
-        assert_eq!(read(PulseSignal::CountPerRow, &negative), Err(PulseError::Falling(3)));
-        let missing = |k: u32| if k == 3 { f64::NAN } else { 1.0 };
-        assert_eq!(read(PulseSignal::CountPerRow, &missing), Err(PulseError::Missing(3)));
+        let reset_counter = |k: u32| if k < 20 { 40_000.0 + f64::from(k) } else { f64::from(k) };
+        assert_eq!(read_signal(PulseSignal::Count, &reset_counter), Err(PulseError::Falling(20)));
+        let single_step = |k: u32| if k < 20 { 0.0 } else { 1.0 };
+        assert_eq!(read_signal(PulseSignal::Count, &single_step), Err(PulseError::FewReadings(1)));
+        let with_negative = |k: u32| if k == 3 { -1.0 } else { 1.0 };
+        assert_eq!(
+            read_signal(PulseSignal::CountPerRow, &with_negative),
+            Err(PulseError::Falling(3))
+        );
+        let with_missing = |k: u32| if k == 3 { f64::NAN } else { 1.0 };
+        assert_eq!(
+            read_signal(PulseSignal::CountPerRow, &with_missing),
+            Err(PulseError::Missing(3))
+        );
     }
 }

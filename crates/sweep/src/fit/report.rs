@@ -17,18 +17,20 @@ use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, format_range, format_table};
 use sweep_engine::config::section::counted;
 
-/// The greatest ratio of a signal's size to that in another unit with which it is taken for one in
-/// that unit. Basis: models of the test data differ from their records by less. Doubling it names
-/// wrong units of more records.
+/// The greatest factor between a signal's size and the model's size in another unit at which the
+/// signal is reported to be in that unit. Basis: models of the test data differ from their records
+/// by less. Doubling it names wrong units of more records.
 const UNIT_SLACK: f64 = 1.5;
-/// The part of a fixed number's tolerance below which the record limits its error. Basis: less of a
-/// limit does not show in two digits of an interval. Doubling it says so of every number.
+/// The ratio of the error of a fixed number after the fit to its tolerance, below which the report
+/// says that the record limits the error. Basis: a ratio nearer to 1 does not change two digits of
+/// an interval. At twice this ratio the report says so of every number.
 const SEEN_RATIO: f64 = 0.9;
-/// The objection to a search that came to no end.
-const UNSETTLED: &str = "not known: the search did not come to its end, so no intervals; expected \
-                         a nearer start (`--set NAME=VALUE`), ranges, or fewer `--free`";
+/// The objection to a fit whose search did not converge.
+const UNFINISHED_SEARCH: &str = "not known: the search did not come to its end, so no \
+                                 intervals; expected a nearer start (`--set NAME=VALUE`), ranges, \
+                                 or fewer `--free`";
 
-/// Numbers by the name of their column.
+/// A map from names of columns to numbers.
 type ByColumn<T> = BTreeMap<String, T>;
 
 /// The result of a fit. Numbers that are not known are null.
@@ -42,11 +44,11 @@ pub(crate) struct FitReport {
     pub(crate) parameters: Vec<FittedNumber>,
     /// The rows of the correlation matrix, in the order of the parameters.
     pub(crate) correlations: Vec<Vec<f64>>,
-    /// Statements on combinations of numbers that the data do not determine.
+    /// Descriptions of the combinations of parameters that the data do not determine.
     pub(crate) untold: Vec<String>,
     /// The number of fixed numbers that have a tolerance.
     pub(crate) fixed_numbers: usize,
-    /// The first file's entries, as in `files`.
+    /// The report of the first file, which is also the first entry of `files`.
     #[serde(flatten)]
     pub(crate) first: FileReport,
     pub(crate) files: Vec<FileReport>,
@@ -58,7 +60,7 @@ pub(crate) struct FitReport {
     pub(crate) evaluations: usize,
     /// The integration's step (s), if it is fixed.
     pub(crate) step_s: Option<f64>,
-    /// The number of standard errors by which half the step moves the number that it moves most.
+    /// The greatest change of a parameter, in standard errors, when the integration step is halved.
     pub(crate) step_effect: Option<f64>,
     /// The columns of speeds and times that seem to be in another unit, a clause each.
     pub(crate) suspected_units: Vec<String>,
@@ -71,20 +73,20 @@ pub(crate) struct FitReport {
 pub(crate) struct FittedNumber {
     pub(crate) name: String,
     pub(crate) unit: String,
-    /// The file that has a value of its own; `None` if all files share the value.
+    /// The file to which the value belongs; `None` if all files share the value.
     pub(crate) file: Option<String>,
     pub(crate) start: f64,
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
     /// The standard error by the measurement's noise alone.
     pub(crate) noise_error: Option<f64>,
-    /// The fixed number whose tolerance moves it most.
+    /// The fixed number whose tolerance changes the fitted value most.
     pub(crate) depends_on: Option<Dependence>,
     /// The 95 % interval within the range of the number.
     pub(crate) interval_95: Option<[f64; 2]>,
-    /// The interval by fits of resampled residuals, if they were asked for.
+    /// The 95 % interval from fits to resampled residuals (`--bootstrap`).
     pub(crate) bootstrap_95: Option<[f64; 2]>,
-    /// Whether the value is at an end of its range.
+    /// Whether the value is at a limit of its range.
     pub(crate) at_bound: bool,
 }
 
@@ -95,14 +97,15 @@ pub(crate) struct Dependence {
     pub(crate) unit: String,
     /// The standard deviation of the fixed number.
     pub(crate) tolerance: f64,
-    /// The error of the fixed number that the record leaves open.
+    /// The standard deviation of the fixed number after the fit, which the record may have reduced.
     pub(crate) error: f64,
     /// The change of the fitted number by `error`.
     pub(crate) moves_by: f64,
 }
 
 impl FittedNumber {
-    /// Returns the name, and the file if it has a value of its own.
+    /// Returns the parameter's name, followed by its file in parentheses if the value belongs to
+    /// one file.
     fn label(&self) -> String {
         let file = self.file.iter().map(|file| format!(" ({file})"));
         std::iter::once(self.name.clone()).chain(file).collect()
@@ -146,58 +149,61 @@ pub(crate) struct Minimum {
 /// The data of a report.
 pub(super) struct ReportData<'a> {
     pub(super) problem: &'a Problem<'a>,
-    /// The clause of each case that its speed or time seems to be in another unit, if it does.
-    pub(super) suspicions: &'a [Option<String>],
+    /// For each case, the statement that its speed or time seems to be in another unit; `None` if
+    /// it does not.
+    pub(super) unit_suspicions: &'a [Option<String>],
     pub(super) minima: &'a [Descent],
-    pub(super) against: &'a [SignalComparison],
-    pub(super) at_start: &'a [SignalComparison],
+    pub(super) comparisons: &'a [SignalComparison],
+    pub(super) start_comparisons: &'a [SignalComparison],
     pub(super) statistics: &'a Statistics,
     pub(super) evaluations: usize,
     pub(super) step_effect: Option<f64>,
     pub(super) resampled: Option<&'a [Vec<f64>]>,
-    /// Rows of the map over the fitted distribution.
+    /// The number of samples drawn from the fitted distribution for the verdict's probability.
     pub(super) draws: u64,
 }
 
 impl ReportData<'_> {
-    /// Makes the report.
+    /// Returns the report of the fit.
     pub(super) fn report(&self) -> Result<FitReport, Error> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
-        let suspected_units: Vec<String> = self.suspicions.iter().flatten().cloned().collect();
-        // A search ends early where a unit is suspected, which is not a failure of the search.
+        let suspected_units: Vec<String> = self.unit_suspicions.iter().flatten().cloned().collect();
+        // If a unit is suspected, the search is limited to a few evaluations. Its early end is then
+        // no reason to reject the fit.
         let is_unfinished = !best.is_settled && suspected_units.is_empty();
-        let unsettled = is_unfinished.then(|| UNSETTLED.to_owned());
-        let objection = unsettled.or_else(|| statistics.objection(problem));
+        let unfinished = is_unfinished.then(|| UNFINISHED_SEARCH.to_owned());
+        let objection = unfinished.or_else(|| statistics.objection(problem));
         let follows = objection.is_none();
         let covariance = statistics.free_covariance(problem);
         let by_noise = statistics.by_noise(problem);
         let error = |k: usize| covariance[k][k].max(0.0).sqrt();
         let noise_error = |k: usize| by_noise[k][k].max(0.0).sqrt();
-        let free = problem.free.len();
+        let free_count = problem.free.len();
         let correlation = |i: usize, j: usize| match error(i) * error(j) {
             _ if i == j => 1.0,
             size if size > 0.0 => covariance[i][j] / size,
             _ => 0.0,
         };
-        let correlations = |i: usize| (0..free).map(|j| correlation(i, j)).collect();
+        let correlations = |i: usize| (0..free_count).map(|j| correlation(i, j)).collect();
         let files = (0..problem.cases.len()).map(|case| self.file_report(case, follows));
         let files = files.collect::<Result<Vec<FileReport>, Error>>()?;
-        let parameters: Vec<FittedNumber> =
-            (0..free).map(|k| self.parameter(k, [error(k), noise_error(k)], follows)).collect();
+        let parameters: Vec<FittedNumber> = (0..free_count)
+            .map(|k| self.parameter(k, [error(k), noise_error(k)], follows))
+            .collect();
         let minimum = |descent: &Descent| Minimum {
             values: parameters
                 .iter()
                 .map(FittedNumber::label)
                 .zip(descent.x.iter().copied())
                 .collect(),
-            cost_above: descent.summary.cost - best.summary.cost,
+            cost_above: descent.equations.cost - best.equations.cost,
             evaluations: descent.evaluations,
         };
         Ok(FitReport {
             follows,
             objection,
-            correlations: (0..free).map(correlations).collect(),
+            correlations: (0..free_count).map(correlations).collect(),
             untold: statistics.untold(problem, &best.x),
             fixed_numbers: statistics.influences().len(),
             first: files[0].clone(),
@@ -214,26 +220,28 @@ impl ReportData<'_> {
     }
 
     fn parameter(&self, k: usize, [error, noise_error]: [f64; 2], follows: bool) -> FittedNumber {
-        let free = &self.problem.free[k];
+        let free_parameter = &self.problem.free[k];
         let value = self.minima[0].x[k];
-        let at_bound = free.range.contains(&value);
-        let known = follows && !at_bound && error > 0.0;
+        let at_bound = free_parameter.range.contains(&value);
+        let has_interval = follows && !at_bound && error > 0.0;
         let [least, most] = self.problem.range(k);
-        let by_noise = self.statistics.quantiles[k] * noise_error;
-        let by_fixed = Z_975 * Z_975 * (error * error - noise_error * noise_error).max(0.0);
-        let half_width = (by_noise * by_noise + by_fixed).sqrt();
+        let noise_half_width = self.statistics.quantiles[k] * noise_error;
+        let fixed_variance = Z_975 * Z_975 * (error * error - noise_error * noise_error).max(0.0);
+        let half_width = (noise_half_width * noise_half_width + fixed_variance).sqrt();
         let interval = [(value - half_width).max(least), (value + half_width).min(most)];
         FittedNumber {
-            name: free.parameter.name().to_owned(),
-            unit: free.parameter.unit().to_owned(),
-            file: free.case.map(|case| self.problem.cases[case].measured.name.clone()),
-            start: free.start,
+            name: free_parameter.parameter.name().to_owned(),
+            unit: free_parameter.parameter.unit().to_owned(),
+            file: free_parameter.case.map(|case| self.problem.cases[case].measurement.name.clone()),
+            start: free_parameter.start,
             value,
-            standard_error: known.then_some(error),
-            noise_error: known.then_some(noise_error),
-            depends_on: known.then(|| self.dependence(k)).flatten(),
-            interval_95: known.then_some(interval),
-            bootstrap_95: self.resampled.and_then(|sets| middle_95(sets.iter().map(|x| x[k]))),
+            standard_error: has_interval.then_some(error),
+            noise_error: has_interval.then_some(noise_error),
+            depends_on: has_interval.then(|| self.dependence(k)).flatten(),
+            interval_95: has_interval.then_some(interval),
+            bootstrap_95: self
+                .resampled
+                .and_then(|resampled_fits| middle_95(resampled_fits.iter().map(|x| x[k]))),
             at_bound,
         }
     }
@@ -241,45 +249,51 @@ impl ReportData<'_> {
     /// Returns the strongest dependence of a free number on a fixed one.
     fn dependence(&self, k: usize) -> Option<Dependence> {
         let influences = self.statistics.influences().iter();
-        let strongest = influences.max_by(|a, b| a.moves[k].abs().total_cmp(&b.moves[k].abs()))?;
+        let strongest =
+            influences.max_by(|a, b| a.effects[k].abs().total_cmp(&b.effects[k].abs()))?;
         Some(Dependence {
             name: strongest.name.clone(),
             unit: strongest.unit.to_owned(),
             tolerance: strongest.tolerance,
             error: strongest.error,
-            moves_by: strongest.moves[k],
+            moves_by: strongest.effects[k],
         })
     }
 
     fn file_report(&self, case: usize, follows: bool) -> Result<FileReport, Error> {
         let problem = self.problem;
         let x = &self.minima[0].x;
-        let measured = &problem.cases[case].measured;
+        let measurement = &problem.cases[case].measurement;
         let fitted_map = FittedMap { problem, x, statistics: self.statistics, draws: self.draws };
-        let comparisons = || {
-            let all = problem.signals().zip(self.against).enumerate();
-            all.filter(move |(_, ((signal_case, ..), _))| *signal_case == case)
+        let case_comparisons = || {
+            let numbered_comparisons = problem.signals().zip(self.comparisons).enumerate();
+            numbered_comparisons.filter(move |(_, ((signal_case, ..), _))| *signal_case == case)
         };
-        let by = |value: &dyn Fn(usize, &SignalComparison) -> f64| -> ByColumn<f64> {
-            comparisons()
-                .map(|(k, ((.., signal), one))| (signal.quantity.column(), value(k, one)))
+        let by_column = |value: &dyn Fn(usize, &SignalComparison) -> f64| -> ByColumn<f64> {
+            case_comparisons()
+                .map(|(k, ((.., signal), comparison))| {
+                    (signal.quantity.column(), value(k, comparison))
+                })
                 .collect()
         };
-        let rms = |one: &SignalComparison| {
-            (dot(&one.residual, &one.residual) / one.residual.len() as f64).sqrt()
+        let rms = |comparison: &SignalComparison| {
+            (dot(&comparison.residual, &comparison.residual) / comparison.residual.len() as f64)
+                .sqrt()
         };
         Ok(FileReport {
-            file: measured.name.clone(),
-            samples: measured.count(),
-            noise: by(&|k, one| rms(one) * (1.0 - self.statistics.motion[k][0]).sqrt()),
-            offset: by(&|_, one| one.offset),
-            shift_s: problem.with_shift.then(|| problem.shift_s(case, x)),
-            residual_rms: by(&|_, one| rms(one)),
-            explained: by(&|k, _| self.statistics.explained[k]),
-            autocorrelation: by(&|k, _| self.statistics.neighbours[k]),
-            widening: by(&|k, _| self.statistics.widening[k]),
-            spin: problem.cases[case].smoothed.clone(),
-            gaps_s: measured.gaps_s.clone(),
+            file: measurement.name.clone(),
+            samples: measurement.count(),
+            noise: by_column(&|k, comparison| {
+                rms(comparison) * (1.0 - self.statistics.motion[k][0]).sqrt()
+            }),
+            offset: by_column(&|_, comparison| comparison.offset),
+            shift_s: problem.fits_shift.then(|| problem.shift_s(case, x)),
+            residual_rms: by_column(&|_, comparison| rms(comparison)),
+            explained: by_column(&|k, _| self.statistics.explained[k]),
+            autocorrelation: by_column(&|k, _| self.statistics.neighbours[k]),
+            widening: by_column(&|k, _| self.statistics.widening[k]),
+            spin: problem.cases[case].smoothed_spin.clone(),
+            gaps_s: measurement.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
             verdict: (self.draws > 0).then(|| fitted_map.verdict(case, follows)).transpose()?,
         })
@@ -291,59 +305,62 @@ impl ReportData<'_> {
         // The start may be wrong by the factor of a unit. It is if channels of several units
         // follow, because no number of the machine compensates for the unit of one of them.
         let units = || self.problem.signals().map(|(.., signal)| signal.quantity.units().1);
-        let is_one = units().all(|unit| Some(unit) == units().next());
-        let by_start = is_one || self.statistics.objection(self.problem).is_some();
-        let signals = self.problem.signals().zip(self.against.iter().zip(self.at_start));
+        let have_one_unit = units().all(|unit| Some(unit) == units().next());
+        let considers_start = have_one_unit || self.statistics.objection(self.problem).is_some();
+        let signals =
+            self.problem.signals().zip(self.comparisons.iter().zip(self.start_comparisons));
         for ((case, _, signal), (end, start)) in signals {
-            // At wrong speeds the model's size says nothing of a channel's unit.
-            if self.suspicions[case].is_some() {
+            // A model at wrong speeds does not show the unit of a channel.
+            if self.unit_suspicions[case].is_some() {
                 continue;
             }
-            let (unit, mistaken) = signal.quantity.units();
-            let Some((other, factor)) = mistaken else { continue };
-            let swing = signal.swing();
-            let size = |one: &SignalComparison| {
-                let moves = signal.samples().map(|(row, _)| one.model[row]);
-                let (moves, _) = centred(moves.collect());
-                (dot(&swing, &swing) / dot(&moves, &moves)).sqrt()
+            let (unit, unit_by_mistake) = signal.quantity.units();
+            let Some((other, factor)) = unit_by_mistake else { continue };
+            let swing = signal.centred_values();
+            let size = |comparison: &SignalComparison| {
+                let model_values = signal.samples().map(|(row, _)| comparison.model[row]);
+                let (model_values, _) = centred(model_values.collect());
+                (dot(&swing, &swing) / dot(&model_values, &model_values)).sqrt()
             };
-            let sizes = [Some(size(end)), by_start.then(|| size(start))];
-            let fits =
+            let sizes = [Some(size(end)), considers_start.then(|| size(start))];
+            let is_near_factor =
                 |size: f64, factor: f64| (1.0 / UNIT_SLACK..UNIT_SLACK).contains(&(size / factor));
-            let twice = format!("have been converted from {other} once too often");
+            let converted_twice = format!("have been converted from {other} once too often");
             let column = signal.quantity.column();
-            let file = &self.problem.cases[case].measured.name;
-            for (factor, seems) in [(factor, format!("be in {other}")), (1.0 / factor, twice)] {
-                let size = sizes.into_iter().flatten().find(|size| fits(*size, factor));
+            let file = &self.problem.cases[case].measurement.name;
+            for (factor, correction) in
+                [(factor, format!("be in {other}")), (1.0 / factor, converted_twice)]
+            {
+                let size = sizes.into_iter().flatten().find(|size| is_near_factor(*size, factor));
                 notes.extend(size.map(|size| {
                     format!(
                         "{column} of {file} is {size:.3} times as large as the model's: it seems \
-                         to {seems} ({factor:.4}), expected {unit}"
+                         to {correction} ({factor:.4}), expected {unit}"
                     )
                 }));
             }
         }
         for case in &self.problem.cases {
-            let measured = &case.measured;
-            if let Some(start) = measured.clock_start() {
+            let measurement = &case.measurement;
+            if let Some(start) = measurement.clock_start() {
                 notes.push(format!(
                     "{}: its clock reads {start} at the first row; the run is taken to begin \
                      there",
-                    measured.name
+                    measurement.name
                 ));
             }
-            if measured.early > 0 {
-                let rows = counted(measured.early, "row");
-                notes.push(format!("{}: {rows} before time 0 left out", measured.name));
+            if measurement.early > 0 {
+                let rows = counted(measurement.early, "row");
+                notes.push(format!("{}: {rows} before time 0 left out", measurement.name));
             }
-            for [from, to] in &measured.gaps_s {
-                notes.push(format!("{} has no rows from {from} to {to} s", measured.name));
+            for [from, to] in &measurement.gaps_s {
+                notes.push(format!("{} has no rows from {from} to {to} s", measurement.name));
             }
             if let Some(first) = case.first_rpm().filter(|first| first.abs() > 5.0) {
                 notes.push(format!(
                     "{} begins at {first:.1} rpm: the model starts at rest there, and is not the \
                      machine's before its start has died away",
-                    measured.name
+                    measurement.name
                 ));
             }
         }
@@ -354,7 +371,7 @@ impl ReportData<'_> {
 impl FitReport {
     /// Formats the report as a command prints it.
     pub(crate) fn text(&self) -> String {
-        let short = |value: f64| {
+        let format_short = |value: f64| {
             if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
                 let digits = (5 - value.abs().log10().floor().clamp(-4.0, 5.0) as i32).max(0);
                 format!("{value:.*}", digits as usize)
@@ -362,13 +379,14 @@ impl FitReport {
                 format!("{value:.4e}")
             }
         };
-        let interval = |ends| format_range(ends, short);
+        let format_interval = |ends| format_range(ends, format_short);
         let row = |fit: &FittedNumber| {
             let unknown = if fit.at_bound { "at its bound" } else { "not known" };
-            let known = fit.interval_95.map_or_else(|| unknown.to_owned(), interval);
-            let error = fit.standard_error.map_or_else(|| "-".to_owned(), short);
-            let mut row = vec![fit.label(), fit.unit.clone(), short(fit.value), error, known];
-            row.extend(fit.bootstrap_95.map(interval));
+            let interval_text = fit.interval_95.map_or_else(|| unknown.to_owned(), format_interval);
+            let error = fit.standard_error.map_or_else(|| "-".to_owned(), format_short);
+            let mut row =
+                vec![fit.label(), fit.unit.clone(), format_short(fit.value), error, interval_text];
+            row.extend(fit.bootstrap_95.map(format_interval));
             row
         };
         let rows: Vec<Vec<String>> = self.parameters.iter().map(row).collect();
@@ -378,62 +396,64 @@ impl FitReport {
             headings.push("by bootstrap".to_owned());
         }
         let mut text = String::new();
-        let model = match &self.objection {
+        let model_text = match &self.objection {
             None => "follows the measurement within its noise".to_owned(),
-            Some(reason) if reason == UNSETTLED => reason.clone(),
+            Some(reason) if reason == UNFINISHED_SEARCH => reason.clone(),
             Some(reason) => {
                 format!("does not follow the measurement: {reason}; so no intervals")
             }
         };
-        text.line("model", model);
+        text.line("model", model_text);
         self.suspected_units.iter().for_each(|clause| text.line("unit", clause));
-        // Without a free number the model is compared alone.
+        // Without free parameters there is no table of fitted values.
         if !rows.is_empty() {
             text.push_str(&format_table(&headings, &rows, ""));
         }
-        let mut say = |what: &str, said: &str| text.line(what, said);
-        self.untold.iter().for_each(|untold| say("untold", untold));
+        let mut push_line = |what: &str, text_of_line: &str| text.line(what, text_of_line);
+        self.untold.iter().for_each(|untold| push_line("untold", untold));
         for fit in &self.parameters {
-            let Some(on) = &fit.depends_on else { continue };
-            let error = format!("{} {}", short(on.error), on.unit);
-            // The error that the record leaves open is less than the tolerance where the record
-            // limits it.
-            let limit = if on.error < SEEN_RATIO * on.tolerance {
-                format!(" (of {}: the record limits it)", short(on.tolerance))
+            let Some(fixed) = &fit.depends_on else { continue };
+            let error = format!("{} {}", format_short(fixed.error), fixed.unit);
+            // An error that is clearly below the tolerance shows that the record limits it.
+            let limit = if fixed.error < SEEN_RATIO * fixed.tolerance {
+                format!(" (of {}: the record limits it)", format_short(fixed.tolerance))
             } else {
                 String::new()
             };
             let effect = format!(
                 "{} on {}: an error of {}{limit} moves it by {} {}, most of {}",
                 fit.label(),
-                on.name,
+                fixed.name,
                 error.trim_end(),
-                short(on.moves_by.abs()),
+                format_short(fixed.moves_by.abs()),
                 fit.unit,
                 counted(self.fixed_numbers, "fixed number"),
             );
-            let noise = fit.noise_error.map_or_else(|| "-".to_owned(), short);
-            say("depends", &format!("{effect}; by noise alone its standard error is {noise}"));
+            let noise = fit.noise_error.map_or_else(|| "-".to_owned(), format_short);
+            push_line(
+                "depends",
+                &format!("{effect}; by noise alone its standard error is {noise}"),
+            );
         }
         if self.follows && self.fixed_numbers == 0 && !self.parameters.is_empty() {
-            say("depends", "on nothing: fixed numbers are taken as exact");
+            push_line("depends", "on nothing: fixed numbers are taken as exact");
         }
         for file in &self.files {
             let column = |(column, noise): (&String, &f64)| {
                 let explained = file.explained.get(column).copied().unwrap_or_default();
                 let residual = 100.0 * (1.0 - explained).max(0.0).sqrt();
-                format!("{column} {} ({residual:.1} %)", short(*noise))
+                format!("{column} {} ({residual:.1} %)", format_short(*noise))
             };
             let columns: Vec<String> = file.noise.iter().map(column).collect();
-            say("file", &format!("{}: {} samples", file.file, file.samples));
-            say("noise", &format!("{} (residual over signal)", columns.join(", ")));
+            push_line("file", &format!("{}: {} samples", file.file, file.samples));
+            push_line("noise", &format!("{} (residual over signal)", columns.join(", ")));
             if let Some(shift_s) = file.shift_s {
                 let direction = if shift_s < 0.0 { "late" } else { "early" };
-                say("clock", &format!("{:.6} s {direction}", shift_s.abs()));
+                push_line("clock", &format!("{:.6} s {direction}", shift_s.abs()));
             }
             if let Some(spin) = &file.spin {
-                let noise = short(spin.noise_rpm);
-                say("spin", &format!("measured: {} knots, noise {noise} rpm", spin.knots));
+                let noise = format_short(spin.noise_rpm);
+                push_line("spin", &format!("measured: {} knots, noise {noise} rpm", spin.knots));
             }
             if let Some(verdict) = &file.verdict {
                 let what = match verdict.reliable {
@@ -441,36 +461,41 @@ impl FitReport {
                     Some(false) => "not reliable",
                     None => "undefined",
                 };
-                let ratio =
-                    verdict.ratio_max.map(|ratio| format!(", greatest ratio {}", short(ratio)));
+                let ratio = verdict
+                    .ratio_max
+                    .map(|ratio| format!(", greatest ratio {}", format_short(ratio)));
                 let ratio = ratio.unwrap_or_default();
-                let chance = match (verdict.probability_reliable, verdict.ratio_max_95) {
+                let probability_text = match (verdict.probability_reliable, verdict.ratio_max_95) {
                     (Some(share), Some(ends)) => format!(
                         "; reliable with probability {share:.3} (ratio {} in 95 % of {} rows)",
-                        interval(ends),
+                        format_interval(ends),
                         verdict.draws
                     ),
                     _ => "; no probability, because the intervals are not known".to_owned(),
                 };
-                // A machine that does not follow says nothing of the measured one.
-                let of = if self.follows { "" } else { "of the numbers above alone: " };
-                say("verdict", &format!("{of}{what}{ratio}{chance}"));
-                if let Some(margin) = verdict.margin(&short) {
-                    say("margin", &format!("{of}{margin}"));
+                // If the model does not follow the measurement, its verdict does not hold for the
+                // measured machine.
+                let scope = if self.follows { "" } else { "of the numbers above alone: " };
+                push_line("verdict", &format!("{scope}{what}{ratio}{probability_text}"));
+                if let Some(margin) = verdict.margin(&format_short) {
+                    push_line("margin", &format!("{scope}{margin}"));
                 }
             }
         }
         for (k, minimum) in self.minima.iter().enumerate().skip(1) {
-            let values: Vec<String> =
-                minimum.values.iter().map(|(name, x)| format!("{name} {}", short(*x))).collect();
-            let above = short(minimum.cost_above);
-            say("minimum", &format!("{}: {}, cost above {above}", k + 1, values.join(", ")));
+            let values: Vec<String> = minimum
+                .values
+                .iter()
+                .map(|(name, x)| format!("{name} {}", format_short(*x)))
+                .collect();
+            let above = format_short(minimum.cost_above);
+            push_line("minimum", &format!("{}: {}, cost above {above}", k + 1, values.join(", ")));
         }
         let effect = self.step_effect.map_or_else(String::new, |effect| {
             format!("; half the step moves numbers by {effect:.3} standard errors at most")
         });
-        say("search", &format!("{} evaluations{effect}", self.evaluations));
-        self.notes.iter().for_each(|note| say("note", note));
+        push_line("search", &format!("{} evaluations{effect}", self.evaluations));
+        self.notes.iter().for_each(|note| push_line("note", note));
         text
     }
 }

@@ -27,7 +27,7 @@ pub(super) const MAX_EVALUATIONS: usize = 200;
 #[derive(Clone, Debug)]
 pub(crate) struct Descent {
     pub(crate) x: Vec<f64>,
-    pub(crate) summary: NormalEquations,
+    pub(crate) equations: NormalEquations,
     /// The number of points at which the model and its derivatives were computed.
     pub(crate) evaluations: usize,
     /// Whether no step decreases the cost further.
@@ -41,69 +41,75 @@ pub(crate) fn descend(
     max_evaluations: usize,
     evaluate: &dyn Fn(&[f64]) -> Result<Option<NormalEquations>, DescentEnd>,
 ) -> Result<Option<Descent>, DescentEnd> {
-    let Some(mut now) = evaluate(start)? else { return Ok(None) };
+    let Some(mut current) = evaluate(start)? else { return Ok(None) };
     let mut x = start.to_vec();
     let mut evaluations = 1;
     let mut damping = 1e-3;
-    let mut stretch = 1.0;
-    let done = |x, summary, evaluations, is_settled| {
-        Ok(Some(Descent { x, summary, evaluations, is_settled }))
+    let mut step_scale = 1.0;
+    let finish = |x, equations, evaluations, is_settled| {
+        Ok(Some(Descent { x, equations, evaluations, is_settled }))
     };
     loop {
         // A number at an end of its range stays if the step would leave the range.
-        let moving: Vec<usize> = (0..x.len())
+        let free_indices: Vec<usize> = (0..x.len())
             .filter(|&k| {
                 let [from, to] = ranges[k];
-                let pull = now.pull[k];
-                now.normal[k][k] > 0.0 && !(x[k] <= from && pull < 0.0 || x[k] >= to && pull > 0.0)
+                let rhs = current.rhs[k];
+                current.normal[k][k] > 0.0
+                    && !(x[k] <= from && rhs < 0.0 || x[k] >= to && rhs > 0.0)
             })
             .collect();
-        let part: Vec<Vec<f64>> =
-            moving.iter().map(|&i| moving.iter().map(|&j| now.normal[i][j]).collect()).collect();
-        let (unit, scale) = scaled(&part);
+        let free_normal: Vec<Vec<f64>> = free_indices
+            .iter()
+            .map(|&i| free_indices.iter().map(|&j| current.normal[i][j]).collect())
+            .collect();
+        let (unit, scale) = scaled(&free_normal);
         let eigen = Symmetric::from_matrix(&unit);
-        let pull: Vec<f64> = moving.iter().zip(&scale).map(|(&k, s)| now.pull[k] / s).collect();
-        let solved = |damping: f64| eigen.apply(&pull, |value| 1.0 / (value.max(0.0) + damping));
+        let rhs: Vec<f64> =
+            free_indices.iter().zip(&scale).map(|(&k, s)| current.rhs[k] / s).collect();
+        let solve = |damping: f64| eigen.apply(&rhs, |value| 1.0 / (value.max(0.0) + damping));
         // The decrease of the cost, as predicted by the quadratic model.
-        let decrease = dot(&solved(MIN_DAMPING), &pull);
-        if decrease < MIN_DECREASE {
-            return done(x, now, evaluations, true);
+        let predicted_decrease = dot(&solve(MIN_DAMPING), &rhs);
+        if predicted_decrease < MIN_DECREASE {
+            return finish(x, current, evaluations, true);
         }
         loop {
-            let solution = solved(damping);
+            let solution = solve(damping);
             let step: Vec<f64> = solution.iter().zip(&scale).map(|(step, s)| step / s).collect();
-            let length = moving.iter().zip(&step).fold(stretch, |share: f64, (&k, step)| {
-                let width = ranges[k][1] - ranges[k][0];
-                let width = if width.is_finite() { 0.1 * width } else { 0.0 };
-                let size = x[k].abs().max(start[k].abs()).max(width);
-                share.min(MAX_STEP_RATIO * size / step.abs())
-            });
+            let step_length =
+                free_indices.iter().zip(&step).fold(step_scale, |share: f64, (&k, step)| {
+                    let width = ranges[k][1] - ranges[k][0];
+                    let width = if width.is_finite() { 0.1 * width } else { 0.0 };
+                    let size = x[k].abs().max(start[k].abs()).max(width);
+                    share.min(MAX_STEP_RATIO * size / step.abs())
+                });
             let mut trial = x.clone();
-            for (&k, step) in moving.iter().zip(&step) {
-                trial[k] = (trial[k] + length * step).clamp(ranges[k][0], ranges[k][1]);
+            for (&k, step) in free_indices.iter().zip(&step) {
+                trial[k] = (trial[k] + step_length * step).clamp(ranges[k][0], ranges[k][1]);
             }
             // Rounding errors and corners of friction may hide a small decrease.
             if evaluations >= max_evaluations || damping > 1e4 {
-                return done(
+                return finish(
                     x,
-                    now,
+                    current,
                     evaluations,
-                    damping > 1e4 && decrease < MAX_UNACHIEVED_DECREASE,
+                    damping > 1e4 && predicted_decrease < MAX_UNACHIEVED_DECREASE,
                 );
             }
             evaluations += 1;
             match evaluate(&trial)? {
-                Some(found) if found.cost < now.cost => {
+                Some(trial_equations) if trial_equations.cost < current.cost => {
                     // A large residual makes successful steps too short. The next one is longer by
                     // the ratio of this step's actual and predicted decrease.
-                    let gain = (now.cost - found.cost) / (length * dot(&solution, &pull));
-                    let longer = (length / (2.0 - gain).max(0.25)).max(1.0);
-                    stretch = if damping > MIN_DAMPING { 1.0 } else { longer };
-                    (x, now) = (trial, found);
+                    let decrease_ratio = (current.cost - trial_equations.cost)
+                        / (step_length * dot(&solution, &rhs));
+                    let longer_scale = (step_length / (2.0 - decrease_ratio).max(0.25)).max(1.0);
+                    step_scale = if damping > MIN_DAMPING { 1.0 } else { longer_scale };
+                    (x, current) = (trial, trial_equations);
                     damping = (damping * 0.1).max(MIN_DAMPING);
                     break;
                 }
-                _ if stretch > 1.0 => stretch = 1.0,
+                _ if step_scale > 1.0 => step_scale = 1.0,
                 _ => damping = (damping * 10.0).max(1e-4),
             }
         }
@@ -134,12 +140,12 @@ mod tests {
         let residual = [-10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let slopes = [[-20.0 * x[0], 1.0], [10.0, 0.0]];
         let normal = slopes.map(|a| slopes.map(|b| dot(&a, &b)).to_vec()).to_vec();
-        let pull = slopes.map(|a| dot(&a, &residual)).to_vec();
+        let rhs = slopes.map(|a| dot(&a, &residual)).to_vec();
         Ok(Some(NormalEquations {
             cost: dot(&residual, &residual),
             sigma: vec![1.0; 2],
             normal,
-            pull,
+            rhs,
         }))
     }
 
@@ -151,28 +157,34 @@ mod tests {
             let residual = [x[0] + 1.0, bend * x[0] * x[0] + x[0] - 1.0].map(|r| 100.0 * r);
             let slopes = [-100.0, -100.0 * (2.0 * bend * x[0] + 1.0)];
             let normal = vec![vec![dot(&slopes, &slopes)]];
-            let pull = vec![dot(&slopes, &residual)];
+            let rhs = vec![dot(&slopes, &residual)];
             Ok(Some(NormalEquations {
                 cost: dot(&residual, &residual),
                 sigma: vec![1.0; 2],
                 normal,
-                pull,
+                rhs,
             }))
         };
-        let free = [[f64::NEG_INFINITY, f64::INFINITY]];
-        let found = descend(&[1.0], &free, MAX_EVALUATIONS, &evaluate).unwrap().unwrap();
-        assert!(found.is_settled && found.evaluations < 40, "{found:?}");
-        assert!(found.x[0].abs() < 0.01, "{found:?}");
+        let unbounded = [[f64::NEG_INFINITY, f64::INFINITY]];
+        let descent = descend(&[1.0], &unbounded, MAX_EVALUATIONS, &evaluate).unwrap().unwrap();
+        assert!(descent.is_settled && descent.evaluations < 40, "{descent:?}");
+        assert!(descent.x[0].abs() < 0.01, "{descent:?}");
     }
 
     #[test]
     fn a_curved_valley_is_followed_to_its_end_or_to_a_bound() {
-        let free = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
-        let found = descend(&[-1.2, 1.0], &free, MAX_EVALUATIONS, &valley).unwrap().unwrap();
-        assert!(found.is_settled && found.evaluations < 60, "{found:?}");
-        assert!((found.x[0] - 1.0).abs() < 0.02 && (found.x[1] - 1.0).abs() < 0.04, "{found:?}");
-        let bound = [[-2.0, 0.5], [-2.0, 2.0]];
-        let found = descend(&[-1.2, 1.0], &bound, MAX_EVALUATIONS, &valley).unwrap().unwrap();
-        assert!((found.x[0] - 0.5).abs() < 1e-9 && (found.x[1] - 0.25).abs() < 0.02, "{found:?}");
+        let unbounded = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+        let descent = descend(&[-1.2, 1.0], &unbounded, MAX_EVALUATIONS, &valley).unwrap().unwrap();
+        assert!(descent.is_settled && descent.evaluations < 60, "{descent:?}");
+        assert!(
+            (descent.x[0] - 1.0).abs() < 0.02 && (descent.x[1] - 1.0).abs() < 0.04,
+            "{descent:?}"
+        );
+        let bounded = [[-2.0, 0.5], [-2.0, 2.0]];
+        let descent = descend(&[-1.2, 1.0], &bounded, MAX_EVALUATIONS, &valley).unwrap().unwrap();
+        assert!(
+            (descent.x[0] - 0.5).abs() < 1e-9 && (descent.x[1] - 0.25).abs() < 0.02,
+            "{descent:?}"
+        );
     }
 }

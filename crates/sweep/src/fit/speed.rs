@@ -30,13 +30,13 @@ pub(crate) struct SmoothedSpin {
     pub(crate) knots: usize,
     /// Random splines, distributed by the noise about the fitted one.
     #[serde(skip)]
-    pub(crate) drawn: Vec<Spin>,
+    pub(crate) random_spins: Vec<Spin>,
 }
 
 /// Fits the least-squares spline of first degree, with as many knots as the noise justifies. Its
 /// integral, the angle, stays near the measured one, because the residuals of each span have a mean
 /// near zero.
-pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedSpin> {
+pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedSpin> {
     let samples: Vec<[f64; 2]> = time_s
         .iter()
         .zip(speed_rpm)
@@ -46,21 +46,22 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedSpin
     let [first, _] = samples.first()?;
     let [last, _] = samples.last()?;
     let greatest_rpm = samples.iter().fold(0.0_f64, |most, [_, speed]| most.max(speed.abs()));
-    let (rounding_rpm, held) = stairs(&samples).unwrap_or((0.0, 0.0));
-    let noise_rpm = noise(&samples).max(MIN_NOISE_RATIO * greatest_rpm).max(rounding_rpm);
+    let (rounding_rpm, samples_per_step) = digit_rounding(&samples).unwrap_or((0.0, 0.0));
+    let noise_rpm = estimate_noise(&samples).max(MIN_NOISE_RATIO * greatest_rpm).max(rounding_rpm);
     // The least gain of a knot by the Bayesian information criterion, with its position as a
     // parameter. A step of the tachometer's digits is no reason for a knot.
-    let worth = (3.0 * libm::log(samples.len() as f64)).max(2.0 * held) * noise_rpm * noise_rpm;
+    let min_gain =
+        (3.0 * libm::log(samples.len() as f64)).max(2.0 * samples_per_step) * noise_rpm * noise_rpm;
     let mut knots = vec![*first, *last];
-    let mut speeds = fitted(&samples, &knots)?;
+    let mut speeds = fit_spline(&samples, &knots)?;
     while knots.len() < MAX_KNOTS {
-        let further = further(&samples, &knots, &speeds, worth);
-        if further.is_empty() {
+        let further_knots = find_further_knots(&samples, &knots, &speeds, min_gain);
+        if further_knots.is_empty() {
             break;
         }
-        knots.extend(further);
+        knots.extend(further_knots);
         knots.sort_by(f64::total_cmp);
-        speeds = fitted(&samples, &knots)?;
+        speeds = fit_spline(&samples, &knots)?;
     }
     let spin = |mut speeds: Vec<f64>| {
         let mut times = knots.clone();
@@ -75,24 +76,30 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedSpin
         }
         Spin::Table { time_s: times, speed_rpm: speeds }
     };
-    let (normal, _) = SplineEquations::from_samples(&samples, &knots);
-    let usual = normal_draws(RANDOM_SPLINES);
+    let (spline_equations, _) = SplineEquations::from_samples(&samples, &knots);
+    let normal_draw = normal_draws(RANDOM_SPLINES);
     let draw = |point: u64| {
-        let even: Vec<f64> = (0..knots.len()).map(|k| usual(point, k)).collect();
-        let moved = normal.drawn(&even);
-        spin(speeds.iter().zip(&moved).map(|(speed, moved)| speed + noise_rpm * moved).collect())
+        let standard_normal: Vec<f64> = (0..knots.len()).map(|k| normal_draw(point, k)).collect();
+        let deviations = spline_equations.random_spins(&standard_normal);
+        spin(
+            speeds
+                .iter()
+                .zip(&deviations)
+                .map(|(speed, deviations)| speed + noise_rpm * deviations)
+                .collect(),
+        )
     };
-    let drawn = (0..RANDOM_SPLINES).map(draw).collect();
-    Some(SmoothedSpin { spin: spin(speeds), noise_rpm, knots: knots.len(), drawn })
+    let random_spins = (0..RANDOM_SPLINES).map(draw).collect();
+    Some(SmoothedSpin { spin: spin(speeds), noise_rpm, knots: knots.len(), random_spins })
 }
 
 /// Estimates the standard deviation of white noise about a smooth curve, from the median of the
 /// distances of samples to the line through their neighbours. Jumps do not change the median.
-fn noise(samples: &[[f64; 2]]) -> f64 {
-    let distances = samples.windows(3).map(|three| {
-        let share = (three[1][0] - three[0][0]) / (three[2][0] - three[0][0]);
+fn estimate_noise(samples: &[[f64; 2]]) -> f64 {
+    let distances = samples.windows(3).map(|neighbours| {
+        let share = (neighbours[1][0] - neighbours[0][0]) / (neighbours[2][0] - neighbours[0][0]);
         let [before, after] = [1.0 - share, share];
-        let distance = three[1][1] - before * three[0][1] - after * three[2][1];
+        let distance = neighbours[1][1] - before * neighbours[0][1] - after * neighbours[2][1];
         distance.abs() / (1.0 + before * before + after * after).sqrt()
     });
     // The median of |x| of a normal distribution.
@@ -102,7 +109,7 @@ fn noise(samples: &[[f64; 2]]) -> f64 {
 /// Returns the rounding error of a tachometer whose digits are coarser than its noise, and the
 /// usual number of samples between changes of a digit. Neighbouring samples do not show the noise
 /// of such a tachometer, because most of them are equal.
-fn stairs(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
+fn digit_rounding(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
     let steps = samples.windows(2).map(|pair| (pair[1][1] - pair[0][1]).abs());
     let steps = steps.filter(|step| *step > 0.0);
     let count = steps.clone().count();
@@ -111,7 +118,7 @@ fn stairs(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
 }
 
 /// Returns the index of the span in which a time lies, and the part of the span before it.
-fn place(knots: &[f64], time_s: f64) -> (usize, f64) {
+fn find_span(knots: &[f64], time_s: f64) -> (usize, f64) {
     let span = knots.partition_point(|&knot| knot <= time_s).clamp(1, knots.len() - 1) - 1;
     (span, (time_s - knots[span]) / (knots[span + 1] - knots[span]))
 }
@@ -126,83 +133,94 @@ impl SplineEquations {
     /// Computes the normal equations of splines with these knots, and their right side.
     fn from_samples(samples: &[[f64; 2]], knots: &[f64]) -> (Self, Vec<f64>) {
         let mut diagonal = vec![0.0; knots.len()];
-        let mut beside = vec![0.0; knots.len()];
-        let mut right = vec![0.0; knots.len()];
+        let mut off_diagonal = vec![0.0; knots.len()];
+        let mut rhs = vec![0.0; knots.len()];
         for &[time, speed] in samples {
-            let (k, share) = place(knots, time);
-            let rest = 1.0 - share;
-            diagonal[k] += rest * rest;
+            let (k, share) = find_span(knots, time);
+            let complement = 1.0 - share;
+            diagonal[k] += complement * complement;
             diagonal[k + 1] += share * share;
-            beside[k] += rest * share;
-            right[k] += rest * speed;
-            right[k + 1] += share * speed;
+            off_diagonal[k] += complement * share;
+            rhs[k] += complement * speed;
+            rhs[k + 1] += share * speed;
         }
         let mut factors = vec![0.0; knots.len()];
         for k in 1..knots.len() {
-            factors[k - 1] = beside[k - 1] / diagonal[k - 1];
-            diagonal[k] -= factors[k - 1] * beside[k - 1];
-            right[k] -= factors[k - 1] * right[k - 1];
+            factors[k - 1] = off_diagonal[k - 1] / diagonal[k - 1];
+            diagonal[k] -= factors[k - 1] * off_diagonal[k - 1];
+            rhs[k] -= factors[k - 1] * rhs[k - 1];
         }
-        right.iter_mut().zip(&diagonal).for_each(|(right, size)| *right /= size);
-        (Self { diagonal, factors }, right)
+        rhs.iter_mut().zip(&diagonal).for_each(|(rhs, size)| *rhs /= size);
+        (Self { diagonal, factors }, rhs)
     }
 
-    fn back(&self, mut right: Vec<f64>) -> Vec<f64> {
-        for k in (1..right.len()).rev() {
-            right[k - 1] -= self.factors[k - 1] * right[k];
+    fn substitute_back(&self, mut rhs: Vec<f64>) -> Vec<f64> {
+        for k in (1..rhs.len()).rev() {
+            rhs[k - 1] -= self.factors[k - 1] * rhs[k];
         }
-        right
+        rhs
     }
 
     /// Transforms independent numbers of variance 1 to numbers whose covariance is the inverse of
     /// the normal matrix.
-    fn drawn(&self, even: &[f64]) -> Vec<f64> {
-        self.back(even.iter().zip(&self.diagonal).map(|(even, size)| even / size.sqrt()).collect())
+    fn random_spins(&self, standard_normal: &[f64]) -> Vec<f64> {
+        self.substitute_back(
+            standard_normal
+                .iter()
+                .zip(&self.diagonal)
+                .map(|(standard_normal, size)| standard_normal / size.sqrt())
+                .collect(),
+        )
     }
 }
 
 /// Fits the spline's values at its knots, by least squares. `None` if they are not all determined.
-fn fitted(samples: &[[f64; 2]], knots: &[f64]) -> Option<Vec<f64>> {
-    let (normal, right) = SplineEquations::from_samples(samples, knots);
-    let speeds = normal.back(right);
+fn fit_spline(samples: &[[f64; 2]], knots: &[f64]) -> Option<Vec<f64>> {
+    let (equations, rhs) = SplineEquations::from_samples(samples, knots);
+    let speeds = equations.substitute_back(rhs);
     speeds.iter().all(|speed| speed.is_finite()).then_some(speeds)
 }
 
-/// Finds the best further knot of each span in which it gains more than `worth`.
-fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> Vec<f64> {
-    let mut found = Vec::new();
+/// Finds the best further knot of each span in which it gains more than `min_gain`.
+fn find_further_knots(
+    samples: &[[f64; 2]],
+    knots: &[f64],
+    speeds: &[f64],
+    min_gain: f64,
+) -> Vec<f64> {
+    let mut new_knots = Vec::new();
     for (span, ends) in knots.windows(2).enumerate() {
         let from = samples.partition_point(|[time, _]| *time < ends[0]);
         let to = samples.partition_point(|[time, _]| *time <= ends[1]);
-        let inside = &samples[from..to];
-        let mut best = (worth, None);
-        for tried in 1..=TRIED_POSITIONS {
-            let place = tried * inside.len() / (TRIED_POSITIONS + 1);
+        let span_samples = &samples[from..to];
+        let mut best = (min_gain, None);
+        for position in 1..=TRIED_POSITIONS {
+            let sample = position * span_samples.len() / (TRIED_POSITIONS + 1);
             // Each span keeps at least a few samples.
-            if place < 3 || place + 4 > inside.len() {
+            if sample < 3 || sample + 4 > span_samples.len() {
                 continue;
             }
-            let knot = inside[place][0];
-            let mut along = 0.0;
-            let mut size = 0.0;
-            for &[time, speed] in inside {
+            let knot = span_samples[sample][0];
+            let mut projection = 0.0;
+            let mut hat_square = 0.0;
+            for &[time, speed] in span_samples {
                 let share = (time - ends[0]) / (ends[1] - ends[0]);
                 let residual = speed - speeds[span] * (1.0 - share) - speeds[span + 1] * share;
                 let hat = match time <= knot {
                     true => (time - ends[0]) / (knot - ends[0]),
                     false => (ends[1] - time) / (ends[1] - knot),
                 };
-                along += hat * residual;
-                size += hat * hat;
+                projection += hat * residual;
+                hat_square += hat * hat;
             }
-            let gain = along * along / size;
+            let gain = projection * projection / hat_square;
             if gain > best.0 {
                 best = (gain, Some(knot));
             }
         }
-        found.extend(best.1);
+        new_knots.extend(best.1);
     }
-    found
+    new_knots
 }
 
 #[cfg(test)]
@@ -212,52 +230,59 @@ mod tests {
 
     #[test]
     fn a_noisy_course_with_kinks_keeps_its_angle() {
-        let course = |t: f64| if t < 7.3 { 40.0 * t } else { 292.0 - 20.0 * (t - 7.3) };
+        let true_speed = |t: f64| if t < 7.3 { 40.0 * t } else { 292.0 - 20.0 * (t - 7.3) };
         let normal = Distribution {
             shape: DistributionShape::Normal { mean: 0.0, sd: 1.5 },
             from: -9.0,
             to: 9.0,
         };
-        let noise = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 5 };
+        let estimate_noise = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 5 };
         let time_s: Vec<f64> = (0..3000).map(|k| 0.003 + 0.004 * f64::from(k)).collect();
         let speed: Vec<f64> = time_s
             .iter()
             .enumerate()
-            .map(|(k, t)| course(*t) + normal.quantile(noise.position(k as u64, 0).unwrap()))
+            .map(|(k, t)| {
+                true_speed(*t) + normal.quantile(estimate_noise.position(k as u64, 0).unwrap())
+            })
             .collect();
-        let found = smoothed(&time_s, &speed).unwrap();
-        assert!((found.noise_rpm - 1.5).abs() < 0.1, "{found:?}");
-        assert!((3..12).contains(&found.knots), "{found:?}");
+        let smoothed = smooth_spin(&time_s, &speed).unwrap();
+        assert!((smoothed.noise_rpm - 1.5).abs() < 0.1, "{smoothed:?}");
+        assert!((3..12).contains(&smoothed.knots), "{smoothed:?}");
         // At the end of a straight span of n samples: a variance of 4 / n.
-        let Spin::Table { time_s: knots, .. } = &found.spin else { panic!("{found:?}") };
+        let Spin::Table { time_s: knots, .. } = &smoothed.spin else { panic!("{smoothed:?}") };
         let span = (knots[knots.len() - 1] - knots[knots.len() - 2]) / 0.004;
-        let end = |spin: &Spin| spin.speeds_rpm([time_s[2999]]).next().unwrap();
-        let middle = end(&found.spin);
-        let square: f64 = found.drawn.iter().map(|spin| (end(spin) - middle).powi(2)).sum();
-        let error = (square / found.drawn.len() as f64).sqrt() / (1.5 * (4.0 / span).sqrt());
+        let end_speed = |spin: &Spin| spin.speeds_rpm([time_s[2999]]).next().unwrap();
+        let fitted_end = end_speed(&smoothed.spin);
+        let square: f64 =
+            smoothed.random_spins.iter().map(|spin| (end_speed(spin) - fitted_end).powi(2)).sum();
+        let error =
+            (square / smoothed.random_spins.len() as f64).sqrt() / (1.5 * (4.0 / span).sqrt());
         assert!((0.5..2.0).contains(&error), "{error}");
         let mut angle = 0.0_f64;
         let mut worst = 0.0_f64;
-        for (t, ours) in time_s.iter().zip(found.spin.speeds_rpm(time_s.iter().copied())) {
-            angle += (ours - course(*t)) / 60.0 * 0.004;
+        for (t, ours) in time_s.iter().zip(smoothed.spin.speeds_rpm(time_s.iter().copied())) {
+            angle += (ours - true_speed(*t)) / 60.0 * 0.004;
             worst = worst.max(angle.abs());
         }
         // Turns; the noise itself wanders by 1.5 / 60 sqrt(12 * 0.004) = 5e-3.
         assert!(worst < 0.01, "{worst}");
-        let exact: Vec<f64> = time_s.iter().map(|t| course(*t)).collect();
-        let found = smoothed(&time_s, &exact).unwrap();
-        let apart = time_s
+        let exact: Vec<f64> = time_s.iter().map(|t| true_speed(*t)).collect();
+        let smoothed = smooth_spin(&time_s, &exact).unwrap();
+        let greatest_difference = time_s
             .iter()
-            .zip(found.spin.speeds_rpm(time_s.iter().copied()))
-            .fold(0.0_f64, |most, (t, ours)| most.max((ours - course(*t)).abs()));
-        assert!(apart < 0.2, "{apart}: {found:?}");
+            .zip(smoothed.spin.speeds_rpm(time_s.iter().copied()))
+            .fold(0.0_f64, |most, (t, ours)| most.max((ours - true_speed(*t)).abs()));
+        assert!(greatest_difference < 0.2, "{greatest_difference}: {smoothed:?}");
         // Stairs of whole digits are no course.
         for digit in [1.0, 5.0] {
             let rounded: Vec<f64> =
-                time_s.iter().map(|t| (course(*t) / digit).round() * digit).collect();
-            let found = smoothed(&time_s, &rounded).unwrap();
-            assert!((found.noise_rpm / digit - 12.0_f64.sqrt().recip()).abs() < 1e-9, "{found:?}");
-            assert!(found.knots < 12, "{digit}: {found:?}");
+                time_s.iter().map(|t| (true_speed(*t) / digit).round() * digit).collect();
+            let smoothed = smooth_spin(&time_s, &rounded).unwrap();
+            assert!(
+                (smoothed.noise_rpm / digit - 12.0_f64.sqrt().recip()).abs() < 1e-9,
+                "{smoothed:?}"
+            );
+            assert!(smoothed.knots < 12, "{digit}: {smoothed:?}");
         }
     }
 }

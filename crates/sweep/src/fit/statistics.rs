@@ -92,14 +92,14 @@ impl Statistics {
     /// Computes the statistics at the end of a descent.
     pub(crate) fn at_end(
         problem: &Problem<'_>,
-        against: &[SignalComparison],
-        summary: &NormalEquations,
+        comparisons: &[SignalComparison],
+        equations: &NormalEquations,
     ) -> Self {
         let n = problem.unknowns();
-        let bread = inverse(&summary.normal);
-        let mut meat = vec![vec![0.0; n]; n];
-        let mut own_meat = vec![vec![0.0; n]; n];
-        let mut own_white_meat = vec![vec![0.0; n]; n];
+        let inverse_normal = inverse(&equations.normal);
+        let mut score_covariance = vec![vec![0.0; n]; n];
+        let mut own_score_covariance = vec![vec![0.0; n]; n];
+        let mut white_score_covariance = vec![vec![0.0; n]; n];
         let mut widening = Vec::new();
         let mut neighbours = Vec::new();
         let mut motion = Vec::new();
@@ -107,73 +107,90 @@ impl Statistics {
         let mut is_white = Vec::new();
         let mut disagreement = 0.0;
         let mut freedom = 0.0;
-        let mut spread = vec![VarianceEstimate::default(); n];
+        let mut variance_estimates = vec![VarianceEstimate::default(); n];
         let mut worst = (0, [0.0; 2], 0.0);
-        for (k, (((_, _, signal), one), sigma)) in
-            problem.signals().zip(against).zip(&summary.sigma).enumerate()
+        for (k, (((_, _, signal), comparison), sigma)) in
+            problem.signals().zip(comparisons).zip(&equations.sigma).enumerate()
         {
-            let rho = autocorrelation(&one.residual);
-            let by_lags = correlated(&one.slopes, &rho, 1.0 / (sigma * sigma));
-            let plain = correlated(&one.slopes, &[1.0], 1.0 / (sigma * sigma));
+            let rho = autocorrelation(&comparison.residual);
+            let by_lags = correlated(&comparison.slopes, &rho, 1.0 / (sigma * sigma));
+            let without_lags = correlated(&comparison.slopes, &[1.0], 1.0 / (sigma * sigma));
             // Intervals are widened, never narrowed.
-            let wider = (0..n).fold(1.0_f64, |most, i| {
-                if plain[i][i] > 0.0 { most.max(by_lags[i][i] / plain[i][i]) } else { most }
+            let widening_factor = (0..n).fold(1.0_f64, |most, i| {
+                if without_lags[i][i] > 0.0 {
+                    most.max(by_lags[i][i] / without_lags[i][i])
+                } else {
+                    most
+                }
             });
-            let narrower = (0..n).any(|i| by_lags[i][i] < plain[i][i]);
-            let own = if narrower { &plain } else { &by_lags };
-            add(&mut meat, own, if narrower { wider } else { 1.0 });
-            let window = lag_window(&one.residual);
-            let scores = scores(one, &bread, *sigma);
-            add(&mut own_meat, &correlated(&scores, &window, 1.0), 1.0);
-            add(&mut own_white_meat, &correlated(&scores, &[1.0], 1.0), 1.0);
-            let noise = noise_scale(one, signal);
-            for (spread, row) in spread.iter_mut().zip(&bread) {
-                spread.add(one, row, &noise, wider / (sigma * sigma), &window);
+            let is_narrower = (0..n).any(|i| by_lags[i][i] < without_lags[i][i]);
+            let signal_covariance = if is_narrower { &without_lags } else { &by_lags };
+            add(
+                &mut score_covariance,
+                signal_covariance,
+                if is_narrower { widening_factor } else { 1.0 },
+            );
+            let window = lag_window(&comparison.residual);
+            let scores = scores(comparison, &inverse_normal, *sigma);
+            add(&mut own_score_covariance, &correlated(&scores, &window, 1.0), 1.0);
+            add(&mut white_score_covariance, &correlated(&scores, &[1.0], 1.0), 1.0);
+            let noise = noise_scale(comparison, signal);
+            for (variance_estimates, row) in variance_estimates.iter_mut().zip(&inverse_normal) {
+                variance_estimates.add(
+                    comparison,
+                    row,
+                    &noise,
+                    widening_factor / (sigma * sigma),
+                    &window,
+                );
             }
-            let square = dot(&one.residual, &one.residual);
-            let swing = signal.swing();
-            let case = &problem.cases[one.case];
+            let residual_square = dot(&comparison.residual, &comparison.residual);
+            let swing = signal.centred_values();
+            let case = &problem.cases[comparison.case];
             // Noise that grows with the motion is scaled, because few of its values are great and
             // their correlations are accidental.
-            let even: Vec<f64> = one.residual.iter().zip(&noise).map(|(r, s)| r / s).collect();
-            let share = swinging(&even, case.rate_hz(signal), 60.0 / case.greatest_rpm());
-            motion.push([share, share * square / dot(&swing, &swing)]);
-            explained.push(1.0 - square / dot(&swing, &swing));
-            is_white.push(is_white_noise(&one.residual));
-            neighbours.push(correlation(&one.residual, 1));
-            widening.push(wider);
+            let scaled_residual: Vec<f64> =
+                comparison.residual.iter().zip(&noise).map(|(r, s)| r / s).collect();
+            let motion_share =
+                motion_share(&scaled_residual, case.rate_hz(signal), 60.0 / case.greatest_rpm());
+            motion.push([motion_share, motion_share * residual_square / dot(&swing, &swing)]);
+            explained.push(1.0 - residual_square / dot(&swing, &swing));
+            is_white.push(is_white_noise(&comparison.residual));
+            neighbours.push(correlation(&comparison.residual, 1));
+            widening.push(widening_factor);
             // Each part of the record pulls at the unknowns on its own.
-            let count = one.residual.len();
+            let count = comparison.residual.len();
             for part in 0..RECORD_PARTS {
                 let range = part * count / RECORD_PARTS..(part + 1) * count / RECORD_PARTS;
-                let Some(rows) = one.residual.get(range.clone()) else { continue };
-                let slopes: Vec<&[f64]> = one
+                let Some(rows) = comparison.residual.get(range.clone()) else { continue };
+                let slopes: Vec<&[f64]> = comparison
                     .slopes
                     .iter()
                     .map(|slope| slope.get(range.clone()).unwrap_or_default())
                     .collect();
                 let noise = &noise[range.clone()];
-                let noisy: Vec<Vec<f64>> = slopes
+                let noise_slopes: Vec<Vec<f64>> = slopes
                     .iter()
                     .map(|slope| slope.iter().zip(noise).map(|(g, s)| g * s).collect())
                     .collect();
-                let information = correlated(&noisy, &[1.0], wider / (sigma * sigma));
+                let information =
+                    correlated(&noise_slopes, &[1.0], widening_factor / (sigma * sigma));
                 let (unit, scale) = scaled(&information);
                 let eigen = Symmetric::from_matrix(&unit);
-                let pull: Vec<f64> = slopes
+                let rhs: Vec<f64> = slopes
                     .iter()
                     .zip(&scale)
                     .map(|(slope, scale)| dot(slope, rows) / (sigma * sigma) / scale)
                     .collect();
                 for (value, vector) in eigen.values.iter().zip(&eigen.vectors) {
                     if *value > 1e-6 {
-                        disagreement += dot(vector, &pull).powi(2) / value;
+                        disagreement += dot(vector, &rhs).powi(2) / value;
                         freedom += 1.0;
                     }
                 }
                 let energy = dot(rows, rows) / (rows.len().max(1) as f64 * sigma * sigma);
                 if energy > worst.2 {
-                    let times = &problem.cases[one.case].measured.time_s;
+                    let times = &problem.cases[comparison.case].measurement.time_s;
                     let rows: Vec<usize> = signal.samples().map(|(row, _)| row).collect();
                     let sample_s = |sample: usize| times[rows[sample.min(rows.len() - 1)]];
                     worst = (k, [sample_s(range.start), sample_s(range.end)], energy);
@@ -181,16 +198,22 @@ impl Statistics {
             }
         }
         let disagreement = disagreement / (freedom - n as f64).max(1.0);
-        let sandwich = |meat: &[Vec<f64>]| product(&product(&bread, meat), &bread);
-        let middle = widened(sandwich(&meat), &sandwich(&own_meat));
-        let middle = widened(middle, &sandwich(&own_white_meat));
+        let sandwich = |score_covariance: &[Vec<f64>]| {
+            product(&product(&inverse_normal, score_covariance), &inverse_normal)
+        };
+        let unknowns_covariance =
+            widened(sandwich(&score_covariance), &sandwich(&own_score_covariance));
+        let unknowns_covariance = widened(unknowns_covariance, &sandwich(&white_score_covariance));
         // Disagreement of the record's parts beyond their noise is an error of the unknowns.
-        let covariance = middle
+        let covariance = unknowns_covariance
             .iter()
             .map(|row| row.iter().map(|x| x * disagreement.max(1.0)).collect())
             .collect();
         let worst = (worst.0, worst.1);
-        let quantiles = spread.iter().map(|spread| student_975(spread.freedom())).collect();
+        let quantiles = variance_estimates
+            .iter()
+            .map(|variance_estimates| student_975(variance_estimates.freedom()))
+            .collect();
         Self {
             covariance,
             quantiles,
@@ -208,7 +231,7 @@ impl Statistics {
 
     /// Returns the signal of which the model explains least, and how much: if that is less than
     /// half of the variance and the rest is more than white noise.
-    pub(super) fn unexplained(&self) -> Option<(usize, f64)> {
+    pub(super) fn worst_explained(&self) -> Option<(usize, f64)> {
         let signals = self.explained.iter().zip(&self.is_white).enumerate();
         signals
             .filter(|(_, (ratio, is_white))| **ratio < EXPLAINED_RATIO && !**is_white)
@@ -222,7 +245,7 @@ impl Statistics {
         let named = |k: usize| {
             problem.signals().nth(k).map_or_else(String::new, |(.., it)| it.quantity.column())
         };
-        if let Some((k, ratio)) = self.unexplained() {
+        if let Some((k, ratio)) = self.worst_explained() {
             let percent = 100.0 * ratio.max(0.0);
             reasons.push(format!("the model explains {percent:.0} % of {}'s variance", named(k)));
         }
@@ -231,8 +254,10 @@ impl Statistics {
             && share > MAX_MOTION_RATIO
         {
             let percent = 100.0 * share;
-            let of = named(k);
-            reasons.push(format!("{percent:.0} % of {of} are left over as a motion, not as noise"));
+            let column = named(k);
+            reasons.push(format!(
+                "{percent:.0} % of {column} are left over as a motion, not as noise"
+            ));
         }
         if self.disagreement > MAX_DISAGREEMENT {
             reasons.push(format!(
@@ -253,8 +278,8 @@ impl Statistics {
             return None;
         }
         let (k, [from, to]) = self.worst;
-        let place = format!("; worst is {} from {from:.1} to {to:.1} s", named(k));
-        Some(reasons.join(", and ") + &place)
+        let worst_place = format!("; worst is {} from {from:.1} to {to:.1} s", named(k));
+        Some(reasons.join(", and ") + &worst_place)
     }
 
     /// Returns the dependences on fixed numbers, the strongest first.
@@ -263,9 +288,9 @@ impl Statistics {
     }
 
     /// Returns the variance of each signal's noise over its independent samples.
-    pub(super) fn variances(&self, summary: &NormalEquations) -> Vec<f64> {
+    pub(super) fn variances(&self, equations: &NormalEquations) -> Vec<f64> {
         let disagreement = self.disagreement.max(1.0);
-        let signals = summary.sigma.iter().zip(&self.widening);
+        let signals = equations.sigma.iter().zip(&self.widening);
         signals.map(|(sigma, widening)| sigma * sigma * widening * disagreement).collect()
     }
 
@@ -361,20 +386,26 @@ fn widened(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// with the residual that the sample would have in a fit without it.
 ///
 /// J. G. MacKinnon, H. White, Journal of Econometrics 29 (1985), 305-325: HC3.
-fn scores(one: &SignalComparison, bread: &[Vec<f64>], sigma: f64) -> Vec<Vec<f64>> {
+fn scores(comparison: &SignalComparison, inverse_normal: &[Vec<f64>], sigma: f64) -> Vec<Vec<f64>> {
     let variance = sigma * sigma;
-    let known = || one.slopes.iter().zip(bread).filter(|(slope, _)| !slope.is_empty());
-    let predicted: Vec<f64> = (0..one.residual.len())
+    let known =
+        || comparison.slopes.iter().zip(inverse_normal).filter(|(slope, _)| !slope.is_empty());
+    let predicted: Vec<f64> = (0..comparison.residual.len())
         .map(|sample| {
-            let projected = |row: &[f64]| -> f64 {
-                one.slopes.iter().zip(row).filter_map(|(g, b)| Some(g.get(sample)? * b)).sum()
+            let project = |row: &[f64]| -> f64 {
+                comparison
+                    .slopes
+                    .iter()
+                    .zip(row)
+                    .filter_map(|(g, b)| Some(g.get(sample)? * b))
+                    .sum()
             };
-            let leverage: f64 = known().map(|(slope, row)| slope[sample] * projected(row)).sum();
-            one.residual[sample] / (1.0 - leverage / variance).max(LEAST_FREEDOM) / variance
+            let leverage: f64 = known().map(|(slope, row)| slope[sample] * project(row)).sum();
+            comparison.residual[sample] / (1.0 - leverage / variance).max(LEAST_FREEDOM) / variance
         })
         .collect();
     let score = |slope: &Vec<f64>| slope.iter().zip(&predicted).map(|(g, r)| g * r).collect();
-    one.slopes.iter().map(score).collect()
+    comparison.slopes.iter().map(score).collect()
 }
 
 /// The variance of an estimate, and the variance of that variance.
@@ -392,14 +423,14 @@ impl VarianceEstimate {
     /// each sample over its mean, the weight of a sample, and the window of its correlations.
     fn add(
         &mut self,
-        one: &SignalComparison,
+        comparison: &SignalComparison,
         row: &[f64],
         noise: &[f64],
         weight: f64,
         window: &[f64],
     ) {
         let parts = noise.iter().enumerate().map(|(sample, noise)| {
-            let products = one.slopes.iter().zip(row);
+            let products = comparison.slopes.iter().zip(row);
             let influence: f64 =
                 products.filter_map(|(slope, b)| Some(slope.get(sample)? * b)).sum();
             weight * (influence * noise).powi(2)
@@ -439,10 +470,10 @@ fn student_975(freedom: f64) -> f64 {
 /// Estimates the standard deviation of a residual's noise at every sample, over its mean: its
 /// variance as a constant and a part that grows with the square of the model's motion, by least
 /// squares.
-fn noise_scale(one: &SignalComparison, signal: &Signal) -> Vec<f64> {
-    let motion = centred(signal.samples().map(|(row, _)| one.model[row]).collect()).0;
+fn noise_scale(comparison: &SignalComparison, signal: &Signal) -> Vec<f64> {
+    let motion = centred(signal.samples().map(|(row, _)| comparison.model[row]).collect()).0;
     let (energy, mean_energy) = centred(motion.iter().map(|m| m * m).collect());
-    let (square, mean_square) = centred(one.residual.iter().map(|r| r * r).collect());
+    let (square, mean_square) = centred(comparison.residual.iter().map(|r| r * r).collect());
     let growth = dot(&energy, &square) / dot(&energy, &energy).max(f64::MIN_POSITIVE);
     let max_growth = (1.0 - STEADY_RATIO) * mean_square / mean_energy.max(f64::MIN_POSITIVE);
     // `clamp` would panic where squares of the measurement overflow.
@@ -528,7 +559,7 @@ fn lag_window(residual: &[f64]) -> Vec<f64> {
 /// Returns the part of a residual's mean square that is a motion: the greatest negative
 /// autocorrelation, if it is above its random error. Slow noise has no negative autocorrelation,
 /// and hum is faster than a suspension.
-fn swinging(residual: &[f64], rate_hz: f64, turn_s: f64) -> f64 {
+fn motion_share(residual: &[f64], rate_hz: f64, turn_s: f64) -> f64 {
     let block = ((FASTEST_MOTION_TURNS * turn_s * rate_hz) as usize).clamp(1, residual.len());
     let mean = |samples: &[f64]| samples.iter().sum::<f64>() / block as f64;
     let (means, _) = centred(residual.chunks_exact(block).map(mean).collect());
@@ -579,12 +610,12 @@ mod tests {
         let tone = |hz: f64| move |k: usize| (TAU * hz * k as f64 / rate_hz).sin();
         for correlation in [0.0, 0.6, 0.9, 0.97] {
             let noise = noise(5, 0, 12_000, correlation);
-            assert_eq!(swinging(&noise, rate_hz, turn_s), 0.0, "{correlation}");
+            assert_eq!(motion_share(&noise, rate_hz, turn_s), 0.0, "{correlation}");
             for (hz, expected) in [(1.5, 0.5), (5.0, 0.5), (50.0, 0.0)] {
                 let motion = (0..12_000).map(tone(hz));
                 let both: Vec<f64> =
                     motion.zip(&noise).map(|(tone, noise)| tone + 0.5_f64.sqrt() * noise).collect();
-                let found = swinging(&both, rate_hz, turn_s);
+                let found = motion_share(&both, rate_hz, turn_s);
                 assert!((found - expected).abs() < 0.15, "{correlation}, {hz} Hz: {found}");
             }
         }

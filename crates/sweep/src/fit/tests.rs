@@ -31,18 +31,20 @@ const FRICTION: [(&str, f64); 5] = [
 /// Returns a reference file up to a time.
 fn reference(name: &str, end_s: f64) -> Measurement {
     let path = format!("{}/testdata/fit/{name}.csv", env!("CARGO_MANIFEST_DIR"));
-    let mut measured = Measurement::read(Path::new(&path), &[]).unwrap();
-    let rows = measured.time_s.partition_point(|time| *time <= end_s);
-    measured.time_s.truncate(rows);
-    measured.speed_rpm.iter_mut().for_each(|speed| speed.truncate(rows));
-    measured.signals.iter_mut().for_each(|signal| signal.values.truncate(rows));
-    measured
+    let mut measurement = Measurement::read(Path::new(&path), &[]).unwrap();
+    let rows = measurement.time_s.partition_point(|time| *time <= end_s);
+    measurement.time_s.truncate(rows);
+    measurement.speed_rpm.iter_mut().for_each(|speed| speed.truncate(rows));
+    measurement.signals.iter_mut().for_each(|signal| signal.values.truncate(rows));
+    measurement
 }
 
-fn case_at(numbers: &[(&str, f64)], factor: f64, measured: Measurement) -> FitCase {
-    let at = numbers.iter().map(|(name, value)| format!("{name}={}", value * factor));
-    let at: Vec<String> = at.chain(["friction_linear_speed_m_per_s=0.1".to_owned()]).collect();
-    case(&WasherGridInput::text("reference", GRID.to_owned(), Vec::new()), &at, measured).unwrap()
+fn case_at(numbers: &[(&str, f64)], factor: f64, measurement: Measurement) -> FitCase {
+    let settings = numbers.iter().map(|(name, value)| format!("{name}={}", value * factor));
+    let settings: Vec<String> =
+        settings.chain(["friction_linear_speed_m_per_s=0.1".to_owned()]).collect();
+    case(&WasherGridInput::text("reference", GRID.to_owned(), Vec::new()), &settings, measurement)
+        .unwrap()
 }
 
 fn options(free: &[&str]) -> FitOptions {
@@ -59,26 +61,30 @@ fn options(free: &[&str]) -> FitOptions {
 }
 
 /// Returns the problem of fitting the nonlinear model by the method that commands choose.
-fn problem(cases: Vec<FitCase>, free: Vec<FreeParameter>, with_shift: bool) -> Problem<'static> {
+fn problem(cases: Vec<FitCase>, free: Vec<FreeParameter>, fits_shift: bool) -> Problem<'static> {
     let method = Problem::method(&cases).unwrap();
     let simd = simd_from_environment().unwrap();
     let model = ModelKind::Nonlinear;
-    Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never }
+    Problem { cases, free, model, fits_shift, method, simd, cancel: Cancel::Never }
 }
 
 fn fitted(cases: Vec<FitCase>, options: &FitOptions) -> FitReport {
-    let work =
-        FitWork { cancel: Cancel::Never, count_evaluations: &|_| {}, output: None, fresh: false };
-    fit(cases, options, &work).unwrap().unwrap().report
+    let context = FitContext {
+        cancel: Cancel::Never,
+        count_evaluations: &|_| {},
+        output: None,
+        fresh: false,
+    };
+    fit(cases, options, &context).unwrap().unwrap().report
 }
 
 /// Returns the errors of the fitted numbers in standard errors.
-fn off(report: &FitReport, truth: &[(&str, f64)]) -> Vec<f64> {
-    let off = |fit: &report::FittedNumber| {
+fn error_ratios(report: &FitReport, truth: &[(&str, f64)]) -> Vec<f64> {
+    let error_ratio = |fit: &report::FittedNumber| {
         let (_, truth) = truth.iter().find(|(name, _)| *name == fit.name).unwrap();
         (fit.value - truth) / fit.standard_error.unwrap()
     };
-    report.parameters.iter().map(off).collect()
+    report.parameters.iter().map(error_ratio).collect()
 }
 
 /// Returns noise of standard deviation 1 with a correlation of neighbours.
@@ -90,11 +96,11 @@ pub(super) fn noise(seed: u64, signal: usize, count: usize, correlation: f64) ->
         to: 6.0,
     };
     let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed };
-    let mut last = 0.0;
+    let mut previous = 0.0;
     let values = (0..(count + SETTLED) as u64).map(|row| {
-        let fresh = normal.quantile(draw.position(row, signal).unwrap());
-        last = correlation * last + (1.0 - correlation * correlation).sqrt() * fresh;
-        last
+        let innovation = normal.quantile(draw.position(row, signal).unwrap());
+        previous = correlation * previous + (1.0 - correlation * correlation).sqrt() * innovation;
+        previous
     });
     values.skip(SETTLED).collect()
 }
@@ -104,13 +110,13 @@ fn the_model_at_the_truth_is_the_exact_record() {
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let cases = vec![case_at(truth, 1.0, reference(name, 8.0))];
         let problem = problem(cases, Vec::new(), false);
-        for one in problem.compare(&[]).unwrap() {
-            let values = &problem.cases[0].measured.signals[one.signal].values;
+        for comparison in problem.compare(&[]).unwrap() {
+            let values = &problem.cases[0].measurement.signals[comparison.signal].values;
             let largest =
                 |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-            let share = largest(&one.residual) / largest(values);
+            let share = largest(&comparison.residual) / largest(values);
             // Accelerations are second differences over 1 ms.
-            assert!(share < 2e-3, "{name}, signal {}: {share}", one.signal);
+            assert!(share < 2e-3, "{name}, signal {}: {share}", comparison.signal);
         }
     }
 }
@@ -121,9 +127,13 @@ fn reference_data_lead_to_the_truth() {
     for factor in [0.7, 1.3] {
         let cases = vec![case_at(&VISCOUS, factor, reference("viscous", 8.0))];
         let report = fitted(cases, &options(&names));
-        let off = off(&report, &VISCOUS);
+        let error_ratios = error_ratios(&report, &VISCOUS);
         assert!(report.follows && report.settled, "{report:?}");
-        assert!(off.iter().all(|off| off.abs() < 3.0), "{off:?}: {}", report.text());
+        assert!(
+            error_ratios.iter().all(|error_ratios| error_ratios.abs() < 3.0),
+            "{error_ratios:?}: {}",
+            report.text()
+        );
         assert!(report.evaluations < 25 && report.untold.is_empty(), "{}", report.text());
         for (noise, known) in report.first.noise.values().zip(NOISE) {
             assert!((noise / known - 1.0).abs() < 0.2, "{}", report.text());
@@ -131,8 +141,8 @@ fn reference_data_lead_to_the_truth() {
         assert!(report.first.shift_s.unwrap().abs() < 1e-3);
         // The noise is a third of the smallest column.
         assert!(report.first.explained.values().all(|share| *share > 0.88), "{}", report.text());
-        let said = "tub_front_y_m_per_s2 0.291315 (32.3 %)";
-        assert!(report.text().contains(said), "{}", report.text());
+        let expected_text = "tub_front_y_m_per_s2 0.291315 (32.3 %)";
+        assert!(report.text().contains(expected_text), "{}", report.text());
     }
 }
 
@@ -153,8 +163,9 @@ fn an_interval_goes_no_farther_than_its_range() {
     // A record of a few seconds does not tell friction from damping.
     let cases = vec![case_at(&FRICTION, 1.1, reference("friction", 4.0))];
     let report = fitted(cases, &options(&["damping_n_s_per_m", "friction_n"]));
-    let from = |fit: &report::FittedNumber| fit.interval_95.map(|[from, _]| from);
-    let least = report.parameters.iter().filter_map(from).reduce(f64::min);
+    let interval_start =
+        |fit: &report::FittedNumber| fit.interval_95.map(|[interval_start, _]| interval_start);
+    let least = report.parameters.iter().filter_map(interval_start).reduce(f64::min);
     assert_eq!(least, Some(0.0), "{}", report.text());
 }
 
@@ -164,25 +175,25 @@ fn a_search_that_came_to_no_end_gives_no_intervals() {
     let free = free_parameters(&options(&["damping_n_s_per_m"]), &cases).unwrap();
     let problem = problem(cases, free, false);
     let x = problem.start();
-    let against = problem.compare(&x).unwrap();
-    let summary = problem.normal_equations(&against);
-    let statistics = Statistics::at_end(&problem, &against, &summary);
+    let comparisons = problem.compare(&x).unwrap();
+    let equations = problem.normal_equations(&comparisons);
+    let statistics = Statistics::at_end(&problem, &comparisons, &equations);
     for is_settled in [true, false] {
         let x = x.clone();
-        let summary = summary.clone();
-        let found = report::ReportData {
+        let equations = equations.clone();
+        let report_data = report::ReportData {
             problem: &problem,
-            suspicions: &[None],
-            minima: &[Descent { x, summary, evaluations: 1, is_settled }],
-            against: &against,
-            at_start: &against,
+            unit_suspicions: &[None],
+            minima: &[Descent { x, equations, evaluations: 1, is_settled }],
+            comparisons: &comparisons,
+            start_comparisons: &comparisons,
             statistics: &statistics,
             evaluations: 1,
             step_effect: None,
             resampled: None,
             draws: 0,
         };
-        let report = found.report().unwrap();
+        let report = report_data.report().unwrap();
         assert_eq!(report.parameters[0].interval_95.is_some(), is_settled, "{report:?}");
         assert_eq!(report.parameters[0].standard_error.is_some(), is_settled, "{report:?}");
         assert_eq!((report.follows, report.objection.is_none()), (is_settled, is_settled));
@@ -201,10 +212,10 @@ fn a_fitted_machine_file_says_where_its_numbers_are_from() {
     let problem = problem(cases, free, false);
     let (machine, _) = problem.machine(0, &problem.start());
     let text = crate::config::machine_file(&machine, &problem.written());
-    let said = |key: &str| text.lines().find(|line| line.starts_with(key)).unwrap();
-    assert!(said("damping_n_s_per_m").ends_with("[given: fit to viscous.csv]"), "{text}");
-    assert!(said("friction_n").ends_with("[given: --at]"), "{text}");
-    assert!(said("stiffness_n_per_m").ends_with("[paper, section 3.1]"), "{text}");
+    let line_with_key = |key: &str| text.lines().find(|line| line.starts_with(key)).unwrap();
+    assert!(line_with_key("damping_n_s_per_m").ends_with("[given: fit to viscous.csv]"), "{text}");
+    assert!(line_with_key("friction_n").ends_with("[given: --at]"), "{text}");
+    assert!(line_with_key("stiffness_n_per_m").ends_with("[paper, section 3.1]"), "{text}");
 }
 
 #[test]
@@ -214,9 +225,13 @@ fn friction_is_told_from_viscous_damping() {
     for factor in [0.7, 1.3] {
         let cases = vec![case_at(&FRICTION, factor, reference("friction", 24.0))];
         let report = fitted(cases, &options(&names));
-        let off = off(&report, &FRICTION);
+        let error_ratios = error_ratios(&report, &FRICTION);
         assert!(report.follows, "{}", report.text());
-        assert!(off.iter().all(|off| off.abs() < 3.0), "{off:?}: {}", report.text());
+        assert!(
+            error_ratios.iter().all(|error_ratios| error_ratios.abs() < 3.0),
+            "{error_ratios:?}: {}",
+            report.text()
+        );
     }
 }
 
@@ -225,25 +240,27 @@ fn friction_is_told_from_viscous_damping() {
 fn intervals_hold_the_truth_as_often_as_they_say() {
     const DRAWS: usize = 50;
     let names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
-    let mut held = vec![0; VISCOUS.len()];
+    let mut count_within = vec![0; VISCOUS.len()];
     for draw in 0..DRAWS {
-        let mut measured = reference("viscous_exact", 8.0);
-        for (s, signal) in measured.signals.iter_mut().enumerate() {
+        let mut measurement = reference("viscous_exact", 8.0);
+        for (s, signal) in measurement.signals.iter_mut().enumerate() {
             let noise = noise(draw as u64, s, signal.values.len(), 0.0);
             signal.values.iter_mut().zip(noise).for_each(|(value, z)| *value += NOISE[s] * z);
         }
-        let report = fitted(vec![case_at(&VISCOUS, 0.97, measured)], &options(&names));
+        let report = fitted(vec![case_at(&VISCOUS, 0.97, measurement)], &options(&names));
         assert!(report.follows, "draw {draw}: {}", report.text());
-        for ((held, fit), (_, truth)) in held.iter_mut().zip(&report.parameters).zip(VISCOUS) {
+        for ((count_within, fit), (_, truth)) in
+            count_within.iter_mut().zip(&report.parameters).zip(VISCOUS)
+        {
             let [from, to] = fit.interval_95.unwrap();
-            *held += usize::from(from <= truth && truth <= to);
+            *count_within += usize::from(from <= truth && truth <= to);
         }
     }
-    println!("of {DRAWS} intervals hold the truth: {held:?}");
-    let all: usize = held.iter().sum();
-    let share = all as f64 / (DRAWS * VISCOUS.len()) as f64;
-    assert!((0.90..=0.99).contains(&share), "{held:?}");
-    assert!(held.iter().all(|held| *held >= 43), "{held:?}");
+    println!("of {DRAWS} intervals hold the truth: {count_within:?}");
+    let total_within: usize = count_within.iter().sum();
+    let share = total_within as f64 / (DRAWS * VISCOUS.len()) as f64;
+    assert!((0.90..=0.99).contains(&share), "{count_within:?}");
+    assert!(count_within.iter().all(|count_within| *count_within >= 43), "{count_within:?}");
 }
 
 /// Returns the seed of draws that the environment gives, or a default.
@@ -271,63 +288,71 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
             (0.6, 2.0, true),
             (0.9, 2.0, true),
         ] {
-            let mut held = vec![0; truth.len()];
+            let mut count_within = vec![0; truth.len()];
             let mut objections = 0;
             let mut quantile: f64 = 0.0;
             for draw in 0..DRAWS {
-                let mut against = exact.clone();
-                for (one, (.., signal)) in against.iter_mut().zip(problem.signals()) {
-                    let motion = signal.samples().map(|(row, _)| one.model[row]);
-                    let mut size = algebra::centred(motion.collect()).0;
+                let mut comparisons = exact.clone();
+                for (comparison, (.., signal)) in comparisons.iter_mut().zip(problem.signals()) {
+                    let motion = signal.samples().map(|(row, _)| comparison.model[row]);
+                    let mut noise_size = algebra::centred(motion.collect()).0;
                     if by_envelope {
-                        let square = |near: &[f64]| algebra::dot(near, near) / near.len() as f64;
-                        let count = size.len();
-                        let near = |k: usize| &size[k.saturating_sub(12)..(k + 13).min(count)];
-                        size = (0..count).map(|k| square(near(k)).sqrt()).collect();
+                        let square = |neighbours: &[f64]| {
+                            algebra::dot(neighbours, neighbours) / neighbours.len() as f64
+                        };
+                        let count = noise_size.len();
+                        let neighbours =
+                            |k: usize| &noise_size[k.saturating_sub(12)..(k + 13).min(count)];
+                        noise_size = (0..count).map(|k| square(neighbours(k)).sqrt()).collect();
                     }
-                    let usual = (algebra::dot(&size, &size) / size.len() as f64).sqrt();
+                    let rms_size =
+                        (algebra::dot(&noise_size, &noise_size) / noise_size.len() as f64).sqrt();
                     let draw = DRAWS * seed() + draw;
-                    let noise = noise(draw, one.signal, one.residual.len(), correlation);
-                    let noise = noise.iter().zip(&size).map(|(noise, size)| {
-                        NOISE[one.signal] * noise * (1.0 + growth * (size / usual).abs())
+                    let noise =
+                        noise(draw, comparison.signal, comparison.residual.len(), correlation);
+                    let noise = noise.iter().zip(&noise_size).map(|(noise, noise_size)| {
+                        NOISE[comparison.signal]
+                            * noise
+                            * (1.0 + growth * (noise_size / rms_size).abs())
                     });
-                    one.residual = algebra::centred(noise.collect()).0;
+                    comparison.residual = algebra::centred(noise.collect()).0;
                 }
                 // Near the truth the model is linear, so that one step of Gauss and Newton
                 // suffices.
-                let summary = problem.normal_equations(&against);
-                let bread = algebra::inverse(&summary.normal);
-                let moved: Vec<f64> =
-                    bread.iter().map(|row| algebra::dot(row, &summary.pull)).collect();
-                for SignalComparison { residual, slopes, .. } in &mut against {
-                    for (slope, moved) in slopes.iter().zip(&moved) {
-                        residual.iter_mut().zip(slope).for_each(|(left, s)| *left -= moved * s);
+                let equations = problem.normal_equations(&comparisons);
+                let inverse_normal = algebra::inverse(&equations.normal);
+                let step: Vec<f64> =
+                    inverse_normal.iter().map(|row| algebra::dot(row, &equations.rhs)).collect();
+                for SignalComparison { residual, slopes, .. } in &mut comparisons {
+                    for (slope, step) in slopes.iter().zip(&step) {
+                        residual.iter_mut().zip(slope).for_each(|(left, s)| *left -= step * s);
                     }
                 }
-                let summary = problem.normal_equations(&against);
-                let statistics = Statistics::at_end(&problem, &against, &summary);
+                let equations = problem.normal_equations(&comparisons);
+                let statistics = Statistics::at_end(&problem, &comparisons, &equations);
                 if let Some(objection) = statistics.objection(&problem) {
                     if objections == 0 {
                         println!("{objection}");
                     }
                     objections += 1;
                 }
-                for (k, held) in held.iter_mut().enumerate() {
-                    let reach = statistics.quantiles[k] * statistics.covariance[k][k].sqrt();
-                    *held += u64::from(moved[k].abs() < reach);
+                for (k, count_within) in count_within.iter_mut().enumerate() {
+                    let half_width = statistics.quantiles[k] * statistics.covariance[k][k].sqrt();
+                    *count_within += u64::from(step[k].abs() < half_width);
                 }
                 quantile = f64::max(quantile, statistics.quantiles[0]);
             }
-            let share = held.iter().sum::<u64>() as f64 / (DRAWS * truth.len() as u64) as f64;
+            let share =
+                count_within.iter().sum::<u64>() as f64 / (DRAWS * truth.len() as u64) as f64;
             let kind = format!("{name}, {correlation}, {growth}, {by_envelope}");
             println!(
-                "{kind}: {held:?} of {DRAWS} hold the truth: {share:.3}; {objections} object; \
-                 quantile up to {quantile:.2}"
+                "{kind}: {count_within:?} of {DRAWS} hold the truth: {share:.3}; {objections} \
+                 object; quantile up to {quantile:.2}"
             );
             assert!(growth > 0.0 || objections == 0, "{kind}: {objections}");
             // Correlations are known less well than variances, and the widest estimate counts.
             let expected = if correlation > 0.0 || growth > 0.0 { 0.90..=1.0 } else { 0.90..=0.99 };
-            assert!(expected.contains(&share), "{kind}: {held:?}");
+            assert!(expected.contains(&share), "{kind}: {count_within:?}");
         }
     }
 }
@@ -335,32 +360,32 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
 #[test]
 fn a_linear_model_says_what_the_nonlinear_one_would_have() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 8.0))];
-    let linear = FitOptions {
+    let linear_options = FitOptions {
         model: ModelKind::Linear.name().to_owned(),
         ..options(&["spring_stiffness_n_per_m"])
     };
-    let report = fitted(cases, &linear);
-    let said = "the nonlinear model would move spring_stiffness_n_per_m by";
-    assert!(report.objection.as_ref().is_some_and(|why| why.contains(said)), "{report:?}");
+    let report = fitted(cases, &linear_options);
+    let expected_text = "the nonlinear model would move spring_stiffness_n_per_m by";
+    assert!(report.objection.as_ref().is_some_and(|why| why.contains(expected_text)), "{report:?}");
 }
 
 #[test]
 fn what_cannot_be_fitted_is_said() {
-    let wrong = |free: &[&str], measured: Measurement| {
-        let work = FitWork {
+    let error_text = |free: &[&str], measurement: Measurement| {
+        let context = FitContext {
             cancel: Cancel::Never,
             count_evaluations: &|_| {},
             output: None,
             fresh: false,
         };
-        let cases = vec![case_at(&VISCOUS, 1.0, measured)];
-        match fit(cases, &options(free), &work) {
+        let cases = vec![case_at(&VISCOUS, 1.0, measurement)];
+        match fit(cases, &options(free), &context) {
             Err(error) => error.to_string(),
             Ok(_) => panic!("{free:?}"),
         }
     };
-    let short = || reference("viscous", 1.0);
-    for (free, said) in [
+    let short_record = || reference("viscous", 1.0);
+    for (free, expected_text) in [
         (&["dampng_n_s_per_m"][..], "did you mean `damping_n_s_per_m`"),
         (&["damping_n_s_per_m", "damping_n_s_per_m"], "free twice"),
         (&["damping_n_s_per_m=200:100"], "is no range"),
@@ -370,38 +395,47 @@ fn what_cannot_be_fitted_is_said() {
         (&["radial_clearance_m"], "does not depend on radial_clearance_m"),
         (&["spin_ramp_s"], "a spin given as a table"),
     ] {
-        let text = wrong(free, short());
-        assert!(text.contains(said), "{free:?}: {text}");
+        let text = error_text(free, short_record());
+        assert!(text.contains(expected_text), "{free:?}: {text}");
     }
-    let mut late = reference("viscous", 8.0);
-    let from = late.time_s.partition_point(|time| *time < 4.0);
-    let columns = late.signals.iter_mut().map(|signal| &mut signal.values);
-    columns.chain(&mut late.speed_rpm).for_each(|values| drop(values.drain(..from)));
-    late.time_s = late.time_s[from..].iter().map(|time| time - 4.0).collect();
-    let text = wrong(&["damping_n_s_per_m"], late);
+    let mut record_from_4_s = reference("viscous", 8.0);
+    let first_row = record_from_4_s.time_s.partition_point(|time| *time < 4.0);
+    let columns = record_from_4_s.signals.iter_mut().map(|signal| &mut signal.values);
+    columns
+        .chain(&mut record_from_4_s.speed_rpm)
+        .for_each(|values| drop(values.drain(..first_row)));
+    record_from_4_s.time_s =
+        record_from_4_s.time_s[first_row..].iter().map(|time| time - 4.0).collect();
+    let text = error_text(&["damping_n_s_per_m"], record_from_4_s);
     assert!(text.contains("viscous.csv begins at 117 rpm"), "{text}");
-    let mut few = short();
-    few.time_s.truncate(1);
-    few.speed_rpm = None;
-    few.signals.iter_mut().for_each(|signal| signal.values.truncate(1));
-    assert!(wrong(&["damping_n_s_per_m"], few).contains("6 unknowns for 4 samples"));
+    let mut sparse_record = short_record();
+    sparse_record.time_s.truncate(1);
+    sparse_record.speed_rpm = None;
+    sparse_record.signals.iter_mut().for_each(|signal| signal.values.truncate(1));
+    assert!(error_text(&["damping_n_s_per_m"], sparse_record).contains("6 unknowns for 4 samples"));
 }
 
 #[test]
 fn units_that_are_wrong_and_loads_that_differ_are_seen() {
-    let mut one = reference("viscous", 5.0);
+    let mut degrees_record = reference("viscous", 5.0);
     // Degrees instead of radians.
-    let degrees = |values: &mut Vec<f64>| values.iter_mut().for_each(|v| *v *= 57.295_78);
-    degrees(&mut one.signals[2].values);
-    let mut other = reference("viscous", 5.0);
-    other.name = "other".to_owned();
-    let mut cases = vec![case_at(&VISCOUS, 1.0, one), case_at(&VISCOUS, 1.0, other)];
+    let convert_to_degrees =
+        |values: &mut Vec<f64>| values.iter_mut().for_each(|v| *v *= 57.295_78);
+    convert_to_degrees(&mut degrees_record.signals[2].values);
+    let mut other_record = reference("viscous", 5.0);
+    other_record.name = "other".to_owned();
+    let mut cases =
+        vec![case_at(&VISCOUS, 1.0, degrees_record), case_at(&VISCOUS, 1.0, other_record)];
     cases[1].plan.model.machine.unbalance.mass_kg = 0.6;
     let mut options = options(&["damping_n_s_per_m"]);
     options.own = vec!["unbalance_mass_kg=0.1:1".to_owned()];
     let report = fitted(cases, &options);
-    let said: Vec<&String> = report.notes.iter().filter(|it| it.contains("degrees")).collect();
-    assert!(said.len() == 1 && said[0].starts_with("tub_yaw_rad of viscous.csv"), "{report:?}");
+    let degree_notes: Vec<&String> =
+        report.notes.iter().filter(|it| it.contains("degrees")).collect();
+    assert!(
+        degree_notes.len() == 1 && degree_notes[0].starts_with("tub_yaw_rad of viscous.csv"),
+        "{report:?}"
+    );
     let [_, first, second] = &report.parameters[..] else { panic!("{report:?}") };
     assert_eq!(first.file.as_deref(), Some("viscous.csv"));
     assert_eq!(second.file.as_deref(), Some("other"));
@@ -412,16 +446,16 @@ fn units_that_are_wrong_and_loads_that_differ_are_seen() {
 fn records_in_g_are_seen_where_the_search_starts() {
     const G: f64 = 9.806_65;
     for (factor, known) in [(1.0 / G, "seems to be in g"), (G, "from g once too often")] {
-        let mut measured = reference("viscous_exact", 8.0);
+        let mut measurement = reference("viscous_exact", 8.0);
         // Without angles a great damping makes the model as small as the record in degrees.
-        measured.signals.truncate(2);
-        for signal in &mut measured.signals {
+        measurement.signals.truncate(2);
+        for signal in &mut measurement.signals {
             signal.values.iter_mut().for_each(|value| *value *= factor);
         }
-        let case = case_at(&VISCOUS, 1.0, measured);
+        let case = case_at(&VISCOUS, 1.0, measurement);
         let report = fitted(vec![case], &options(&["damping_n_s_per_m"]));
-        let said = report.notes.iter().filter(|note| note.contains(known));
-        assert_eq!(said.count(), 2, "{report:?}");
+        let unit_notes = report.notes.iter().filter(|note| note.contains(known));
+        assert_eq!(unit_notes.count(), 2, "{report:?}");
     }
 }
 
@@ -431,9 +465,13 @@ fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
     let start = [("friction_n", 0.0), FRICTION[0], FRICTION[1], FRICTION[2]];
     let cases = || vec![case_at(&start, 1.0, reference("friction", 8.0))];
     let mut options = options(&["friction_n=0:60", "friction_speed_m_per_s=0.005:0.02"]);
-    let work =
-        FitWork { cancel: Cancel::Never, count_evaluations: &|_| {}, output: None, fresh: false };
-    let error = fit(cases(), &options, &work).err().unwrap().to_string();
+    let context = FitContext {
+        cancel: Cancel::Never,
+        count_evaluations: &|_| {},
+        output: None,
+        fresh: false,
+    };
+    let error = fit(cases(), &options, &context).err().unwrap().to_string();
     assert!(error.contains("does not depend on friction_speed_m_per_s"), "{error}");
     options.starts = 6;
     let report = fitted(cases(), &options);
@@ -443,15 +481,15 @@ fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
 #[test]
 fn a_wrong_unit_of_speed_or_time_is_named() {
     let record = |speed_factor: f64, time_factor: f64| {
-        let mut measured = reference("viscous", 8.0);
-        let speeds = measured.speed_rpm.iter_mut().flatten();
+        let mut measurement = reference("viscous", 8.0);
+        let speeds = measurement.speed_rpm.iter_mut().flatten();
         speeds.for_each(|speed| *speed *= speed_factor);
-        measured.time_s.iter_mut().for_each(|time_s| *time_s *= time_factor);
-        measured
+        measurement.time_s.iter_mut().for_each(|time_s| *time_s *= time_factor);
+        measurement
     };
     let start = [("unbalance_mass_kg", 0.34), ("damping_n_s_per_m", 120.0), VISCOUS[2]];
     let free = options(&["unbalance_mass_kg", "damping_n_s_per_m"]);
-    for (speed_factor, time_factor, said) in [
+    for (speed_factor, time_factor, expected_text) in [
         (std::f64::consts::TAU / 60.0, 1.0, "speed_rpm of viscous.csv seems to be in rad/s"),
         (1.0 / 60.0, 1.0, "speed_rpm of viscous.csv seems to be in Hz"),
         (0.1, 1.0, "speed_rpm of viscous.csv seems to be in tens of rpm"),
@@ -463,18 +501,21 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
         let cases = vec![case_at(&start, 1.0, record(speed_factor, time_factor))];
         let report = fitted(cases, &free);
         let text = report.text();
-        println!("{} {said}: {:?} {text}", report.evaluations, report.first.explained);
-        assert!(!report.follows && text.contains(&format!("      unit  {said}")), "{said}: {text}");
+        println!("{} {expected_text}: {:?} {text}", report.evaluations, report.first.explained);
+        assert!(
+            !report.follows && text.contains(&format!("      unit  {expected_text}")),
+            "{expected_text}: {text}"
+        );
         assert!(text.contains("converted, a short fit explains"), "{text}");
         assert!(
             text.starts_with("     model  does not follow the measurement: the model "),
             "{text}"
         );
         // The search does not go on in wrong units: an evaluation at the start and eight others.
-        assert!(report.evaluations < 10, "{said}: {} evaluations", report.evaluations);
+        assert!(report.evaluations < 10, "{expected_text}: {} evaluations", report.evaluations);
         assert!(report.first.explained.values().all(|ratio| *ratio < 0.25), "{report:?}");
         let is_of_unit = |note: &String| note.contains("it seems to");
-        assert!(!report.notes.iter().any(is_of_unit), "{said}: {:?}", report.notes);
+        assert!(!report.notes.iter().any(is_of_unit), "{expected_text}: {:?}", report.notes);
     }
     let report = fitted(vec![case_at(&start, 1.0, record(1.0, 1.0))], &free);
     println!("right units: {:?}", report.first.explained);
@@ -490,49 +531,50 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
 fn a_wrong_unit_of_speed_is_no_wrong_unit_of_a_channel() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
     let problem = problem(cases, Vec::new(), false);
-    let mut against = problem.compare(&[]).unwrap();
-    let yaw = &mut against[2];
-    let column = problem.cases[0].measured.signals[2].quantity.column();
+    let mut comparisons = problem.compare(&[]).unwrap();
+    let yaw = &mut comparisons[2];
+    let column = problem.cases[0].measurement.signals[2].quantity.column();
     yaw.model.iter_mut().for_each(|value| *value = value.to_radians());
-    let summary = problem.normal_equations(&against);
-    let statistics = Statistics::at_end(&problem, &against, &summary);
+    let equations = problem.normal_equations(&comparisons);
+    let statistics = Statistics::at_end(&problem, &comparisons, &equations);
     let is_settled = true;
-    let minima = [Descent { x: Vec::new(), summary, evaluations: 1, is_settled }];
-    let notes = |suspicions: &[Option<String>]| {
-        let found = report::ReportData {
+    let minima = [Descent { x: Vec::new(), equations, evaluations: 1, is_settled }];
+    let notes = |unit_suspicions: &[Option<String>]| {
+        let report_data = report::ReportData {
             problem: &problem,
-            suspicions,
+            unit_suspicions,
             minima: &minima,
-            against: &against,
-            at_start: &against,
+            comparisons: &comparisons,
+            start_comparisons: &comparisons,
             statistics: &statistics,
             evaluations: 1,
             step_effect: None,
             resampled: None,
             draws: 0,
         };
-        found.report().unwrap().notes
+        report_data.report().unwrap().notes
     };
-    let said = notes(&[None]);
+    let unit_notes = notes(&[None]);
     let is_named = |note: &String| note.starts_with(&column) && note.contains("in degrees");
-    assert!(said.iter().any(is_named), "{said:?}");
+    assert!(unit_notes.iter().any(is_named), "{unit_notes:?}");
     assert!(notes(&[Some("speed_rpm seems to be in rad/s".to_owned())]).is_empty());
 }
 
 #[test]
 fn a_signal_in_white_noise_is_followed() {
-    let mut measured = reference("viscous_exact", 8.0);
-    measured.signals.drain(..2);
-    for (s, signal) in measured.signals.iter_mut().enumerate() {
-        let size = 2.0 * algebra::dot(&signal.swing(), &signal.swing()).sqrt();
+    let mut measurement = reference("viscous_exact", 8.0);
+    measurement.signals.drain(..2);
+    for (s, signal) in measurement.signals.iter_mut().enumerate() {
+        let size = 2.0 * algebra::dot(&signal.centred_values(), &signal.centred_values()).sqrt();
         let size = size / (signal.values.len() as f64).sqrt();
         let noise = noise(3, s, signal.values.len(), 0.0);
         signal.values.iter_mut().zip(noise).for_each(|(value, z)| *value += size * z);
     }
-    let report = fitted(vec![case_at(&VISCOUS, 0.9, measured)], &options(&["unbalance_mass_kg"]));
+    let report =
+        fitted(vec![case_at(&VISCOUS, 0.9, measurement)], &options(&["unbalance_mass_kg"]));
     assert!(report.first.explained.values().all(|ratio| *ratio < 0.5), "{report:?}");
     assert!(report.follows, "{}", report.text());
-    assert!(off(&report, &VISCOUS)[0].abs() < 3.0, "{}", report.text());
+    assert!(error_ratios(&report, &VISCOUS)[0].abs() < 3.0, "{}", report.text());
 }
 
 #[test]
@@ -550,51 +592,51 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let partial = folder.path().join("x.toml.partial");
     let cases = || vec![case_at(&VISCOUS, 0.9, reference("viscous", 3.0))];
     let options = options(&["damping_n_s_per_m", "unbalance_mass_kg"]);
-    let whole = fitted(cases(), &options);
-    let made = AtomicUsize::new(0);
-    let seen = |_| {
-        made.fetch_add(1, Ordering::Relaxed);
+    let uninterrupted = fitted(cases(), &options);
+    let evaluations_made = AtomicUsize::new(0);
+    let count_evaluation = |_| {
+        evaluations_made.fetch_add(1, Ordering::Relaxed);
     };
-    let stop = || made.load(Ordering::Relaxed) >= 3;
-    let work = FitWork {
-        cancel: Cancel::When(&stop),
-        count_evaluations: &seen,
+    let is_requested = || evaluations_made.load(Ordering::Relaxed) >= 3;
+    let context = FitContext {
+        cancel: Cancel::When(&is_requested),
+        count_evaluations: &count_evaluation,
         output: Some(&output),
         fresh: false,
     };
-    assert!(fit(cases(), &options, &work).unwrap().is_none());
-    let part = ParquetFile::open(&partial.join("part-00000000.parquet")).unwrap();
+    assert!(fit(cases(), &options, &context).unwrap().is_none());
+    let part_file = ParquetFile::open(&partial.join("part-00000000.parquet")).unwrap();
     // The start is evaluated once, although each descent begins with it.
-    assert_eq!(part.rows(), 2);
-    let fields = part.schema().fields().iter().take(4).map(|field| field.name().as_str());
+    assert_eq!(part_file.rows(), 2);
+    let fields = part_file.schema().fields().iter().take(4).map(|field| field.name().as_str());
     let expected = ["damping_n_s_per_m", "unbalance_mass_kg", "file_1_shift_s", "cost"];
     assert_eq!(fields.collect::<Vec<_>>(), expected);
 
     // Another fit does not change stored evaluations, nor does a second process.
-    let work = FitWork {
+    let context = FitContext {
         cancel: Cancel::When(&|| true),
         count_evaluations: &|_| {},
         output: Some(&output),
         fresh: false,
     };
-    let other = FitOptions { no_shift: true, ..options.clone() };
-    let error = fit(cases(), &other, &work).err().unwrap().to_string();
+    let without_shift = FitOptions { no_shift: true, ..options.clone() };
+    let error = fit(cases(), &without_shift, &context).err().unwrap().to_string();
     assert!(error.contains("/fit/shift: was true, is false"), "{error}");
 
-    let made = AtomicUsize::new(0);
-    let seen = |_| {
-        made.fetch_add(1, Ordering::Relaxed);
+    let evaluations_made = AtomicUsize::new(0);
+    let count_evaluation = |_| {
+        evaluations_made.fetch_add(1, Ordering::Relaxed);
     };
-    let work = FitWork {
+    let context = FitContext {
         cancel: Cancel::Never,
-        count_evaluations: &seen,
+        count_evaluations: &count_evaluation,
         output: Some(&output),
         fresh: false,
     };
-    let resumed = fit(cases(), &options, &work).unwrap().unwrap();
-    assert_eq!(serde_json::json!(resumed.report), serde_json::json!(whole));
-    let busy = fit(cases(), &options, &work).err().unwrap().to_string();
-    assert!(busy.contains("is in use by process"), "{busy}");
+    let resumed = fit(cases(), &options, &context).unwrap().unwrap();
+    assert_eq!(serde_json::json!(resumed.report), serde_json::json!(uninterrupted));
+    let error_while_open = fit(cases(), &options, &context).err().unwrap().to_string();
+    assert!(error_while_open.contains("is in use by process"), "{error_while_open}");
     assert_eq!(resumed.evaluations.unwrap().complete(), None);
     assert!(!partial.exists());
 }
@@ -603,27 +645,27 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
 fn a_damaged_part_of_a_fit_costs_its_evaluations() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("x.toml");
-    let part = folder.path().join("x.toml.partial/part-00000000.parquet");
+    let part_path = folder.path().join("x.toml.partial/part-00000000.parquet");
     let cases = || vec![case_at(&VISCOUS, 0.9, reference("viscous", 3.0))];
     let options = options(&["damping_n_s_per_m"]);
-    let whole = fitted(cases(), &options);
+    let uninterrupted = fitted(cases(), &options);
     let fit = || {
-        let work = FitWork {
+        let context = FitContext {
             cancel: Cancel::Never,
             count_evaluations: &|_| {},
             output: Some(&output),
             fresh: false,
         };
-        fit(cases(), &options, &work).unwrap().unwrap()
+        fit(cases(), &options, &context).unwrap().unwrap()
     };
     drop(fit());
-    let sound = std::fs::read(&part).unwrap();
-    let mut bytes = sound.clone();
-    bytes[sound.len() / 2] ^= 1;
-    std::fs::write(&part, bytes).unwrap();
-    let again = fit();
-    assert_eq!(serde_json::json!(again.report), serde_json::json!(whole));
-    assert!(part.with_extension("parquet.damaged").exists());
-    let note = again.evaluations.unwrap().complete().unwrap();
+    let undamaged = std::fs::read(&part_path).unwrap();
+    let mut bytes = undamaged.clone();
+    bytes[undamaged.len() / 2] ^= 1;
+    std::fs::write(&part_path, bytes).unwrap();
+    let repeated = fit();
+    assert_eq!(serde_json::json!(repeated.report), serde_json::json!(uninterrupted));
+    assert!(part_path.with_extension("parquet.damaged").exists());
+    let note = repeated.evaluations.unwrap().complete().unwrap();
     assert!(note.contains("part-00000000.parquet.damaged"), "{note}");
 }

@@ -70,105 +70,107 @@ const UNITS: [ClockUnit; 12] = [
 ];
 
 /// Returns for each file a clause that its column seems to be in another unit, if it does.
-pub(super) fn suspicions(problem: &Problem<'_>) -> Result<Vec<Option<String>>, DescentEnd> {
-    (0..problem.cases.len()).map(|case| suspicion(problem, case)).collect()
+pub(super) fn find_suspicions(problem: &Problem<'_>) -> Result<Vec<Option<String>>, DescentEnd> {
+    (0..problem.cases.len()).map(|case| find_suspicion(problem, case)).collect()
 }
 
-fn suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, DescentEnd> {
-    let as_given = &problem.cases[case];
-    let least_ratio = TURNING_RATIO.max(TURNING_GAIN * turning_ratio(as_given));
+fn find_suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, DescentEnd> {
+    let fit_case = &problem.cases[case];
+    let least_ratio = TURNING_RATIO.max(TURNING_GAIN * turning_ratio(fit_case));
     let mut best: Option<(ClockUnit, f64)> = None;
     for unit in UNITS {
-        let Some(converted) = converted(as_given, unit) else { continue };
-        let turning = turning_ratio(&converted);
-        if turning < least_ratio {
+        let Some(convert_column) = convert_column(fit_case, unit) else { continue };
+        let ratio = turning_ratio(&convert_column);
+        if ratio < least_ratio {
             continue;
         }
-        let explained = explained_by_short_fit(problem, case, converted)?;
+        let explained_ratio = explained_by_short_fit(problem, case, convert_column)?;
         // Half, as for the model itself: less is no evidence of this unit.
-        let is_evident = explained.max(turning) > EXPLAINED_RATIO;
-        if is_evident && best.is_none_or(|(_, best)| explained > best) {
-            best = Some((unit, explained));
+        let is_evident = explained_ratio.max(ratio) > EXPLAINED_RATIO;
+        if is_evident && best.is_none_or(|(_, best)| explained_ratio > best) {
+            best = Some((unit, explained_ratio));
         }
     }
     Ok(best.map(|(unit, ratio)| {
-        let (column, own) = match unit.column {
+        let (column, own_unit) = match unit.column {
             ClockColumn::Speed => ("speed_rpm", "rpm"),
             ClockColumn::Time => ("time_s", "s"),
         };
         let name = unit.name;
         let factor = unit.factor;
-        let file = &as_given.measured.name;
-        let gain = if ratio > EXPLAINED_RATIO {
+        let file_name = &fit_case.measurement.name;
+        let evidence = if ratio > EXPLAINED_RATIO {
             format!("converted, a short fit explains {:.0} % of the record", 100.0 * ratio)
         } else {
             "converted, the record turns with the drum".to_owned()
         };
         format!(
-            "{column} of {file} seems to be in {name}, expected {own} (times {factor:.5}): {gain}"
+            "{column} of {file_name} seems to be in {name}, expected {own_unit} (times \
+             {factor:.5}): {evidence}"
         )
     }))
 }
 
 /// Returns a case whose column is converted from a unit; none if there is no such column, the run
 /// would be too long, or its rows would show no turn of a drum.
-fn converted(case: &FitCase, unit: ClockUnit) -> Option<FitCase> {
-    let mut measured = case.measured.clone();
+fn convert_column(case: &FitCase, unit: ClockUnit) -> Option<FitCase> {
+    let mut measurement = case.measurement.clone();
     let column = match unit.column {
-        ClockColumn::Speed => measured.speed_rpm.as_mut()?,
-        ClockColumn::Time => &mut measured.time_s,
+        ClockColumn::Speed => measurement.speed_rpm.as_mut()?,
+        ClockColumn::Time => &mut measurement.time_s,
     };
     column.iter_mut().for_each(|value| *value *= unit.factor);
-    if let (ClockColumn::Time, Some(pulses)) = (unit.column, &mut measured.pulses) {
+    if let (ClockColumn::Time, Some(pulses)) = (unit.column, &mut measurement.pulses) {
         pulses.edges_s.iter_mut().for_each(|edge_s| *edge_s *= unit.factor);
     }
-    let end_s = *measured.time_s.last()?;
-    if end_s > LONGEST_RUN_S || usual_step(&measured.time_s)? > SLOWEST_S {
+    let end_s = *measurement.time_s.last()?;
+    if end_s > LONGEST_RUN_S || usual_step(&measurement.time_s)? > SLOWEST_S {
         return None;
     }
-    let smoothed = measured.smoothed_spin();
-    Some(FitCase { plan: case.plan.clone(), measured, smoothed })
+    let smoothed_spin = measurement.smooth_spin();
+    Some(FitCase { plan: case.plan.clone(), measurement, smoothed_spin })
 }
 
 /// Computes the part of a record's variance that turns with the drum, the mean of its signals: by
 /// least squares, block by block, a constant and the drum's sine and cosine.
 fn turning_ratio(case: &FitCase) -> f64 {
-    let turns = turns(case);
-    let signals = &case.measured.signals;
+    let integrate_turns = integrate_turns(case);
+    let signals = &case.measurement.signals;
     let ratio = |signal: &Signal| {
         let samples: Vec<[f64; 2]> =
-            signal.samples().map(|(row, value)| [turns[row], value]).collect();
-        let swing = signal.swing();
-        turning_square(&samples) / dot(&swing, &swing)
+            signal.samples().map(|(row, value)| [integrate_turns[row], value]).collect();
+        let centred = signal.centred_values();
+        turning_square(&samples) / dot(&centred, &centred)
     };
     signals.iter().map(ratio).sum::<f64>() / signals.len() as f64
 }
 
 /// Computes the turns of the drum up to every row, by the trapezoidal rule.
-fn turns(case: &FitCase) -> Vec<f64> {
-    let times = &case.measured.time_s;
+fn integrate_turns(case: &FitCase) -> Vec<f64> {
+    let times = &case.measurement.time_s;
     let speeds: Vec<f64> = case.spin().speeds_rpm(times.iter().copied()).collect();
-    let mut turns = vec![0.0; times.len()];
+    let mut integrate_turns = vec![0.0; times.len()];
     for row in 1..times.len() {
         let mean_rpm = 0.5 * (speeds[row] + speeds[row - 1]);
-        turns[row] = turns[row - 1] + mean_rpm.abs() / 60.0 * (times[row] - times[row - 1]);
+        integrate_turns[row] =
+            integrate_turns[row - 1] + mean_rpm.abs() / 60.0 * (times[row] - times[row - 1]);
     }
-    turns
+    integrate_turns
 }
 
 /// Computes the sum of squares that turns, of samples of turns and value: beyond what three numbers
 /// a block explain of noise.
 fn turning_square(samples: &[[f64; 2]]) -> f64 {
     let mut sum = 0.0;
-    let mut rest = samples;
-    while let Some(&[first, _]) = rest.first() {
-        let by_turns = rest.partition_point(|[turn, _]| *turn < first + BLOCK_TURNS);
-        let count = by_turns.max(BLOCK_SAMPLES);
-        if count > rest.len() {
+    let mut remaining = samples;
+    while let Some(&[first, _]) = remaining.first() {
+        let count_in_block = remaining.partition_point(|[turn, _]| *turn < first + BLOCK_TURNS);
+        let count = count_in_block.max(BLOCK_SAMPLES);
+        if count > remaining.len() {
             break;
         }
-        let (block, later) = rest.split_at(count);
-        rest = later;
+        let (block, remaining_after) = remaining.split_at(count);
+        remaining = remaining_after;
         if count as f64 >= SAMPLES_PER_TURN * (block[count - 1][0] - first) {
             sum += block_square(block);
         }
@@ -182,17 +184,17 @@ fn block_square(block: &[[f64; 2]]) -> f64 {
     let wave = |wave: fn(f64) -> f64| {
         centred(block.iter().map(|[turn, _]| wave(TAU * turn.fract())).collect()).0
     };
-    let waves = [wave(libm::cos), wave(libm::sin)];
+    let centred_waves = [wave(libm::cos), wave(libm::sin)];
     let normal: Vec<Vec<f64>> =
-        waves.iter().map(|a| waves.iter().map(|b| dot(a, b)).collect()).collect();
+        centred_waves.iter().map(|a| centred_waves.iter().map(|b| dot(a, b)).collect()).collect();
     let (unit, scale) = scaled(&normal);
-    let pull: Vec<f64> =
-        waves.iter().zip(&scale).map(|(wave, scale)| dot(wave, &values) / scale).collect();
+    let rhs: Vec<f64> =
+        centred_waves.iter().zip(&scale).map(|(wave, scale)| dot(wave, &values) / scale).collect();
     // A block of a hundredth of a turn has a parabola, but no wave.
     let inverse = |value: f64| if value > 1e-3 { 1.0 / value } else { 0.0 };
-    let explained = dot(&Symmetric::from_matrix(&unit).apply(&pull, inverse), &pull);
-    let noise = (dot(&values, &values) - explained) / (block.len() as f64 - 3.0);
-    explained - 2.0 * noise
+    let explained_square = dot(&Symmetric::from_matrix(&unit).apply(&rhs, inverse), &rhs);
+    let noise = (dot(&values, &values) - explained_square) / (block.len() as f64 - 3.0);
+    explained_square - 2.0 * noise
 }
 
 /// Fits the leading free parameters to a converted case alone, in few evaluations, and returns the
@@ -201,31 +203,31 @@ fn block_square(block: &[[f64; 2]]) -> f64 {
 fn explained_by_short_fit(
     problem: &Problem<'_>,
     case: usize,
-    converted: FitCase,
+    convert_column: FitCase,
 ) -> Result<f64, DescentEnd> {
-    let cases = vec![converted];
+    let cases = vec![convert_column];
     let Ok(method) = Problem::method(&cases) else { return Ok(0.0) };
-    let own = problem.free.iter().filter(|free| free.belongs_to(case));
-    let free = own.map(|free| FreeParameter { case: None, ..free.clone() }).collect();
-    let trial = Problem { cases, free, with_shift: false, method, ..*problem };
+    let case_parameters = problem.free.iter().filter(|free| free.belongs_to(case));
+    let free = case_parameters.map(|free| FreeParameter { case: None, ..free.clone() }).collect();
+    let trial = Problem { cases, free, fits_shift: false, method, ..*problem };
     let start = trial.start();
     let evaluate = |x: &[f64]| {
-        let against = trial.compare(x);
+        let comparisons = trial.compare(x);
         if trial.cancel.is_requested() {
             return Err(DescentEnd::Stopped);
         }
-        Ok(against.map(|against| trial.normal_equations(&against)))
+        Ok(comparisons.map(|comparisons| trial.normal_equations(&comparisons)))
     };
-    let Some(summary) = evaluate(&start)? else { return Ok(0.0) };
-    let influence = |k: usize| summary.normal[k][k] * start[k] * start[k];
-    let mut order: Vec<usize> = (0..start.len()).collect();
-    order.sort_by(|&a, &b| influence(b).total_cmp(&influence(a)));
+    let Some(equations) = evaluate(&start)? else { return Ok(0.0) };
+    let influence = |k: usize| equations.normal[k][k] * start[k] * start[k];
+    let mut by_influence: Vec<usize> = (0..start.len()).collect();
+    by_influence.sort_by(|&a, &b| influence(b).total_cmp(&influence(a)));
     let mut ranges: Vec<[f64; 2]> = start.iter().map(|&value| [value; 2]).collect();
-    for &k in order.iter().take(TRIAL_PARAMETERS) {
+    for &k in by_influence.iter().take(TRIAL_PARAMETERS) {
         ranges[k] = trial.range(k);
     }
-    let found = descend(&start, &ranges, TRIAL_EVALUATIONS, &evaluate)?;
-    Ok(found.map_or(0.0, |found| mean_explained_ratio(&trial, &found)))
+    let descent = descend(&start, &ranges, TRIAL_EVALUATIONS, &evaluate)?;
+    Ok(descent.map_or(0.0, |descent| mean_explained_ratio(&trial, &descent)))
 }
 
 /// Returns whether the model explains most of the record at the end of a descent.
@@ -236,10 +238,10 @@ pub(super) fn is_explained(problem: &Problem<'_>, end: &Descent) -> bool {
 /// Computes the part of the record's variance that the model explains at the end of a descent, the
 /// mean of its signals.
 fn mean_explained_ratio(problem: &Problem<'_>, found: &Descent) -> f64 {
-    let signals = problem.signals().zip(&found.summary.sigma);
+    let signals = problem.signals().zip(&found.equations.sigma);
     let ratio = |((.., signal), sigma): ((usize, usize, &Signal), &f64)| {
-        let swing = signal.swing();
+        let swing = signal.centred_values();
         1.0 - sigma * sigma * swing.len() as f64 / dot(&swing, &swing)
     };
-    signals.map(ratio).sum::<f64>() / found.summary.sigma.len() as f64
+    signals.map(ratio).sum::<f64>() / found.equations.sigma.len() as f64
 }

@@ -235,7 +235,7 @@ impl FittedMap<'_> {
                     let [from, to] = self.problem.range(k);
                     (x - sign * by).clamp(from, to)
                 };
-                let moves = x.iter().zip(&direction.moves).enumerate();
+                let moves = x.iter().zip(&direction.effects).enumerate();
                 let varied: Vec<f64> = moves.map(moved).collect();
                 let changes = direction.changes.iter();
                 let changes: Vec<(MachineParameter, f64)> =

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::{Execution, Explained, PointTable};
 use crate::config::WasherGridInput;
-use crate::fit::{self, FitOptions, FitWork, Measurement};
+use crate::fit::{self, FitContext, FitOptions, Measurement};
 use sweep_engine::{Error, threads};
 
 /// Fits parameters of a grid's machine to measurements; `None` if it was interrupted. A measurement
@@ -27,16 +27,16 @@ pub fn fit_tables(
     let columns = grid.load()?.aside.columns;
     let mut cases = Vec::with_capacity(tables.len());
     for (k, (table, constants)) in tables.into_iter().enumerate() {
-        let mut measured = Measurement::from_columns(table.into_columns(), &columns)?;
+        let mut measurement = Measurement::from_columns(table.into_columns(), &columns)?;
         if k > 0 {
-            measured.name = format!("table {}", k + 1);
+            measurement.name = format!("table {}", k + 1);
         }
-        cases.push(fit::case(grid, &constants, measured)?);
+        cases.push(fit::case(grid, &constants, measurement)?);
     }
     let cancel = Cancel::Flag(execution.interrupt.flag());
-    let work = FitWork { cancel, count_evaluations: &|_| {}, output: None, fresh: false };
+    let context = FitContext { cancel, count_evaluations: &|_| {}, output: None, fresh: false };
     let fitted =
-        threads::pool(execution.threads()?)?.install(|| fit::fit(cases, options, &work))?;
+        threads::pool(execution.threads()?)?.install(|| fit::fit(cases, options, &context))?;
     Ok(fitted.map(|fit| Explained { found: json!(fit.report), text: fit.report.text() }))
 }
 

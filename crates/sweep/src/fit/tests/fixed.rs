@@ -12,23 +12,31 @@ fn intervals_count_what_the_fixed_numbers_may_be_off() {
     let names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
     let exact = fitted(vec![case.clone()], &options(&names));
     assert!(exact.follows && exact.text().contains("fixed numbers are taken as exact"));
-    assert!(off(&exact, &VISCOUS)[0].abs() > 10.0, "{}", exact.text());
-    let with = |known: &[&str]| {
+    assert!(error_ratios(&exact, &VISCOUS)[0].abs() > 10.0, "{}", exact.text());
+    let assert_dependence = |known: &[&str]| {
         let known = known.iter().map(|text| (*text).to_owned()).collect();
         FitOptions { known, ..options(&names) }
     };
-    for options in [with(&[]), with(&["none", "unbalance_radius_m=5%"])] {
+    for options in [assert_dependence(&[]), assert_dependence(&["none", "unbalance_radius_m=5%"])] {
         let report = fitted(vec![case.clone()], &options);
         let mass = &report.parameters[0];
-        assert!(off(&report, &VISCOUS).iter().all(|off| off.abs() < 3.0), "{}", report.text());
+        assert!(
+            error_ratios(&report, &VISCOUS).iter().all(|ratio| ratio.abs() < 3.0),
+            "{}",
+            report.text()
+        );
         assert_eq!(mass.value, exact.parameters[0].value);
         assert_eq!(mass.noise_error, exact.parameters[0].standard_error);
-        let on = mass.depends_on.as_ref().unwrap();
+        let dependence = mass.depends_on.as_ref().unwrap();
         // Mass times radius shakes.
-        assert_eq!(on.name, "unbalance_radius_m", "{}", report.text());
-        let ratio = on.moves_by.abs() / mass.value / (on.error / radius_m);
-        println!("{}: {on:?}", report.fixed_numbers);
-        assert!((ratio - 1.0).abs() < 0.1 && on.error <= on.tolerance, "{}", report.text());
+        assert_eq!(dependence.name, "unbalance_radius_m", "{}", report.text());
+        let ratio = dependence.moves_by.abs() / mass.value / (dependence.error / radius_m);
+        println!("{}: {dependence:?}", report.fixed_numbers);
+        assert!(
+            (ratio - 1.0).abs() < 0.1 && dependence.error <= dependence.tolerance,
+            "{}",
+            report.text()
+        );
         assert!(mass.standard_error.unwrap() < 0.08 * mass.value, "{}", report.text());
         assert_eq!(report.fixed_numbers == 1, !options.known.is_empty());
         let text = report.text();
@@ -45,39 +53,43 @@ fn tolerances_are_the_prior_of_an_unknown() {
     let radius_m = case.plan.model.machine.unbalance.radius_m;
     let mut names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
     let cases = vec![case];
-    let work =
-        FitWork { cancel: Cancel::Never, count_evaluations: &|_| {}, output: None, fresh: false };
-    let fitted = fit(cases.clone(), &options(&names), &work).unwrap().unwrap();
-    let Fitted { problem, mut x, against, .. } = fitted;
-    let summary = problem.normal_equations(&against);
-    let variances: Vec<f64> = summary.sigma.iter().map(|sigma| sigma * sigma).collect();
+    let context = FitContext {
+        cancel: Cancel::Never,
+        count_evaluations: &|_| {},
+        output: None,
+        fresh: false,
+    };
+    let fitted = fit(cases.clone(), &options(&names), &context).unwrap().unwrap();
+    let Fitted { problem, mut x, comparisons, .. } = fitted;
+    let equations = problem.normal_equations(&comparisons);
+    let variances: Vec<f64> = equations.sigma.iter().map(|sigma| sigma * sigma).collect();
     let known = ["none", "unbalance_radius_m=5%"].map(str::to_owned);
     let known = FixedNumbers::read(&known, &cases[0], &problem.free).unwrap();
-    let found = known.influences(&problem, &x, &against, &summary, &variances);
+    let influences = known.influences(&problem, &x, &comparisons, &equations, &variances);
     let radius = names.len();
     names.push("unbalance_radius_m");
     x.insert(radius, radius_m);
     let free = free_parameters(&options(&names), &cases).unwrap();
-    let Problem { model, with_shift, method, simd, cancel, .. } = problem;
-    let joint = Problem { cases, free, model, with_shift, method, simd, cancel };
-    let NormalEquations { mut normal, pull, .. } =
+    let Problem { model, fits_shift, method, simd, cancel, .. } = problem;
+    let joint = Problem { cases, free, model, fits_shift, method, simd, cancel };
+    let NormalEquations { mut normal, rhs, .. } =
         joint.normal_equations(&joint.compare(&x).unwrap());
     normal[radius][radius] += 1.0 / (0.05 * radius_m).powi(2);
     let covariance = algebra::inverse(&normal);
-    let moved: Vec<f64> = covariance.iter().map(|row| algebra::dot(row, &pull)).collect();
-    let number = &found.numbers[0];
+    let moved: Vec<f64> = covariance.iter().map(|row| algebra::dot(row, &rhs)).collect();
+    let number = &influences.numbers[0];
     println!("{radius_m} m: moved by {moved:?}, {number:?}");
     assert!((number.error / covariance[radius][radius].sqrt() - 1.0).abs() < 0.01, "{number:?}");
-    let by_noise = algebra::inverse(&summary.normal);
+    let by_noise = algebra::inverse(&equations.normal);
     let unknowns: Vec<usize> = (0..x.len()).filter(|k| *k != radius).collect();
     for (i, &row) in unknowns.iter().enumerate() {
         let error = |k: usize| covariance[k][k].sqrt();
         for (j, &column) in unknowns.iter().enumerate() {
-            let ours = by_noise[i][j] + number.moves[i] * number.moves[j];
+            let ours = by_noise[i][j] + number.effects[i] * number.effects[j];
             let off = (ours - covariance[row][column]) / (error(row) * error(column));
             assert!(off.abs() < 0.01, "{row}, {column}: {ours}, {covariance:?}");
         }
-        let square = found.covariance[i][i] - number.moves[i].powi(2);
+        let square = influences.covariance[i][i] - number.effects[i].powi(2);
         let off = (square.max(0.0).sqrt() - moved[row].abs()) / error(row);
         assert!(off.abs() < 0.05, "{row}: {square}, {moved:?}");
     }
@@ -105,9 +117,9 @@ fn the_record_limits_errors_of_fixed_numbers() {
 fn a_gain_moves_the_estimates_that_it_scales() {
     let known = ["none", "gain=3%"].map(str::to_owned).to_vec();
     let options = FitOptions { known, ..options(&["unbalance_mass_kg"]) };
-    let mut measured = reference("viscous", 8.0);
-    measured.signals.truncate(1);
-    let report = fitted(vec![case_at(&VISCOUS, 1.0, measured)], &options);
+    let mut measurement = reference("viscous", 8.0);
+    measurement.signals.truncate(1);
+    let report = fitted(vec![case_at(&VISCOUS, 1.0, measurement)], &options);
     let mass = &report.parameters[0];
     let on = mass.depends_on.as_ref().unwrap();
     assert_eq!(on.name, "gain of tub_front_y_m_per_s2");
@@ -161,10 +173,10 @@ fn intervals_hold_the_truth_as_often_as_the_fixed_numbers_are_known() {
     let mut following = 0;
     for draw in 0..DRAWS {
         let draw = DRAWS * seed() + draw;
-        let mut measured = reference("viscous_exact", 8.0);
+        let mut measurement = reference("viscous_exact", 8.0);
         let errors = noise(draw, 20, FIXED.len(), 0.0);
-        let gains = noise(draw, 21, measured.signals.len(), 0.0);
-        for (s, signal) in measured.signals.iter_mut().enumerate() {
+        let gains = noise(draw, 21, measurement.signals.len(), 0.0);
+        for (s, signal) in measurement.signals.iter_mut().enumerate() {
             let noise = noise(draw, s, signal.values.len(), 0.0);
             let gain = 1.0 + 0.03 * gains[s];
             for (value, z) in signal.values.iter_mut().zip(noise) {
@@ -172,7 +184,7 @@ fn intervals_hold_the_truth_as_often_as_the_fixed_numbers_are_known() {
             }
         }
         // The machine file is off, as seen from the record.
-        let mut case = case_at(&VISCOUS, 0.97, measured);
+        let mut case = case_at(&VISCOUS, 0.97, measurement);
         let mut spin = case.plan.model.spin.clone();
         for ((name, ratio), error) in FIXED.iter().zip(&errors) {
             let machine = &mut case.plan.model.machine;
