@@ -27,9 +27,11 @@ done
 # The machine's mass centre, up and sideways.
 centre="--channel total_centre_y --channel total_centre_z"
 for name in fig10 fig11; do
-    "$SWEEP" plot "results/$name.parquet" --modes results/fig7.parquet -o "$figures/$name.svg"
+    modes=results/$name-modes.parquet
+    "$SWEEP" modes "sweeps/$name.toml" --speed 0:1200:10 --out "$modes"
+    "$SWEEP" plot "results/$name.parquet" --modes "$modes" -o "$figures/$name.svg"
     # shellcheck disable=SC2086 # two options and their values
-    "$SWEEP" plot "results/$name.parquet" $centre --modes results/fig7.parquet \
+    "$SWEEP" plot "results/$name.parquet" $centre --modes "$modes" \
         -o "$figures/${name}_centre.svg"
 done
 
@@ -49,11 +51,12 @@ done
 "$SWEEP" plot results/fig10.parquet --view passages --channel tub_yaw --channel tub_pitch $centre \
     --modes results/fig7.parquet -o "$figures/delay.svg"
 "$SWEEP" run sweeps/held.toml --progress plain
-held=()
+held=
 for channel in tub_yaw tub_pitch total_centre_y total_centre_z; do
-    held+=(--quantity "linear_$channel")
+    held="$held --quantity linear_$channel"
 done
-"$SWEEP" plot results/held.parquet "${held[@]}" -o "$figures/held.svg"
+# shellcheck disable=SC2086
+"$SWEEP" plot results/held.parquet $held -o "$figures/held.svg"
 
 "$SWEEP" run sweeps/fig12.toml --progress plain
 "$SWEEP" plot results/fig12.parquet -o "$figures/fig12.svg"
