@@ -207,8 +207,8 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
 /// Doubling it has sums stored in memory.
 const SUMS_IN_REGISTERS: usize = 10;
 
-/// Computes a state from state `from` and the slopes weighted by a row's coefficients, and stores
-/// it as state `to`.
+/// Computes a state from state `source_index` and the slopes weighted by a row's coefficients, and
+/// stores it as state `target_index`.
 #[expect(clippy::manual_memcpy, reason = "sums are registers, not memory")]
 #[inline(always)]
 fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
@@ -216,15 +216,15 @@ fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
     row: SparseRow,
     slopes: &[[N<T>; D]; K],
     states: &mut [[N<T>; D]; S],
-    from: usize,
-    to: usize,
+    source_index: usize,
+    target_index: usize,
 ) {
     // Coordinates are summed in groups whose sums fit in registers. Each weight is loaded once for
     // a group, and the sums of a group are computed independently of each other.
     for first in (0..D).step_by(SUMS_IN_REGISTERS) {
         let mut x = [h; SUMS_IN_REGISTERS];
         for i in 0..SUMS_IN_REGISTERS.min(D - first) {
-            x[i] = states[from][first + i];
+            x[i] = states[source_index][first + i];
         }
         for (stage, weight) in row {
             let weighted_step = (h * *weight).v();
@@ -233,7 +233,7 @@ fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
             }
         }
         for i in 0..SUMS_IN_REGISTERS.min(D - first) {
-            states[to][first + i] = x[i];
+            states[target_index][first + i] = x[i];
         }
     }
 }

@@ -110,7 +110,7 @@ impl<T: Lane> Lane for Dual<T> {
         T::bits(mask)
     }
     #[inline(always)]
-    fn run_out_of_line<W: OutOfLine>(self, work: W) -> W::Output {
-        self.value.run_out_of_line(work)
+    fn run_out_of_line<W: OutOfLine>(self, computation: W) -> W::Output {
+        self.value.run_out_of_line(computation)
     }
 }

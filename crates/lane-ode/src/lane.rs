@@ -31,11 +31,11 @@ pub trait Lane: Real {
     fn larger(self, b: Self) -> Self {
         Self::select(b.less(self), self, b)
     }
-    /// Runs `work`, which uses lanes of this type, as a separate function that is compiled once for
-    /// all callers with the type's instructions.
+    /// Runs `computation`, which uses lanes of this type, as a separate function that is compiled
+    /// once for all callers with the type's instructions.
     #[inline(always)]
-    fn run_out_of_line<W: OutOfLine>(self, work: W) -> W::Output {
-        call_out_of_line(work)
+    fn run_out_of_line<W: OutOfLine>(self, computation: W) -> W::Output {
+        call_out_of_line(computation)
     }
 }
 
@@ -50,8 +50,8 @@ pub trait OutOfLine {
     fn run(self) -> Self::Output;
 }
 
-/// Runs `work` compiled with the target's baseline instructions.
+/// Runs `computation` compiled with the target's baseline instructions.
 #[inline(never)]
-pub(crate) fn call_out_of_line<W: OutOfLine>(work: W) -> W::Output {
-    work.run()
+pub(crate) fn call_out_of_line<W: OutOfLine>(computation: W) -> W::Output {
+    computation.run()
 }

@@ -60,8 +60,8 @@ impl Lane for f64 {
         u32::from(mask)
     }
     #[inline(always)]
-    fn run_out_of_line<W: OutOfLine>(self, work: W) -> W::Output {
-        Simd::one_lane(work)
+    fn run_out_of_line<W: OutOfLine>(self, computation: W) -> W::Output {
+        Simd::one_lane(computation)
     }
 }
 

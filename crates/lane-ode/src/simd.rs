@@ -162,8 +162,8 @@ impl Simd {
     /// # Panics
     /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].
     #[inline(always)]
-    pub fn one_lane<W: OutOfLine>(work: W) -> W::Output {
-        one_lane(work)
+    pub fn one_lane<W: OutOfLine>(computation: W) -> W::Output {
+        one_lane(computation)
     }
 
     /// Runs a kernel that integrates one trajectory and uses lanes for another purpose, such as

@@ -92,14 +92,14 @@ macro_rules! vector {
                 $bits
             }
             #[inline(always)]
-            fn run_out_of_line<W: $crate::OutOfLine>(self, work: W) -> W::Output {
+            fn run_out_of_line<W: $crate::OutOfLine>(self, computation: W) -> W::Output {
                 #[inline(never)]
                 #[target_feature(enable = $features)]
-                fn inner<W: $crate::OutOfLine>(work: W) -> W::Output {
-                    work.run()
+                fn inner<W: $crate::OutOfLine>(computation: W) -> W::Output {
+                    computation.run()
                 }
                 // SAFETY: as in `lit`.
-                unsafe { inner(work) }
+                unsafe { inner(computation) }
             }
         }
     };

@@ -340,13 +340,13 @@ mod tests {
                             machine,
                         );
                     }
-                    let max_derivative = (0..STATE_LEN).fold(1.0_f64, |max_derivative, i| {
-                        max_derivative.max(f64::abs(jacobian[i][j]))
+                    let column_scale = (0..STATE_LEN).fold(1.0_f64, |column_scale, i| {
+                        column_scale.max(f64::abs(jacobian[i][j]))
                     });
                     for i in 0..STATE_LEN {
                         let difference_quotient =
                             (shifted_rates[0][i] - shifted_rates[1][i]) / (2.0 * step);
-                        let error = (jacobian[i][j] - difference_quotient).abs() / max_derivative;
+                        let error = (jacobian[i][j] - difference_quotient).abs() / column_scale;
                         assert!(
                             error < 1e-6,
                             "{model:?} [{i}][{j}]: {} {difference_quotient}",

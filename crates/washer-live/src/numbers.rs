@@ -49,21 +49,25 @@ impl NumberWalk<'_> {
         is_count.then_some(value as usize)
     }
 
-    /// Writes or reads an element of `all` as its index.
-    pub(crate) fn choice<T: Clone + PartialEq>(&mut self, value: &mut T, all: &[T]) -> Option<()> {
-        let index = all.iter().position(|known| known == value).unwrap_or(all.len());
-        *value = all.get(self.count(index)?)?.clone();
+    /// Writes or reads an element of `choices` as its index.
+    pub(crate) fn choice<T: Clone + PartialEq>(
+        &mut self,
+        value: &mut T,
+        choices: &[T],
+    ) -> Option<()> {
+        let index = choices.iter().position(|choice| choice == value).unwrap_or(choices.len());
+        *value = choices.get(self.count(index)?)?.clone();
         Some(())
     }
 
-    /// Writes or reads some elements of `all` as their indices.
+    /// Writes or reads some elements of `choices` as their indices.
     pub(crate) fn choices<T: Clone + PartialEq>(
         &mut self,
         values: &mut Vec<T>,
-        all: &[T],
+        choices: &[T],
     ) -> Option<()> {
-        self.resize(values, all.first()?)?;
-        values.iter_mut().try_for_each(|value| self.choice(value, all))
+        self.resize(values, choices.first()?)?;
+        values.iter_mut().try_for_each(|value| self.choice(value, choices))
     }
 
     /// Writes the length of a list, or reads a length and resizes the list. The elements are

@@ -223,13 +223,13 @@ fn normalize_to_unit_mass(
     mass: &[[f64; COORDINATES]; COORDINATES],
     vector: &[c64; COORDINATES],
 ) -> [[f64; 2]; COORDINATES] {
-    let mut largest = c64::new(0.0, 0.0);
+    let mut largest_entry = c64::new(0.0, 0.0);
     for entry in vector {
-        if entry.norm_sqr() > largest.norm_sqr() {
-            largest = *entry;
+        if entry.norm_sqr() > largest_entry.norm_sqr() {
+            largest_entry = *entry;
         }
     }
-    let rotated_vector = vector.map(|v| v * largest.conj() / largest.norm_sqr());
+    let rotated_vector = vector.map(|v| v * largest_entry.conj() / largest_entry.norm_sqr());
     let pairs = rotated_vector.map(|v| [v.re, v.im]);
     let scale = mass_inner_product(mass, &pairs, &pairs)[0].sqrt();
     pairs.map(|[re, im]| [re / scale, im / scale])
@@ -365,13 +365,13 @@ fn first_order_system(
     let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| ModesError::Mass)?;
     let stiffness = factors.solve(to_matrix(&matrices.stiffness));
     let damping = factors.solve(to_matrix(&matrices.damping));
-    let largest = (0..COORDINATES)
+    let largest_stiffness = (0..COORDINATES)
         .flat_map(|i| (0..COORDINATES).map(move |j| (i, j)))
-        .fold(0.0_f64, |largest, entry| largest.max(stiffness[entry].abs()));
-    if !largest.is_finite() {
+        .fold(0.0_f64, |largest_stiffness, entry| largest_stiffness.max(stiffness[entry].abs()));
+    if !largest_stiffness.is_finite() {
         return Err(ModesError::Eigenvalues);
     }
-    let unit_per_s = largest.sqrt().max(1.0);
+    let unit_per_s = largest_stiffness.sqrt().max(1.0);
     let matrix = Mat::from_fn(STATES, STATES, |i, j| {
         if i < COORDINATES {
             f64::from(u8::from(j == i + COORDINATES))

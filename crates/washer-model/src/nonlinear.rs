@@ -384,9 +384,9 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
 
     let mut inertia = rotor_inertia::<T, SKEWED>(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {
-        let axial_r = (b.rotor_mass * axial_arm[r]).v();
+        let axial_moment = (b.rotor_mass * axial_arm[r]).v();
         for s in 0..=r {
-            inertia[r][s] += axial_r * axial_arm[s];
+            inertia[r][s] += axial_moment * axial_arm[s];
         }
     }
     Half {

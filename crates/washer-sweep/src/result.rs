@@ -43,8 +43,9 @@ impl PyResultTable {
         }
         let axes = plan["axis"].as_array().map_or(&[][..], Vec::as_slice);
         let distinct = axes.iter().filter_map(|axis| axis["parameter"].as_str()).map(|name| {
-            let parts = self.0.batches().iter().filter_map(|batch| batch.column_by_name(name));
-            let values = parts.flat_map(|part| cells::numbers(part).unwrap_or_default());
+            let column_chunks =
+                self.0.batches().iter().filter_map(|batch| batch.column_by_name(name));
+            let values = column_chunks.flat_map(|chunk| cells::numbers(chunk).unwrap_or_default());
             values.map(|value| value.map(f64::to_bits)).collect::<HashSet<_>>().len()
         });
         distinct.product::<usize>() != self.0.rows()
@@ -88,17 +89,20 @@ impl PyResultTable {
     /// Returns a column as a NumPy array.
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let field = self.field(name)?;
-        let parts: Vec<&ArrayRef> =
+        let column_chunks: Vec<&ArrayRef> =
             self.0.batches().iter().filter_map(|batch| batch.column_by_name(name)).collect();
         let numpy = py.import("numpy")?;
         let (bytes, kind) = match field.data_type() {
             DataType::UInt64 => {
-                let counts =
-                    parts.iter().flat_map(|part| part.as_primitive::<UInt64Type>().values());
+                let counts = column_chunks
+                    .iter()
+                    .flat_map(|chunk| chunk.as_primitive::<UInt64Type>().values());
                 (counts.flat_map(|count| count.to_ne_bytes()).collect::<Vec<u8>>(), "uint64")
             }
             number if cells::is_number(number) => {
-                let values = parts.iter().flat_map(|part| cells::numbers(part).unwrap_or_default());
+                let values = column_chunks
+                    .iter()
+                    .flat_map(|chunk| cells::numbers(chunk).unwrap_or_default());
                 (
                     values.flat_map(|value| value.unwrap_or(f64::NAN).to_ne_bytes()).collect(),
                     "float64",
@@ -106,8 +110,8 @@ impl PyResultTable {
             }
             _ => {
                 let values = PyList::empty(py);
-                for part in parts {
-                    append(&values, part)?;
+                for chunk in column_chunks {
+                    append(&values, chunk)?;
                 }
                 let options = PyDict::new(py);
                 options.set_item("dtype", "object")?;
@@ -217,11 +221,11 @@ fn in_temporary_file<T>(action: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T
 }
 
 /// Appends flags or words to a list; a null becomes `None`.
-fn append(values: &Bound<'_, PyList>, part: &ArrayRef) -> PyResult<()> {
-    if let Ok(flags) = cells::flags(part) {
+fn append(values: &Bound<'_, PyList>, chunk: &ArrayRef) -> PyResult<()> {
+    if let Ok(flags) = cells::flags(chunk) {
         return flags.iter().try_for_each(|flag| values.append(flag));
     }
-    cells::words(part).into_iter().flatten().try_for_each(|word| values.append(word))
+    cells::words(chunk).into_iter().flatten().try_for_each(|word| values.append(word))
 }
 
 /// Reads a result file of any kind, and checks its digest.

@@ -86,18 +86,19 @@ fn wait_for_result<T>(
 pub(crate) fn supervise_abandonable<T: Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
-    work: impl FnOnce(Execution<'_>) -> Result<Option<T>, Error> + Send + 'static,
+    computation: impl FnOnce(Execution<'_>) -> Result<Option<T>, Error> + Send + 'static,
 ) -> PyResult<T> {
     let result = py.detach(|| {
         let (sender, results) = channel();
         let interrupt = Interrupt::new();
         let work_interrupt = interrupt.clone();
-        let work = move || {
+        let run_and_send = move || {
             // The receiver no longer exists if the work was abandoned.
-            let _ = sender
-                .send(work(WorkOptions { threads, progress: false }.execution(&work_interrupt)));
+            let _ = sender.send(computation(
+                WorkOptions { threads, progress: false }.execution(&work_interrupt),
+            ));
         };
-        Builder::new().spawn(work).map_err(thread_error)?;
+        Builder::new().spawn(run_and_send).map_err(thread_error)?;
         match wait_for_result(&results, &interrupt, true) {
             (_, Some(raised)) => Err(raised),
             (value, None) => value.ok_or_else(panic_error),
@@ -126,18 +127,18 @@ fn panic_error() -> PyErr {
 pub(crate) fn supervise<T: Send>(
     py: Python<'_>,
     options: WorkOptions,
-    work: impl FnOnce(Execution<'_>) -> Result<T, Error> + Send,
+    computation: impl FnOnce(Execution<'_>) -> Result<T, Error> + Send,
 ) -> PyResult<Supervised<T>> {
     py.detach(|| {
         let interrupt = Interrupt::new();
         std::thread::scope(|scope| {
             let (sender, results) = channel();
             let interrupt = &interrupt;
-            let work = move || {
+            let run_and_send = move || {
                 // The receiver exists, because this function waits for the work.
-                let _ = sender.send(work(options.execution(interrupt)));
+                let _ = sender.send(computation(options.execution(interrupt)));
             };
-            let worker = Builder::new().spawn_scoped(scope, work).map_err(thread_error)?;
+            let worker = Builder::new().spawn_scoped(scope, run_and_send).map_err(thread_error)?;
             let (value, raised) = wait_for_result(&results, interrupt, false);
             // Without this join the scope would propagate a panic of the thread.
             let _ = worker.join();

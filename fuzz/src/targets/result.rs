@@ -21,7 +21,9 @@ pub(crate) fn run(bytes: &[u8]) {
     let job = Job::new(&files.plan);
     match status(&files.result, &job) {
         // An empty file is treated like a missing one.
-        Ok(found) => assert!(found.state == RunStage::NotStarted && bytes.is_empty(), "{found:?}"),
+        Ok(status) => {
+            assert!(status.state == RunStage::NotStarted && bytes.is_empty(), "{status:?}")
+        }
         Err(error) => assert!(error.to_string().contains("x.parquet"), "{error}"),
     }
     if !bytes.is_empty() {
@@ -39,8 +41,8 @@ fn with_digest(bytes: &[u8]) -> Vec<u8> {
     /// The number of hexadecimal digits of a digest.
     const DIGITS: usize = 64;
     let mut bytes = bytes.to_vec();
-    let found = bytes.windows(ENTRY.len()).rposition(|window| window == ENTRY);
-    if let Some(start) = found.map(|entry| entry + ENTRY.len())
+    let last_entry_start = bytes.windows(ENTRY.len()).rposition(|window| window == ENTRY);
+    if let Some(start) = last_entry_start.map(|start| start + ENTRY.len())
         && start + DIGITS <= bytes.len()
     {
         bytes[start..start + DIGITS].fill(b'0');

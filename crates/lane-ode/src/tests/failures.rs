@@ -68,11 +68,11 @@ fn solve_among_regular(
                 positions.push(position);
             }
             let (outcomes, _) = solve::<FailingEquation, 3, 5>(simd, method, &mixed);
-            let mut failed_lanes = Vec::new();
+            let mut failed_outcomes = Vec::new();
             let mut completed = Vec::new();
             for (i, outcome) in outcomes.into_iter().enumerate() {
                 if positions.contains(&i) {
-                    failed_lanes.push(outcome)
+                    failed_outcomes.push(outcome)
                 } else {
                     completed.push(outcome)
                 }
@@ -83,8 +83,8 @@ fn solve_among_regular(
                     "{simd:?}, sound {i}: {mixed:?} against {expected:?}"
                 );
             }
-            let first_failure = first_failed.get_or_insert_with(|| failed_lanes.clone());
-            for (outcome, first_failure) in failed_lanes.iter().zip(first_failure.iter()) {
+            let first_failure = first_failed.get_or_insert_with(|| failed_outcomes.clone());
+            for (outcome, first_failure) in failed_outcomes.iter().zip(first_failure.iter()) {
                 assert_eq!(
                     (outcome.end, outcome.count),
                     (first_failure.end, first_failure.count),

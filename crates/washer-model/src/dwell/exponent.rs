@@ -60,45 +60,52 @@ pub(super) fn compute_exponents(
 ) -> Vec<Option<Exponent>> {
     let initial_separation: Vec<f64> = requests
         .iter()
-        .map(|(held, _)| RESCALED_SEPARATION * largest_deviation(held.setup.point, &held.state))
+        .map(|(held_state, _)| {
+            RESCALED_SEPARATION * largest_deviation(held_state.setup.point, &held_state.state)
+        })
         .collect();
     // In the list, each run is followed by its perturbed run.
     let mut pairs = Vec::with_capacity(2 * requests.len());
-    for ((held, direction), initial_separation) in requests.iter().zip(&initial_separation) {
-        let speed = held.setup.speed_rpm * TAU / 60.0;
-        let mut perturbed = *held;
+    for ((held_state, direction), initial_separation) in requests.iter().zip(&initial_separation) {
+        let speed = held_state.setup.speed_rpm * TAU / 60.0;
+        let mut perturbed_state = *held_state;
         for i in 0..COORDINATES {
-            perturbed.state[COORDINATES + i] += initial_separation * speed * direction[i];
+            perturbed_state.state[COORDINATES + i] += initial_separation * speed * direction[i];
         }
-        pairs.extend([*held, perturbed]);
+        pairs.extend([*held_state, perturbed_state]);
     }
-    let mut parts = vec![[0.0_f64; PARTS]; requests.len()];
+    let mut growth_in_parts = vec![[0.0_f64; PARTS]; requests.len()];
     for turn in 0..TRANSIENT_TURNS + PARTS * PART_TURNS {
         let turns = integrate_turns(simd, &pairs, 1);
         for (k, initial_separation) in initial_separation.iter().enumerate() {
-            let (Some(run), Some(perturbed)) = (turns[2 * k].first(), turns[2 * k + 1].first())
+            let (Some(run), Some(perturbed_turn)) =
+                (turns[2 * k].first(), turns[2 * k + 1].first())
             else {
-                parts[k][0] = f64::NAN;
+                growth_in_parts[k][0] = f64::NAN;
                 continue;
             };
             let setup = pairs[2 * k].setup;
-            let separation = distance(&setup, &run.end, &perturbed.end);
+            let separation = distance(&setup, &run.end, &perturbed_turn.end);
             if let Some(measured_turn) = turn.checked_sub(TRANSIENT_TURNS) {
-                parts[k][measured_turn / PART_TURNS] += libm::log(separation / initial_separation);
+                growth_in_parts[k][measured_turn / PART_TURNS] +=
+                    libm::log(separation / initial_separation);
             }
             pairs[2 * k].state = run.end;
             pairs[2 * k + 1].state = core::array::from_fn(|i| {
-                run.end[i] + (perturbed.end[i] - run.end[i]) * (initial_separation / separation)
+                run.end[i]
+                    + (perturbed_turn.end[i] - run.end[i]) * (initial_separation / separation)
             });
         }
     }
-    let exponents = parts.iter().zip(requests).map(|(parts, (held, _))| {
-        let part_s = PART_TURNS as f64 * held.setup.turn_s();
-        let mean = parts.iter().sum::<f64>() / PARTS as f64;
-        let squares: f64 = parts.iter().map(|part| (part - mean) * (part - mean)).sum();
-        let error = (squares / (PARTS * (PARTS - 1)) as f64).sqrt();
-        let exponent = Exponent { per_s: mean / part_s, error_per_s: error / part_s };
-        (exponent.per_s.is_finite() && exponent.error_per_s.is_finite()).then_some(exponent)
-    });
+    let exponents =
+        growth_in_parts.iter().zip(requests).map(|(growth_in_parts, (held_state, _))| {
+            let part_s = PART_TURNS as f64 * held_state.setup.turn_s();
+            let mean = growth_in_parts.iter().sum::<f64>() / PARTS as f64;
+            let squares: f64 =
+                growth_in_parts.iter().map(|part| (part - mean) * (part - mean)).sum();
+            let error = (squares / (PARTS * (PARTS - 1)) as f64).sqrt();
+            let exponent = Exponent { per_s: mean / part_s, error_per_s: error / part_s };
+            (exponent.per_s.is_finite() && exponent.error_per_s.is_finite()).then_some(exponent)
+        });
     exponents.collect()
 }

@@ -60,7 +60,7 @@ fn fourier_means<const M: usize>(
             (re[k], im[k]) = (re[k] * cos[k] - im[k] * sin[k], re[k] * sin[k] + im[k] * cos[k]);
         }
     }
-    sums.map(|sum| sum.map(|part| part / window_sum))
+    sums.map(|sum| sum.map(|component| component / window_sum))
 }
 
 /// Returns the power of all signals together at some frequencies.
@@ -98,27 +98,34 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     let frequency_at = |trial: usize| 0.5 * trial as f64 / (TRIALS_PER_SAMPLE * count) as f64;
     // The lowest frequencies are excluded, because the mean dominates them.
     let trials: Vec<usize> = (2 * TRIALS_PER_SAMPLE * 2..=TRIALS_PER_SAMPLE * count).collect();
-    let mut best = (0.0, *trials.first()?);
+    let mut strongest = (0.0, *trials.first()?);
     for trials in trials.chunks(FREQUENCIES_AT_ONCE) {
         let frequencies =
             from_fn::<_, FREQUENCIES_AT_ONCE, _>(|k| frequency_at(trials[k.min(trials.len() - 1)]));
         let powers = powers(&residuals, &windows, frequencies);
         let trial_powers = powers.into_iter().zip(trials.iter().copied());
-        best = trial_powers.fold(best, |best, trial| if trial.0 < best.0 { best } else { trial });
+        strongest =
+            trial_powers.fold(
+                strongest,
+                |strongest, trial| {
+                    if trial.0 < strongest.0 { strongest } else { trial }
+                },
+            );
     }
-    let (_, best) = best;
-    let mut low = frequency_at(best - 1);
-    let mut high = frequency_at(best + 1).min(0.5);
+    let (_, strongest_trial) = strongest;
+    let mut min_frequency = frequency_at(strongest_trial - 1);
+    let mut max_frequency = frequency_at(strongest_trial + 1).min(0.5);
     for _ in 0..TERNARY_ROUNDS {
-        let third = (high - low) / 3.0;
-        let [below, above] = powers(&residuals, &windows, [low + third, high - third]);
+        let third = (max_frequency - min_frequency) / 3.0;
+        let [below, above] =
+            powers(&residuals, &windows, [min_frequency + third, max_frequency - third]);
         if below < above {
-            low += third;
+            min_frequency += third;
         } else {
-            high -= third;
+            max_frequency -= third;
         }
     }
-    let frequency = 0.5 * (low + high);
+    let frequency = 0.5 * (min_frequency + max_frequency);
     let harmonics: Vec<Harmonic> =
         (0..=HARMONICS).map(|k| Harmonic::new((k as f64 * frequency).fract(), count)).collect();
     for _ in 0..SUBTRACTION_PASSES {

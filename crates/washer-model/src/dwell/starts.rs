@@ -72,12 +72,12 @@ pub(super) fn kick_directions(point: &Point, frozen_modes: &Modes, random: usize
         let shape = &frozen_modes.modes[modes[rank].0].shape;
         core::array::from_fn(|i| round_last_digits(shape[i][0] * amplitude(rank)))
     };
-    let first_mode_velocity = unit(0);
-    let second_mode_velocity = unit(1);
+    let first_scaled_shape = unit(0);
+    let second_scaled_shape = unit(1);
     let mut directions = vec![
-        first_mode_velocity,
-        second_mode_velocity,
-        core::array::from_fn(|i| first_mode_velocity[i] + second_mode_velocity[i]),
+        first_scaled_shape,
+        second_scaled_shape,
+        core::array::from_fn(|i| first_scaled_shape[i] + second_scaled_shape[i]),
     ];
     let mut numbers = fastrand::Rng::with_seed(DIRECTION_SEED);
     for _ in 0..random {

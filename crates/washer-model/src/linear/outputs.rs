@@ -35,18 +35,18 @@ const SAMPLE_ANGLES: [(f64, f64); 3] =
 /// the other parts.
 const fn entry_index(
     output: usize,
-    part: usize,
+    harmonic_part: usize,
     harmonic_outputs: &[usize],
     outputs: usize,
 ) -> usize {
-    if part == 0 {
+    if harmonic_part == 0 {
         return output;
     }
     let mut index = 0;
     while harmonic_outputs[index] != output {
         index += 1;
     }
-    outputs + 2 * index + part - 1
+    outputs + 2 * index + harmonic_part - 1
 }
 
 macro_rules! expand {
@@ -82,8 +82,8 @@ channels!(expand);
 /// The number of entries of the channels' terms.
 const CHANNEL_ENTRIES: usize = CHANNELS + 2 * HARMONIC_CHANNELS.len();
 
-const fn channel_entry(channel: Channel, part: usize) -> usize {
-    entry_index(channel.index(), part, HARMONIC_CHANNELS, CHANNELS)
+const fn channel_entry(channel: Channel, harmonic_part: usize) -> usize {
+    entry_index(channel.index(), harmonic_part, HARMONIC_CHANNELS, CHANNELS)
 }
 
 /// The components of the radial distance that have harmonics of theta, which are both.
@@ -93,8 +93,8 @@ const RADIAL_ENTRIES: usize = 3 * RADIAL_COMPONENTS;
 /// The entries of the radial distance's parts of order zero, which are all.
 const RADIAL_AT_REST: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
 
-const fn radial_entry(component: usize, part: usize) -> usize {
-    entry_index(component, part, &HARMONIC_RADIAL, RADIAL_COMPONENTS)
+const fn radial_entry(component: usize, harmonic_part: usize) -> usize {
+    entry_index(component, harmonic_part, &HARMONIC_RADIAL, RADIAL_COMPONENTS)
 }
 
 sparse_sums! {
@@ -297,13 +297,16 @@ fn select_lane_coefficients(
             let cos = (2.0 * values[0] - values[1] - values[2]) / 3.0;
             let sin = (values[1] - values[2]) * 2.0 * SAMPLE_ANGLES[1].1 / 3.0;
             // Channels are deviations from their values at theta = 0, where the cosine is 1.
-            let steady = if column == REST_COLUMN && output < CHANNELS { -cos } else { mean };
-            for (part, coefficient) in [steady, cos, sin].into_iter().enumerate() {
+            let steady_coefficient =
+                if column == REST_COLUMN && output < CHANNELS { -cos } else { mean };
+            for (harmonic_part, coefficient) in
+                [steady_coefficient, cos, sin].into_iter().enumerate()
+            {
                 let (entry, terms, at_rest) = if output >= CHANNELS {
-                    let entry = radial_entry(output - CHANNELS, part);
+                    let entry = radial_entry(output - CHANNELS, harmonic_part);
                     (entry, &mut radial[..], &mut radial_at_rest[..])
-                } else if part == 0 || HARMONIC_CHANNELS.contains(&output) {
-                    let entry = entry_index(output, part, HARMONIC_CHANNELS, CHANNELS);
+                } else if harmonic_part == 0 || HARMONIC_CHANNELS.contains(&output) {
+                    let entry = entry_index(output, harmonic_part, HARMONIC_CHANNELS, CHANNELS);
                     (entry, &mut channels[..], &mut channels_at_rest[..])
                 } else {
                     continue;

@@ -114,9 +114,15 @@ pub fn campbell_until(
                     [k - 1, k].map(|k| modes_at_speeds[k].0[mode].frequency_rpm - speeds_rpm[k]);
                 // An overdamped motion has no resonance, not even at standstill.
                 if (excess[0] > 0.0) != (excess[1] > 0.0) && excess[0] != 0.0 {
-                    let from = &modes_at_speeds[k - 1].1;
+                    let previous_modes = &modes_at_speeds[k - 1].1;
                     let bracket_rpm = [speeds_rpm[k - 1], speeds_rpm[k]];
-                    resonances.extend(find_resonance(point, mode, from, bracket_rpm, excess)?);
+                    resonances.extend(find_resonance(
+                        point,
+                        mode,
+                        previous_modes,
+                        bracket_rpm,
+                        excess,
+                    )?);
                 }
             }
             let at_speed: Vec<_> = modes_at_speeds.iter().map(|(turn, _)| turn[mode]).collect();
@@ -136,22 +142,29 @@ fn rad_per_s(rpm: f64) -> f64 {
     rpm * TAU / 60.0
 }
 
-/// Returns the modes at `to`, in the order of the modes `start` at `from`.
+/// Returns the modes at `end_parameter`, in the order of the modes `start` at `start_parameter`.
 fn follow_modes(
     start: &Modes,
-    from: f64,
-    to: f64,
+    start_parameter: f64,
+    end_parameter: f64,
     modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
 ) -> Result<Modes, ModesError> {
-    follow_halving(start, from, to, modes_at, modes_at(to)?, MAX_HALVINGS)
+    follow_halving(
+        start,
+        start_parameter,
+        end_parameter,
+        modes_at,
+        modes_at(end_parameter)?,
+        MAX_HALVINGS,
+    )
 }
 
 /// Returns the modes `end` in the order of the modes `start`, and halves the interval at most
 /// `halvings` times.
 fn follow_halving(
     start: &Modes,
-    from: f64,
-    to: f64,
+    start_parameter: f64,
+    end_parameter: f64,
     modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
     end: Modes,
     halvings: u32,
@@ -160,10 +173,16 @@ fn follow_halving(
     if assurance >= MIN_ASSURANCE || halvings == 0 {
         return Ok(Modes { modes: order.map(|k| end.modes[k]), ..end });
     }
-    let midpoint = 0.5 * (from + to);
-    let midpoint_modes =
-        follow_halving(start, from, midpoint, modes_at, modes_at(midpoint)?, halvings - 1)?;
-    follow_halving(&midpoint_modes, midpoint, to, modes_at, end, halvings - 1)
+    let midpoint = 0.5 * (start_parameter + end_parameter);
+    let midpoint_modes = follow_halving(
+        start,
+        start_parameter,
+        midpoint,
+        modes_at,
+        modes_at(midpoint)?,
+        halvings - 1,
+    )?;
+    follow_halving(&midpoint_modes, midpoint, end_parameter, modes_at, end, halvings - 1)
 }
 
 /// Returns for each mode of `start` the index of the mode of `end` that continues it, and the least
@@ -177,14 +196,14 @@ fn match_modes(start: &Modes, end: &Modes) -> ([usize; COORDINATES], f64) {
     }
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut order = [usize::MAX; COORDINATES];
-    let mut least = 1.0_f64;
+    let mut least_assurance = 1.0_f64;
     for (assurance, i, j) in pairs {
         if order[i] == usize::MAX && !order.contains(&j) {
             order[i] = j;
-            least = least.min(assurance);
+            least_assurance = least_assurance.min(assurance);
         }
     }
-    (order, least)
+    (order, least_assurance)
 }
 
 /// Averages every mode at a speed over a turn. `start` holds the modes at theta = 0.
@@ -227,7 +246,7 @@ fn average_over_turn(
 fn find_resonance(
     point: &Point,
     mode: usize,
-    from: &Modes,
+    previous_modes: &Modes,
     [start, end]: [f64; 2],
     [mut low_excess, mut high_excess]: [f64; 2],
 ) -> Result<Option<Resonance>, ModesError> {
@@ -236,8 +255,9 @@ fn find_resonance(
     let mut side = 0;
     for _ in 0..MAX_SEARCH_STEPS {
         let speed_rpm = (low * high_excess - high * low_excess) / (high_excess - low_excess);
-        let end_modes =
-            follow_modes(from, start, speed_rpm, &|rpm| modes(point, 0.0, rad_per_s(rpm)))?;
+        let end_modes = follow_modes(previous_modes, start, speed_rpm, &|rpm| {
+            modes(point, 0.0, rad_per_s(rpm))
+        })?;
         let resonance =
             Resonance { speed_rpm, mode: average_over_turn(point, speed_rpm, &end_modes)?[mode] };
         let excess = resonance.mode.frequency_rpm - speed_rpm;

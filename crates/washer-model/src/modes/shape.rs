@@ -111,12 +111,12 @@ pub(crate) fn motion(
     mass: &[[f64; COORDINATES]; COORDINATES],
     shape: &[[f64; 2]; COORDINATES],
 ) -> ModeMotion {
-    let shares = rigid_shares(mass, shape);
-    let [vertical_translation, horizontal_translation, yaw, pitch] = shares;
-    let movement = if shares.iter().sum::<f64>() < 1.0 - MAJORITY_SHARE {
+    let energy_shares = rigid_shares(mass, shape);
+    let [vertical_translation, horizontal_translation, yaw, pitch] = energy_shares;
+    let movement = if energy_shares.iter().sum::<f64>() < 1.0 - MAJORITY_SHARE {
         relative_movement(point, shape)
     } else {
-        rigid_movement(shares)
+        rigid_movement(energy_shares)
     };
     let mut horizontal_part = [[0.0; 2]; COORDINATES];
     for i in HORIZONTAL {
@@ -158,10 +158,10 @@ fn rigid_shares(
         for i in coordinates {
             rigid[i][0] = 1.0;
         }
-        for other in &basis {
-            let projection = mass_inner_product(mass, other, &rigid)[0];
+        for basis_vector in &basis {
+            let projection = mass_inner_product(mass, basis_vector, &rigid)[0];
             for i in 0..COORDINATES {
-                rigid[i][0] -= projection * other[i][0];
+                rigid[i][0] -= projection * basis_vector[i][0];
             }
         }
         let scale = mass_inner_product(mass, &rigid, &rigid)[0].sqrt();

@@ -64,21 +64,32 @@ const WALK_INDEX: usize = MAX_FEET + 1;
 #[derive(Clone, Copy)]
 struct TubExpansion<T> {
     value_at_rest: N<T>,
-    by_coordinate: [N<T>; 4],
-    by_speed: [N<T>; 4],
+    coordinate_derivatives: [N<T>; 4],
+    speed_derivatives: [N<T>; 4],
 }
 
 impl<T: Lane> TubExpansion<T> {
     #[inline(always)]
     fn new(zero: N<T>) -> Self {
-        Self { value_at_rest: zero, by_coordinate: [zero; 4], by_speed: [zero; 4] }
+        Self {
+            value_at_rest: zero,
+            coordinate_derivatives: [zero; 4],
+            speed_derivatives: [zero; 4],
+        }
     }
 
     /// Sets the value at rest and the derivatives by coordinate `k` in one lane.
-    fn set(&mut self, lane: usize, rest: f64, k: usize, by_coordinate: f64, by_speed: f64) {
+    fn set(
+        &mut self,
+        lane: usize,
+        rest: f64,
+        k: usize,
+        coordinate_derivative: f64,
+        speed_derivative: f64,
+    ) {
         self.value_at_rest.0.set(lane, rest);
-        self.by_coordinate[k].0.set(lane, by_coordinate);
-        self.by_speed[k].0.set(lane, by_speed);
+        self.coordinate_derivatives[k].0.set(lane, coordinate_derivative);
+        self.speed_derivatives[k].0.set(lane, speed_derivative);
     }
 
     #[inline(always)]
@@ -86,10 +97,10 @@ impl<T: Lane> TubExpansion<T> {
         let mut value = self.value_at_rest;
         let mut slope = self.value_at_rest.lit(0.0);
         for k in 0..4 {
-            value += self.by_coordinate[k] * tub[k].value;
-            value += self.by_speed[k] * tub[k].slope;
-            slope += self.by_coordinate[k] * tub[k].slope;
-            slope += self.by_speed[k] * tub[k].curvature;
+            value += self.coordinate_derivatives[k] * tub[k].value;
+            value += self.speed_derivatives[k] * tub[k].slope;
+            slope += self.coordinate_derivatives[k] * tub[k].slope;
+            slope += self.speed_derivatives[k] * tub[k].curvature;
         }
         N(Dual { value: value.0, slope: slope.0 })
     }
@@ -173,17 +184,31 @@ impl<T: Lane> LoadLaws<T> {
         for k in 0..4 {
             let [coordinate, speed] = [TUB[k], COORDINATES + TUB[k]];
             let slopes = components_by(coordinate).into_iter().zip(components_by(speed));
-            for (component, (N(by_coordinate), N(by_speed))) in components.iter_mut().zip(slopes) {
-                component.set(lane, by_coordinate.value, k, by_coordinate.slope, by_speed.slope);
+            for (component, (N(coordinate_derivative), N(speed_derivative))) in
+                components.iter_mut().zip(slopes)
+            {
+                component.set(
+                    lane,
+                    coordinate_derivative.value,
+                    k,
+                    coordinate_derivative.slope,
+                    speed_derivative.slope,
+                );
             }
             if selection.force {
                 let force_at_rest = cabinet_force_at(&[0.0; STATES]);
                 let [at_unit_coordinate, at_unit_speed] =
                     [coordinate, speed].map(|state| cabinet_force_at(&unit(state)));
                 for i in 0..3 {
-                    let by_coordinate = at_unit_coordinate[i] - force_at_rest[i];
-                    let by_speed = at_unit_speed[i] - force_at_rest[i];
-                    force[i].set(lane, force_at_rest[i], k, by_coordinate, by_speed);
+                    let coordinate_derivative = at_unit_coordinate[i] - force_at_rest[i];
+                    let speed_derivative = at_unit_speed[i] - force_at_rest[i];
+                    force[i].set(
+                        lane,
+                        force_at_rest[i],
+                        k,
+                        coordinate_derivative,
+                        speed_derivative,
+                    );
                 }
             }
         }

@@ -73,9 +73,14 @@ pub fn follow_crossings(
             failure.map_or(Ok(state), Err)
         };
         let [from_s, to_s] = crossing.interval_s;
-        effects.push(integrate_to(from_s).and_then(|entry| {
+        effects.push(integrate_to(from_s).and_then(|entry_state| {
             let exit = integrate_to(to_s)?;
-            let map = Simd::dispatch_narrow(TangentMap { point, step_s, crossing, entry: &entry });
+            let tangent_map = Simd::dispatch_narrow(TangentMap {
+                point,
+                step_s,
+                crossing,
+                entry_state: &entry_state,
+            });
             let norms = crossing.interval_s.map(|time_s| EnergyNorm::new(point, time_s));
             let departure = |index: usize, state: &[f64; STATES]| {
                 let response = crossing.responses[index]?;
@@ -86,8 +91,8 @@ pub fn follow_crossings(
                 Some(norms[index].energy_j(&difference))
             };
             Ok(CrossingEffect {
-                amplification: amplification(&norms, &map),
-                departure_j: [departure(0, &entry), departure(1, &exit)],
+                amplification: amplification(&norms, &tangent_map),
+                departure_j: [departure(0, &entry_state), departure(1, &exit)],
             })
         }));
     }
@@ -256,7 +261,7 @@ struct TangentMap<'a> {
     point: &'a Point,
     step_s: f64,
     crossing: &'a Crossing<'a>,
-    entry: &'a [f64; STATES],
+    entry_state: &'a [f64; STATES],
 }
 
 impl Kernel for TangentMap<'_> {
@@ -273,7 +278,7 @@ impl Kernel for TangentMap<'_> {
             let first = columns.len();
             let mut x = [zero; STATES];
             for i in 0..STATES {
-                x[i] = zero.lit(self.entry[i]);
+                x[i] = zero.lit(self.entry_state[i]);
             }
             for lane in 0..T::LANES {
                 // Surplus lanes repeat the last column.

@@ -150,8 +150,8 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
     fn run(self) -> Vec<StateMatrix> {
         let Self { zero, weights, .. } = self;
         let samples = self.sample_coefficients(zero);
-        let block = if T::LANES == MAX_LANES { WIDE_BLOCK_LANES } else { BLOCK_LANES };
-        let vectors = STATES.div_ceil(block * T::LANES) * block;
+        let vectors_per_block = if T::LANES == MAX_LANES { WIDE_BLOCK_LANES } else { BLOCK_LANES };
+        let vectors = STATES.div_ceil(vectors_per_block * T::LANES) * vectors_per_block;
         let mut columns = vec![vec![[zero; STATES]; vectors]; self.turn_count];
         for columns in &mut columns {
             for j in 0..STATES {
@@ -184,12 +184,12 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                     let end = &coefficients[2 * k + 2].derivatives;
                     let coefficients = [start, middle, middle, end];
                     if T::LANES == MAX_LANES {
-                        for block in columns.as_chunks_mut::<WIDE_BLOCK_LANES>().0 {
-                            integrate_step(zero, step_s, coefficients, block);
+                        for disturbances in columns.as_chunks_mut::<WIDE_BLOCK_LANES>().0 {
+                            integrate_step(zero, step_s, coefficients, disturbances);
                         }
                     } else {
-                        for block in columns.as_chunks_mut::<BLOCK_LANES>().0 {
-                            integrate_step(zero, step_s, coefficients, block);
+                        for disturbances in columns.as_chunks_mut::<BLOCK_LANES>().0 {
+                            integrate_step(zero, step_s, coefficients, disturbances);
                         }
                     }
                 }
@@ -273,12 +273,12 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
         &self,
         zero: N<T>,
         forcing: &<Nonlinear<Dual<T>> as System<Dual<T>, STATES>>::Forcing,
-        at: &[N<T>; STATES],
+        reference_state: &[N<T>; STATES],
         derivatives: &mut [[N<T>; STATES]; COORDINATES],
     ) {
         let mut state = [zero.constant(); STATES];
         for i in 0..STATES {
-            state[i] = at[i].constant();
+            state[i] = reference_state[i].constant();
         }
         for j in 0..STATES {
             state[j].0.slope = zero.lit(1.0).0;
@@ -343,9 +343,9 @@ fn integrate_step<T: Lane, const BLOCK_LANES: usize>(
     zero: N<T>,
     h: N<T>,
     stage_derivatives: [&AccelerationDerivatives; 4],
-    block: &mut [[N<T>; STATES]; BLOCK_LANES],
+    disturbances: &mut [[N<T>; STATES]; BLOCK_LANES],
 ) {
-    let mut stage_states = *block;
+    let mut stage_states = *disturbances;
     let start_states = stage_states;
     for stage in 0..4 {
         let derivatives = stage_derivatives[stage];
@@ -373,10 +373,10 @@ fn integrate_step<T: Lane, const BLOCK_LANES: usize>(
                 let speed = stage_states[c][COORDINATES + i];
                 let acceleration = accelerations[c][i];
                 stage_states[c][i] = start_states[c][i] + a_step * speed;
-                block[c][i] += b_step * speed;
+                disturbances[c][i] += b_step * speed;
                 stage_states[c][COORDINATES + i] =
                     start_states[c][COORDINATES + i] + a_step * acceleration;
-                block[c][COORDINATES + i] += b_step * acceleration;
+                disturbances[c][COORDINATES + i] += b_step * acceleration;
             }
         }
     }

@@ -196,11 +196,11 @@ impl<'a> NewtonSearch<'a> {
             if i < COORDINATES { REPULSION_RANGE } else { REPULSION_RANGE * speed_rad_per_s }
         };
         let mut derivative = 0.0;
-        for known in &self.known_responses {
+        for known_response in &self.known_responses {
             let mut squared = 0.0;
             let mut product = 0.0;
             for i in 0..STATES {
-                let offset = (self.state[i] - known[i]) / unit(i);
+                let offset = (self.state[i] - known_response[i]) / unit(i);
                 squared += offset * offset;
                 product += offset * step[i].0 / unit(i);
             }
@@ -314,20 +314,20 @@ mod tests {
     fn known_responses_repel() {
         let point = prepared(machine_with(0.4, 140.0), 100.0);
         let setup = Settings::new(&point).held_case(250.0).unwrap().setup;
-        let known = [0.0; STATES];
+        let known_response = [0.0; STATES];
         // The ratio of the deflated step to Newton's, which leads to the known response.
         let factor = |distance_m: f64| {
-            let mut state = known;
+            let mut state = known_response;
             state[0] = distance_m;
             let mut newton_step = [N(0.0); STATES];
             newton_step[0] = N(-distance_m);
-            NewtonSearch::deflated(setup, state, f64::INFINITY, vec![known])
+            NewtonSearch::deflated(setup, state, f64::INFINITY, vec![known_response])
                 .deflation_factor(&newton_step)
         };
         assert!((factor(1e-6) + 1.0).abs() < 1e-3, "{}", factor(1e-6));
         assert!((factor(1.0) - 1.0).abs() < 1e-3, "{}", factor(1.0));
         let factor_without_known =
-            NewtonSearch::new(setup, known, None).deflation_factor(&[N(1.0); STATES]);
+            NewtonSearch::new(setup, known_response, None).deflation_factor(&[N(1.0); STATES]);
         assert_eq!(factor_without_known, 1.0);
     }
 }

@@ -239,7 +239,7 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
         potential_j(&machine, &instant.deviations)
             + kinetic_j(&coefficients, &instant.deviations, &instant.speeds)
     };
-    let first = energy(&instants[0]);
+    let initial_energy_j = energy(&instants[0]);
     let at_rest = equilibrium(&machine);
     let mut dissipated_j = 0.0;
     let mut max_error = 0.0_f64;
@@ -247,8 +247,10 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
         let [before, after] = [&pair[0], &pair[1]]
             .map(|instant| losses_w(&machine, &at_rest, &instant.deviations, &instant.speeds));
         dissipated_j += 0.5 * interval_s * (before + after);
-        max_error = max_error
-            .max((first - energy(&pair[1]) - dissipated_j).abs() / first.abs().max(dissipated_j));
+        max_error = max_error.max(
+            (initial_energy_j - energy(&pair[1]) - dissipated_j).abs()
+                / initial_energy_j.abs().max(dissipated_j),
+        );
     }
     let initial_j = kinetic_j(&coefficients, &instants[0].deviations, &instants[0].speeds);
     eprintln!(

@@ -30,11 +30,11 @@ struct SampledReadings {
 
 fn sample_readings(point: &Point, model: ModelKind, method: &Method) -> SampledReadings {
     let history = history(model, method, point, &InitialDeviation::default(), INTERVAL_S);
-    let cuts = whole_turn_cuts_s(&point.spin_segments, TIMING.window_s);
+    let turn_boundaries_s = whole_turn_cuts_s(&point.spin_segments, TIMING.window_s);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
     let mut readings = SampledReadings {
         root_mean_squares: [0.0; 8],
-        turns: vec![[0.0; 8]; cuts.len() + 1],
+        turns: vec![[0.0; 8]; turn_boundaries_s.len() + 1],
         cabinet_force_n: 0.0,
         clash_time_s: 0.0,
     };
@@ -42,7 +42,8 @@ fn sample_readings(point: &Point, model: ModelKind, method: &Method) -> SampledR
         // The weight of the trapezoidal rule.
         let weight = if k == first || k == last { 0.5 * INTERVAL_S } else { INTERVAL_S };
         let instant = history.instant(k).unwrap();
-        let turn = cuts.partition_point(|cut_s| *cut_s < k as f64 * INTERVAL_S);
+        let turn =
+            turn_boundaries_s.partition_point(|boundary_s| *boundary_s < k as f64 * INTERVAL_S);
         for (i, y) in instant.channels.into_iter().enumerate() {
             readings.root_mean_squares[i] += weight * y * y;
             readings.turns[turn][i] = readings.turns[turn][i].max(y.abs());

@@ -21,16 +21,16 @@ fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
             assert_eq!(parameter.get(&machine, &spin), None);
             continue;
         }
-        let Some(before) = parameter.get(&machine, &spin) else {
+        let Some(initial_value) = parameter.get(&machine, &spin) else {
             // This number is optional.
             assert!(parameter.name().ends_with("friction_linear_speed_m_per_s"), "{parameter:?}");
             parameter.set(&mut machine, &mut spin, 0.125);
             assert_eq!(parameter.get(&machine, &spin), Some(0.125), "{parameter:?}");
             continue;
         };
-        assert!(parameter.range().contains(before), "{parameter:?} = {before}");
-        parameter.set(&mut machine, &mut spin, before + 0.125);
-        assert_eq!(parameter.get(&machine, &spin), Some(before + 0.125), "{parameter:?}");
+        assert!(parameter.range().contains(initial_value), "{parameter:?} = {initial_value}");
+        parameter.set(&mut machine, &mut spin, initial_value + 0.125);
+        assert_eq!(parameter.get(&machine, &spin), Some(initial_value + 0.125), "{parameter:?}");
     }
 }
 
@@ -40,16 +40,16 @@ fn each_parameter_writes_its_parts_and_nothing_else() {
     for parameter in &parameters {
         let mut machine = Machine::paper();
         let mut spin = spin();
-        let before: Vec<_> = parameters.iter().map(|p| p.get(&machine, &spin)).collect();
+        let values_before: Vec<_> = parameters.iter().map(|p| p.get(&machine, &spin)).collect();
         parameter.set(&mut machine, &mut spin, 0.875);
-        let parts = parameter.single_names(&machine);
-        for (other, before) in parameters.iter().zip(before) {
-            if other.single_names(&machine).iter().all(|part| !parts.contains(part)) {
+        let single_names = parameter.single_names(&machine);
+        for (other, value_before) in parameters.iter().zip(values_before) {
+            if other.single_names(&machine).iter().all(|name| !single_names.contains(name)) {
                 // A default free length is the distance between the ends of its spring.
                 let follows_ends =
                     other.name().ends_with("free_length_m") && other.index == parameter.index;
                 assert!(
-                    follows_ends || other.get(&machine, &spin) == before,
+                    follows_ends || other.get(&machine, &spin) == value_before,
                     "{parameter:?} wrote {other:?}"
                 );
             }
@@ -182,19 +182,20 @@ fn numbers_that_a_machine_lacks_differ_from_misspellings() {
         find("spin_table_3_time_s"),
         in_other_models("the spin's table has 2 points, numbered from 1")
     );
-    let edges = ["window_from_s", "window_to_s", "tub_mass_kg"];
-    let edges = edges.map(|name| MachineParameter::find(name, &machine, &table).unwrap().target());
-    assert_eq!(edges, [Target::Window(0), Target::Window(1), Target::Machine]);
+    let names = ["window_from_s", "window_to_s", "tub_mass_kg"];
+    let targets =
+        names.map(|name| MachineParameter::find(name, &machine, &table).unwrap().target());
+    assert_eq!(targets, [Target::Window(0), Target::Window(1), Target::Machine]);
 }
 
 #[test]
 fn a_parameter_of_several_numbers_has_no_value_when_they_differ() {
     let mut machine = Machine::paper();
     let spin = spin();
-    let all = MachineParameter::find("damping_n_s_per_m", &machine, &spin).unwrap();
-    assert_eq!(all.get(&machine, &spin), Some(140.0));
+    let common_damping = MachineParameter::find("damping_n_s_per_m", &machine, &spin).unwrap();
+    assert_eq!(common_damping.get(&machine, &spin), Some(140.0));
     machine.dampers[1].damping_n_s_per_m = 100.0;
-    assert_eq!(all.get(&machine, &spin), None);
+    assert_eq!(common_damping.get(&machine, &spin), None);
 }
 
 #[test]

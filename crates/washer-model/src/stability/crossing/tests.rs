@@ -35,7 +35,7 @@ fn the_tangent_map_agrees_with_differences_of_nearby_runs() {
         point: &point,
         step_s: STEP_S,
         crossing: &crossing,
-        entry: &entry_state,
+        entry_state: &entry_state,
     });
     let end = |disturbance: f64, index: usize| {
         let mut start = entry_state;
