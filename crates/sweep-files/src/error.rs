@@ -123,6 +123,9 @@ fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
         io::ErrorKind::NotADirectory => {
             "a part of that path is a file, not a folder: move it, or give another path"
         }
+        io::ErrorKind::AlreadyExists => {
+            "a file of that name is in the way: move it, or give another path"
+        }
         io::ErrorKind::InvalidInput => "give the name of a regular file",
         _ => {
             "check the disk (the system's log may say more) and run the same command again; \

@@ -59,6 +59,11 @@ there.";
 /// of a terminal. Doubling it lists twice as many.
 const MAX_LISTED: usize = 12;
 
+/// The slack, relative to the limit, up to which a condition is said to bind. Basis: searches of a
+/// hundred candidates come within a percent of the limit that stops them. Doubling it calls
+/// conditions binding that are twice as far from their limits.
+const BINDING_SLACK: f64 = 0.02;
+
 /// Runs the search of a study, and prints a summary.
 ///
 /// # Errors
@@ -129,16 +134,25 @@ fn slack_lines<M: Model>(
 ) -> Result<Option<String>, Error> {
     let Some(slacks) = slacks(study, values, execution)? else { return Ok(None) };
     let known_slacks = study.conditions.iter().zip(slacks);
-    let mut known_slacks: Vec<(&str, Slack)> =
-        known_slacks.filter_map(|(goal, slack)| Some((goal.text(), slack?))).collect();
+    let known_slacks = known_slacks.filter_map(|(goal, slack)| Some((goal.text(), slack?)));
+    Ok(Some(describe_slacks(known_slacks.collect())))
+}
+
+/// Returns a line for each condition with its slack, the least relative slack first. It binds if
+/// this slack is at most [`BINDING_SLACK`], otherwise it is only the closest to its limit.
+fn describe_slacks(mut known_slacks: Vec<(&str, Slack)>) -> String {
     known_slacks.sort_by(|a, b| a.1.relative.total_cmp(&b.1.relative));
     let mut text = String::new();
     for (k, (condition, Slack { distance, relative })) in known_slacks.into_iter().enumerate() {
         let percent = format_number(100.0 * relative);
-        let name = if k == 0 { "binds" } else { "" };
+        let name = match k {
+            0 if relative <= BINDING_SLACK => "binds",
+            0 => "closest",
+            _ => "",
+        };
         text.line(name, format!("{condition}: slack {}, {percent} %", format_number(distance)));
     }
-    Ok(Some(text))
+    text
 }
 
 /// Describes the candidate with the least violation, and the conditions that it violates. The
@@ -343,4 +357,18 @@ fn summarise<M: Model>(
     tell(text.trim_end());
     // An empty front means that no candidate is feasible.
     Ok(if front.is_empty() { Exit::NotHeld } else { Exit::Done })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_condition_far_from_its_limit_does_not_bind() {
+        let far = ("stop <= 50", Slack { distance: 40.0, relative: 0.8 });
+        let near = ("travel <= 0.05", Slack { distance: 1e-4, relative: 2e-3 });
+        assert!(describe_slacks(vec![far, near]).starts_with("     binds  travel"));
+        assert!(describe_slacks(vec![far]).starts_with("   closest  stop"));
+        assert_eq!(describe_slacks(Vec::new()), "");
+    }
 }

@@ -219,6 +219,16 @@ mod tests {
     }
 
     #[test]
+    fn a_file_in_the_place_of_the_folder_is_kept_and_said_to_be_in_the_way() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = folder(&home);
+        fs::write(&folder.path, "my thesis").unwrap();
+        let message = Lock::acquire(&folder, None).unwrap_err().to_string();
+        assert!(message.contains("a file of that name is in the way"), "{message}");
+        assert_eq!(fs::read_to_string(&folder.path).unwrap(), "my thesis");
+    }
+
+    #[test]
     fn a_second_run_is_refused_with_the_process_of_the_first() {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
