@@ -23,6 +23,10 @@
 //! 4. The last two levels resolve the bearings' modes. They are for rows in which bearings that
 //!    ring after a jump of the drum's acceleration matter.
 //!
+//! Numbers of two levels can agree by chance, for instance the least gaps of two chaotic motions.
+//! Levels whose motions separate by a tenth ([`Separation::is_complete`]) follow different motions,
+//! and their separation is their difference.
+//!
 //! Two levels that leave the same ringing unresolved share its error, so that their difference does
 //! not show it. This error is bounded by the static deflection under the jump
 //! ([`Point::ringing`](washer_model::Point::ringing)), times the amplification of a motion whose
@@ -38,6 +42,7 @@ use lane_ode::Tolerance;
 use washer_model::{Formula, Method, MethodKind, ModelKind, StepSelector, capped_method};
 
 use crate::levels::{FamilyStart, RESOLVING_LEVELS, RefinementLevels};
+use crate::separation::Separation;
 
 /// Safety factor: the estimated error of a level, divided by its difference from the level before.
 ///
@@ -128,6 +133,12 @@ pub(crate) fn contraction(kind: MethodKind, start: FamilyStart) -> f64 {
         }
         (FamilyStart::None, _) => STEP_CONTRACTION,
     }
+}
+
+/// Returns the relative difference of two levels from that of their numbers and the separation of
+/// their motions.
+pub(crate) fn difference_of_levels(numbers: f64, separation: Separation) -> f64 {
+    if separation.is_complete() { numbers.max(separation.greatest_distance) } else { numbers }
 }
 
 /// Returns the error of a level from its difference from the level before, and from that level's
@@ -250,6 +261,15 @@ mod tests {
         assert_eq!(error_of_level(1e-4, 2e-4), Some(4e-4));
         assert_eq!(error_of_level(f64::INFINITY, 0.0), None);
         assert_eq!(error_of_level(1e-4, f64::INFINITY), None);
+    }
+
+    /// Two chaotic motions may have the same least gap.
+    #[test]
+    fn numbers_of_different_motions_do_not_count_as_equal() {
+        let separation = |distance| Separation::new(&[(0.0, 1e-9), (20.0, distance)]);
+        assert_eq!(difference_of_levels(1e-4, separation(0.05)), 1e-4);
+        assert_eq!(difference_of_levels(1e-4, separation(0.3)), 0.3);
+        assert_eq!(difference_of_levels(0.5, separation(0.3)), 0.5);
     }
 
     #[test]

@@ -4,7 +4,9 @@
 use sweep_parameter::{RatioLimits, Verdict};
 use washer_model::{MethodKind, ModelKind, Point, UnresolvedModes};
 
-use crate::error_control::{amplification, contraction, error_of_chaos, error_of_level};
+use crate::error_control::{
+    amplification, contraction, difference_of_levels, error_of_chaos, error_of_level,
+};
 use crate::levels::{FamilyStart, RefinementLevels};
 use crate::measures::{REST_SHARE, TURN_FLOOR};
 use crate::metrics::Metric;
@@ -132,18 +134,24 @@ impl ModelRefinement {
         };
         let difference =
             relative_difference(&previous_run.trajectory, &run.trajectory, rule.point, rule.rule);
+        let separation = match rule.kind {
+            ModelKind::Nonlinear => {
+                let [previous, current] = [&previous_run, &run].map(|run| &run.checkpoints);
+                Separation::new(&rule.point.separations(previous, current))
+            }
+            ModelKind::Linear => Separation::default(),
+        };
         if rule.levels.is_perturbed(level) {
-            let separations = rule.point.separations(&previous_run.checkpoints, &run.checkpoints);
-            let separation = Separation::new(&separations);
             let is_chaotic = separation.is_exponential();
             self.perturbed = Some(PerturbedComparison { is_chaotic, difference });
             self.run = Some(previous_run);
             return;
         }
+        let relative = difference.map(|numbers| difference_of_levels(numbers, separation));
         let start = rule.levels.family_start(level);
-        self.differences.push(LevelDifference { relative: difference, start });
+        self.differences.push(LevelDifference { relative, start });
         if self.differences.len() == 1 && self.level == 0 {
-            self.first_difference = difference.unwrap_or(f64::INFINITY);
+            self.first_difference = relative.unwrap_or(f64::INFINITY);
         }
         self.level = level;
         self.run = Some(run);

@@ -1,7 +1,8 @@
-//! Measures the separation of a perturbed run from the unperturbed one, whose exponential growth is
-//! the sign of chaos.
+//! Measures the separation of two runs of a point: of two levels, or of a perturbed run from the
+//! unperturbed one. Exponential growth of the latter is the sign of chaos.
 
-/// The least separation of a chaotic motion, relative to the motion.
+/// The least separation of two different motions, and of a chaotic one from its perturbed run,
+/// relative to the motion.
 ///
 /// Basis: a tenth is far more than the error of any step. Doubling it misses chaos that begins late
 /// in the run.
@@ -20,7 +21,7 @@ const LEAST_LOG_GROWTH: f64 = 9.0;
 /// attractors with the smallest exponents.
 const LEAST_EXPONENT_PER_S: f64 = 0.1;
 
-/// The growth of a separation from its least value to the greatest value after it.
+/// The growth of the separation of two runs from its least value to the greatest value after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Separation {
     /// The greatest distance, relative to the motion.
@@ -59,9 +60,14 @@ impl Separation {
         if self.time_s > 0.0 { self.log_growth / self.time_s } else { 0.0 }
     }
 
+    /// Whether the two runs follow different motions, of which one does not approximate the other.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.greatest_distance >= LEAST_SEPARATION
+    }
+
     /// Whether the motion is chaotic.
     pub(crate) fn is_exponential(&self) -> bool {
-        self.greatest_distance >= LEAST_SEPARATION
+        self.is_complete()
             && self.log_growth >= LEAST_LOG_GROWTH
             && self.exponent_per_s() >= LEAST_EXPONENT_PER_S
     }
