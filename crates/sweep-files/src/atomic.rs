@@ -56,7 +56,7 @@ fn hash_digits(text: &str) -> String {
 ///
 /// # Errors
 /// [`FileError::Io`].
-pub fn begin(folder: &Path) -> Result<NamedTempFile, FileError> {
+pub fn create_temporary(folder: &Path) -> Result<NamedTempFile, FileError> {
     let mut attempt = 1;
     loop {
         let name = temporary_name();
@@ -123,7 +123,7 @@ pub fn publish(file: NamedTempFile, target: &Path) -> Result<(), FileError> {
 /// # Errors
 /// [`FileError::Io`].
 pub fn write(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    let mut file = begin(folder)?;
+    let mut file = create_temporary(folder)?;
     file.write_all(bytes).map_err(FileError::io("write", target))?;
     publish(file, target)
 }
@@ -133,7 +133,7 @@ pub fn write(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), FileError
 /// # Errors
 /// [`FileError::Io`].
 pub fn create(folder: &Path, target: &Path, bytes: &[u8]) -> Result<bool, FileError> {
-    let mut file = begin(folder)?;
+    let mut file = create_temporary(folder)?;
     file.write_all(bytes).map_err(FileError::io("write", target))?;
     file.as_file().sync_all().map_err(FileError::io("sync", target))?;
     match file.persist_noclobber(target) {
@@ -148,8 +148,8 @@ pub fn create(folder: &Path, target: &Path, bytes: &[u8]) -> Result<bool, FileEr
 /// # Errors
 /// [`FileError::Io`].
 pub fn sync_folder(folder: &Path) -> Result<(), FileError> {
-    let synced = File::open(folder).and_then(|folder| folder.sync_all());
-    match synced {
+    let result = File::open(folder).and_then(|folder| folder.sync_all());
+    match result {
         // Some network file systems cannot sync a folder; this is no error.
         Err(error)
             if matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) =>
@@ -214,10 +214,10 @@ mod tests {
         for name in names {
             assert!(is_temporary(&name), "{name}");
             for at in PREFIX.len()..name.len() - SUFFIX.len() {
-                let mut other = name.clone().into_bytes();
-                other[at] ^= 1;
-                let other = String::from_utf8(other).unwrap();
-                assert!(!is_temporary(&other), "{other}");
+                let mut other_name = name.clone().into_bytes();
+                other_name[at] ^= 1;
+                let other_name = String::from_utf8(other_name).unwrap();
+                assert!(!is_temporary(&other_name), "{other_name}");
             }
         }
     }
@@ -225,22 +225,22 @@ mod tests {
     #[test]
     fn only_unlocked_temporary_files_are_cleared() {
         let folder = tempfile::tempdir().unwrap();
-        let left = folder.path().join(temporary_name());
-        let held = begin(folder.path()).unwrap();
-        fs::write(&left, "half a file").unwrap();
-        let others = ["notes.tmp", ".sweep-notes.tmp", ".sweep-Xb7Qz1.tmp", ".sweep-.tmp"];
-        for name in others {
+        let leftover = folder.path().join(temporary_name());
+        let locked_file = create_temporary(folder.path()).unwrap();
+        fs::write(&leftover, "half a file").unwrap();
+        let foreign_names = ["notes.tmp", ".sweep-notes.tmp", ".sweep-Xb7Qz1.tmp", ".sweep-.tmp"];
+        for name in foreign_names {
             fs::write(folder.path().join(name), "mine").unwrap();
         }
         clear_leftovers(folder.path());
-        assert!(!left.exists());
-        assert!(held.path().exists(), "its process lives");
-        for name in others {
+        assert!(!leftover.exists());
+        assert!(locked_file.path().exists(), "its process lives");
+        for name in foreign_names {
             assert!(folder.path().join(name).exists(), "{name}");
         }
-        let path = held.path().to_owned();
+        let path = locked_file.path().to_owned();
         // A killed process leaves the file without its lock.
-        drop(held.keep().unwrap());
+        drop(locked_file.keep().unwrap());
         clear_leftovers(folder.path());
         assert!(!path.exists());
     }
@@ -250,12 +250,12 @@ mod tests {
     fn files_have_the_permissions_that_the_umask_allows() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let ours = folder.path().join("ours");
-        let plain = folder.path().join("plain");
-        write(folder.path(), &ours, b"").unwrap();
-        File::create(&plain).unwrap();
+        let own_file = folder.path().join("ours");
+        let plain_file = folder.path().join("plain");
+        write(folder.path(), &own_file, b"").unwrap();
+        File::create(&plain_file).unwrap();
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
-        assert_eq!(mode(&ours), mode(&plain));
+        assert_eq!(mode(&own_file), mode(&plain_file));
     }
 
     #[test]

@@ -53,21 +53,22 @@ fn described_schema(
     file: &ParquetMetaData,
     clock_type: impl Fn(&Declared) -> Option<DataType>,
 ) -> SchemaRef {
-    let about = file.file_metadata();
-    let pairs = about.key_value_metadata().into_iter().flatten();
-    let described =
+    let file_metadata = file.file_metadata();
+    let pairs = file_metadata.key_value_metadata().into_iter().flatten();
+    let descriptions =
         pairs.filter(|pair| pair.key == key::COLUMNS).find_map(|pair| pair.value.as_deref());
-    let described: Value =
-        described.and_then(|described| serde_json::from_str(described).ok()).unwrap_or_default();
-    let fields = about.schema_descr().root_schema().get_fields().iter().map(|declared| {
-        let described = described[declared.name()].as_object().into_iter().flatten();
-        let described = described.filter(|(key, _)| *key != "type").map(|(key, value)| {
+    let descriptions: Value = descriptions
+        .and_then(|descriptions| serde_json::from_str(descriptions).ok())
+        .unwrap_or_default();
+    let fields = file_metadata.schema_descr().root_schema().get_fields().iter().map(|declared| {
+        let descriptions = descriptions[declared.name()].as_object().into_iter().flatten();
+        let descriptions = descriptions.filter(|(key, _)| *key != "type").map(|(key, value)| {
             (key.clone(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
         });
-        let described: HashMap<String, String> = described.collect();
+        let descriptions: HashMap<String, String> = descriptions.collect();
         let is_nullable = declared.get_basic_info().repetition() != Repetition::REQUIRED;
         let data_type = clock_type(declared).unwrap_or_else(|| data_type(declared));
-        Field::new(declared.name(), data_type, is_nullable).with_metadata(described)
+        Field::new(declared.name(), data_type, is_nullable).with_metadata(descriptions)
     });
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
@@ -83,11 +84,11 @@ fn has_decimal_length(declared: &Declared) -> bool {
 /// their kind.
 fn data_type(declared: &Declared) -> DataType {
     use ConvertedType as As;
-    let about = declared.get_basic_info();
-    if declared.is_group() || about.repetition() == Repetition::REPEATED {
+    let basic_info = declared.get_basic_info();
+    if declared.is_group() || basic_info.repetition() == Repetition::REPEATED {
         return DataType::Null;
     }
-    match (declared.get_physical_type(), about.converted_type()) {
+    match (declared.get_physical_type(), basic_info.converted_type()) {
         (Type::FIXED_LEN_BYTE_ARRAY, As::DECIMAL) if !has_decimal_length(declared) => {
             DataType::Null
         }
@@ -97,7 +98,7 @@ fn data_type(declared: &Declared) -> DataType {
         (_, As::INT_8 | As::INT_16 | As::INT_32 | As::INT_64) => DataType::Int64,
         (_, As::UINT_8 | As::UINT_16 | As::UINT_32 | As::UINT_64) => DataType::UInt64,
         // Times in nanoseconds have a logical type but no converted one.
-        (Type::INT32 | Type::INT64, As::NONE) if about.logical_type_ref().is_none() => {
+        (Type::INT32 | Type::INT64, As::NONE) if basic_info.logical_type_ref().is_none() => {
             DataType::Int64
         }
         // Words are read as a dictionary, so that each distinct word takes memory once.
@@ -111,12 +112,12 @@ fn data_type(declared: &Declared) -> DataType {
 /// Returns the type of a column of instants or of times of day in units of 64 bits. Instants are
 /// read without their time zone.
 fn clock_type(declared: &Declared) -> Option<DataType> {
-    let about = declared.get_basic_info();
-    let is_plain = !declared.is_group() && about.repetition() != Repetition::REPEATED;
+    let basic_info = declared.get_basic_info();
+    let is_plain = !declared.is_group() && basic_info.repetition() != Repetition::REPEATED;
     if !is_plain || declared.get_physical_type() != Type::INT64 {
         return None;
     }
-    let unit = match (about.logical_type_ref(), about.converted_type()) {
+    let unit = match (basic_info.logical_type_ref(), basic_info.converted_type()) {
         (Some(LogicalType::Timestamp(time) | LogicalType::Time(time)), _) => match time.unit {
             DeclaredUnit::MILLIS => TimeUnit::Millisecond,
             DeclaredUnit::MICROS => TimeUnit::Microsecond,
@@ -128,8 +129,8 @@ fn clock_type(declared: &Declared) -> Option<DataType> {
         }
         _ => return None,
     };
-    let is_of_day = matches!(about.logical_type_ref(), Some(LogicalType::Time(_)))
-        || about.converted_type() == ConvertedType::TIME_MICROS;
+    let is_of_day = matches!(basic_info.logical_type_ref(), Some(LogicalType::Time(_)))
+        || basic_info.converted_type() == ConvertedType::TIME_MICROS;
     match (is_of_day, unit) {
         (false, unit) => Some(DataType::Timestamp(unit, None)),
         // Times of day in milliseconds have 32 bits.
@@ -166,18 +167,20 @@ impl<R: ChunkReader + 'static> Batches<R> {
         fields: Vec<usize>,
     ) -> Result<Self, ParquetError> {
         let schema = Arc::new(schema.project(&fields).map_err(from_arrow)?);
-        if let Some(other) =
+        if let Some(unreadable_field) =
             schema.fields().iter().find(|field| *field.data_type() == DataType::Null)
         {
-            let reason = format!("its column `{}` is of a type that is not read", other.name());
+            let reason =
+                format!("its column `{}` is of a type that is not read", unreadable_field.name());
             return Err(ParquetError::General(reason));
         }
-        let about = file.file_metadata().schema_descr();
-        let mut leaves = vec![0; about.root_schema().get_fields().len()];
-        (0..about.num_columns()).for_each(|leaf| leaves[about.get_column_root_idx(leaf)] = leaf);
+        let schema_descriptor = file.file_metadata().schema_descr();
+        let mut leaves = vec![0; schema_descriptor.root_schema().get_fields().len()];
+        (0..schema_descriptor.num_columns())
+            .for_each(|leaf| leaves[schema_descriptor.get_column_root_idx(leaf)] = leaf);
         let leaves: Vec<usize> = fields.into_iter().map(|field| leaves[field]).collect();
         let scale = |leaf: &usize| {
-            let column = about.column(*leaf);
+            let column = schema_descriptor.column(*leaf);
             (column.converted_type() == ConvertedType::DECIMAL).then(|| column.type_scale())
         };
         let scales = leaves.iter().map(scale).collect();
@@ -204,17 +207,19 @@ impl<R: ChunkReader + 'static> Batches<R> {
             self.left = usize::try_from(group.num_rows())?;
             // The pages of the last row group go before others come.
             self.columns.clear();
-            let budget = pages::budget();
-            let open =
-                |leaf: &usize| pages::open(&self.source, group.column(*leaf), self.left, &budget);
-            self.columns = self.leaves.iter().map(open).collect::<Result<_, ParquetError>>()?;
+            let byte_budget = pages::budget();
+            let open_column = |leaf: &usize| {
+                pages::open(&self.source, group.column(*leaf), self.left, &byte_budget)
+            };
+            self.columns =
+                self.leaves.iter().map(open_column).collect::<Result<_, ParquetError>>()?;
         }
         let rows = self.left.min(BATCH_ROWS);
         self.left -= rows;
         let columns = self.columns.iter_mut().zip(self.schema.fields());
         let arrays = columns.zip(&self.scales).map(|((column, field), scale)| match scale {
-            Some(scale) => decimals(column, *scale, rows),
-            None => array(column, field.data_type(), rows),
+            Some(scale) => read_decimals(column, *scale, rows),
+            None => read_array(column, field.data_type(), rows),
         });
         let arrays = arrays.collect::<Result<Vec<_>, _>>()?;
         // The number of rows is given because there may be no column.
@@ -229,7 +234,7 @@ pub fn from_arrow(error: ArrowError) -> ParquetError {
     ParquetError::External(Box::new(error))
 }
 
-fn array(
+fn read_array(
     column: &mut ColumnReader,
     data_type: &DataType,
     rows: usize,
@@ -238,7 +243,7 @@ fn array(
     let is_unsigned = *data_type == DataType::UInt64;
     match column {
         Reader::BoolColumnReader(column) => {
-            Ok(Arc::new(cells(read(column, rows)?).collect::<BooleanArray>()))
+            Ok(Arc::new(cells(read_values(column, rows)?).collect::<BooleanArray>()))
         }
         Reader::Int32ColumnReader(column) if is_unsigned => {
             numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned().into())
@@ -247,23 +252,23 @@ fn array(
         Reader::Int64ColumnReader(column) if is_unsigned => {
             numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned())
         }
-        Reader::Int64ColumnReader(column) => integers(column, data_type, rows),
+        Reader::Int64ColumnReader(column) => read_integers(column, data_type, rows),
         Reader::FloatColumnReader(column) => numbers::<_, Float64Type>(column, rows, f64::from),
         Reader::DoubleColumnReader(column) => numbers::<_, Float64Type>(column, rows, |cell| cell),
-        Reader::ByteArrayColumnReader(column) => words(column, rows),
+        Reader::ByteArrayColumnReader(column) => read_words(column, rows),
         _ => unreachable!("`data_type` takes no others"),
     }
 }
 
 /// Reads the next values of a column, and a level for each row: 1 if it has a value, else 0.
-fn read<T: Physical>(
+fn read_values<T: Physical>(
     column: &mut ColumnReaderImpl<T>,
     rows: usize,
 ) -> Result<(Vec<i16>, Vec<T::T>), ParquetError> {
     let mut levels = Vec::new();
     let mut values = Vec::new();
-    let (read, ..) = column.read_records(rows, Some(&mut levels), None, &mut values)?;
-    if read != rows {
+    let (values_read, ..) = column.read_records(rows, Some(&mut levels), None, &mut values)?;
+    if values_read != rows {
         return Err(ParquetError::General("a column has fewer rows than it should".to_owned()));
     }
     // The library gives no levels for a column without nulls.
@@ -278,7 +283,7 @@ fn cells<T>((levels, values): (Vec<i16>, Vec<T>)) -> impl Iterator<Item = Option
 }
 
 /// Reads integers as numbers, instants or times of day.
-fn integers(
+fn read_integers(
     column: &mut ColumnReaderImpl<parquet::data_type::Int64Type>,
     data_type: &DataType,
     rows: usize,
@@ -303,7 +308,7 @@ fn numbers<T: Physical, A: ArrowPrimitiveType>(
     rows: usize,
     typed: impl Fn(T::T) -> A::Native,
 ) -> Result<ArrayRef, ParquetError> {
-    let (levels, values) = read(column, rows)?;
+    let (levels, values) = read_values(column, rows)?;
     let values: Vec<A::Native> = values.into_iter().map(typed).collect();
     Ok(Arc::new(if values.len() == rows {
         PrimitiveArray::<A>::new(values.into(), None)
@@ -318,7 +323,11 @@ const MAX_DECIMAL_BYTES: usize = 16;
 
 /// Reads decimals as numbers. They are stored as whole numbers, in units of the last of `scale`
 /// decimal places.
-fn decimals(column: &mut ColumnReader, scale: i32, rows: usize) -> Result<ArrayRef, ParquetError> {
+fn read_decimals(
+    column: &mut ColumnReader,
+    scale: i32,
+    rows: usize,
+) -> Result<ArrayRef, ParquetError> {
     let size = 10_f64.powi(scale);
     match column {
         ColumnReader::Int32ColumnReader(column) => {
@@ -338,48 +347,49 @@ fn decimals(column: &mut ColumnReader, scale: i32, rows: usize) -> Result<ArrayR
 
 /// Returns the integer that big-endian bytes in two's complement stand for.
 fn big_endian_integer(bytes: &[u8]) -> i128 {
-    let sign = bytes.first().is_some_and(|first| *first >= 0x80);
-    let filled: i128 = if sign { -1 } else { 0 };
-    bytes.iter().fold(filled, |sum, byte| (sum << 8) | i128::from(*byte))
+    let is_negative = bytes.first().is_some_and(|first| *first >= 0x80);
+    let sign_extension: i128 = if is_negative { -1 } else { 0 };
+    bytes.iter().fold(sign_extension, |sum, byte| (sum << 8) | i128::from(*byte))
 }
 
-fn words(
+fn read_words(
     column: &mut ColumnReaderImpl<ByteArrayType>,
     rows: usize,
 ) -> Result<ArrayRef, ParquetError> {
-    let mut words = Vec::<String>::new();
+    let mut read_words = Vec::<String>::new();
     let mut bytes = 0;
     // A word's code by its address in a page's dictionary, which has each word once. Another page
     // may have another word at the same address, so that the words are compared too.
     let mut codes = HashMap::new();
     let mut keys = Vec::with_capacity(rows);
     while keys.len() < rows {
-        // Neighbouring rows mostly have the same word: `last` spares the look-up.
-        let mut last = (("".as_ptr(), usize::MAX), 0);
-        for word in cells(read(column, WORDS_AT_ONCE.min(rows - keys.len()))?) {
+        // Neighbouring rows mostly have the same word: `last_word` spares the look-up.
+        let mut last_word = (("".as_ptr(), usize::MAX), 0);
+        for word in cells(read_values(column, WORDS_AT_ONCE.min(rows - keys.len()))?) {
             let Some(word) = word else {
                 keys.push(None);
                 continue;
             };
-            let place = (word.data().as_ptr(), word.len());
-            if place != last.0 {
-                let known = codes.get(&place).copied();
-                let known = known.filter(|code| words[*code as usize].as_bytes() == word.data());
-                let code = known.unwrap_or(words.len() as i32);
-                if known.is_none() {
+            let address = (word.data().as_ptr(), word.len());
+            if address != last_word.0 {
+                let known_code = codes.get(&address).copied();
+                let known_code =
+                    known_code.filter(|code| read_words[*code as usize].as_bytes() == word.data());
+                let code = known_code.unwrap_or(read_words.len() as i32);
+                if known_code.is_none() {
                     bytes += word.len();
-                    words.push(word.as_utf8()?.to_owned());
-                    codes.insert(place, code);
+                    read_words.push(word.as_utf8()?.to_owned());
+                    codes.insert(address, code);
                 }
-                last = (place, code);
+                last_word = (address, code);
             }
-            keys.push(Some(last.1));
+            keys.push(Some(last_word.1));
         }
         if bytes > MAX_WORD_BYTES {
             return Err(ParquetError::General("its words are too long".to_owned()));
         }
     }
-    let words = Arc::new(StringArray::from(words));
-    let coded = DictionaryArray::<Int32Type>::try_new(Int32Array::from(keys), words);
-    Ok(Arc::new(coded.map_err(from_arrow)?))
+    let read_words = Arc::new(StringArray::from(read_words));
+    let dictionary = DictionaryArray::<Int32Type>::try_new(Int32Array::from(keys), read_words);
+    Ok(Arc::new(dictionary.map_err(from_arrow)?))
 }

@@ -58,8 +58,8 @@ pub fn clock_seconds(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> 
                 .iter()
                 .map(|cell| {
                     let cell = cell?;
-                    let part = cell.rem_euclid($units) as f64 / $units as f64;
-                    Some(cell.div_euclid($units) as f64 + part)
+                    let fraction = cell.rem_euclid($units) as f64 / $units as f64;
+                    Some(cell.div_euclid($units) as f64 + fraction)
                 })
                 .collect()
         };
@@ -101,9 +101,9 @@ pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
 pub fn words(
     array: &dyn Array,
 ) -> Result<TypedDictionaryArray<'_, Int32Type, StringArray>, ArrowError> {
-    let coded = array.as_dictionary_opt::<Int32Type>();
-    let typed = coded.and_then(|coded| coded.downcast_dict());
-    typed.ok_or_else(|| unreadable(array, "words"))
+    let dictionary = array.as_dictionary_opt::<Int32Type>();
+    let dictionary_of_text = dictionary.and_then(|dictionary| dictionary.downcast_dict());
+    dictionary_of_text.ok_or_else(|| unreadable(array, "words"))
 }
 
 /// Whether [`words`] can read a column of this type.

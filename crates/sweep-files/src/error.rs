@@ -138,11 +138,11 @@ fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
 /// Finds the result that was probably meant by a path that lacks its folder or its ending.
 fn find_similar(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?;
-    let mut whole = name.to_owned();
+    let mut full_name = name.to_owned();
     if path.extension().is_none_or(|ending| ending != "parquet") {
-        whole.push(".parquet");
+        full_name.push(".parquet");
     }
     let folders = [path.with_file_name(""), path.with_file_name("results"), "results".into()];
-    let mut places = folders.map(|folder: PathBuf| folder.join(&whole)).into_iter();
-    places.find(|place| place.is_file())
+    let mut candidates = folders.map(|folder: PathBuf| folder.join(&full_name)).into_iter();
+    candidates.find(|place| place.is_file())
 }

@@ -117,8 +117,8 @@ impl<R: ChunkReader> ChunkReader for Footer<'_, R> {
     /// Returns the footer, the only bytes that the library takes here.
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
         if length > MAX_FOOTER_BYTES {
-            let most = MAX_FOOTER_BYTES >> 20;
-            return Err(refused(format!("its footer is longer than {most} MiB")));
+            let max_mebibytes = MAX_FOOTER_BYTES >> 20;
+            return Err(refused(format!("its footer is longer than {max_mebibytes} MiB")));
         }
         let footer = self.0.get_bytes(start, length)?;
         check(&footer)?;
@@ -151,8 +151,10 @@ fn check(footer: &[u8]) -> Result<(), ParquetError> {
         return Err(refused(format!("its columns are nested more than {MAX_DEPTH} deep")));
     }
     if tree.path_bytes > MAX_PATH_BYTES {
-        let most = MAX_PATH_BYTES >> 20;
-        return Err(refused(format!("the paths of its columns are longer than {most} MiB")));
+        let max_mebibytes = MAX_PATH_BYTES >> 20;
+        return Err(refused(format!(
+            "the paths of its columns are longer than {max_mebibytes} MiB"
+        )));
     }
     Ok(())
 }
@@ -334,23 +336,26 @@ mod tests {
     #[test]
     fn groups_that_are_nested_too_deeply_are_refused() {
         // The root counts as one level of nesting.
-        let chain = |groups| std::iter::repeat_n(1, groups).chain([0]);
-        assert_eq!(message(&file(chain(MAX_DEPTH), &[])), "fine");
-        let refusal = message(&file(chain(MAX_DEPTH + 1), &[]));
+        let nested_groups = |groups| std::iter::repeat_n(1, groups).chain([0]);
+        assert_eq!(message(&file(nested_groups(MAX_DEPTH), &[])), "fine");
+        let refusal = message(&file(nested_groups(MAX_DEPTH + 1), &[]));
         assert_eq!(refusal, "its columns are nested more than 100 deep");
         // Groups side by side are not nested.
-        let beside = [150].into_iter().chain([1, 0].repeat(150));
-        assert_eq!(message(&file(beside, &[])), "fine");
+        let siblings = [150].into_iter().chain([1, 0].repeat(150));
+        assert_eq!(message(&file(siblings, &[])), "fine");
         // Each group has a leaf and a further group, so the last child counts to the depth.
-        let comb = [2].into_iter().chain([0, 2].repeat(MAX_DEPTH)).chain([0, 0]);
-        assert_eq!(message(&file(comb, &[])), "its columns are nested more than 100 deep");
+        let comb_tree = [2].into_iter().chain([0, 2].repeat(MAX_DEPTH)).chain([0, 0]);
+        assert_eq!(message(&file(comb_tree, &[])), "its columns are nested more than 100 deep");
     }
 
     #[test]
     fn too_many_columns_are_refused() {
-        let flat = |columns: u64| std::iter::once(columns).chain((0..columns).map(|_| 0));
-        assert_eq!(message(&file(flat(MAX_COLUMNS - 1), &[])), "fine");
-        assert_eq!(message(&file(flat(MAX_COLUMNS), &[])), "it has more than 100000 columns");
+        let flat_columns = |columns: u64| std::iter::once(columns).chain((0..columns).map(|_| 0));
+        assert_eq!(message(&file(flat_columns(MAX_COLUMNS - 1), &[])), "fine");
+        assert_eq!(
+            message(&file(flat_columns(MAX_COLUMNS), &[])),
+            "it has more than 100000 columns"
+        );
     }
 
     #[test]

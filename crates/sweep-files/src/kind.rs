@@ -92,23 +92,24 @@ impl FileKind<'_> {
 
     /// Returns the reason why the regular file at `path` is not of this kind; `None` if it is.
     pub(crate) fn objection(self, path: &Path) -> Result<Option<String>, FileError> {
-        let begins = |with: &[u8]| {
+        let begins_with = |prefix: &[u8]| {
             let mut start = Vec::new();
-            let read = regular::open(path).and_then(|file| file.take(256).read_to_end(&mut start));
-            read.map_err(FileError::io("read", path))?;
-            Ok(start.starts_with(with))
+            let result =
+                regular::open(path).and_then(|file| file.take(256).read_to_end(&mut start));
+            result.map_err(FileError::io("read", path))?;
+            Ok(start.starts_with(prefix))
         };
         let objection = format!("the file there is no {}", self.name());
         let is_ours = match self {
-            Self::Own => begins(OWN_FILE.as_bytes())?,
-            Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
-            Self::Exported { .. } => begins(b"PK\x03\x04")?,
+            Self::Own => begins_with(OWN_FILE.as_bytes())?,
+            Self::Exported { ending: "csv" } => begins_with(EXPORTED_CSV.as_bytes())?,
+            Self::Exported { .. } => begins_with(b"PK\x03\x04")?,
             Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
-            Self::Svg => begins(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
-            Self::Pdf => begins(PDF_START)?,
-            Self::Png => begins(b"\x89PNG\r\n\x1a\n")?,
-            Self::Html => begins(b"<!doctype html>\n")?,
-            Self::ManPage => begins(b".ie \\n(.g ")?,
+            Self::Svg => begins_with(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
+            Self::Pdf => begins_with(PDF_START)?,
+            Self::Png => begins_with(b"\x89PNG\r\n\x1a\n")?,
+            Self::Html => begins_with(b"<!doctype html>\n")?,
+            Self::ManPage => begins_with(b".ie \\n(.g ")?,
             _ => match ParquetFile::look(path) {
                 Ok(file) if file.kind() == Some(self) => true,
                 Ok(_) => {
@@ -147,9 +148,9 @@ impl FileKind<'_> {
 impl ParquetFile {
     /// Returns the kind of result that the metadata tells, if the file is a result.
     pub fn kind(&self) -> Option<FileKind<'static>> {
-        let has = |key: &str| self.value(key).is_some();
-        let own = OWN.iter().find(|(_, _, key, _)| has(key)).map(|(kind, ..)| *kind);
-        own.or_else(|| has(key::PLAN).then_some(FileKind::Map))
+        let has_key = |key: &str| self.value(key).is_some();
+        let own_kind = OWN.iter().find(|(_, _, key, _)| has_key(key)).map(|(kind, ..)| *kind);
+        own_kind.or_else(|| has_key(key::PLAN).then_some(FileKind::Map))
     }
 }
 
@@ -172,9 +173,10 @@ pub fn beside(output: &Path, ending: &str) -> PathBuf {
 /// summary of another result that has the same path is kept.
 fn is_account(path: &Path, of: &OsStr) -> std::io::Result<bool> {
     let text = regular::read_json(path)?;
-    let account: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
-    let is_free = |named: &str| {
+    let provenance: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
+    let can_be_replaced = |named: &str| {
         named == of.to_string_lossy() || beside(&path.with_file_name(named), "run.json") != path
     };
-    Ok(account["plan_hash"].is_string() && account["file"].as_str().is_some_and(is_free))
+    Ok(provenance["plan_hash"].is_string()
+        && provenance["file"].as_str().is_some_and(can_be_replaced))
 }

@@ -34,25 +34,25 @@ pub fn leaves<'a>(
     sides: [Option<&'a Value>; 2],
     opens: fn(&[Value], &[Value]) -> bool,
     path: &mut Vec<Step<'a>>,
-    take: &mut dyn FnMut(&[Step<'a>], [Option<&'a Value>; 2]),
+    visit_leaf: &mut dyn FnMut(&[Step<'a>], [Option<&'a Value>; 2]),
 ) {
-    let mut go = |step: Step<'a>, sides| {
+    let mut visit = |step: Step<'a>, sides| {
         path.push(step);
-        leaves(sides, opens, path, take);
+        leaves(sides, opens, path, visit_leaf);
         path.pop();
     };
     match sides {
         [Some(Value::Object(first)), Some(Value::Object(second))] => {
-            let further = second.keys().filter(|name| !first.contains_key(*name));
-            for name in first.keys().chain(further) {
-                go(Step::Name(name), [first.get(name), second.get(name)]);
+            let added_names = second.keys().filter(|name| !first.contains_key(*name));
+            for name in first.keys().chain(added_names) {
+                visit(Step::Name(name), [first.get(name), second.get(name)]);
             }
         }
         [Some(Value::Array(first)), Some(Value::Array(second))] if opens(first, second) => {
             for place in 0..first.len().max(second.len()) {
-                go(Step::Place(place), [first.get(place), second.get(place)]);
+                visit(Step::Place(place), [first.get(place), second.get(place)]);
             }
         }
-        sides => take(path, sides),
+        sides => visit_leaf(path, sides),
     }
 }

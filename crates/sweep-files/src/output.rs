@@ -27,7 +27,7 @@ impl<'a> Output<'a> {
         judge(path, kind)?;
         let folder = atomic::parent(path);
         ready(folder)?;
-        Ok(Self { path, kind, temporary: atomic::begin(folder)? })
+        Ok(Self { path, kind, temporary: atomic::create_temporary(folder)? })
     }
 
     /// Writes the next bytes.
@@ -55,7 +55,7 @@ impl<'a> Output<'a> {
 /// Those of [`Output::begin`].
 pub fn write(path: &Path, kind: FileKind<'_>, bytes: &[u8]) -> Result<(), FileError> {
     judge(path, kind)?;
-    let output = Output { path, kind, temporary: atomic::begin(atomic::parent(path))? };
+    let output = Output { path, kind, temporary: atomic::create_temporary(atomic::parent(path))? };
     output.finish(bytes)
 }
 
@@ -84,8 +84,8 @@ pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
         return refuse("it has no file name", NAME_A_FILE);
     }
     let text = path.to_string_lossy();
-    let folder_alike = |text: &str| text.ends_with(std::path::is_separator);
-    if folder_alike(&text) || text.strip_suffix('.').is_some_and(folder_alike) {
+    let ends_in_separator = |text: &str| text.ends_with(std::path::is_separator);
+    if ends_in_separator(&text) || text.strip_suffix('.').is_some_and(ends_in_separator) {
         return refuse("it is the name of a folder", NAME_A_FILE);
     }
     if let Some(ending) = kind.other_format(path) {
@@ -95,18 +95,18 @@ pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
              `sweep plot` pictures",
         );
     }
-    let found = regular::if_there(fs::symlink_metadata(path));
-    let Some(found) = found.map_err(FileError::io("look at", path))? else { return Ok(()) };
-    if found.is_symlink() {
+    let metadata = regular::if_there(fs::symlink_metadata(path));
+    let Some(metadata) = metadata.map_err(FileError::io("look at", path))? else { return Ok(()) };
+    if metadata.is_symlink() {
         return refuse(
             "it is a symbolic link",
             "give the name of the file that the link leads to, or remove the link",
         );
     }
-    if let Some(what) = regular::what(found.file_type()) {
+    if let Some(what) = regular::what(metadata.file_type()) {
         return refuse(&format!("it is {what}, not a regular file"), NAME_A_FILE);
     }
-    if found.len() == 0 {
+    if metadata.len() == 0 {
         return Ok(());
     }
     match kind.objection(path)? {
@@ -143,7 +143,7 @@ mod tests {
 
     /// Returns the bytes of a file of this kind, as the commands write it.
     fn example(kind: FileKind<'_>) -> Vec<u8> {
-        let own = match kind {
+        let columns = match kind {
             FileKind::Map => key::PLAN,
             FileKind::Trace => key::TRACE,
             FileKind::Modes => key::MODES,
@@ -169,7 +169,7 @@ mod tests {
             FileKind::Html => return b"<!doctype html>\n<title>x</title>".to_vec(),
             FileKind::ManPage => return b".ie \\n(.g .ds Aq \\(aq\n".to_vec(),
         };
-        sealed(&[key::PLAN, own])
+        sealed(&[key::PLAN, columns])
     }
 
     /// Makes a Parquet file of one number, with a digest and with these keys in its metadata.
@@ -190,9 +190,9 @@ mod tests {
     }
 
     fn kinds() -> impl Iterator<Item = FileKind<'static>> {
-        let account = FileKind::Account { of: OsStr::new("x.parquet") };
+        let provenance = FileKind::Account { of: OsStr::new("x.parquet") };
         PARQUET.into_iter().chain([
-            account,
+            provenance,
             FileKind::Own,
             FileKind::Svg,
             FileKind::Pdf,
@@ -223,15 +223,15 @@ mod tests {
         let path = home.path().join("file");
         for kind in kinds() {
             for other in kinds() {
-                let before = example(other);
-                fs::write(&path, &before).unwrap();
+                let original_bytes = example(other);
+                fs::write(&path, &original_bytes).unwrap();
                 if kind == other {
                     Output::begin(&path, kind).unwrap().finish(b"new").unwrap();
                     assert_eq!(fs::read(&path).unwrap(), b"new");
                 } else {
                     let message = refusal(&path, kind);
                     assert!(message.contains(kind.name()), "{message}");
-                    assert!(fs::read(&path).unwrap() == before);
+                    assert!(fs::read(&path).unwrap() == original_bytes);
                 }
             }
             for mine in ["my thesis", "PAR1", "{}"] {
@@ -247,10 +247,10 @@ mod tests {
 
     #[test]
     fn results_with_different_names_have_sidecars_with_different_names() {
-        let named = |output| crate::beside(Path::new(output), "svg");
-        assert_eq!(named("maps/x.parquet"), Path::new("maps/x.svg"));
-        assert_eq!(named("v1.0"), Path::new("v1.0.svg"));
-        assert_eq!(named("v1.5.parquet"), Path::new("v1.5.svg"));
+        let path_beside = |output| crate::beside(Path::new(output), "svg");
+        assert_eq!(path_beside("maps/x.parquet"), Path::new("maps/x.svg"));
+        assert_eq!(path_beside("v1.0"), Path::new("v1.0.svg"));
+        assert_eq!(path_beside("v1.5.parquet"), Path::new("v1.5.svg"));
     }
 
     #[test]

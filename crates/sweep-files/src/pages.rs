@@ -69,16 +69,16 @@ pub(crate) fn open<R: ChunkReader + 'static>(
     let start = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
     let start = u64::try_from(start).ok();
     let length = u64::try_from(column.compressed_size()).ok();
-    let end = start.zip(length).and_then(|(start, length)| start.checked_add(length));
-    let end = end.filter(|end| *end <= file.len());
-    let end = end.ok_or_else(|| refused("a column lies outside of it"))?;
+    let column_end = start.zip(length).and_then(|(start, length)| start.checked_add(length));
+    let column_end = column_end.filter(|column_end| *column_end <= file.len());
+    let column_end = column_end.ok_or_else(|| refused("a column lies outside of it"))?;
     let headers = PageHeaders {
         file: Arc::clone(file),
-        end,
+        end: column_end,
         codec: column.compression(),
         kind: column.column_type(),
         entry_bytes: column.column_descr().type_length(),
-        taken: Mutex::default(),
+        bytes_by_encoding: Mutex::default(),
         budget: Arc::clone(budget),
     };
     let pages = SerializedPageReader::new(Arc::new(headers), column, rows, None)?;
@@ -96,7 +96,7 @@ struct PageHeaders<R> {
     entry_bytes: i32,
     /// The bytes taken from the budget for the dictionary, and for the largest page so far of each
     /// encoding: the library holds the last page of each.
-    taken: Mutex<HashMap<(bool, [i32; 2]), u64>>,
+    bytes_by_encoding: Mutex<HashMap<(bool, [i32; 2]), u64>>,
     budget: Budget,
 }
 
@@ -111,16 +111,16 @@ impl<R: ChunkReader> ChunkReader for PageHeaders<R> {
 
     /// Returns the page header at `start`, and nothing behind it: the library reads no more here.
     fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
-        let left = self.end.saturating_sub(start);
+        let remaining_bytes = self.end.saturating_sub(start);
         for most in HEADER_BYTES {
-            let bytes = self.file.get_bytes(start, left.min(most) as usize)?;
+            let bytes = self.file.get_bytes(start, remaining_bytes.min(most) as usize)?;
             if let Some((header, rest)) = Header::read(&bytes) {
                 let length = bytes.len() - rest.len();
                 self.check(&header, start + length as u64)?;
                 return Ok(Cursor::new(bytes.slice(..length)));
             }
         }
-        Err(senseless())
+        Err(invalid_header_error())
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
@@ -132,12 +132,12 @@ impl<R: ChunkReader> PageHeaders<R> {
     /// Checks the header of a page whose bytes begin at `start`, and takes the page's bytes from
     /// the budget.
     fn check(&self, header: &Header, start: u64) -> Result<(), ParquetError> {
-        let size = |declared: i32| u64::try_from(declared).map_err(|_| senseless());
+        let size = |declared: i32| u64::try_from(declared).map_err(|_| invalid_header_error());
         let unpacked = size(header.unpacked)?;
         let packed = size(header.packed)?;
         let entries = size(header.dictionary)?;
         // Bytes of an entry in the file, and in the library's memory.
-        let (stored, held) = match self.kind {
+        let (bytes_per_value, held) = match self.kind {
             Type::BOOLEAN => (1, 1),
             Type::INT32 | Type::FLOAT => (4, 4),
             Type::INT64 | Type::DOUBLE => (8, 8),
@@ -145,8 +145,8 @@ impl<R: ChunkReader> PageHeaders<R> {
             Type::BYTE_ARRAY => (4, BYTE_ARRAY_BYTES),
             Type::FIXED_LEN_BYTE_ARRAY => (size(self.entry_bytes)?.max(1), BYTE_ARRAY_BYTES),
         };
-        if entries > unpacked / stored || packed > self.end.saturating_sub(start) {
-            return Err(senseless());
+        if entries > unpacked / bytes_per_value || packed > self.end.saturating_sub(start) {
+            return Err(invalid_header_error());
         }
         let is_bytes = matches!(self.kind, Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY);
         if is_bytes && header.encodings.iter().any(|it| COUNTED_ENCODINGS.contains(it)) {
@@ -159,32 +159,36 @@ impl<R: ChunkReader> PageHeaders<R> {
             Type::BYTE_ARRAY => BYTES_PER_WORD_BYTE * unpacked,
             _ => unpacked + entries * held,
         };
-        let mut taken = lock(&self.taken);
-        let before = taken.entry((header.dictionary > 0, header.encodings)).or_default();
-        let more = bytes.saturating_sub(*before);
-        *before += more;
+        let mut bytes_by_encoding = lock(&self.bytes_by_encoding);
+        let counted_bytes =
+            bytes_by_encoding.entry((header.dictionary > 0, header.encodings)).or_default();
+        let additional_bytes = bytes.saturating_sub(*counted_bytes);
+        *counted_bytes += additional_bytes;
         self.budget
-            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(more))
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+                left.checked_sub(additional_bytes)
+            })
             .map_err(|_| too_long())?;
         if matches!(self.codec, Compression::GZIP(_)) && !header.is_plain {
             let levels = size(header.levels[0])? + size(header.levels[1])?;
-            let length = packed.checked_sub(levels).ok_or_else(senseless)?;
+            let length = packed.checked_sub(levels).ok_or_else(invalid_header_error)?;
             let compressed = self.file.get_bytes(start + levels, length as usize)?;
             if unpacks_beyond(&compressed, unpacked.saturating_sub(levels)) {
-                return Err(senseless());
+                return Err(invalid_header_error());
             }
         }
         Ok(())
     }
 }
 
-fn senseless() -> ParquetError {
+fn invalid_header_error() -> ParquetError {
     refused("the header of a page makes no sense")
 }
 
 fn too_long() -> ParquetError {
-    let [all, words] = [1, BYTES_PER_WORD_BYTE].map(|weight| (MAX_UNPACKED_BYTES / weight) >> 20);
-    let limits = format!("{all} MiB at once, or into {words} MiB of words");
+    let [max_mebibytes, max_word_mebibytes] =
+        [1, BYTES_PER_WORD_BYTE].map(|weight| (MAX_UNPACKED_BYTES / weight) >> 20);
+    let limits = format!("{max_mebibytes} MiB at once, or into {max_word_mebibytes} MiB of words");
     refused(format!("its pages unpack into more than {limits}"))
 }
 
@@ -270,7 +274,7 @@ mod tests {
 
     /// Reads the headers of a column chunk as the library does, and returns the number of bytes
     /// that they take from the budget, or an error.
-    fn taken(chunk: &[u8], codec: Compression, kind: Type) -> Result<u64, String> {
+    fn bytes_by_encoding(chunk: &[u8], codec: Compression, kind: Type) -> Result<u64, String> {
         // Other bytes stand before and behind the column chunk.
         let file = Arc::new(Bytes::from([&[9; 5], chunk, &[9; 500]].concat()));
         let budget = budget();
@@ -280,46 +284,48 @@ mod tests {
             codec,
             kind,
             entry_bytes: 2,
-            taken: Mutex::default(),
+            bytes_by_encoding: Mutex::default(),
             budget: Arc::clone(&budget),
         };
-        let mut at = 5;
-        while at < headers.end {
-            let bytes = headers.get_read(at).map_err(|error| error.to_string())?.into_inner();
+        let mut offset = 5;
+        while offset < headers.end {
+            let bytes = headers.get_read(offset).map_err(|error| error.to_string())?.into_inner();
             let (header, rest) = Header::read(&bytes).unwrap();
             assert!(rest.is_empty());
-            at += bytes.len() as u64 + header.packed as u64;
+            offset += bytes.len() as u64 + header.packed as u64;
         }
         Ok(MAX_UNPACKED_BYTES - budget.load(Ordering::Relaxed))
     }
 
     fn taken_or_error(chunk: &[u8], codec: Compression) -> String {
-        taken(chunk, codec, Type::DOUBLE).map_or_else(|error| error, |bytes| bytes.to_string())
+        bytes_by_encoding(chunk, codec, Type::DOUBLE)
+            .map_or_else(|error| error, |bytes| bytes.to_string())
     }
 
     #[test]
     fn the_dictionary_and_the_largest_page_of_each_encoding_are_counted() {
         let chunk = [dictionary(80, 10), page(100, &[1; 10]), page(50, &[2; 60])].concat();
-        assert_eq!(taken(&chunk, Compression::SNAPPY, Type::DOUBLE), Ok(80 + 80 + 100));
-        assert_eq!(taken(&chunk, Compression::SNAPPY, Type::BYTE_ARRAY), Ok(8 * 180));
-        let mut other = page(70, &[1; 10]);
-        let encoding = other.windows(4).position(|bytes| bytes == [0x15, 2, 0x15, 0]).unwrap();
+        assert_eq!(bytes_by_encoding(&chunk, Compression::SNAPPY, Type::DOUBLE), Ok(80 + 80 + 100));
+        assert_eq!(bytes_by_encoding(&chunk, Compression::SNAPPY, Type::BYTE_ARRAY), Ok(8 * 180));
+        let mut other_encoding = page(70, &[1; 10]);
+        let encoding =
+            other_encoding.windows(4).position(|bytes| bytes == [0x15, 2, 0x15, 0]).unwrap();
         // DELTA_BINARY_PACKED.
-        other[encoding + 3] = 10;
-        let chunk = [page(100, &[1; 10]), other].concat();
-        assert_eq!(taken(&chunk, Compression::SNAPPY, Type::DOUBLE), Ok(170));
-        let half = page(1 << 29, &[0; 40]).repeat(3);
+        other_encoding[encoding + 3] = 10;
+        let chunk = [page(100, &[1; 10]), other_encoding].concat();
+        assert_eq!(bytes_by_encoding(&chunk, Compression::SNAPPY, Type::DOUBLE), Ok(170));
+        let half_of_budget = page(1 << 29, &[0; 40]).repeat(3);
         let zstd = Compression::ZSTD(Default::default());
-        assert_eq!(taken(&half, zstd, Type::DOUBLE), Ok(1 << 29));
+        assert_eq!(bytes_by_encoding(&half_of_budget, zstd, Type::DOUBLE), Ok(1 << 29));
         assert!(taken_or_error(&page(i32::MAX, &[0; 40]), zstd).contains("more than 1024 MiB"));
-        let both = [dictionary(80, 10), page(1 << 30, &[0; 40])].concat();
-        assert!(taken_or_error(&both, zstd).contains("more than 1024 MiB"));
+        let dictionary_and_page = [dictionary(80, 10), page(1 << 30, &[0; 40])].concat();
+        assert!(taken_or_error(&dictionary_and_page, zstd).contains("more than 1024 MiB"));
     }
 
     #[test]
     fn a_dictionary_that_declares_more_entries_than_fit_is_refused() {
         let fits = |kind, entries| {
-            taken(&dictionary(80, entries), Compression::UNCOMPRESSED, kind).is_ok()
+            bytes_by_encoding(&dictionary(80, entries), Compression::UNCOMPRESSED, kind).is_ok()
         };
         for (kind, most) in [
             (Type::INT32, 20),
@@ -336,12 +342,16 @@ mod tests {
     fn words_in_encodings_whose_counts_the_library_trusts_are_refused() {
         for encoding in COUNTED_ENCODINGS {
             let mut bytes = page(100, &[1; 10]);
-            let at = bytes.windows(4).position(|bytes| bytes == [0x15, 2, 0x15, 0]).unwrap();
-            bytes[at + 3] = 2 * encoding as u8;
+            let encoding_offset =
+                bytes.windows(4).position(|bytes| bytes == [0x15, 2, 0x15, 0]).unwrap();
+            bytes[encoding_offset + 3] = 2 * encoding as u8;
             let codec = Compression::SNAPPY;
-            let message = taken(&bytes, codec, Type::BYTE_ARRAY).unwrap_err();
+            let message = bytes_by_encoding(&bytes, codec, Type::BYTE_ARRAY).unwrap_err();
             assert!(message.contains("DELTA_LENGTH_BYTE_ARRAY or DELTA_BYTE_ARRAY"), "{message}");
-            assert!(taken(&bytes, codec, Type::DOUBLE).is_ok(), "the library reports it");
+            assert!(
+                bytes_by_encoding(&bytes, codec, Type::DOUBLE).is_ok(),
+                "the library reports it"
+            );
         }
     }
 
@@ -372,22 +382,22 @@ mod tests {
 
     #[test]
     fn headers_that_make_no_sense_are_refused() {
-        let sound = page(100, &[1; 10]);
-        for length in 1..sound.len() {
+        let undamaged = page(100, &[1; 10]);
+        for length in 1..undamaged.len() {
             assert!(
-                taken_or_error(&sound[..length], Compression::SNAPPY).contains("no sense"),
+                taken_or_error(&undamaged[..length], Compression::SNAPPY).contains("no sense"),
                 "{length}"
             );
         }
         // Lists of 2^31 - 1 booleans, which take no bytes: the library would count for minutes.
-        let mut counted = sound[..sound.len() - 11].to_vec();
-        counted.extend([0x99, 0xf1, 0xff, 0xff, 0xff, 0xff, 7].repeat(30));
-        counted.push(0);
-        assert!(taken_or_error(&counted, Compression::SNAPPY).contains("no sense"));
+        let mut with_counted_encoding = undamaged[..undamaged.len() - 11].to_vec();
+        with_counted_encoding.extend([0x99, 0xf1, 0xff, 0xff, 0xff, 0xff, 7].repeat(30));
+        with_counted_encoding.push(0);
+        assert!(taken_or_error(&with_counted_encoding, Compression::SNAPPY).contains("no sense"));
         // A size as a text, which a reader that trusts the schema would take for a number.
-        let mut other = sound;
-        other[2] = 0x18;
-        assert!(taken_or_error(&other, Compression::SNAPPY).contains("no sense"));
+        let mut damaged = undamaged;
+        damaged[2] = 0x18;
+        assert!(taken_or_error(&damaged, Compression::SNAPPY).contains("no sense"));
         assert!(taken_or_error(&page(-1, &[1; 10]), Compression::SNAPPY).contains("no sense"));
     }
 }

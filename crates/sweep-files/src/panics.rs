@@ -21,16 +21,16 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     // The panic hook is set once per process.
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
-        let before = panic::take_hook();
+        let previous_hook = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
             if !CAUGHT.get() {
-                before(info);
+                previous_hook(info);
             }
         }));
     });
-    let outer = CAUGHT.replace(true);
+    let was_caught = CAUGHT.replace(true);
     let result = panic::catch_unwind(AssertUnwindSafe(work));
-    CAUGHT.set(outer);
+    CAUGHT.set(was_caught);
     result.map_err(|panic| text(panic.as_ref()).to_owned())
 }
 
@@ -77,8 +77,8 @@ mod tests {
             caught(|| -> u8 { panic!("row {} is no row", 3) }),
             Err("row 3 is no row".to_owned())
         );
-        let nested = caught(|| caught(|| -> u8 { panic!("inside") }));
-        assert_eq!(nested, Ok(Err("inside".to_owned())));
+        let nested_result = caught(|| caught(|| -> u8 { panic!("inside") }));
+        assert_eq!(nested_result, Ok(Err("inside".to_owned())));
         assert!(!CAUGHT.get());
     }
 }

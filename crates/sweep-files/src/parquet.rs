@@ -99,8 +99,9 @@ impl ParquetFile {
 
     /// Whether another program has written a result of this program again, with its digest.
     pub fn is_copy(&self) -> bool {
-        let is_others = |by: &str| OTHER_WRITERS.iter().any(|writer| by.starts_with(writer));
-        self.created_by().is_some_and(is_others) && self.pairs().any(|pair| pair.key == key::DIGEST)
+        let is_other_writer = |by: &str| OTHER_WRITERS.iter().any(|writer| by.starts_with(writer));
+        self.created_by().is_some_and(is_other_writer)
+            && self.pairs().any(|pair| pair.key == key::DIGEST)
     }
 
     /// Whether the file has a digest that fits its bytes.
@@ -115,8 +116,8 @@ impl ParquetFile {
     pub fn bytes(&self) -> Result<Vec<u8>, FileError> {
         let mut bytes = Vec::new();
         let mut file = &self.file;
-        let read = file.seek(SeekFrom::Start(0)).and_then(|_| file.read_to_end(&mut bytes));
-        read.map_err(FileError::io("read", &self.path))?;
+        let result = file.seek(SeekFrom::Start(0)).and_then(|_| file.read_to_end(&mut bytes));
+        result.map_err(FileError::io("read", &self.path))?;
         let seal = seal::check(&mut io::Cursor::new(&bytes));
         if seal.map_err(FileError::io("read", &self.path))? != self.seal {
             return Err(FileError::damaged(&self.path));
@@ -124,7 +125,7 @@ impl ParquetFile {
         Ok(bytes)
     }
 
-    fn about(&self) -> &FileMetaData {
+    fn file_metadata(&self) -> &FileMetaData {
         self.metadata.file_metadata()
     }
 
@@ -135,17 +136,17 @@ impl ParquetFile {
 
     /// Returns the number of rows by the metadata.
     pub fn rows(&self) -> u64 {
-        u64::try_from(self.about().num_rows()).unwrap_or(0)
+        u64::try_from(self.file_metadata().num_rows()).unwrap_or(0)
     }
 
     /// Returns the program that wrote it.
     pub fn created_by(&self) -> Option<&str> {
-        self.about().created_by()
+        self.file_metadata().created_by()
     }
 
     /// Returns the file's own key-value metadata.
     pub fn pairs(&self) -> impl Iterator<Item = &KeyValue> {
-        self.about().key_value_metadata().into_iter().flatten()
+        self.file_metadata().key_value_metadata().into_iter().flatten()
     }
 
     /// Returns the value of a key of the metadata.
@@ -224,7 +225,7 @@ mod tests {
     use crate::{Writer, cells};
 
     /// The bytes of a file that this program has written, with its digest.
-    fn ours() -> Vec<u8> {
+    fn own_file() -> Vec<u8> {
         let mut bytes = io::Cursor::new(with_blank_digest(&format!("{CREATED_BY}0.0.0")));
         seal::seal(&mut bytes).unwrap();
         bytes.into_inner()
@@ -268,11 +269,11 @@ mod tests {
     fn a_result_with_any_bit_flipped_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
-        let sound = ours();
-        std::fs::write(&path, &sound).unwrap();
+        let undamaged = own_file();
+        std::fs::write(&path, &undamaged).unwrap();
         assert!(ParquetFile::open(&path).unwrap().is_sealed());
-        for bit in 0..8 * sound.len() {
-            let mut bytes = sound.clone();
+        for bit in 0..8 * undamaged.len() {
+            let mut bytes = undamaged.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
             std::fs::write(&path, &bytes).unwrap();
             assert!(ParquetFile::open(&path).is_err(), "bit {bit}");
@@ -283,19 +284,19 @@ mod tests {
     fn bytes_of_an_open_file_that_has_changed_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
-        let sound = ours();
-        std::fs::write(&path, &sound).unwrap();
+        let undamaged = own_file();
+        std::fs::write(&path, &undamaged).unwrap();
         let file = ParquetFile::open(&path).unwrap();
-        assert_eq!(file.bytes().unwrap(), sound);
-        let other = folder.path().join("y.parquet");
-        std::fs::write(&other, b"another file").unwrap();
-        std::fs::rename(&other, &path).unwrap();
-        assert_eq!(file.bytes().unwrap(), sound, "a file that took its place is another one");
-        std::fs::write(&path, &sound).unwrap();
+        assert_eq!(file.bytes().unwrap(), undamaged);
+        let other_path = folder.path().join("y.parquet");
+        std::fs::write(&other_path, b"another file").unwrap();
+        std::fs::rename(&other_path, &path).unwrap();
+        assert_eq!(file.bytes().unwrap(), undamaged, "a file that took its place is another one");
+        std::fs::write(&path, &undamaged).unwrap();
         let file = ParquetFile::open(&path).unwrap();
-        let mut changed = sound;
-        changed[20] ^= 1;
-        std::fs::write(&path, &changed).unwrap();
+        let mut changed_bytes = undamaged;
+        changed_bytes[20] ^= 1;
+        std::fs::write(&path, &changed_bytes).unwrap();
         assert!(matches!(file.bytes(), Err(FileError::Damaged { .. })));
     }
 
@@ -304,8 +305,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         // Reading the word for each row would take 3 GB, more than Arrow's offsets can count.
-        let long = "a".repeat(1 << 20);
-        let words: DictionaryArray<Int32Type> = [long.as_str(); 3].into_iter().collect();
+        let long_word = "a".repeat(1 << 20);
+        let words: DictionaryArray<Int32Type> = [long_word.as_str(); 3].into_iter().collect();
         let batch = RecordBatch::try_from_iter([("status", Arc::new(words) as _)]).unwrap();
         let file = File::create(&path).unwrap();
         let properties =
@@ -332,9 +333,9 @@ mod tests {
             .set_write_batch_size(1 << 20)
             .set_compression(parquet::basic::Compression::ZSTD(Default::default()));
         let write = |mebibytes: usize| {
-            let long = "a".repeat(1 << 20);
+            let long_word = "a".repeat(1 << 20);
             let words: DictionaryArray<Int32Type> =
-                vec![long.as_str(); mebibytes].into_iter().collect();
+                vec![long_word.as_str(); mebibytes].into_iter().collect();
             let batch = RecordBatch::try_from_iter([("status", Arc::new(words) as _)]).unwrap();
             let file = File::create(&path).unwrap();
             let properties = properties.clone().build();
@@ -353,7 +354,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let result = folder.path().join("results/tol60.parquet");
         std::fs::create_dir(folder.path().join("results")).unwrap();
-        std::fs::write(&result, ours()).unwrap();
+        std::fs::write(&result, own_file()).unwrap();
         std::fs::write(folder.path().join("g.toml"), "name = \"tol60\"\n").unwrap();
         let message =
             |name: &str| ParquetFile::open(&folder.path().join(name)).unwrap_err().to_string();
@@ -373,17 +374,17 @@ mod tests {
         let properties = WriterProperties::builder().build();
         let mut writer = Writer::new(Vec::new(), &batch.schema(), properties).unwrap();
         writer.write(&batch).unwrap();
-        let sound = writer.end().unwrap().into_inner().unwrap();
-        std::fs::write(&path, &sound).unwrap();
-        let read = || ParquetFile::open(&path).and_then(|file| rows(&file));
-        assert_eq!(read().unwrap().iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
+        let undamaged = writer.end().unwrap().into_inner().unwrap();
+        std::fs::write(&path, &undamaged).unwrap();
+        let read_rows = || ParquetFile::open(&path).and_then(|file| rows(&file));
+        assert_eq!(read_rows().unwrap().iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
         // The header's number of entries, 1500, becomes 8191; the library believes any.
-        let declared = [0x4c, 0x15, 0xb8, 0x17];
-        let at = sound.windows(4).position(|bytes| bytes == declared).unwrap();
-        let mut other = sound;
-        other[at + 2..at + 4].copy_from_slice(&[0xfe, 0x7f]);
-        std::fs::write(&path, &other).unwrap();
-        let message = read().unwrap_err().to_string();
+        let declared_count = [0x4c, 0x15, 0xb8, 0x17];
+        let count_offset = undamaged.windows(4).position(|bytes| bytes == declared_count).unwrap();
+        let mut damaged = undamaged;
+        damaged[count_offset + 2..count_offset + 4].copy_from_slice(&[0xfe, 0x7f]);
+        std::fs::write(&path, &damaged).unwrap();
+        let message = read_rows().unwrap_err().to_string();
         assert!(message.contains("the header of a page makes no sense"), "{message}");
     }
 

@@ -35,7 +35,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(5);
 /// # Errors
 /// An error of the system, or an error with the type of a file that is neither regular nor a pipe.
 #[cfg(unix)]
-pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     use std::os::unix::fs::FileTypeExt as _;
     // The parent process passed these descriptors, and has opened the other end of such a pipe
     // before.
@@ -45,26 +45,26 @@ pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file_type = fs::metadata(path)?.file_type();
     if !file_type.is_fifo() && !is_passed {
         let mut bytes = Vec::new();
-        open(path)?.take(most).read_to_end(&mut bytes)?;
+        open(path)?.take(max_bytes).read_to_end(&mut bytes)?;
         return Ok(bytes);
     }
     // Opening a pipe in this way does not wait for a writer, and unblocks writers that wait for a
     // reader.
     let file = without_waiting(OpenOptions::new().read(true), true).open(path)?;
-    let begun = Instant::now();
+    let start_time = Instant::now();
     let mut bytes = Vec::new();
-    while (bytes.len() as u64) < most {
-        let mut part = [0; 1 << 16];
-        let room = usize::try_from(most - bytes.len() as u64).unwrap_or(usize::MAX);
-        let room = room.min(part.len());
-        match (&file).read(&mut part[..room]) {
+    while (bytes.len() as u64) < max_bytes {
+        let mut buffer = [0; 1 << 16];
+        let remaining_bytes = usize::try_from(max_bytes - bytes.len() as u64).unwrap_or(usize::MAX);
+        let remaining_bytes = remaining_bytes.min(buffer.len());
+        match (&file).read(&mut buffer[..remaining_bytes]) {
             Ok(0) if is_passed || !bytes.is_empty() => break,
-            Ok(0) if begun.elapsed() >= WRITER_WAIT => {
+            Ok(0) if start_time.elapsed() >= WRITER_WAIT => {
                 let reason = "it is a FIFO that nobody writes to";
                 return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
             }
             Ok(0) => std::thread::sleep(LOOK_AGAIN),
-            Ok(count) => bytes.extend_from_slice(&part[..count]),
+            Ok(count) => bytes.extend_from_slice(&buffer[..count]),
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
                 std::thread::sleep(LOOK_AGAIN);
             }
@@ -237,10 +237,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let fifo = folder.path().join("fifo");
         rustix::fs::mkfifoat(rustix::fs::CWD, &fifo, rustix::fs::Mode::RUSR).unwrap();
-        let said = |path: &Path| open(path).unwrap_err().to_string();
-        assert_eq!(said(&fifo), "it is a FIFO, not a regular file");
-        assert_eq!(said(folder.path()), "it is a folder, not a regular file");
-        assert_eq!(said(Path::new("/dev/null")), "it is a device, not a regular file");
+        let error_text = |path: &Path| open(path).unwrap_err().to_string();
+        assert_eq!(error_text(&fifo), "it is a FIFO, not a regular file");
+        assert_eq!(error_text(folder.path()), "it is a folder, not a regular file");
+        assert_eq!(error_text(Path::new("/dev/null")), "it is a device, not a regular file");
 
         let target = folder.path().join("target");
         let link = folder.path().join("link");
@@ -285,9 +285,9 @@ mod tests {
         let (reader, mut writer) = io::pipe().unwrap();
         writer.write_all(b"name").unwrap();
         drop(writer);
-        let passed = format!("/dev/fd/{}", reader.as_raw_fd());
-        assert_eq!(read_text(Path::new(&passed), 1000).unwrap(), b"name");
-        assert_eq!(read_text(Path::new(&passed), 1000).unwrap(), b"");
+        let passed_path = format!("/dev/fd/{}", reader.as_raw_fd());
+        assert_eq!(read_text(Path::new(&passed_path), 1000).unwrap(), b"name");
+        assert_eq!(read_text(Path::new(&passed_path), 1000).unwrap(), b"");
         assert!(read_text(folder.path(), 1000).is_err());
         let device = read_text(Path::new("/dev/zero"), 1000).unwrap_err();
         assert_eq!(device.to_string(), "it is a device, not a regular file");

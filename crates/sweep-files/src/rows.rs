@@ -42,10 +42,10 @@ impl Cell {
 }
 
 fn without_point<S: serde::Serializer>(number: &f64, to: S) -> Result<S::Ok, S::Error> {
-    let whole = *number as i64;
+    let integer = *number as i64;
     // An f64 holds every whole number up to 2^53.
-    let is_whole = whole as f64 == *number && number.abs() < 2_f64.powi(53);
-    if is_whole { to.serialize_i64(whole) } else { to.serialize_f64(*number) }
+    let is_integer = integer as f64 == *number && number.abs() < 2_f64.powi(53);
+    if is_integer { to.serialize_i64(integer) } else { to.serialize_f64(*number) }
 }
 
 /// Returns the limits of ratios in a plan.
@@ -104,19 +104,20 @@ impl ResultTable {
     /// Returns the names of the swept parameters that have a column, in order; in a map, all have
     /// one.
     pub fn axes(&self) -> Vec<&str> {
-        let planned = self.plan.as_ref().and_then(|plan| plan["axis"].as_array());
-        if let Some(axes) = planned {
+        let planned_axes = self.plan.as_ref().and_then(|plan| plan["axis"].as_array());
+        if let Some(axes) = planned_axes {
             let names = axes.iter().filter_map(|axis| axis["parameter"].as_str());
             return names.filter_map(|name| Some(self.column(name)?.name.as_str())).collect();
         }
         // Files that other programs have rewritten lack the plan.
         let is_amplitude =
             |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
-        let before = self.columns.iter().take_while(|column| !is_amplitude(&column.name));
+        let columns_before_results =
+            self.columns.iter().take_while(|column| !is_amplitude(&column.name));
         if self.column("ratio_max").is_none() {
             return Vec::new();
         }
-        before
+        columns_before_results
             .filter(|column| column.is_number() && column.name != "point")
             .map(|column| column.name.as_str())
             .collect()
@@ -125,9 +126,11 @@ impl ResultTable {
     /// Returns the names of the columns that identify a row: the point's index, the axes, and in
     /// results other than maps the further columns that number their rows.
     pub fn places(&self) -> Vec<&str> {
-        let further = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
+        let further_keys = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
         let mut names: Vec<&str> = ["point"].into_iter().chain(self.axes()).collect();
-        names.extend(further.into_iter().filter(|name| !names.contains(name)).collect::<Vec<_>>());
+        names.extend(
+            further_keys.into_iter().filter(|name| !names.contains(name)).collect::<Vec<_>>(),
+        );
         names.retain(|name| self.column(name).is_some());
         names
     }
@@ -143,24 +146,31 @@ impl ParquetFile {
         &self,
         names: &[&str],
     ) -> Result<impl Iterator<Item = Result<Rows, FileError>> + use<'_>, FileError> {
-        let all = columns(self.schema());
-        let named = |name: &&str| all.iter().find(|column| column.name == **name);
-        let chosen: Vec<Option<&Column>> = names.iter().map(named).collect();
+        let all_columns = columns(self.schema());
+        let find_by_name = |name: &&str| all_columns.iter().find(|column| column.name == **name);
+        let chosen_columns: Vec<Option<&Column>> = names.iter().map(find_by_name).collect();
         // A column that is named twice is decoded once.
         let fields: BTreeMap<usize, CellKind> =
-            chosen.iter().flatten().map(|column| (column.field, column.kind)).collect();
-        let place = |column: &Column| fields.keys().position(|field| *field == column.field);
-        let places: Vec<Option<usize>> = chosen.iter().map(|column| place((*column)?)).collect();
+            chosen_columns.iter().flatten().map(|column| (column.field, column.kind)).collect();
+        let position_in_batch =
+            |column: &Column| fields.keys().position(|field| *field == column.field);
+        let positions_in_batch: Vec<Option<usize>> =
+            chosen_columns.iter().map(|column| position_in_batch((*column)?)).collect();
         let batches = self.batches(fields.keys().copied().collect())?;
-        let mut first = 0;
+        let mut first_row = 0;
         Ok(batches.map(move |batch| {
             let batch = batch?;
             let columns = batch.columns().iter().zip(fields.values());
             let columns =
                 columns.map(|(cells, kind)| decode(cells, *kind)).collect::<Result<_, _>>();
             let columns = columns.map_err(FileError::cells(self.path()))?;
-            let rows = Rows { first, count: batch.num_rows(), places: places.clone(), columns };
-            first += rows.count as u64;
+            let rows = Rows {
+                first: first_row,
+                count: batch.num_rows(),
+                places: positions_in_batch.clone(),
+                columns,
+            };
+            first_row += rows.count as u64;
             Ok(rows)
         }))
     }
@@ -253,8 +263,8 @@ impl<'a> Row<'a> {
     pub fn word(self, column: usize) -> Option<&'a str> {
         match self.cells(column)? {
             Cells::Words(places, words) => {
-                let place = places.is_valid(self.at).then(|| places.value(self.at))?;
-                Some(words.value(place as usize))
+                let word_index = places.is_valid(self.at).then(|| places.value(self.at))?;
+                Some(words.value(word_index as usize))
             }
             Cells::Flags(cells) => cells[self.at].map(|flag| if flag { "true" } else { "false" }),
             Cells::Numbers(_) => None,
@@ -283,8 +293,8 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
         }),
         CellKind::Flag => Cells::Flags(cells::flags(array)?.iter().collect()),
         CellKind::Text => {
-            let coded = cells::words(array)?;
-            Cells::Words(coded.keys().clone(), coded.values().clone())
+            let dictionary = cells::words(array)?;
+            Cells::Words(dictionary.keys().clone(), dictionary.values().clone())
         }
     })
 }

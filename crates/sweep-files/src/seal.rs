@@ -41,44 +41,51 @@ pub fn blank() -> KeyValue {
 /// # Errors
 /// Fails if the file cannot be read or written, or has no [`blank`] digest.
 pub fn seal(file: &mut (impl Read + Write + Seek)) -> io::Result<()> {
-    let place = place(file)?.ok_or_else(|| io::Error::other("it has no place for its digest"))?;
-    let digest = digest(file, place)?;
-    file.seek(SeekFrom::Start(place))?;
+    let digest_offset = find_digest_offset(file)?
+        .ok_or_else(|| io::Error::other("it has no place for its digest"))?;
+    let digest = digest(file, digest_offset)?;
+    file.seek(SeekFrom::Start(digest_offset))?;
     file.write_all(digest.as_bytes())?;
     file.flush()
 }
 
 /// Compares a file with its digest.
 pub(crate) fn check(file: &mut (impl Read + Seek)) -> io::Result<Seal> {
-    let Some(place) = place(file)? else { return Ok(Seal::Absent) };
-    let mut found = BLANK;
-    file.seek(SeekFrom::Start(place))?;
-    file.read_exact(&mut found)?;
-    Ok(if digest(file, place)?.as_bytes() == found { Seal::Whole } else { Seal::Broken })
+    let Some(digest_offset) = find_digest_offset(file)? else { return Ok(Seal::Absent) };
+    let mut found_digest = BLANK;
+    file.seek(SeekFrom::Start(digest_offset))?;
+    file.read_exact(&mut found_digest)?;
+    Ok(if digest(file, digest_offset)?.as_bytes() == found_digest {
+        Seal::Whole
+    } else {
+        Seal::Broken
+    })
 }
 
 /// Finds the place at which the digest begins.
-fn place(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> {
+fn find_digest_offset(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> {
     let length = file.seek(SeekFrom::End(0))?;
     let start = length.saturating_sub(TAIL_BYTES);
     let mut tail = Vec::new();
     file.seek(SeekFrom::Start(start))?;
     file.take(TAIL_BYTES).read_to_end(&mut tail)?;
     // Thrift's compact protocol writes the key, then 0x18 for a text, its length, and the text.
-    let mut entry = key::DIGEST.as_bytes().to_vec();
-    entry.extend_from_slice(&[0x18, DIGITS as u8]);
-    let found = tail.windows(entry.len()).rposition(|window| window == entry);
-    let place = found.map(|found| found + entry.len()).filter(|place| place + DIGITS <= tail.len());
-    Ok(place.map(|place| start + place as u64))
+    let mut key_bytes = key::DIGEST.as_bytes().to_vec();
+    key_bytes.extend_from_slice(&[0x18, DIGITS as u8]);
+    let key_offset = tail.windows(key_bytes.len()).rposition(|window| window == key_bytes);
+    let find_digest_offset = key_offset
+        .map(|key_offset| key_offset + key_bytes.len())
+        .filter(|find_digest_offset| find_digest_offset + DIGITS <= tail.len());
+    Ok(find_digest_offset.map(|find_digest_offset| start + find_digest_offset as u64))
 }
 
-/// Computes the digest of a file whose digest begins at `place`.
-fn digest(file: &mut (impl Read + Seek), place: u64) -> io::Result<String> {
+/// Computes the digest of a file whose digest begins at `find_digest_offset`.
+fn digest(file: &mut (impl Read + Seek), find_digest_offset: u64) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     file.seek(SeekFrom::Start(0))?;
-    hasher.update_reader(file.by_ref().take(place))?;
+    hasher.update_reader(file.by_ref().take(find_digest_offset))?;
     hasher.update(&BLANK);
-    file.seek(SeekFrom::Start(place + DIGITS as u64))?;
+    file.seek(SeekFrom::Start(find_digest_offset + DIGITS as u64))?;
     hasher.update_reader(file)?;
     Ok(hasher.finalize().to_hex().to_string())
 }
@@ -102,22 +109,22 @@ mod tests {
 
     #[test]
     fn every_flipped_bit_breaks_the_seal_or_hides_it() {
-        let whole = sealed();
-        assert_eq!(check(&mut Cursor::new(&whole)).unwrap(), Seal::Whole);
-        for bit in 0..8 * whole.len() {
-            let mut bytes = whole.clone();
+        let sealed_bytes = sealed();
+        assert_eq!(check(&mut Cursor::new(&sealed_bytes)).unwrap(), Seal::Whole);
+        for bit in 0..8 * sealed_bytes.len() {
+            let mut bytes = sealed_bytes.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
             assert_ne!(check(&mut Cursor::new(&bytes)).unwrap(), Seal::Whole, "bit {bit}");
         }
-        for length in 0..whole.len() {
+        for length in 0..sealed_bytes.len() {
             assert_ne!(
-                check(&mut Cursor::new(&whole[..length])).unwrap(),
+                check(&mut Cursor::new(&sealed_bytes[..length])).unwrap(),
                 Seal::Whole,
                 "{length} bytes"
             );
         }
-        let longer = [whole.as_slice(), b"x"].concat();
-        assert_eq!(check(&mut Cursor::new(&longer)).unwrap(), Seal::Broken);
+        let with_extra_byte = [sealed_bytes.as_slice(), b"x"].concat();
+        assert_eq!(check(&mut Cursor::new(&with_extra_byte)).unwrap(), Seal::Broken);
     }
 
     #[test]

@@ -114,33 +114,34 @@ impl Walk<'_, '_> {
     fn fields(&mut self, shape: Option<Shape>) -> Option<()> {
         let mut field = 0_i16;
         loop {
-            let head = self.byte()?;
-            let step = head >> 4;
-            let declared = head & 0xf;
+            let header_byte = self.byte()?;
+            let step = header_byte >> 4;
+            let declared = header_byte & 0xf;
             if declared == 0 {
                 (self.found)(&self.path, Found::End);
                 return Some(());
             }
-            let last = field;
+            let last_field = field;
             field = match step {
                 // The library truncates field numbers to this type too.
                 0 => self.number()? as i16,
                 step => field.checked_add(i16::from(step))?,
             };
-            if field <= last {
+            if field <= last_field {
                 return None;
             }
-            let known = shape.and_then(|shape| shape.iter().find(|(at, _)| at.contains(&field)));
-            let known = known.map(|(_, kind)| *kind);
+            let known_type =
+                shape.and_then(|shape| shape.iter().find(|(at, _)| at.contains(&field)));
+            let known_type = known_type.map(|(_, kind)| *kind);
             self.path.push(field);
             if matches!(declared, TRUE | FALSE) {
                 // Only a boolean has its value in the byte of its type.
-                if !known.is_none_or(|kind| kind.is(declared)) {
+                if !known_type.is_none_or(|kind| kind.is(declared)) {
                     return None;
                 }
                 (self.found)(&self.path, Found::Number(i64::from(declared == TRUE)));
             } else {
-                self.value(declared, known)?;
+                self.value(declared, known_type)?;
             }
             self.path.pop();
         }
@@ -164,11 +165,15 @@ impl Walk<'_, '_> {
                 self.skip(length)?;
             }
             LIST => {
-                let head = self.byte()?;
-                let length = if head >> 4 == 0xf { self.varint()? } else { u64::from(head >> 4) };
+                let header_byte = self.byte()?;
+                let length = if header_byte >> 4 == 0xf {
+                    self.varint()?
+                } else {
+                    u64::from(header_byte >> 4)
+                };
                 let element = if let Some(Wire::List(kind)) = known { Some(*kind) } else { None };
                 for _ in 0..length {
-                    self.value(head & 0xf, element)?;
+                    self.value(header_byte & 0xf, element)?;
                 }
             }
             STRUCT => {
@@ -245,9 +250,10 @@ mod tests {
 
     /// Returns the items that a walk reports, and the number of bytes behind the struct.
     fn walked(bytes: &[u8]) -> Option<(Vec<(Vec<i16>, Found)>, usize)> {
-        let mut all = Vec::new();
-        let rest = walk(bytes, SHAPE, &mut |path, found| all.push((path.to_vec(), found)))?;
-        Some((all, rest.len()))
+        let mut found_fields = Vec::new();
+        let rest =
+            walk(bytes, SHAPE, &mut |path, found| found_fields.push((path.to_vec(), found)))?;
+        Some((found_fields, rest.len()))
     }
 
     #[test]

@@ -52,12 +52,12 @@ impl<W: Write + Send> Writer<W> {
     /// # Errors
     /// Those of the library.
     pub fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
-        let mut from = 0;
-        while from < rows.num_rows() {
-            let more = (rows.num_rows() - from).min(self.group_rows - self.count);
-            self.rows.push(rows.slice(from, more));
-            self.count += more;
-            from += more;
+        let mut first_row = 0;
+        while first_row < rows.num_rows() {
+            let row_count = (rows.num_rows() - first_row).min(self.group_rows - self.count);
+            self.rows.push(rows.slice(first_row, row_count));
+            self.count += row_count;
+            first_row += row_count;
             if self.count == self.group_rows {
                 self.flush()?;
             }
@@ -81,13 +81,13 @@ impl<W: Write + Send> Writer<W> {
     /// call, and the file must not depend on the batches in which the rows came.
     fn flush(&mut self) -> Result<(), ParquetError> {
         let mut group = self.file.next_row_group()?;
-        let mut place = 0;
+        let mut column_index = 0;
         while let Some(mut column) = group.next_column()? {
             let arrays: Vec<&dyn Array> =
-                self.rows.iter().map(|rows| rows.column(place).as_ref()).collect();
+                self.rows.iter().map(|rows| rows.column(column_index).as_ref()).collect();
             write(column.untyped(), &arrays)?;
             column.close()?;
-            place += 1;
+            column_index += 1;
         }
         group.close()?;
         self.rows.clear();
@@ -99,7 +99,7 @@ impl<W: Write + Send> Writer<W> {
 /// Returns the metadata of all columns as one entry of the file's metadata, because Parquet has
 /// none for a column.
 fn column_metadata(schema: &Schema) -> KeyValue {
-    let entry = |field: &FieldRef| {
+    let column_description = |field: &FieldRef| {
         let kind = match field.data_type() {
             DataType::Boolean => "bool",
             DataType::UInt64 => "uint64",
@@ -110,10 +110,10 @@ fn column_metadata(schema: &Schema) -> KeyValue {
             let number = (key == key::LIMIT).then(|| serde_json::from_str(text).ok()).flatten();
             (key.clone(), number.unwrap_or_else(|| Value::from(text.as_str())))
         });
-        let entry = pairs.chain([("type".to_owned(), kind.into())]).collect::<Value>();
-        (field.name().clone(), entry)
+        let column_description = pairs.chain([("type".to_owned(), kind.into())]).collect::<Value>();
+        (field.name().clone(), column_description)
     };
-    let columns: Value = schema.fields().iter().map(entry).collect();
+    let columns: Value = schema.fields().iter().map(column_description).collect();
     KeyValue::new(key::COLUMNS.to_owned(), columns.to_string())
 }
 
@@ -191,7 +191,7 @@ mod tests {
         let number = |row: usize| (!row.is_multiple_of(7)).then_some(row as f64 / 3.0);
         let numbers: ArrayRef = Arc::new((0..ROWS).map(number).collect::<Float64Array>());
         let batch = RecordBatch::try_from_iter([("count", counts), ("number", numbers)]).unwrap();
-        let written = |batch_rows: usize| {
+        let written_bytes = |batch_rows: usize| {
             let properties = WriterProperties::builder().set_max_row_group_row_count(Some(60_000));
             let mut writer = Writer::new(Vec::new(), &batch.schema(), properties.build()).unwrap();
             for from in (0..ROWS).step_by(batch_rows) {
@@ -199,9 +199,9 @@ mod tests {
             }
             writer.end().unwrap().into_inner().unwrap()
         };
-        let whole = written(ROWS);
+        let in_one_batch = written_bytes(ROWS);
         for batch_rows in [1000, 4096, 33_333] {
-            assert!(written(batch_rows) == whole, "batches of {batch_rows} rows");
+            assert!(written_bytes(batch_rows) == in_one_batch, "batches of {batch_rows} rows");
         }
     }
 }

@@ -51,9 +51,9 @@ impl AxisScale {
 
     /// Returns the position of a value: 0 at the start of the scale, 1 at its end.
     pub(crate) fn position(self, value: f64) -> f64 {
-        let from = self.coordinate(self.from);
-        let to = self.coordinate(self.to);
-        (self.coordinate(value) - from) / (to - from)
+        let start = self.coordinate(self.from);
+        let end = self.coordinate(self.to);
+        (self.coordinate(value) - start) / (end - start)
     }
 
     /// Returns about `count` round values within the scale.
@@ -71,8 +71,8 @@ pub(crate) const fn has_logarithm(value: f64) -> bool {
 
 /// Returns the least and the greatest of the finite values.
 pub fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let finite = values.filter(|value| value.is_finite()).map(|value| (value, value));
-    finite.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
+    let finite_pairs = values.filter(|value| value.is_finite()).map(|value| (value, value));
+    finite_pairs.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
 }
 
 /// A distance between ticks: 1, 2 or 5 times a power of ten.
@@ -165,14 +165,14 @@ pub(crate) fn log_tick_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
     if !has_logarithm(low) || !has_logarithm(high) {
         return Default::default();
     }
-    let sets: [&[f64]; 5] = [
+    let tick_sets: [&[f64]; 5] = [
         &[1.0],
         &[1.0, 3.0],
         &[1.0, 2.0, 5.0],
         &[1.0, 1.5, 2.0, 3.0, 5.0, 7.0],
         &[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0],
     ];
-    sets.map(|factors| {
+    tick_sets.map(|factors| {
         let powers = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
         let values =
             powers.flat_map(|power| factors.iter().map(move |factor| factor * 10_f64.powi(power)));
@@ -214,32 +214,32 @@ pub(crate) fn is_log_spaced(values: &[f64]) -> bool {
 mod tests {
     use super::*;
 
-    fn labels(scale: AxisScale, count: usize) -> Vec<String> {
+    fn tick_labels(scale: AxisScale, count: usize) -> Vec<String> {
         scale.ticks(count).into_iter().map(|tick| tick.label).collect()
     }
 
     #[test]
     fn ticks_are_round_values_within_the_scale() {
         assert_eq!(
-            labels(AxisScale::linear(0.0, 1.0), 5),
+            tick_labels(AxisScale::linear(0.0, 1.0), 5),
             ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
         );
         assert_eq!(
-            labels(AxisScale::linear(46.0, 314.0), 6),
+            tick_labels(AxisScale::linear(46.0, 314.0), 6),
             ["50", "100", "150", "200", "250", "300"]
         );
-        assert_eq!(labels(AxisScale::linear(-0.3, 0.3), 3), ["-0.2", "0.0", "0.2"]);
-        assert_eq!(labels(AxisScale::linear(-48.0, 48.0), 3), ["-40", "-20", "0", "20", "40"]);
-        assert_eq!(labels(AxisScale::linear(-1.1e15, 0.0), 3), ["-1e15", "-5e14", "0"]);
-        assert_eq!(labels(AxisScale::logarithmic(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
-        assert_eq!(labels(AxisScale::logarithmic(1.0, 9.0), 4), ["1", "2", "5"]);
-        assert!(labels(AxisScale::linear(1.0, 1.0), 5).is_empty());
+        assert_eq!(tick_labels(AxisScale::linear(-0.3, 0.3), 3), ["-0.2", "0.0", "0.2"]);
+        assert_eq!(tick_labels(AxisScale::linear(-48.0, 48.0), 3), ["-40", "-20", "0", "20", "40"]);
+        assert_eq!(tick_labels(AxisScale::linear(-1.1e15, 0.0), 3), ["-1e15", "-5e14", "0"]);
+        assert_eq!(tick_labels(AxisScale::logarithmic(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
+        assert_eq!(tick_labels(AxisScale::logarithmic(1.0, 9.0), 4), ["1", "2", "5"]);
+        assert!(tick_labels(AxisScale::linear(1.0, 1.0), 5).is_empty());
     }
 
     #[test]
     fn a_log_scale_over_many_decades_has_few_ticks() {
-        assert_eq!(labels(AxisScale::logarithmic(1e-3, 1e12), 5).len(), 6);
-        assert!(labels(AxisScale::logarithmic(1e-100, 1e100), 5).len() <= 6);
+        assert_eq!(tick_labels(AxisScale::logarithmic(1e-3, 1e12), 5).len(), 6);
+        assert!(tick_labels(AxisScale::logarithmic(1e-100, 1e100), 5).len() <= 6);
     }
 
     #[test]

@@ -15,7 +15,7 @@ impl Buckets {
     }
 
     /// Returns the maximum number of rows in a bucket.
-    pub(crate) fn longest(self) -> usize {
+    pub(crate) fn max_bucket_rows(self) -> usize {
         self.rows.div_ceil(self.count.max(1))
     }
 

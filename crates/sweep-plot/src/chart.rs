@@ -167,8 +167,8 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
         }
         draw_marks(&mut scene, chart, &panel, index == 0);
         draw_stars(&mut scene, content, &panel);
-        let last = index + 1 == panels.len();
-        panel.draw_frame(&mut scene, last, true);
+        let is_last_panel = index + 1 == panels.len();
+        panel.draw_frame(&mut scene, is_last_panel, true);
         // Dots are drawn after the frame and without clipping, so that they are whole at the edge
         // too.
         let is_in_panel = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
@@ -176,7 +176,7 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
             scene.fill(Outline::circle(position, radius), colour);
         }
         panel.draw_y_label(&mut scene, &content.label.to_string(), 62.0);
-        if last {
+        if is_last_panel {
             panel.draw_x_label(&mut scene, &chart.x_label.to_string());
         }
         y += content.height + PANEL_GAP;
@@ -193,15 +193,15 @@ pub(crate) fn x_scale(chart: &Chart) -> AxisScale {
         return AxisScale::around(xs);
     }
     if chart.is_x_log {
-        let positive = xs.filter(|x| has_logarithm(*x));
-        let (low, high) = extremes(positive).unwrap_or((1.0, 10.0));
+        let positive_xs = xs.filter(|x| has_logarithm(*x));
+        let (low, high) = extremes(positive_xs).unwrap_or((1.0, 10.0));
         return AxisScale::logarithmic(low, if high > low { high } else { 10.0 * low });
     }
     let (low, high) = extremes(xs).unwrap_or((0.0, 1.0));
     // If all series have only one x, it is in the middle, so that its dots are whole.
     if high <= low {
-        let half = 0.5_f64.max(1e-6 * low.abs());
-        return AxisScale::linear(low - half, low + half);
+        let half_width = 0.5_f64.max(1e-6 * low.abs());
+        return AxisScale::linear(low - half_width, low + half_width);
     }
     AxisScale::linear(low, high)
 }
@@ -257,21 +257,23 @@ fn draw_panel(
         if ranges.is_empty() {
             continue;
         }
-        let mut areas = Outline::default();
+        let mut shaded_areas = Outline::default();
         for range in ranges {
             let [from, to] = range.map(|x| panel.x_pixel(x));
             // A shade narrower than 1 px would not be visible.
-            areas.add_rectangle(from, panel.y, (to - from).max(1.0), panel.height);
+            shaded_areas.add_rectangle(from, panel.y, (to - from).max(1.0), panel.height);
         }
-        scene.fill(areas, colour);
+        scene.fill(shaded_areas, colour);
     }
     for series in &content.series {
         let xs = &series.x;
-        let pixel = |ys: &[f64], k: usize| {
+        let pixel_of_sample = |ys: &[f64], k: usize| {
             (xs[k].is_finite() && ys[k].is_finite()).then(|| panel.pixel(xs[k], ys[k]))
         };
         if let Style::Band(low, high) = &series.style {
-            let edges: Vec<_> = (0..xs.len()).map(|k| pixel(low, k).zip(pixel(high, k))).collect();
+            let edges: Vec<_> = (0..xs.len())
+                .map(|k| pixel_of_sample(low, k).zip(pixel_of_sample(high, k)))
+                .collect();
             let mut outline = Outline::default();
             for run in edges.split(Option::is_none).filter(|run| !run.is_empty()) {
                 let (mut low_points, mut high_points): (Vec<[f64; 2]>, Vec<[f64; 2]>) =
@@ -288,17 +290,19 @@ fn draw_panel(
             scene.fill(outline, series.colour.with_alpha(90));
         }
         if series.style == Style::Dots {
-            let points = (0..xs.len()).filter_map(|k| pixel(&series.y, k));
+            let points = (0..xs.len()).filter_map(|k| pixel_of_sample(&series.y, k));
             dots.extend(points.map(|point| (point, DOT_RADIUS, series.colour)));
             continue;
         }
         let indices =
             envelope(xs, &series.y, panel.x_scale.from, panel.x_scale.to, panel.width as usize);
-        let points: Vec<_> = indices.into_iter().map(|k| pixel(&series.y, k)).collect();
+        let points: Vec<_> = indices.into_iter().map(|k| pixel_of_sample(&series.y, k)).collect();
         let mut outline = Outline::default();
-        let isolated = outline.add_runs(&points);
+        let isolated_points = outline.add_runs(&points);
         scene.line(outline, series_stroke(series));
-        dots.extend(isolated.into_iter().map(|point| (point, ISOLATED_RADIUS, series.colour)));
+        dots.extend(
+            isolated_points.into_iter().map(|point| (point, ISOLATED_RADIUS, series.colour)),
+        );
     }
     for (value, _) in &content.levels {
         let y = panel.y_pixel(*value);
@@ -348,12 +352,13 @@ fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
         let width = text_width(label, TICK_SIZE, true);
         // The candidates lie on both sides of the star, from close to it to farther above and
         // below.
-        let sides = [x - STAR_RADIUS - 2.0 - width, x + STAR_RADIUS + 2.0];
-        let heights = [-6.0, 18.0, -24.0, 36.0, -42.0, 54.0];
-        let candidates = heights.iter().flat_map(|dy| sides.map(|left| [left, y + dy]));
-        let extent = |[left, base]: [f64; 2]| [left, base - TICK_SIZE, left + width, base + 4.0];
+        let x_candidates = [x - STAR_RADIUS - 2.0 - width, x + STAR_RADIUS + 2.0];
+        let y_offsets = [-6.0, 18.0, -24.0, 36.0, -42.0, 54.0];
+        let candidates = y_offsets.iter().flat_map(|dy| x_candidates.map(|left| [left, y + dy]));
+        let text_extent =
+            |[left, base]: [f64; 2]| [left, base - TICK_SIZE, left + width, base + 4.0];
         let is_free = |position: &[f64; 2]| {
-            let [left, top, right, bottom] = extent(*position);
+            let [left, top, right, bottom] = text_extent(*position);
             left > panel.x
                 && right < panel.x + panel.width
                 && top > panel.y
@@ -367,9 +372,9 @@ fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
         };
         let position = candidates
             .filter(is_free)
-            .min_by_key(|position| count_curves_through(content, panel, extent(*position)));
-        let position = position.unwrap_or([sides[1], y + 18.0]);
-        occupied.push(extent(position));
+            .min_by_key(|position| count_curves_through(content, panel, text_extent(*position)));
+        let position = position.unwrap_or([x_candidates[1], y + 18.0]);
+        occupied.push(text_extent(position));
         let text = Text::new(label.clone(), position, TICK_SIZE).bold();
         scene.text(Text { halo: Some(PAPER), ..text });
     }
@@ -380,15 +385,15 @@ fn count_curves_through(content: &ChartPanel, panel: &Panel, extent: Rectangle) 
     let passes_through = |series: &&Series| {
         let points = series.x.iter().zip(&series.y).map(|(&x, &y)| panel.pixel(x, y));
         let points: Vec<[f64; 2]> = points.collect();
-        points.windows(2).any(|pair| intersects([pair[0], pair[1]], extent))
+        points.windows(2).any(|pair| segment_intersects([pair[0], pair[1]], extent))
     };
     content.series.iter().filter(passes_through).count()
 }
 
 /// Returns whether a part of a line segment lies within a rectangle (Liang-Barsky clipping).
-fn intersects([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Rectangle) -> bool {
-    let mut entry = 0.0_f64;
-    let mut exit = 1.0_f64;
+fn segment_intersects([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Rectangle) -> bool {
+    let mut entry_fraction = 0.0_f64;
+    let mut exit_fraction = 1.0_f64;
     for (k, (low, high)) in [(left, right), (top, bottom)].into_iter().enumerate() {
         let step = to[k] - from[k];
         if step == 0.0 {
@@ -398,11 +403,12 @@ fn intersects([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Rectangle) 
             continue;
         }
         let [at_low, at_high] = [(low - from[k]) / step, (high - from[k]) / step];
-        entry = entry.max(at_low.min(at_high));
-        exit = exit.min(at_low.max(at_high));
+        entry_fraction = entry_fraction.max(at_low.min(at_high));
+        exit_fraction = exit_fraction.min(at_low.max(at_high));
     }
     // A segment with a NaN end belongs to a gap of the curve.
-    from.iter().chain(&to).all(|coordinate| coordinate.is_finite()) && entry <= exit
+    from.iter().chain(&to).all(|coordinate| coordinate.is_finite())
+        && entry_fraction <= exit_fraction
 }
 
 /// Draws the marks through a panel, and their labels above it if `is_labelled`. A label that would
@@ -426,7 +432,7 @@ fn draw_marks(scene: &mut Scene, chart: &Chart, panel: &Panel, is_labelled: bool
 
 fn legend_entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, String)> {
     let mut entries: Vec<(LegendSymbol, String)> = Vec::new();
-    let mut add = |symbol: LegendSymbol, name: &str| {
+    let mut add_entry = |symbol: LegendSymbol, name: &str| {
         if !name.is_empty() && !entries.iter().any(|(_, known_name)| known_name == name) {
             entries.push((symbol, name.to_owned()));
         }
@@ -435,34 +441,34 @@ fn legend_entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, S
         for series in &panel.series {
             if series.style == Style::Dots {
                 let dot = Outline::circle([0.0, 0.0], 1.4 * DOT_RADIUS);
-                add(LegendSymbol::Shape(dot, true, series.colour), &series.name);
+                add_entry(LegendSymbol::Shape(dot, true, series.colour), &series.name);
                 continue;
             }
             let mut stroke = series_stroke(series);
             stroke.width = stroke.width.max(2.2);
-            add(LegendSymbol::Line(stroke), &series.name);
+            add_entry(LegendSymbol::Line(stroke), &series.name);
         }
         if let [.., under, over] = &panel.series[..]
             && over.colour.alpha < 255
         {
             let overlap = Stroke::solid(over.colour.over(under.colour), 2.2);
-            add(LegendSymbol::Line(overlap), OVERLAP_MEANING);
+            add_entry(LegendSymbol::Line(overlap), OVERLAP_MEANING);
         }
         for (_, meaning) in &panel.levels {
-            add(LegendSymbol::Line(level_stroke()), meaning);
+            add_entry(LegendSymbol::Line(level_stroke()), meaning);
         }
         if !panel.mixed.is_empty() {
-            add(LegendSymbol::Area(BOTH_SIDES), MIXED_MEANING);
+            add_entry(LegendSymbol::Area(BOTH_SIDES), MIXED_MEANING);
         }
         if !panel.stars.is_empty() {
-            add(LegendSymbol::Shape(Outline::star([0.0, 0.0], 9.0), true, INK), STAR_MEANING);
+            add_entry(LegendSymbol::Shape(Outline::star([0.0, 0.0], 9.0), true, INK), STAR_MEANING);
         }
     }
     if !chart.marks.is_empty() {
-        add(LegendSymbol::Line(mark_stroke()), &chart.mark_meaning);
+        add_entry(LegendSymbol::Line(mark_stroke()), &chart.mark_meaning);
     }
     if !chart.shades.is_empty() {
-        add(LegendSymbol::Area(UNSTABLE_SHADE), &chart.shade_meaning);
+        add_entry(LegendSymbol::Area(UNSTABLE_SHADE), &chart.shade_meaning);
     }
     entries
 }
@@ -527,8 +533,8 @@ mod tests {
         for text in labels {
             let [left, base] = text.position;
             let width = text_width(&text.text, TICK_SIZE, true);
-            let extent = [left, base - TICK_SIZE, left + width, base + 4.0];
-            assert_eq!(count_curves_through(content, &panel, extent), 0, "{}", text.text);
+            let text_extent = [left, base - TICK_SIZE, left + width, base + 4.0];
+            assert_eq!(count_curves_through(content, &panel, text_extent), 0, "{}", text.text);
             count += 1;
         }
         assert_eq!(count, 2);

@@ -94,8 +94,8 @@ impl ColourScale {
 
     /// Returns the scale of factors, which reaches as far below 1 as above it.
     pub(crate) fn around_one(values: impl Iterator<Item = f64>) -> Self {
-        let farthest = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
-        let scale_end = values.filter(|value| *value > 0.0).fold(MIN_FACTOR_END, farthest);
+        let greater_factor = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
+        let scale_end = values.filter(|value| *value > 0.0).fold(MIN_FACTOR_END, greater_factor);
         Self {
             is_neutral: true,
             ..Self::diverging(AxisScale::logarithmic(1.0 / scale_end, scale_end), 1.0, false)
@@ -105,8 +105,8 @@ impl ColourScale {
     /// Returns the scale of differences, which reaches as far below 0 as above it. `is_reversed` if
     /// less is worse.
     pub(crate) fn around_zero(values: impl Iterator<Item = f64>, is_reversed: bool) -> Self {
-        let farthest = |so_far: f64, value: f64| so_far.max(value.abs());
-        let scale_end = values.filter(|value| value.is_finite()).fold(0.0, farthest);
+        let greater_magnitude = |so_far: f64, value: f64| so_far.max(value.abs());
+        let scale_end = values.filter(|value| value.is_finite()).fold(0.0, greater_magnitude);
         let scale_end = if scale_end > 0.0 { scale_end } else { 1.0 };
         Self {
             is_neutral: true,
@@ -206,10 +206,11 @@ fn blend(anchors: &[u32], fraction: f64) -> Colour {
     let position = fraction.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
     let lower = (position as usize).min(anchors.len() - 2);
     let weight = position - lower as f64;
-    let from = Colour::hex(anchors[lower]).rgb;
-    let to = Colour::hex(anchors[lower + 1]).rgb;
+    let lower_colour = Colour::hex(anchors[lower]).rgb;
+    let upper_colour = Colour::hex(anchors[lower + 1]).rgb;
     let rgb = std::array::from_fn(|k| {
-        (f64::from(from[k]) * (1.0 - weight) + f64::from(to[k]) * weight).round() as u8
+        (f64::from(lower_colour[k]) * (1.0 - weight) + f64::from(upper_colour[k]) * weight).round()
+            as u8
     });
     Colour { rgb, alpha: 255 }
 }
@@ -251,8 +252,8 @@ mod tests {
     fn values_on_one_side_of_the_limit_have_all_colours() {
         let scale = ColourScale::with_limit([0.004, 0.012].into_iter(), 0.0, true);
         assert_eq!([0.004, 0.012].map(|gap| scale.position(gap)), [0.0, 1.0]);
-        let mixed = ColourScale::with_limit([-0.001, 0.012].into_iter(), 0.0, true);
-        assert_eq!([-0.001, 0.0, 0.012].map(|gap| mixed.position(gap)), [0.0, 0.5, 1.0]);
+        let mixed_scale = ColourScale::with_limit([-0.001, 0.012].into_iter(), 0.0, true);
+        assert_eq!([-0.001, 0.0, 0.012].map(|gap| mixed_scale.position(gap)), [0.0, 0.5, 1.0]);
         assert!(ColourScale::without_limit([3.0, 3.0].into_iter()).position(3.0).is_finite());
     }
 
@@ -267,13 +268,13 @@ mod tests {
         let factors = ColourScale::around_one([0.5, 1.1].into_iter());
         assert!(saturation(&factors, 1.0) < 24 && saturation(&factors, 0.5) > 70);
         assert_eq!(factors.position(2.0), 1.0, "as far above 1 as below it");
-        let gaps = ColourScale::around_zero([-0.001, 0.004].into_iter(), true);
-        assert!(saturation(&gaps, 0.0) < 24);
-        assert_eq!([-0.004, 0.0, 0.004].map(|gap| gaps.position(gap)), [0.0, 0.5, 1.0]);
-        let [red, _, blue] = gaps.colour(gaps.step(-0.003)).rgb;
+        let gap_scale = ColourScale::around_zero([-0.001, 0.004].into_iter(), true);
+        assert!(saturation(&gap_scale, 0.0) < 24);
+        assert_eq!([-0.004, 0.0, 0.004].map(|gap| gap_scale.position(gap)), [0.0, 0.5, 1.0]);
+        let [red, _, blue] = gap_scale.colour(gap_scale.step(-0.003)).rgb;
         assert!(red > blue, "a gap that got smaller is worse");
-        let same = ColourScale::around_zero([0.0, 0.0].into_iter(), true);
-        assert!(same.position(0.0).is_finite());
+        let constant_scale = ColourScale::around_zero([0.0, 0.0].into_iter(), true);
+        assert!(constant_scale.position(0.0).is_finite());
     }
 
     #[test]

@@ -53,14 +53,14 @@ fn segments_in_square(
     // The corners run counter-clockwise from the lower left.
     let nodes = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
     let corners = nodes.map(|(i, j)| value(i, j));
-    let above = corners.map(|corner| corner >= 0.0);
+    let is_above = corners.map(|corner| corner >= 0.0);
     let known_corners: Vec<usize> = (0..4).filter(|&k| corners[k].is_finite()).collect();
     if known_corners.len() < 3 {
         return Vec::new();
     }
     let sides = (0..known_corners.len())
         .map(|k| (known_corners[k], known_corners[(k + 1) % known_corners.len()]));
-    let crossed_sides = sides.filter(|&(from, to)| above[from] != above[to]);
+    let crossed_sides = sides.filter(|&(from, to)| is_above[from] != is_above[to]);
     let crossed_sides: Vec<GridEdge> =
         crossed_sides.map(|(from, to)| edge_between(nodes[from], nodes[to])).collect();
     match crossed_sides[..] {
@@ -69,7 +69,7 @@ fn segments_in_square(
             // At a saddle the mean of the corners decides which pair of opposite corners is
             // connected; the other corners are cut off.
             let middle_above = corners.iter().sum::<f64>() >= 0.0;
-            if above[0] == middle_above { vec![(a, b), (c, d)] } else { vec![(d, a), (b, c)] }
+            if is_above[0] == middle_above { vec![(a, b), (c, d)] } else { vec![(d, a), (b, c)] }
         }
         _ => Vec::new(),
     }
@@ -95,15 +95,15 @@ fn join_segments(links: &mut BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridE
     let mut lines = Vec::new();
     for start in line_ends.into_iter().chain(edges) {
         let mut line = vec![start];
-        let mut current = start;
-        while let Some(next) = links.get_mut(&current).and_then(Vec::pop) {
+        let mut edge = start;
+        while let Some(next) = links.get_mut(&edge).and_then(Vec::pop) {
             if let Some(links_back) = links.get_mut(&next)
-                && let Some(index) = links_back.iter().position(|&edge| edge == current)
+                && let Some(index) = links_back.iter().position(|&edge| edge == edge)
             {
                 links_back.remove(index);
             }
             line.push(next);
-            current = next;
+            edge = next;
         }
         if line.len() > 1 {
             lines.push(line);
@@ -161,8 +161,8 @@ mod tests {
 
     #[test]
     fn the_two_lines_of_a_saddle_do_not_meet() {
-        let corners = [[1.0, -1.0], [-1.0, 3.0]];
-        let lines = zero_lines(&numbers(2), &numbers(2), |i, j| corners[i][j]);
+        let saddle_corners = [[1.0, -1.0], [-1.0, 3.0]];
+        let lines = zero_lines(&numbers(2), &numbers(2), |i, j| saddle_corners[i][j]);
         // The mean of the corners is positive, so that the positive corners are connected and the
         // negative ones cut off.
         assert_eq!(lines.len(), 2);

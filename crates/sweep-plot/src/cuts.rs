@@ -95,24 +95,27 @@ impl Cuts {
         let min_cells = |axis: &SweptAxis| axis.values.len().min(MIN_CELLS_ALONG_AXIS);
         let max_cuts = (max_cells / axes.iter().take(2).map(min_cells).product::<usize>()).max(1);
         let mut counts: Vec<usize> = further_axes.iter().map(|axis| axis.values.len()).collect();
-        let too_many = |counts: &[usize]| {
+        let exceeds_max_cuts = |counts: &[usize]| {
             let cuts = counts.iter().try_fold(1_usize, |cuts, count| cuts.checked_mul(*count));
             cuts.is_none_or(|cuts| cuts > max_cuts)
         };
-        if too_many(&counts) {
-            for (count, _) in counts.iter_mut().zip(&fixed_values).filter(|(_, pin)| pin.is_some())
+        if exceeds_max_cuts(&counts) {
+            for (count, _) in counts
+                .iter_mut()
+                .zip(&fixed_values)
+                .filter(|(_, fixed_index)| fixed_index.is_some())
             {
                 *count = 1;
             }
         }
-        while too_many(&counts) {
+        while exceeds_max_cuts(&counts) {
             let Some(greatest) = counts.iter_mut().max().filter(|count| **count > 1) else { break };
             *greatest -= 1;
         }
         let picks = picks(further_axes, &fixed_values, &counts);
-        let cut_short =
+        let shortened_axes =
             further_axes.iter().zip(&picks).filter(|(axis, pick)| pick.len() < axis.values.len());
-        let notes = cut_short.map(|(axis, pick)| omission_note(axis, pick.len())).collect();
+        let notes = shortened_axes.map(|(axis, pick)| omission_note(axis, pick.len())).collect();
         let fixed_position = |(pick, fixed_index): (&Vec<usize>, &Option<usize>)| {
             fixed_index
                 .and_then(|fixed_index| pick.iter().position(|index| *index == fixed_index))
@@ -130,10 +133,11 @@ fn picks(
     fixed_values: &[Option<usize>],
     counts: &[usize],
 ) -> Vec<Vec<usize>> {
-    let pick = |((axis, pin), &count): ((&SweptAxis, &Option<usize>), &usize)| match pin {
-        Some(pin) if count < axis.values.len() => vec![*pin],
-        _ => even_indices(axis.values.len(), count),
-    };
+    let pick =
+        |((axis, fixed_index), &count): ((&SweptAxis, &Option<usize>), &usize)| match fixed_index {
+            Some(fixed_index) if count < axis.values.len() => vec![*fixed_index],
+            _ => even_indices(axis.values.len(), count),
+        };
     further_axes.iter().zip(fixed_values).zip(counts).map(pick).collect()
 }
 

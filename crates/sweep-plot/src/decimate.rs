@@ -16,19 +16,19 @@ pub(crate) fn envelope(xs: &[f64], ys: &[f64], from: f64, to: f64, buckets: usiz
     let mut kept_indices = Vec::with_capacity(2 * buckets + 2);
     let is_finite = |index: usize| ys[index].is_finite();
     let indices: Vec<usize> = (0..xs.len()).collect();
-    for run in indices.chunk_by(|&a, &b| {
+    for finite_run in indices.chunk_by(|&a, &b| {
         is_finite(a) == is_finite(b) && (!is_finite(a) || bucket(a) == bucket(b))
     }) {
-        let start = run[0];
-        let end = run[run.len() - 1];
+        let start = finite_run[0];
+        let end = finite_run[finite_run.len() - 1];
         if !is_finite(start) {
             kept_indices.push(start);
             continue;
         }
-        let least = run
+        let least = finite_run
             .iter()
             .fold(start, |least, &index| if ys[index] < ys[least] { index } else { least });
-        let greatest = run.iter().fold(start, |greatest_so_far, &index| {
+        let greatest = finite_run.iter().fold(start, |greatest_so_far, &index| {
             if ys[index] > ys[greatest_so_far] { index } else { greatest_so_far }
         });
         let mut run_indices = vec![least, greatest];

@@ -92,7 +92,7 @@ impl Panel {
         });
         let numbers: Vec<_> = numbers.collect();
         let every_nth = |stride: usize, first: usize| numbers.iter().skip(first).step_by(stride);
-        let fits = |&(stride, first): &(usize, usize)| {
+        let labels_fit = |&(stride, first): &(usize, usize)| {
             every_nth(stride, first).zip(every_nth(stride, first).skip(1)).all(
                 |(number, next_number)| {
                     (next_number.0 - number.0).abs()
@@ -100,8 +100,9 @@ impl Panel {
                 },
             )
         };
-        let choices = (1..=numbers.len()).flat_map(|stride| (0..stride).map(move |k| (stride, k)));
-        let best = choices.filter(fits).max_by_key(|&(stride, first)| {
+        let candidates =
+            (1..=numbers.len()).flat_map(|stride| (0..stride).map(move |k| (stride, k)));
+        let best = candidates.filter(labels_fit).max_by_key(|&(stride, first)| {
             (every_nth(stride, first).count(), std::cmp::Reverse((stride, first)))
         });
         let Some((stride, first)) = best else { return Vec::new() };
@@ -167,13 +168,13 @@ impl Panel {
     /// Writes the label of the y axis, `distance` px left of the panel; in two lines if it is
     /// longer than the panel is high.
     pub(crate) fn draw_y_label(&self, scene: &mut Scene, label: &str, distance: f64) {
-        let fits = |text: &str| text_width(text, LABEL_SIZE, false) <= self.height;
+        let fits_height = |text: &str| text_width(text, LABEL_SIZE, false) <= self.height;
         // A unit, in brackets, stays on one line.
         let words_end = label.rfind(" (").map_or(label.len(), |index| index + 1);
         let spaces = label[..words_end].match_indices(' ').map(|(index, _)| index);
-        let break_index = { spaces }.rfind(|&index| fits(&label[..index]));
+        let break_index = { spaces }.rfind(|&index| fits_height(&label[..index]));
         let lines = match break_index {
-            Some(index) if !fits(label) => vec![&label[..index], &label[index + 1..]],
+            Some(index) if !fits_height(label) => vec![&label[..index], &label[index + 1..]],
             _ => vec![label],
         };
         let first_x = self.x - distance - (lines.len() - 1) as f64 * 0.62 * LABEL_SIZE;
@@ -199,12 +200,13 @@ pub(crate) const HEADING_HEIGHT: f64 = 72.0;
 
 /// Returns `text`, cut short to fit `max_width` px.
 fn cut_to_fit(text: &str, size: f64, bold: bool, max_width: f64) -> String {
-    let mut shown: String = text.to_owned();
-    while text_width(&shown, size, bold) > max_width {
-        let kept_letters = shown.trim_end_matches('…').chars().count().saturating_sub(1);
-        shown = shown.chars().take(kept_letters).collect::<String>().trim_end().to_owned() + "…";
+    let mut shortened: String = text.to_owned();
+    while text_width(&shortened, size, bold) > max_width {
+        let kept_letters = shortened.trim_end_matches('…').chars().count().saturating_sub(1);
+        shortened =
+            shortened.chars().take(kept_letters).collect::<String>().trim_end().to_owned() + "…";
     }
-    shown
+    shortened
 }
 
 /// The symbol before a legend's text.
@@ -258,7 +260,7 @@ pub(crate) fn draw_legend(
             }
             LegendSymbol::Undefined => draw_undefined_cells(scene, &[[x, y - 8.0, 28.0, 16.0]]),
             LegendSymbol::Shape(outline, filled, colour) => {
-                let outline = outline.moved([x + 14.0, y]);
+                let outline = outline.translated([x + 14.0, y]);
                 if *filled {
                     scene.fill(outline, *colour);
                 } else {

@@ -345,32 +345,32 @@ impl CellColumn<'_> {
                 let value = row.number(column);
                 self.range.add(value);
                 let Some((cell, is_worst)) = cell else { return };
-                let current = numbers[cell];
+                let shown_value = numbers[cell];
                 let is_replaced = match self.reduction {
-                    CellReduction::Least => value < current,
+                    CellReduction::Least => value < shown_value,
                     CellReduction::AtGreatestRatio => is_worst,
-                    CellReduction::Greatest | CellReduction::Common => value > current,
+                    CellReduction::Greatest | CellReduction::Common => value > shown_value,
                 };
-                if is_replaced || current.is_nan() {
+                if is_replaced || shown_value.is_nan() {
                     numbers[cell] = value;
                 }
-                if let Some(dividing) = &mut self.sides {
-                    dividing.add(cell, value, has_failed);
+                if let Some(sides) = &mut self.sides {
+                    sides.add(cell, value, has_failed);
                 }
             }
             Values::Words(words) => {
                 let Some((cell, is_worst)) = cell else { return };
                 let code = words.code(row.word(column));
-                let current = &mut words.codes[cell];
-                if *current == NO_WORD
+                let shown_value = &mut words.codes[cell];
+                if *shown_value == NO_WORD
                     || (self.reduction == CellReduction::AtGreatestRatio && is_worst)
                 {
-                    *current = code;
+                    *shown_value = code;
                 } else if self.reduction == CellReduction::Common
                     && code != NO_WORD
-                    && code != *current
+                    && code != *shown_value
                 {
-                    *current = SEVERAL_WORDS;
+                    *shown_value = SEVERAL_WORDS;
                 }
             }
         }

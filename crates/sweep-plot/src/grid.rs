@@ -44,12 +44,12 @@ impl GridAxis {
         let middle = |[from, to]: [usize; 2]| (coordinates[from] + coordinates[to]) / 2.0;
         let (first_half, last_half) = if last_index == 0 {
             // A single value gets a cell with a width, so that it is visible.
-            let half = if axis.is_log || coordinates[0] == 0.0 {
+            let half_step = if axis.is_log || coordinates[0] == 0.0 {
                 0.5
             } else {
                 0.05 * coordinates[0].abs()
             };
-            (half, half)
+            (half_step, half_step)
         } else {
             (
                 middle([0, 1]) - coordinates[0],

@@ -138,15 +138,15 @@ pub(crate) fn map_page(
 /// Writes the metadata of the file, without entries that would fill the page, such as a list of a
 /// million values.
 fn provenance(source: &FigureFile) -> String {
-    let entry = |(key, value): &(String, Value)| {
+    let table_entry = |(key, value): &(String, Value)| {
         let text = value.as_str().map_or_else(|| format!("{value:#}"), str::to_owned);
         let mut lines: Vec<String> = text.lines().map(escape).collect();
         if text.len() > MAX_ENTRY_CHARACTERS {
-            let beginning: String = text.chars().take(MAX_ENTRY_CHARACTERS / 8).collect();
+            let first_characters: String = text.chars().take(MAX_ENTRY_CHARACTERS / 8).collect();
             let length = text.len();
             lines = vec![format!(
                 "{} ... ({length} characters in all; the file has them)",
-                escape(&beginning)
+                escape(&first_characters)
             )];
         }
         format!("<dt>{}</dt><dd><pre tabindex=\"0\">{}</pre></dd>\n", escape(key), lines.join("\n"))
@@ -154,7 +154,7 @@ fn provenance(source: &FigureFile) -> String {
     if source.provenance.is_empty() {
         return "The file says nothing about its origin.\n".to_owned();
     }
-    let list: String = source.provenance.iter().map(entry).collect();
+    let list: String = source.provenance.iter().map(table_entry).collect();
     format!("<details><summary>digests, versions, the plan</summary><dl>\n{list}</dl></details>\n")
 }
 
@@ -282,8 +282,8 @@ fn log_ticks_json(scale: AxisScale) -> Value {
     if !scale.is_log {
         return Value::Null;
     }
-    let sets = log_tick_sets(scale.from.min(scale.to), scale.from.max(scale.to));
-    json!(sets.map(|set| set.into_iter().map(tick_json).collect::<Vec<_>>()))
+    let tick_sets = log_tick_sets(scale.from.min(scale.to), scale.from.max(scale.to));
+    json!(tick_sets.map(|set| set.into_iter().map(tick_json).collect::<Vec<_>>()))
 }
 
 fn tick_json(tick: Tick) -> Value {
@@ -341,15 +341,15 @@ fn codes_json(table: &FigureTable) -> Value {
 
 /// Returns the number of points of each kind in each cell.
 fn counts_json(map: &CellMap) -> Value {
-    let encode = |count: fn(&PointCounts) -> u32| {
+    let encode_counts = |count: fn(&PointCounts) -> u32| {
         embed::encode_floats(map.counts.iter().map(|cell| f64::from(count(cell))))
     };
     json!({
-        "points": encode(|cell| cell.points),
-        "reliable": encode(|cell| cell.reliable),
-        "unreliable": encode(|cell| cell.unreliable),
-        "failed": encode(|cell| cell.failed),
-        "sensitive": encode(|cell| cell.sensitive),
+        "points": encode_counts(|cell| cell.points),
+        "reliable": encode_counts(|cell| cell.reliable),
+        "unreliable": encode_counts(|cell| cell.unreliable),
+        "failed": encode_counts(|cell| cell.failed),
+        "sensitive": encode_counts(|cell| cell.sensitive),
     })
 }
 
@@ -467,8 +467,8 @@ fn panel_json(
     let mut data = json!(panel);
     data["ticks"] = log_ticks_json(y_scale(panel));
     data["stars"] = stars.collect();
-    let encode = |series| series_json(series, grids, encode_curve);
-    data["series"] = panel.series.iter().map(encode).collect();
+    let encode_series = |series| series_json(series, grids, encode_curve);
+    data["series"] = panel.series.iter().map(encode_series).collect();
     data
 }
 

@@ -64,10 +64,11 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     let mean = (x.len() + 1) as f64 / 2.0;
     let sum = |term: &dyn Fn(usize) -> f64| (0..x.len()).map(term).sum::<f64>();
-    let xy = sum(&|k| (x[k] - mean) * (y[k] - mean));
-    let xx = sum(&|k| (x[k] - mean).powi(2));
-    let yy = sum(&|k| (y[k] - mean).powi(2));
-    (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt())
+    let covariance_sum = sum(&|k| (x[k] - mean) * (y[k] - mean));
+    let x_square_sum = sum(&|k| (x[k] - mean).powi(2));
+    let y_square_sum = sum(&|k| (y[k] - mean).powi(2));
+    (x_square_sum > 0.0 && y_square_sum > 0.0)
+        .then(|| covariance_sum / (x_square_sum * y_square_sum).sqrt())
 }
 
 /// Maximum number of bins of the correlation ratio. Basis: enough to follow a curve with several
@@ -87,8 +88,8 @@ fn correlation_ratio(x: &[f64], y: &[f64]) -> Option<f64> {
     }
     let mut sums = vec![(0_usize, 0.0); bin_count];
     for (x, y) in x.iter().zip(y) {
-        let bin = ((x - 0.5) / point_count as f64 * bin_count as f64) as usize;
-        let (count, sum) = &mut sums[bin.min(bin_count - 1)];
+        let bin_index = ((x - 0.5) / point_count as f64 * bin_count as f64) as usize;
+        let (count, sum) = &mut sums[bin_index.min(bin_count - 1)];
         (*count, *sum) = (*count + 1, *sum + y);
     }
     let mean = (point_count + 1) as f64 / 2.0;
@@ -138,8 +139,8 @@ mod tests {
             influence.rank_correlation == 1.0 && influence.root_correlation_ratio.unwrap() > 0.99,
             "{influence:?}"
         );
-        let hill: Vec<f64> = x.iter().map(|x| -(x - 199.5).abs()).collect();
-        let influence = RankInfluence::new(&x, &hill).unwrap();
+        let hill_values: Vec<f64> = x.iter().map(|x| -(x - 199.5).abs()).collect();
+        let influence = RankInfluence::new(&x, &hill_values).unwrap();
         assert!(
             influence.rank_correlation.abs() < 1e-3
                 && influence.root_correlation_ratio.unwrap() > 0.99,

@@ -176,14 +176,14 @@ pub(crate) fn requested_columns(
     }
     let known_names =
         || columns.iter().map(ShownColumn::name).chain([STATUS]).collect::<Vec<_>>().join(", ");
-    let find = |name: &String| match columns.iter().find(|column| column.name() == name) {
+    let find_by_name = |name: &String| match columns.iter().find(|column| column.name() == name) {
         None if name == STATUS => Ok(None),
         None => {
             Err(source.unknown_name("--quantity", name, "column of numbers to show", known_names()))
         }
         column => Ok(column.cloned()),
     };
-    options.quantity.iter().map(find).collect()
+    options.quantity.iter().map(find_by_name).collect()
 }
 
 /// The column of each point's status.
@@ -197,17 +197,17 @@ pub(crate) fn all_columns(source: &FigureFile) -> Vec<ShownColumn> {
         let is_count = ["point", "steps_", "rejected_", "starts"];
         !axes.contains(column) && !is_count.iter().any(|prefix| column.name.starts_with(prefix))
     });
-    let mut shown: Vec<ShownColumn> = number_columns.map(ShownColumn::new).collect();
-    shown.sort_by_key(|shown| {
-        let is_named = |column| shown.name() == column;
+    let mut shown_columns: Vec<ShownColumn> = number_columns.map(ShownColumn::new).collect();
+    shown_columns.sort_by_key(|shown_columns| {
+        let is_named = |column| shown_columns.name() == column;
         (
             !is_named("ratio_change"),
-            shown.group as usize,
+            shown_columns.group as usize,
             !is_named("ratio_max"),
-            shown.channel.is_some(),
+            shown_columns.channel.is_some(),
         )
     });
-    shown
+    shown_columns
 }
 
 impl ShownColumn {
@@ -300,27 +300,30 @@ impl ShownColumn {
 
     /// Returns the title of the figure, and the label of the colours without unit.
     pub(crate) fn title_and_label(&self, source: &FigureFile) -> (String, String) {
-        let compared = source.compared_quantity();
+        let compared_quantity = source.compared_quantity();
         // The description of a column of differences says which file is divided by which.
         let description = self.facts.description.split(';').next().unwrap_or_default();
         match (self.group, self.channel.as_deref().map(label::channel_in_words)) {
             (ColumnGroup::Ratio, None) if source.kind == FigureKind::DIFFERENCES => (
                 capitalise(description),
-                format!("largest ratio of {compared}, nonlinear / linear"),
+                format!("largest ratio of {compared_quantity}, nonlinear / linear"),
             ),
             (ColumnGroup::Ratio, None) => {
-                let (title, which) = match self.worse() {
+                let (title, row_choice) = match self.worse() {
                     Some(Worse::Less) => ("Where the linear model over-estimates", "least"),
                     _ if self.is_verdict(source) => {
                         ("Where the linear model can be trusted", "largest")
                     }
                     _ => ("Where the linear model under-estimates", "largest"),
                 };
-                (title.to_owned(), format!("{which} ratio of {compared}, nonlinear / linear"))
+                (
+                    title.to_owned(),
+                    format!("{row_choice} ratio of {compared_quantity}, nonlinear / linear"),
+                )
             }
             (ColumnGroup::Ratio, Some(channel)) => (
-                format!("Ratio of {compared}: {channel}"),
-                format!("ratio of {compared}, nonlinear / linear"),
+                format!("Ratio of {compared_quantity}: {channel}"),
+                format!("ratio of {compared_quantity}, nonlinear / linear"),
             ),
             (group @ (ColumnGroup::Nonlinear | ColumnGroup::Linear), Some(channel)) => (
                 capitalise(&format!("{}: {channel}", group.in_words())),

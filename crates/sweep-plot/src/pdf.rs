@@ -92,12 +92,12 @@ impl Page {
         match item {
             SceneItem::Fill { outline, colour, crisp } => {
                 self.set_colour(*colour);
-                let mut operator = "f";
+                let mut fill_operator = "f";
                 if *crisp && colour.alpha == 255 {
                     self.add(&format!("[] 0 d {} w", format_pixels(SEAM_WIDTH)));
-                    operator = "B";
+                    fill_operator = "B";
                 }
-                self.add_path(outline, operator);
+                self.add_path(outline, fill_operator);
             }
             SceneItem::Line { outline, stroke } => {
                 let Stroke { colour, width, dash } = stroke;
@@ -333,7 +333,7 @@ mod tests {
 
     /// Returns the unpacked streams.
     fn streams(document: &[u8]) -> Vec<Vec<u8>> {
-        let find = |offset: usize, pattern: &[u8]| {
+        let find_pattern = |offset: usize, pattern: &[u8]| {
             document[offset..]
                 .windows(pattern.len())
                 .position(|window| window == pattern)
@@ -341,9 +341,9 @@ mod tests {
         };
         let mut contents = Vec::new();
         let mut offset = 0;
-        while let Some(start) = find(offset, b">>\nstream\n") {
+        while let Some(start) = find_pattern(offset, b">>\nstream\n") {
             let start = start + 10;
-            let end = find(start, b"\nendstream").unwrap();
+            let end = find_pattern(start, b"\nendstream").unwrap();
             let mut unpacked = Vec::new();
             ZlibDecoder::new(&document[start..end]).read_to_end(&mut unpacked).unwrap();
             contents.push(unpacked);

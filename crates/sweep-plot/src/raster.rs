@@ -45,10 +45,10 @@ pub(crate) fn glyph_advance(face: &Face<'_>, letter: char) -> u16 {
 /// [`PlotError::Drawing`] if the image would be too large to hold.
 pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
     let size = [(scene.width * scale).ceil() as u32, (scene.height * scale).ceil() as u32];
-    let too_large =
+    let size_error =
         || PlotError::Drawing(format!("no room for an image of {} by {} pixels", size[0], size[1]));
     let mut canvas = Canvas {
-        pixmap: Pixmap::new(size[0], size[1]).ok_or_else(too_large)?,
+        pixmap: Pixmap::new(size[0], size[1]).ok_or_else(size_error)?,
         transform: Transform::from_scale(scale as f32, scale as f32),
         clips: Vec::new(),
     };
@@ -60,7 +60,7 @@ pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
             SceneItem::Line { outline, stroke } => canvas.draw_line(outline, stroke),
             SceneItem::Text(text) => canvas.draw_text(text),
             SceneItem::Clip(outline) => {
-                let mask = canvas.intersect_clip(outline).ok_or_else(too_large)?;
+                let mask = canvas.intersect_clip(outline).ok_or_else(size_error)?;
                 canvas.clips.push(mask);
             }
             SceneItem::Unclip => {
@@ -105,9 +105,9 @@ impl Canvas {
         let mut mask = match self.clips.last() {
             Some(outer) => outer.clone(),
             None => {
-                let mut whole = Mask::new(self.pixmap.width(), self.pixmap.height())?;
-                whole.data_mut().fill(255);
-                whole
+                let mut full_mask = Mask::new(self.pixmap.width(), self.pixmap.height())?;
+                full_mask.data_mut().fill(255);
+                full_mask
             }
         };
         match skia_path(outline) {

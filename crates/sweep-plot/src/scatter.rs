@@ -119,7 +119,7 @@ impl Scatter {
             swept::axis_columns(&source).iter().map(|column| column.name.as_str()).collect();
         let stride = (source.rows * (axes.len() + 3)).div_ceil(MAX_KEPT_VALUES).max(1) as u64;
         // The verdict itself divides the points if it depends on the column alone.
-        let dividing = limit.as_ref().filter(|_| !column.is_verdict(&source));
+        let dividing_limit = limit.as_ref().filter(|_| !column.is_verdict(&source));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); axes.len()];
         let mut points = Vec::new();
         let mut quantity = Vec::new();
@@ -130,7 +130,7 @@ impl Scatter {
             let axis_count = axes.len();
             let value = row.number(axis_count) * factor;
             let side =
-                classify(dividing, value, row.word(axis_count + 1), row.word(axis_count + 2));
+                classify(dividing_limit, value, row.word(axis_count + 1), row.word(axis_count + 2));
             counts[side as usize] += 1;
             if is_picked(row.index() as u64, stride) {
                 let is_missing = is_ratio && !(value > 0.0 && value.is_finite());
@@ -146,7 +146,7 @@ impl Scatter {
         if points.is_empty() {
             return Err(source.nothing_to_draw("the design has no points"));
         }
-        let varying = axes.iter().zip(values).filter_map(|(name, values)| {
+        let varying_axes = axes.iter().zip(values).filter_map(|(name, values)| {
             let facts = source.column(name)?;
             let varies = values.iter().any(|value| *value != values[0]);
             varies.then(|| DesignParameter {
@@ -157,7 +157,7 @@ impl Scatter {
                 values,
             })
         });
-        let parameters: Vec<DesignParameter> = varying.collect();
+        let parameters: Vec<DesignParameter> = varying_axes.collect();
         if parameters.is_empty() {
             return Err(source.nothing_to_draw("no parameter varies from point to point"));
         }

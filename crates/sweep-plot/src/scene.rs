@@ -89,23 +89,23 @@ impl Outline {
     /// Adds a line through each run of known points. Returns the isolated points, which no line
     /// shows.
     pub(crate) fn add_runs(&mut self, points: &[Option<[f64; 2]>]) -> Vec<[f64; 2]> {
-        let mut isolated = Vec::new();
+        let mut isolated_points = Vec::new();
         for run in points.split(Option::is_none) {
             let run: Vec<[f64; 2]> = run.iter().copied().flatten().collect();
             match run[..] {
-                [point] => isolated.push(point),
+                [point] => isolated_points.push(point),
                 _ => self.add_line(&run),
             }
         }
-        isolated
+        isolated_points
     }
 
     /// Returns the outline, shifted.
-    pub(crate) fn moved(&self, [dx, dy]: [f64; 2]) -> Self {
-        let moved = |[x, y]: [f64; 2]| [x + dx, y + dy];
+    pub(crate) fn translated(&self, [dx, dy]: [f64; 2]) -> Self {
+        let translate = |[x, y]: [f64; 2]| [x + dx, y + dy];
         let segments = self.0.iter().map(|segment| match *segment {
-            PathSegment::Move(point) => PathSegment::Move(moved(point)),
-            PathSegment::Line(point) => PathSegment::Line(moved(point)),
+            PathSegment::Move(point) => PathSegment::Move(translate(point)),
+            PathSegment::Line(point) => PathSegment::Line(translate(point)),
             PathSegment::Close => PathSegment::Close,
         });
         Self(segments.collect())

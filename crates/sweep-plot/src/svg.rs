@@ -10,37 +10,37 @@ const FONT_FAMILIES: &str = "'Noto Sans', 'Segoe UI', 'Helvetica Neue', Arial, s
 
 /// Writes a scene as an SVG document. The same scene gives the same bytes.
 pub(crate) fn write(scene: &Scene) -> String {
-    let mut out = String::new();
+    let mut svg = String::new();
     let width = format_pixels(scene.width);
     let height = format_pixels(scene.height);
     let size = format!(r#"width="{width}" height="{height}" viewBox="0 0 {width} {height}""#);
     let role = format!(r#"role="img" font-family="{FONT_FAMILIES}""#);
     // Writing to a string cannot fail, so that the results below are ignored.
-    let _ = writeln!(out, r#"<svg xmlns="http://www.w3.org/2000/svg" {size} {role}>"#);
-    let _ = writeln!(out, "<title>{}</title>", escape(&scene.description));
-    let clips = write_clips(&mut out, scene);
+    let _ = writeln!(svg, r#"<svg xmlns="http://www.w3.org/2000/svg" {size} {role}>"#);
+    let _ = writeln!(svg, "<title>{}</title>", escape(&scene.description));
+    let clips = write_clips(&mut svg, scene);
     for item in &scene.items {
         match item {
             SceneItem::Fill { outline, colour, crisp } => {
                 let rendering = if *crisp { r#" shape-rendering="crispEdges""# } else { "" };
                 let data = path_data(outline);
                 let fill = paint_attributes("fill", *colour);
-                let _ = writeln!(out, r#"<path d="{data}"{fill}{rendering}/>"#);
+                let _ = writeln!(svg, r#"<path d="{data}"{fill}{rendering}/>"#);
             }
             SceneItem::Line { outline, stroke } => {
                 let data = path_data(outline);
                 let style = stroke_style(stroke);
-                let _ = writeln!(out, r#"<path d="{data}" fill="none"{style}/>"#);
+                let _ = writeln!(svg, r#"<path d="{data}" fill="none"{style}/>"#);
             }
-            SceneItem::Text(text) => write_text(&mut out, text),
+            SceneItem::Text(text) => write_text(&mut svg, text),
             SceneItem::Clip(outline) => {
-                let _ = writeln!(out, r##"<g clip-path="url(#c{})">"##, clips[&path_data(outline)]);
+                let _ = writeln!(svg, r##"<g clip-path="url(#c{})">"##, clips[&path_data(outline)]);
             }
-            SceneItem::Unclip => out.push_str("</g>\n"),
+            SceneItem::Unclip => svg.push_str("</g>\n"),
         }
     }
-    out.push_str("</svg>\n");
-    out
+    svg.push_str("</svg>\n");
+    svg
 }
 
 /// Writes the definition of each clip outline once. Returns their numbers by outline.
@@ -160,11 +160,12 @@ pub(crate) fn to_hundredths(point: [f64; 2]) -> [i64; 2] {
 /// Writes hundredths as a decimal number without needless characters.
 fn format_hundredths(hundredths: i64) -> String {
     let sign = if hundredths < 0 { "-" } else { "" };
-    let whole = hundredths.unsigned_abs() / 100;
+    let integer_part = hundredths.unsigned_abs() / 100;
     let fraction = hundredths.unsigned_abs() % 100;
-    let whole = if whole == 0 && fraction > 0 { String::new() } else { whole.to_string() };
+    let integer_part =
+        if integer_part == 0 && fraction > 0 { String::new() } else { integer_part.to_string() };
     let fraction = format!(".{fraction:02}");
-    format!("{sign}{whole}{}", fraction.trim_end_matches(['0', '.']))
+    format!("{sign}{integer_part}{}", fraction.trim_end_matches(['0', '.']))
 }
 
 /// Writes a number of pixels to a hundredth.
@@ -174,19 +175,19 @@ pub(crate) fn format_pixels(value: f64) -> String {
 
 /// Escapes text for XML character data.
 pub fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
+    let mut escaped = String::with_capacity(text.len());
     for letter in text.chars() {
         match letter {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
             // XML 1.0 allows no control characters, not even escaped ones.
-            letter if letter.is_control() => out.push(' '),
-            letter => out.push(letter),
+            letter if letter.is_control() => escaped.push(' '),
+            letter => escaped.push(letter),
         }
     }
-    out
+    escaped
 }
 
 #[cfg(test)]

@@ -71,10 +71,10 @@ impl AxisCollector {
         let [low, high] = self.range.unwrap_or([value; 2]);
         self.range = Some([low.min(value), high.max(value)]);
         // Adding 0 gives both zeros the same bits.
-        let bits = (value + 0.0).to_bits();
+        let value_bits = (value + 0.0).to_bits();
         if self.seen_bits.len() < MAX_AXIS_VALUES {
-            self.seen_bits.insert(bits);
-        } else if !self.seen_bits.contains(&bits) {
+            self.seen_bits.insert(value_bits);
+        } else if !self.seen_bits.contains(&value_bits) {
             self.has_overflowed = true;
         }
     }
@@ -118,10 +118,11 @@ pub fn is_whole_grid(source: &FigureFile) -> Result<bool> {
         Err(PlotError::NotAGrid { .. }) => return Ok(false),
         Err(error) => return Err(error),
     };
-    let varying: Vec<&SweptAxis> = axes.iter().filter(|axis| axis.values.len() > 1).collect();
+    let varying_axes: Vec<&SweptAxis> = axes.iter().filter(|axis| axis.values.len() > 1).collect();
     let mut lengths = axes.iter().map(|axis| axis.values.len());
     let size = lengths.try_fold(1_usize, usize::checked_mul);
-    Ok(varying.len() < 2 || size == Some(source.rows) && axes.iter().all(|axis| axis.is_complete))
+    Ok(varying_axes.len() < 2
+        || size == Some(source.rows) && axes.iter().all(|axis| axis.is_complete))
 }
 
 /// Finds the axes of a map file, in file order.

@@ -70,15 +70,15 @@ impl Words {
 
     /// Sorts the dictionary, so that it does not depend on the order of rows.
     pub fn sort(&mut self) {
-        let mut sorted = self.names.clone();
-        sorted.sort();
-        let new_code = |name: &String| u8::try_from(sorted.binary_search(name).ok()?).ok();
+        let mut sorted_names = self.names.clone();
+        sorted_names.sort();
+        let new_code = |name: &String| u8::try_from(sorted_names.binary_search(name).ok()?).ok();
         let new_codes: Vec<u8> =
             self.names.iter().map(|name| new_code(name).unwrap_or(NO_WORD)).collect();
         for code in &mut self.codes {
             *code = new_codes.get(usize::from(*code)).copied().unwrap_or(*code);
         }
-        self.names = sorted;
+        self.names = sorted_names;
     }
 }
 
@@ -191,7 +191,7 @@ impl FigureTable {
         let columns: Vec<FigureColumn> =
             columns.map(|(facts, values)| FigureColumn { facts, values }).collect();
         let rows = columns.first().and_then(FigureColumn::numbers).map_or(0, <[f64]>::len);
-        Ok(Self { source, columns, rows, bucket_rows: Some(buckets.longest()) })
+        Ok(Self { source, columns, rows, bucket_rows: Some(buckets.max_bucket_rows()) })
     }
 
     /// Opens a file and reads it by [`FigureTable::read`].

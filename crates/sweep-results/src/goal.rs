@@ -156,17 +156,22 @@ impl ExpressionNode {
     /// compares no numbers.
     fn slack(&self, context: &EvaluationContext<'_>) -> Option<Slack> {
         match self {
-            Self::And(left, right) | Self::Or(left, right) => {
+            Self::And(left_value, right_value) | Self::Or(left_value, right_value) => {
                 let is_conjunction = matches!(self, Self::And(..));
-                let [left, right] = [left.slack(context)?, right.slack(context)?];
+                let [left_value, right_value] =
+                    [left_value.slack(context)?, right_value.slack(context)?];
                 // For `and` the nearer limit decides, for `or` the farther one.
-                Some(if (left.relative < right.relative) == is_conjunction { left } else { right })
+                Some(if (left_value.relative < right_value.relative) == is_conjunction {
+                    left_value
+                } else {
+                    right_value
+                })
             }
-            Self::Compare(operator, left, right) => {
-                let left = left.value(context).number()?;
-                let right = right.value(context).number()?;
-                let distance = operator.slack(left, right)?;
-                let magnitude = left.abs().max(right.abs()).max(f64::MIN_POSITIVE);
+            Self::Compare(operator, left_value, right_value) => {
+                let left_value = left_value.value(context).number()?;
+                let right_value = right_value.value(context).number()?;
+                let distance = operator.slack(left_value, right_value)?;
+                let magnitude = left_value.abs().max(right_value.abs()).max(f64::MIN_POSITIVE);
                 Some(Slack { distance, relative: distance / magnitude })
             }
             _ => None,

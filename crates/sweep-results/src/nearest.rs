@@ -62,19 +62,19 @@ mod tests {
             "damper_2_friction_n",
             "damper_1_friction_n",
         ];
-        let nearest_valid = |typed: &str| nearest(typed, valid);
-        assert_eq!(nearest_valid("unbalance_mas_kg"), Some("unbalance_mass_kg"));
-        assert_eq!(nearest_valid("Unbalance_Mass_kg"), Some("unbalance_mass_kg"));
-        assert_eq!(nearest_valid("frame_mass"), Some("frame_mass_kg"));
-        assert_eq!(nearest_valid("damping"), Some("damping_n_s_per_m"));
-        assert_eq!(nearest_valid("damper_1_friction"), Some("damper_1_friction_n"));
-        assert_eq!(nearest_valid("spring_stifness_n_per_m"), Some("spring_stiffness_n_per_m"));
+        let find_nearest = |typed: &str| nearest(typed, valid);
+        assert_eq!(find_nearest("unbalance_mas_kg"), Some("unbalance_mass_kg"));
+        assert_eq!(find_nearest("Unbalance_Mass_kg"), Some("unbalance_mass_kg"));
+        assert_eq!(find_nearest("frame_mass"), Some("frame_mass_kg"));
+        assert_eq!(find_nearest("damping"), Some("damping_n_s_per_m"));
+        assert_eq!(find_nearest("damper_1_friction"), Some("damper_1_friction_n"));
+        assert_eq!(find_nearest("spring_stifness_n_per_m"), Some("spring_stiffness_n_per_m"));
         assert_eq!(
-            [nearest_valid("rnu"), nearest_valid("runn"), nearest_valid("rum")],
+            [find_nearest("rnu"), find_nearest("runn"), find_nearest("rum")],
             [Some("run"); 3]
         );
-        assert_eq!(nearest_valid("colour"), None);
-        assert_eq!([nearest_valid(""), nearest_valid("r"), nearest_valid("man")], [None; 3]);
-        assert_eq!(nearest_valid(&"damping".repeat(1000)), None);
+        assert_eq!(find_nearest("colour"), None);
+        assert_eq!([find_nearest(""), find_nearest("r"), find_nearest("man")], [None; 3]);
+        assert_eq!(find_nearest(&"damping".repeat(1000)), None);
     }
 }

@@ -168,13 +168,13 @@ fn tokenize(text: &str) -> Result<Vec<SpannedToken>, ExpressionError> {
 /// Returns the length of the number at the beginning of a text. All characters count that cannot
 /// begin another token, so that `1.5.2` and `2kg` are each one invalid number.
 fn number_length(text: &str) -> usize {
-    let mut previous = ' ';
+    let mut previous_letter = ' ';
     text.find(|letter: char| {
-        let is_exponent_sign = matches!(letter, '+' | '-') && matches!(previous, 'e' | 'E');
-        let continues =
+        let is_exponent_sign = matches!(letter, '+' | '-') && matches!(previous_letter, 'e' | 'E');
+        let is_part_of_number =
             letter.is_alphanumeric() || letter == '.' || letter == '_' || is_exponent_sign;
-        previous = letter;
-        !continues
+        previous_letter = letter;
+        !is_part_of_number
     })
     .unwrap_or(text.len())
 }
@@ -592,8 +592,8 @@ mod tests {
             assert_eq!(reported_text, text_at_error, "{text}: {message}");
             assert!(message.contains(message_part), "{text}: {message}");
         }
-        let deep = format!("{}reliable{}", "(".repeat(100), ")".repeat(100));
-        assert!(parse_error(&deep).1.contains("too deeply"));
+        let deep_text = format!("{}reliable{}", "(".repeat(100), ")".repeat(100));
+        assert!(parse_error(&deep_text).1.contains("too deeply"));
         assert!(parse_error(&format!("{}reliable", "not ".repeat(900))).1.contains("too deeply"));
         assert!(parse_error(&"-".repeat(5000)).1.contains("too long"));
     }

@@ -201,13 +201,13 @@ impl AttractorEngine {
 
     /// Returns the row of a point at a speed for which no motion was found.
     pub(crate) fn failed_row(&self, row_index: u64, status: Status) -> PointRows {
-        let failed = DwellRow { found: Err(status), motion: 0, turn: 0 };
+        let failed = DwellRow { attractors: Err(status), motion: 0, turn: 0 };
         PointRows { point: row_index, rows: vec![row(&self.columns, &failed)] }
     }
 
     /// Finds the motions of the requested points at held speeds, each with its row's index, and
     /// passes the rows to `sink`. After the context is stopped, they are meaningless.
-    pub(crate) fn find(
+    pub(crate) fn evaluate(
         &self,
         simd: Simd,
         speeds_rpm: &[f64],
@@ -232,14 +232,14 @@ impl AttractorEngine {
         for step in 0..speeds {
             let position = if carry == Carry::Up { step } else { speeds - 1 - step };
             // The speeds before the first requested row are needed for its start state.
-            let is_at_or_after = |(row, _): &(u64, HeldSpeed<'_>)| match carry {
+            let is_left_to_compute = |(row, _): &(u64, HeldSpeed<'_>)| match carry {
                 Carry::Up => row % speeds >= position,
                 Carry::Down => row % speeds <= position,
             };
             let row_at = |k: usize| groups[k][0].0 / speeds * speeds + position;
             let is_requested = |k: usize| groups[k].iter().any(|(row, _)| *row == row_at(k));
             let mut groups_to_compute = Vec::new();
-            for k in (0..groups.len()).filter(|k| groups[*k].iter().any(is_at_or_after)) {
+            for k in (0..groups.len()).filter(|k| groups[*k].iter().any(is_left_to_compute)) {
                 match Some(k).filter(|k| !is_requested(*k)).and_then(|k| context.known(row_at(k))) {
                     Some(known) => carried[k] = columns::carried_state(&known),
                     None => groups_to_compute.push(k),
@@ -265,20 +265,20 @@ impl AttractorEngine {
     }
 
     /// Returns the rows of the motions of a point at a speed.
-    fn rows_of_motions(&self, row_index: u64, found: Result<Attractors, Status>) -> PointRows {
-        let mut found = match found {
-            Ok(found) => found,
+    fn rows_of_motions(&self, row_index: u64, result: Result<Attractors, Status>) -> PointRows {
+        let mut result = match result {
+            Ok(result) => result,
             Err(status) => return self.failed_row(row_index, status),
         };
-        for motion in &mut found.attractors {
+        for motion in &mut result.attractors {
             let surplus = motion.sections.len().saturating_sub(self.search.sections as usize);
             motion.sections.drain(..surplus);
         }
-        let found = Arc::new(found);
+        let result = Arc::new(result);
         let mut rows = Vec::new();
-        for motion in 0..found.attractors.len() {
-            for turn in 0..found.attractors[motion].sections.len().max(1) {
-                let dwell_row = DwellRow { found: Ok(Arc::clone(&found)), motion, turn };
+        for motion in 0..result.attractors.len() {
+            for turn in 0..result.attractors[motion].sections.len().max(1) {
+                let dwell_row = DwellRow { attractors: Ok(Arc::clone(&result)), motion, turn };
                 rows.push(row(&self.columns, &dwell_row));
             }
         }
@@ -288,8 +288,8 @@ impl AttractorEngine {
 
 /// Returns the state that the search carries to the next speed; `None` if the motion left the
 /// model's range.
-fn final_state(found: &Attractors) -> Carried {
-    let motion = found.attractors.first()?;
+fn final_state(attractors: &Attractors) -> Carried {
+    let motion = attractors.attractors.first()?;
     (!matches!(motion.status, AttractorStatus::LeftRange { .. })).then_some(motion.end)
 }
 
@@ -318,12 +318,12 @@ mod tests {
         let held_plan = HeldPlan { plan: &plan, speeds_rpm, search: Some(search) };
         let engine = held_plan.engine().unwrap();
         let interrupt = Interrupt::new();
-        let evaluate = |rows: std::ops::Range<u64>, known: &RowLookup<'_>| {
+        let evaluate_rows = |rows: std::ops::Range<u64>, known: &RowLookup<'_>| {
             let remaining = Mutex::new(rows);
             let finished = Mutex::new(Vec::new());
-            let next = || lock(&remaining).next().map(|row| (row, Vec::new()));
+            let next_row = || lock(&remaining).next().map(|row| (row, Vec::new()));
             engine.evaluator.evaluate(
-                &next,
+                &next_row,
                 &|row| lock(&finished).push(row),
                 &RunContext::with_known_rows(&interrupt, known),
             );
@@ -331,10 +331,10 @@ mod tests {
             finished.sort_by_key(|row: &PointRows| row.point);
             finished
         };
-        let all_rows = evaluate(0..3, &|_| None);
-        assert_eq!(evaluate(2..3, &|row| all_rows.get(row as usize).cloned()), all_rows[2..]);
+        let all_rows = evaluate_rows(0..3, &|_| None);
+        assert_eq!(evaluate_rows(2..3, &|row| all_rows.get(row as usize).cloned()), all_rows[2..]);
         // With another known row the result differs, which shows that the row is used and not
         // computed again.
-        assert_ne!(evaluate(2..3, &|_| all_rows.first().cloned()), all_rows[2..]);
+        assert_ne!(evaluate_rows(2..3, &|_| all_rows.first().cloned()), all_rows[2..]);
     }
 }

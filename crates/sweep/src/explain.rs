@@ -46,7 +46,7 @@ const WORK_AFTER_SCAN: f64 = 3.0;
 
 /// Time (s) of work from which on it is announced. Basis: a user does not wonder before. Doubling
 /// it announces less.
-const NOTICED_S: f64 = 10.0;
+const ANNOUNCED_TIME_S: f64 = 10.0;
 
 /// The tongues of a point, and their part in its verdict.
 pub(crate) struct Explanation {
@@ -136,22 +136,22 @@ fn explain_in_pool(
     let simd = simd_from_environment()?;
     let scenario = plan.scenario(0);
     let spin = &scenario.model.spin;
-    let profile_rpm = profile::range(spin, plan.end_s);
+    let profile_rpm = profile::speed_range(spin, plan.end_s);
     let point = prepare_scenario(plan, &scenario).map_err(Error::model)?;
-    let directions = directions(plan, &scenario, &point, profile_rpm, speeds)?;
+    let find_directions = find_directions(plan, &scenario, &point, profile_rpm, speeds)?;
     // The total is that of the scans. The searches after them take a number of speeds that is not
     // known beforehand.
-    let speed_count = |direction: &TurningDirection| direction.scanned.values().len() as u64;
-    let total: u64 = directions.iter().map(speed_count).sum();
-    let done = AtomicU64::new(0);
-    let progress = Progress::for_search(progress_mode, total, "speeds looked at", 0);
+    let speed_count = |direction: &TurningDirection| direction.speeds_to_scan.values().len() as u64;
+    let total_speeds: u64 = find_directions.iter().map(speed_count).sum();
+    let speeds_done = AtomicU64::new(0);
+    let progress = Progress::for_search(progress_mode, total_speeds, "speeds looked at", 0);
     let count_speeds = |speeds: usize| {
-        let done = done.fetch_add(speeds as u64, Ordering::Relaxed) + speeds as u64;
-        progress.show_search(done.min(total), done);
+        let speeds_done = speeds_done.fetch_add(speeds as u64, Ordering::Relaxed) + speeds as u64;
+        progress.show_search(speeds_done.min(total_speeds), speeds_done);
     };
     count_speeds(0);
-    let mut finders = Vec::with_capacity(directions.len());
-    for direction in &directions {
+    let mut finders = Vec::with_capacity(find_directions.len());
+    for direction in &find_directions {
         let mut finder = ResponseFinder {
             simd,
             plan,
@@ -162,55 +162,59 @@ fn explain_in_pool(
             count_speeds: &count_speeds,
             curves: Vec::new(),
         };
-        finder.follow(direction.scanned.to.max(direction.fastest_rpm));
+        finder.follow_curves(direction.speeds_to_scan.to.max(direction.fastest_rpm));
         finders.push(finder);
     }
     if progress_mode != ProgressMode::None {
-        let scans = finders.iter().zip(&directions);
+        let scans = finders.iter().zip(&find_directions);
         let thread_s: f64 = scans
             .map(|(finder, direction)| {
-                speed_count(direction) as f64 * finder.seconds_per_speed(direction.scanned)
+                speed_count(direction) as f64 * finder.seconds_per_speed(direction.speeds_to_scan)
             })
             .sum();
         let scan_s = thread_s / rayon::current_num_threads() as f64;
-        announcement(total, scan_s).iter().for_each(|line| tell(line));
+        announce_long_scan(total_speeds, scan_s).iter().for_each(|line| tell(line));
     }
-    let scan = || {
+    let run_scans = || {
         finders
             .iter()
-            .zip(&directions)
-            .map(|(finder, direction)| find_tongues(finder, direction.scanned))
+            .zip(&find_directions)
+            .map(|(finder, direction)| find_tongues(finder, direction.speeds_to_scan))
             .collect::<Vec<_>>()
     };
-    let (scanned, swept) = rayon::join(scan, || swept_result(plan, interrupt));
-    let (tongues, scans): (Vec<Vec<Tongue>>, Vec<SpeedScan>) = scanned.into_iter().unzip();
+    let (scan_results, swept) = rayon::join(run_scans, || evaluate_swept_result(plan, interrupt));
+    let (tongues, scans): (Vec<Vec<Tongue>>, Vec<SpeedScan>) = scan_results.into_iter().unzip();
     let tongues: Vec<Tongue> = tongues.into_iter().flatten().collect();
     let swept = swept?;
     let finder_for = |tongue: &Tongue| {
-        let same_direction =
+        let has_same_direction =
             |finder: &&ResponseFinder<'_>| finder.is_backward == tongue.is_backward;
-        finders.iter().find(same_direction).unwrap_or(&finders[0])
+        finders.iter().find(has_same_direction).unwrap_or(&finders[0])
     };
-    let endings = || -> Vec<Option<Attractor>> {
-        let directions = tongues.chunk_by(|a, b| a.is_backward == b.is_backward);
-        let endings = |tongues: &[Tongue]| tongue::find_endings(finder_for(&tongues[0]), tongues);
-        directions.flat_map(endings).collect()
+    let find_all_endings = || -> Vec<Option<Attractor>> {
+        let find_directions = tongues.chunk_by(|a, b| a.is_backward == b.is_backward);
+        let find_all_endings =
+            |tongues: &[Tongue]| tongue::find_endings(finder_for(&tongues[0]), tongues);
+        find_directions.flat_map(find_all_endings).collect()
     };
-    let crossings = || find_crossings(plan, (&point, spin), &finders, &tongues, &swept);
-    let closings = || tongues.par_iter().map(|tongue| tongue.find_closing(finder_for(tongue)));
-    let ((crossings, endings), closings) =
-        rayon::join(|| rayon::join(crossings, endings), || closings().collect::<Vec<_>>());
-    let (passages, without_departures) = crossings;
+    let find_all_crossings = || find_crossings(plan, (&point, spin), &finders, &tongues, &swept);
+    let find_all_closings =
+        || tongues.par_iter().map(|tongue| tongue.find_closing(finder_for(tongue)));
+    let ((find_all_crossings, find_all_endings), find_all_closings) = rayon::join(
+        || rayon::join(find_all_crossings, find_all_endings),
+        || find_all_closings().collect::<Vec<_>>(),
+    );
+    let (passages, without_departures) = find_all_crossings;
     let step_s = reference_step_s(&StepSelector::new([(&point, spin)], plan.end_s));
-    let growing = tongues.iter().zip(&passages).flat_map(|(tongue, passages)| {
+    let growing_passages = tongues.iter().zip(&passages).flat_map(|(tongue, passages)| {
         passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
     });
     let keeps_limit = |amplitudes: &Vec<f64>| {
         swept.greatest_ratio(amplitudes).is_some_and(|(ratio, _)| ratio < swept.limits.upper)
     };
     let has_passed = matches!(&without_departures, Some(Ok(amplitudes)) if keeps_limit(amplitudes));
-    let cause = cause::find_cause((&point, spin), step_s, &swept, has_passed, growing);
-    let tongues = tongues.into_iter().zip(closings).zip(endings).zip(passages);
+    let cause = cause::find_cause((&point, spin), step_s, &swept, has_passed, growing_passages);
+    let tongues = tongues.into_iter().zip(find_all_closings).zip(find_all_endings).zip(passages);
     let tongues = tongues.map(|(((tongue, closing), ending), passages)| {
         (Tongue { closing: Some(closing), ending, ..tongue }, passages)
     });
@@ -228,18 +232,18 @@ fn explain_in_pool(
 
 /// Returns the time of a scan over a number of speeds, if a user notices it, and what makes a long
 /// one shorter.
-fn announcement(speeds: u64, scan_s: f64) -> Option<String> {
-    let whole_s = WORK_AFTER_SCAN * scan_s;
-    if whole_s < NOTICED_S {
+fn announce_long_scan(speeds: u64, scan_s: f64) -> Option<String> {
+    let total_s = WORK_AFTER_SCAN * scan_s;
+    if total_s < ANNOUNCED_TIME_S {
         return None;
     }
     let scan = duration(scan_s);
-    let whole = duration(whole_s);
+    let total = duration(total_s);
     let mut text = format!(
         "{speeds} speeds take about {scan}; the edges, endings and remedies of unstable bands may \
-         add to {whole}"
+         add to {total}"
     );
-    if whole_s > LONG_WORK_S {
+    if total_s > LONG_WORK_S {
         text += "\nit is shorter with fewer speeds (--speed FROM:TO:STEP)";
     }
     Some(text)
@@ -253,7 +257,7 @@ struct TurningDirection {
     scenario: Scenario,
     point: Point,
     /// The speeds at which responses are sought.
-    scanned: Speeds,
+    speeds_to_scan: Speeds,
     /// The greatest speed of the profile in this direction (rpm).
     fastest_rpm: f64,
 }
@@ -264,7 +268,7 @@ struct TurningDirection {
 ///
 /// # Errors
 /// Returns an error if the machine has no modes, or if the profile reaches none of these speeds.
-fn directions(
+fn find_directions(
     plan: &Plan,
     scenario: &Scenario,
     point: &Point,
@@ -273,19 +277,25 @@ fn directions(
 ) -> Result<Vec<TurningDirection>, Error> {
     let slowest_rpm = modes(point, 0.0, 0.0).map_err(Error::model)?.modes[0].frequency_rpm();
     let from_rpm = (LOWEST_SPEED * slowest_rpm).floor().max(1.0);
-    let mut directions = Vec::new();
+    let mut find_directions = Vec::new();
     for (is_backward, fastest_rpm) in [(false, highest_rpm), (true, -lowest_rpm)] {
         let is_turned = fastest_rpm > 0.0 || !is_backward && lowest_rpm >= 0.0;
-        let scanned = match requested {
+        let speeds_to_scan = match requested {
             Some(requested) if is_turned => requested,
             None if fastest_rpm > from_rpm => Speeds::new(from_rpm, fastest_rpm, STEP_RPM),
             _ => continue,
         };
-        let scenario = if is_backward { mirrored(scenario) } else { scenario.clone() };
+        let scenario = if is_backward { mirror_scenario(scenario) } else { scenario.clone() };
         let point = prepare_scenario(plan, &scenario).map_err(Error::model)?;
-        directions.push(TurningDirection { is_backward, scenario, point, scanned, fastest_rpm });
+        find_directions.push(TurningDirection {
+            is_backward,
+            scenario,
+            point,
+            speeds_to_scan,
+            fastest_rpm,
+        });
     }
-    if directions.is_empty() {
+    if find_directions.is_empty() {
         let fastest_rpm = highest_rpm.max(-lowest_rpm);
         let expected = format!(
             "a profile that exceeds {from_rpm} rpm, half of the slowest mode's frequency, within \
@@ -293,11 +303,11 @@ fn directions(
         );
         return Err(Error::option("[spin]", format!("at most {fastest_rpm:.3} rpm"), expected));
     }
-    Ok(directions)
+    Ok(find_directions)
 }
 
 /// Returns the mirror image of a machine and its spin.
-fn mirrored(scenario: &Scenario) -> Scenario {
+fn mirror_scenario(scenario: &Scenario) -> Scenario {
     let mut mirrored = scenario.clone();
     mirrored.model.machine = scenario.model.machine.mirrored();
     match &mut mirrored.model.spin {
@@ -309,7 +319,7 @@ fn mirrored(scenario: &Scenario) -> Scenario {
 
 /// Computes the row of the plan's only point. Once the interrupt is raised, the result is
 /// meaningless.
-fn swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResult, Error> {
+fn evaluate_swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResult, Error> {
     let engine = ModelEngine::new(plan)?;
     let row = engine.evaluate_only_point(interrupt);
     let amplitudes = |model| row.as_ref().map_or_else(Vec::new, |row| row.amplitudes(model));
@@ -338,31 +348,31 @@ fn find_crossings(
 ) -> (Vec<Vec<Passage>>, WithoutDepartures) {
     let end_s = plan.end_s;
     // Passages in order of time, each with the number of its tongue.
-    let times = tongues.iter().enumerate().flat_map(|(k, tongue)| {
+    let intervals = tongues.iter().enumerate().flat_map(|(k, tongue)| {
         let [from, to] = tongue.range_rpm;
         let band_rpm = if tongue.is_backward { [-to, -from] } else { [from, to] };
-        let inside = profile::times_inside_s(spin, end_s, band_rpm);
-        inside.into_iter().map(move |interval_s| (k, interval_s))
+        let intervals_s = profile::times_inside_s(spin, end_s, band_rpm);
+        intervals_s.into_iter().map(move |interval_s| (k, interval_s))
     });
-    let mut times: Vec<(usize, [f64; 2])> = times.collect();
-    times.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
-    for i in 1..times.len() {
+    let mut intervals: Vec<(usize, [f64; 2])> = intervals.collect();
+    intervals.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+    for i in 1..intervals.len() {
         // Adjacent tongues share an edge that was located twice, with an error each.
-        times[i].1[0] = times[i].1[0].max(times[i - 1].1[1]);
+        intervals[i].1[0] = intervals[i].1[0].max(intervals[i - 1].1[1]);
     }
-    let mut responses: Vec<[Option<Response>; 2]> = vec![[None, None]; times.len()];
+    let mut responses: Vec<[Option<Response>; 2]> = vec![[None, None]; intervals.len()];
     for finder in finders {
-        let same_direction =
-            |number: &usize| tongues[times[*number].0].is_backward == finder.is_backward;
-        let numbers: Vec<usize> = (0..times.len()).filter(same_direction).collect();
-        let ends_s = numbers.iter().flat_map(|&number| times[number].1);
+        let has_same_direction =
+            |number: &usize| tongues[intervals[*number].0].is_backward == finder.is_backward;
+        let numbers: Vec<usize> = (0..intervals.len()).filter(has_same_direction).collect();
+        let ends_s = numbers.iter().flat_map(|&number| intervals[number].1);
         let speeds: Vec<f64> = spin.speeds_rpm(ends_s).map(f64::abs).collect();
         let mut end_responses = finder.find_responses(&speeds).into_iter();
         for number in numbers {
             responses[number] = [end_responses.next().flatten(), end_responses.next().flatten()];
         }
     }
-    let crossings: Vec<Crossing<'_>> = times
+    let crossings: Vec<Crossing<'_>> = intervals
         .iter()
         .zip(&responses)
         .map(|((k, interval_s), [entry, exit])| Crossing {
@@ -375,17 +385,18 @@ fn find_crossings(
         return (Vec::new(), None);
     }
     let step_s = reference_step_s(&StepSelector::new([(point, spin)], end_s));
-    let before_end = |crossing: &&Crossing<'_>| crossing.interval_s[0] < swept.window_s[1];
+    let begins_before_window_end =
+        |crossing: &&Crossing<'_>| crossing.interval_s[0] < swept.window_s[1];
     let (effects, peaks) = rayon::join(
         || follow_crossings(point, step_s, &crossings),
         || {
-            crossings.iter().find(before_end)?;
+            crossings.iter().find(begins_before_window_end)?;
             let peaks = peaks_without_departures(point, step_s, &crossings, swept.window_s);
             Some(peaks.map(|peaks| swept.plan_channels(&peaks)))
         },
     );
     let mut passages: Vec<Vec<Passage>> = tongues.iter().map(|_| Vec::new()).collect();
-    for ((k, interval_s), effect) in times.into_iter().zip(effects) {
+    for ((k, interval_s), effect) in intervals.into_iter().zip(effects) {
         passages[k].push(Passage {
             interval_s,
             ends_inside: interval_s[1] >= end_s,
@@ -402,14 +413,14 @@ mod tests {
 
     #[test]
     fn a_long_scan_is_announced_with_what_makes_it_shorter() {
-        assert_eq!(announcement(20, 1.0), None);
-        let text = announcement(296, 25.0).expect("it is noticed");
+        assert_eq!(announce_long_scan(20, 1.0), None);
+        let text = announce_long_scan(296, 25.0).expect("it is noticed");
         assert_eq!(
             text,
             "296 speeds take about 25 s; the edges, endings and remedies of unstable bands may add \
              to 1 min 15 s"
         );
-        let text = announcement(296, 3600.0).expect("it is noticed");
+        let text = announce_long_scan(296, 3600.0).expect("it is noticed");
         assert!(text.contains("3 h 00 min\n") && text.contains("--speed FROM:TO:STEP"), "{text}");
     }
 }

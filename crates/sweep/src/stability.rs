@@ -221,7 +221,7 @@ impl HeldSpeedEvaluator<'_> {
                 }
             }
             HeldAnalysis::Attractors(engine) => {
-                engine.find(self.simd, self.held.speeds_rpm, &requests, &store, context);
+                engine.evaluate(self.simd, self.held.speeds_rpm, &requests, &store, context);
             }
         }
     }

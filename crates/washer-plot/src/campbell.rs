@@ -111,7 +111,7 @@ pub(crate) fn resonances(table: &FigureTable) -> Result<Vec<f64>, PlotError> {
 fn frequency_sums(modes: &[FrequencyCurve], unstable: &UnstableSpeeds) -> Vec<FrequencyCurve> {
     let mut pairs: Vec<[usize; 2]> = Vec::new();
     for (speed, frequencies) in &unstable.participants {
-        let nearest = |frequency: f64| {
+        let nearest_mode = |frequency: f64| {
             let distance = |mode: &FrequencyCurve| (at_speed(mode, *speed) - frequency).abs();
             let indices = 0..modes.len();
             indices.min_by(|&a, &b| distance(&modes[a]).total_cmp(&distance(&modes[b])))
@@ -120,7 +120,7 @@ fn frequency_sums(modes: &[FrequencyCurve], unstable: &UnstableSpeeds) -> Vec<Fr
         let participants: Vec<usize> = frequencies
             .iter()
             .filter(|frequency| frequency.is_finite())
-            .filter_map(|frequency| nearest(*frequency))
+            .filter_map(|frequency| nearest_mode(*frequency))
             .collect();
         let candidates = participants
             .iter()
@@ -200,9 +200,9 @@ pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotErro
         mode_numbers.iter().copied().filter(|number| number.is_finite()).collect();
     distinct_numbers.sort_by(f64::total_cmp);
     distinct_numbers.dedup();
-    let mode_curve = |wanted: f64| {
+    let mode_curve = |number: f64| {
         let mut rows: Vec<usize> =
-            (0..table.rows).filter(|&row| mode_numbers[row] == wanted).collect();
+            (0..table.rows).filter(|&row| mode_numbers[row] == number).collect();
         rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
         let values_of_rows =
             |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
@@ -210,14 +210,14 @@ pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotErro
         let resonances_in_file = || -> Option<Vec<f64>> {
             let mut modes_in_file = table.source.metadata_list(key::MODES);
             let resonances =
-                modes_in_file.find(|mode| mode["mode"] == wanted)?["resonances"].as_array()?;
+                modes_in_file.find(|mode| mode["mode"] == number)?["resonances"].as_array()?;
             resonances.iter().map(|resonance| resonance["speed_rpm"].as_f64()).collect()
         };
         let speed = values_of_rows(speed);
         let frequency = values_of_rows(frequency);
         FrequencyCurve {
             name: shape_name
-                .map_or(format!("mode {wanted}"), |shape_name| format!("{wanted} {shape_name}")),
+                .map_or(format!("mode {number}"), |shape_name| format!("{number} {shape_name}")),
             resonances: resonances_in_file().unwrap_or_else(|| crossings(&speed, &frequency)),
             speed,
             frequency,

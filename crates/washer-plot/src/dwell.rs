@@ -64,9 +64,9 @@ pub(crate) fn chart(
     let attractors_with_kind = |kind: usize| {
         attractors.iter().filter(move |(_, kind_of_attractor, _)| *kind_of_attractor == kind)
     };
-    let first = curves.speed.first().copied();
-    let last = curves.speed.last().copied();
-    let is_in_range = |speed: &f64| first <= Some(*speed) && Some(*speed) <= last;
+    let first_speed = curves.speed.first().copied();
+    let last_speed = curves.speed.last().copied();
+    let is_in_range = |speed: &f64| first_speed <= Some(*speed) && Some(*speed) <= last_speed;
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
         let (_, factor) = label::display_unit(&facts.unit);
         let mut series = response_series("periodic response", &curves, k, factor);

@@ -87,8 +87,10 @@ fn series_over_speed(series: &Series, all_turns: &[RampTurns]) -> Vec<Series> {
 
 /// Returns the greatest magnitude; NaN if a value is missing.
 fn greatest_magnitude(values: &[f64]) -> f64 {
-    let greatest = values.iter().fold(0.0, |greatest: f64, value| greatest.max(value.abs()));
-    if values.iter().any(|value| value.is_nan()) { f64::NAN } else { greatest }
+    let greatest_magnitude = values
+        .iter()
+        .fold(0.0, |greatest_magnitude: f64, value| greatest_magnitude.max(value.abs()));
+    if values.iter().any(|value| value.is_nan()) { f64::NAN } else { greatest_magnitude }
 }
 
 /// Returns the ramps of a trace; instants of constant speed belong to none.
@@ -112,12 +114,12 @@ fn ramps(speed: &[f64]) -> Vec<Ramp> {
 fn turns(time: &[f64], speed: &[f64], ramp: Ramp) -> Vec<[usize; 2]> {
     let mut turns = Vec::new();
     let mut turn_count = 0.0;
-    let mut first = ramp.from;
+    let mut turn_start = ramp.from;
     for k in ramp.from + 1..=ramp.to {
         turn_count += 0.5 * (speed[k] + speed[k - 1]) / 60.0 * (time[k] - time[k - 1]);
         if turn_count >= 1.0 {
-            turns.push([first, k]);
-            (turn_count, first) = (turn_count - 1.0, k);
+            turns.push([turn_start, k]);
+            (turn_count, turn_start) = (turn_count - 1.0, k);
         }
     }
     if !ramp.is_rising {
@@ -136,14 +138,17 @@ mod tests {
         let time: Vec<f64> = (0..=920).map(|k| 0.01 * f64::from(k)).collect();
         let speed: Vec<f64> =
             time.iter().map(|t| (30.0 * t).min(126.0).min(30.0 * (9.2 - t))).collect();
-        let ramps = ramps(&speed);
-        assert_eq!(ramps.iter().map(|ramp| ramp.is_rising).collect::<Vec<_>>(), [true, false]);
-        let [up, down] = [0, 1].map(|k| turns(&time, &speed, ramps[k]));
+        let found_ramps = ramps(&speed);
+        assert_eq!(
+            found_ramps.iter().map(|ramp| ramp.is_rising).collect::<Vec<_>>(),
+            [true, false]
+        );
+        let [rising_turns, falling_turns] = [0, 1].map(|k| turns(&time, &speed, found_ramps[k]));
         // On the rising ramp t^2/4 turns are made at t: the second ends at sqrt(8) s.
-        assert_eq!((up.len(), down.len()), (4, 4));
-        assert!((time[up[1][1]] - 8.0_f64.sqrt()).abs() < 0.02);
+        assert_eq!((rising_turns.len(), falling_turns.len()), (4, 4));
+        assert!((time[rising_turns[1][1]] - 8.0_f64.sqrt()).abs() < 0.02);
         let speed_sum = |turn: &[usize; 2]| speed[turn[0]] + speed[turn[1]];
-        assert!(down.windows(2).all(|pair| speed_sum(&pair[0]) < speed_sum(&pair[1])));
+        assert!(falling_turns.windows(2).all(|pair| speed_sum(&pair[0]) < speed_sum(&pair[1])));
         assert_eq!(greatest_magnitude(&[1.0, -3.0, 2.0]), 3.0);
         assert!(
             greatest_magnitude(&[1.0, f64::NAN, 2.0]).is_nan()

@@ -23,7 +23,7 @@ fn machine_summary(machine: &Value) -> Option<String> {
     let drum = mass_of("drum")?;
     let radius = format_quantity(&machine["unbalance"], "radius_m")?;
     let unbalance = mass_of("unbalance")?;
-    let mut parts = vec![format!(
+    let mut phrases = vec![format!(
         "tub {tub}, shaft {shaft}, drum {drum}, unbalance {unbalance} at radius {radius}"
     )];
     // Each number of a list's elements follows its word: the common value, or the least and the
@@ -33,14 +33,14 @@ fn machine_summary(machine: &Value) -> Option<String> {
         let values = numbers.iter().filter_map(|(word, key)| {
             // A number that an element lacks is 0; a number that all lack is left out.
             let value_of = |element: &Value| element[*key].as_f64().unwrap_or_default();
-            let greatest =
+            let greatest_element =
                 elements_of_list.iter().max_by(|a, b| value_of(a).total_cmp(&value_of(b)))?;
             let least = elements_of_list.iter().map(value_of).fold(f64::INFINITY, f64::min);
-            let least_text = match least == value_of(greatest) {
+            let least_text = match least == value_of(greatest_element) {
                 true => String::new(),
                 false => format!("{} to ", format_significant(least, 4)),
             };
-            Some(format!(" {word} {least_text}{}", format_quantity(greatest, key)?))
+            Some(format!(" {word} {least_text}{}", format_quantity(greatest_element, key)?))
         });
         let words = list.replace('_', " ");
         let words = if elements_of_list.len() == 1 { words.trim_end_matches('s') } else { &words };
@@ -54,16 +54,16 @@ fn machine_summary(machine: &Value) -> Option<String> {
         ("further_unbalances", &[("of", "mass_kg")]),
         ("feet", &[]),
     ];
-    parts.extend(lists.into_iter().filter_map(list_summary));
+    phrases.extend(lists.into_iter().filter_map(list_summary));
     if let Some(mass_of) =
         machine.get("cabinet").and_then(|cabinet| format_quantity(cabinet, "mass_kg"))
     {
-        parts.push(format!("a cabinet of {mass_of}"));
+        phrases.push(format!("a cabinet of {mass_of}"));
     }
     if let Some(gap) = format_quantity(machine, "radial_clearance_m") {
-        parts.push(format!("a gap of {gap} between drum and tub"));
+        phrases.push(format!("a gap of {gap} between drum and tub"));
     }
-    Some(format!("{}; each point has its own values of the axes' parameters", parts.join("; ")))
+    Some(format!("{}; each point has its own values of the axes' parameters", phrases.join("; ")))
 }
 
 fn spin_summary(spin: &Value) -> Option<String> {

@@ -125,16 +125,16 @@ fn shape_series(positions: &AxisPositions, phasors: &[Phasor]) -> Vec<Series> {
     let [tub, drum] = axis_shapes(positions, phasors);
     let squared_magnitude = |[real, imaginary]: Phasor| real * real + imaginary * imaginary;
     let deflections = tub.iter().chain(&drum).flatten();
-    let greatest = deflections
+    let greatest_magnitude = deflections
         .copied()
         .max_by(|a, b| squared_magnitude(*a).total_cmp(&squared_magnitude(*b)))
         .unwrap_or([1.0, 0.0]);
     // Division by the greatest deflection makes that 1 at its maximum.
-    let scale = squared_magnitude(greatest);
+    let scale = squared_magnitude(greatest_magnitude);
     let normalise = |[real, imaginary]: Phasor| {
         [
-            (real * greatest[0] + imaginary * greatest[1]) / scale,
-            (imaginary * greatest[0] - real * greatest[1]) / scale,
+            (real * greatest_magnitude[0] + imaginary * greatest_magnitude[1]) / scale,
+            (imaginary * greatest_magnitude[0] - real * greatest_magnitude[1]) / scale,
         ]
     };
     let mut series = Vec::new();

@@ -51,9 +51,9 @@ pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<C
     }
     let curves = held_points.read(&[])?;
     let HeldPoints { axes, points: shown_points, .. } = &held_points;
-    let varies = |k: usize| shown_points.iter().any(|curve| curve[k] != shown_points[0][k]);
+    let is_varying = |k: usize| shown_points.iter().any(|curve| curve[k] != shown_points[0][k]);
     let curve_name = |curve: &[f64]| {
-        let varying_axes = axes.iter().zip(curve).enumerate().filter(|(k, _)| varies(*k));
+        let varying_axes = axes.iter().zip(curve).enumerate().filter(|(k, _)| is_varying(*k));
         let varying_axes: Vec<String> =
             varying_axes.map(|(_, (axis, value))| format_value(axis, *value)).collect();
         if varying_axes.is_empty() { "growth".to_owned() } else { varying_axes.join(", ") }
@@ -63,7 +63,8 @@ pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<C
         let y = curve.growth.clone();
         Series::new(curve_name(values), DISTINCT[k], x, y, Style::Solid(2.2))
     });
-    let constant_axes = axes.iter().zip(&shown_points[0]).enumerate().filter(|(k, _)| !varies(*k));
+    let constant_axes =
+        axes.iter().zip(&shown_points[0]).enumerate().filter(|(k, _)| !is_varying(*k));
     let mut notes =
         source.notes(constant_axes.map(|(_, (axis, value))| format_in_lower_case(axis, *value)));
     if shown_points.len() < count {
@@ -186,13 +187,13 @@ pub(crate) fn response_series(
     let [linear, periodic]: [Vec<f64>; 2] =
         [2 * k, 2 * k + 1].map(|k| curves.columns[k].iter().map(|value| value * factor).collect());
     let [stable, unstable] = stability_parts(&curves.speed, &periodic, &curves.growth);
-    let part = |word: &str, colour, (speed, values): (Vec<f64>, Vec<f64>), style| {
+    let series_of_part = |word: &str, colour, (speed, values): (Vec<f64>, Vec<f64>), style| {
         Series::new(format!("{name}, {word}"), colour, speed, values, style)
     };
     vec![
         Series::new("linear model", LINEAR, curves.speed.clone(), linear, Style::Solid(1.6)),
-        part("stable", NONLINEAR, stable, Style::Solid(2.2)),
-        part("unstable", NONLINEAR, unstable, Style::Dashed),
+        series_of_part("stable", NONLINEAR, stable, Style::Solid(2.2)),
+        series_of_part("unstable", NONLINEAR, unstable, Style::Dashed),
     ]
 }
 
@@ -200,25 +201,26 @@ pub(crate) fn response_series(
 /// NaN. The parts meet where growth passes 0, as the shaded ranges end there.
 fn stability_parts(speed: &[f64], curve: &[f64], growth: &[f64]) -> [(Vec<f64>, Vec<f64>); 2] {
     let mut parts = [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())];
-    let mut add = |part: usize, speed: f64, value: f64| {
+    let mut add_point = |part: usize, speed: f64, value: f64| {
         parts[part].0.push(speed);
         parts[part].1.push(value);
     };
     for k in 0..speed.len() {
         let part = usize::from(growth[k] > 0.0);
         let value = if growth[k].is_nan() { f64::NAN } else { curve[k] };
-        add(part, speed[k], value);
+        add_point(part, speed[k], value);
         let Some(&next_growth) = growth.get(k + 1) else { continue };
         let next_part = usize::from(next_growth > 0.0);
         if next_growth.is_nan() || growth[k].is_nan() {
-            add(part, speed[k], f64::NAN);
+            add_point(part, speed[k], f64::NAN);
         } else if next_part != part {
             let share = growth[k] / (growth[k] - next_growth);
-            let between = |values: &[f64]| values[k] + share * (values[k + 1] - values[k]);
-            let edge = between(speed);
-            add(part, edge, between(curve));
-            add(part, edge, f64::NAN);
-            add(next_part, edge, between(curve));
+            let interpolate_between =
+                |values: &[f64]| values[k] + share * (values[k + 1] - values[k]);
+            let edge_speed = interpolate_between(speed);
+            add_point(part, edge_speed, interpolate_between(curve));
+            add_point(part, edge_speed, f64::NAN);
+            add_point(next_part, edge_speed, interpolate_between(curve));
         }
     }
     parts
@@ -449,9 +451,9 @@ impl<'a> HeldPoints<'a> {
     /// # Errors
     /// Returns the errors of [`FigureFile::each_row`].
     pub(crate) fn read(&self, columns: &[String]) -> Result<Vec<SpeedCurves>, PlotError> {
-        let empty =
+        let empty_curves =
             SpeedCurves { columns: vec![Vec::new(); columns.len()], ..SpeedCurves::default() };
-        let mut curves = vec![empty; self.points.len()];
+        let mut curves = vec![empty_curves; self.points.len()];
         self.each_row(columns, |point_index, row| {
             let curve = &mut curves[point_index];
             // A speed can have several responses. The first is that of a machine that runs up.
@@ -491,12 +493,13 @@ pub(crate) fn intervals_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec
         let first_of_range = intervals.len();
         let is_within = |k: usize| low < y[k] && y[k] < high;
         for k in 0..x.len().min(y.len()) {
-            let mut add = |[from, to]: [f64; 2]| match intervals[first_of_range..].last_mut() {
-                Some(last) if from <= last[1] => last[1] = to,
-                _ => intervals.push([from, to]),
-            };
+            let mut add_interval =
+                |[from, to]: [f64; 2]| match intervals[first_of_range..].last_mut() {
+                    Some(last) if from <= last[1] => last[1] = to,
+                    _ => intervals.push([from, to]),
+                };
             if k > 0 && y[k - 1] == y[k] && is_within(k) {
-                add([x[k - 1], x[k]]);
+                add_interval([x[k - 1], x[k]]);
             } else if k > 0 && (y[k] - y[k - 1]).is_finite() {
                 // The part of this segment within the range, as fractions of the segment from 0 to
                 // 1.
@@ -506,16 +509,16 @@ pub(crate) fn intervals_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec
                     fraction_at_low.min(fraction_at_high).max(0.0),
                     fraction_at_low.max(fraction_at_high).min(1.0),
                 ];
-                let x_at = |fraction: f64| match fraction {
+                let interpolate_x = |fraction: f64| match fraction {
                     1.0 => x[k],
                     fraction => x[k - 1] + fraction * (x[k] - x[k - 1]),
                 };
                 if last_fraction > first_fraction {
-                    add([x_at(first_fraction), x_at(last_fraction)]);
+                    add_interval([interpolate_x(first_fraction), interpolate_x(last_fraction)]);
                 }
             }
             if is_within(k) {
-                add([x[k]; 2]);
+                add_interval([x[k]; 2]);
             }
         }
     }
@@ -542,14 +545,17 @@ mod tests {
         let growth = [-1.0, 1.0, -3.0, f64::NAN, 1.0];
         let curve = [1.0, 3.0, 7.0, 9.0, 11.0];
         let [stable, unstable] = stability_parts(&speed, &curve, &growth);
-        let known = |(speed, values): (Vec<f64>, Vec<f64>)| -> Vec<(f64, f64)> {
+        let finite_points = |(speed, values): (Vec<f64>, Vec<f64>)| -> Vec<(f64, f64)> {
             speed.into_iter().zip(values).filter(|(_, value)| !value.is_nan()).collect()
         };
-        assert_eq!(known(stable), [(200.0, 1.0), (205.0, 2.0), (212.5, 4.0), (220.0, 7.0)]);
-        assert_eq!(known(unstable), [(205.0, 2.0), (210.0, 3.0), (212.5, 4.0), (240.0, 11.0)]);
+        assert_eq!(finite_points(stable), [(200.0, 1.0), (205.0, 2.0), (212.5, 4.0), (220.0, 7.0)]);
+        assert_eq!(
+            finite_points(unstable),
+            [(205.0, 2.0), (210.0, 3.0), (212.5, 4.0), (240.0, 11.0)]
+        );
         // A last speed alone in its part is the end of a line, no dot.
         let [_, unstable] = stability_parts(&speed[..2], &curve[..2], &growth[..2]);
-        assert_eq!(known(unstable), [(205.0, 2.0), (210.0, 3.0)]);
+        assert_eq!(finite_points(unstable), [(205.0, 2.0), (210.0, 3.0)]);
     }
 
     #[test]

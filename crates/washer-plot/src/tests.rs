@@ -163,8 +163,11 @@ fn a_trace_is_compared_with_another() {
         .numbers("time_s", "s", [0.0, 6.0, 12.0])
         .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.09, 0.0])
         .with_metadata("sweep.plan", r#"{"name": "another program"}"#);
-    let against = |path| WasherFigures { against: Some(path), ..WasherFigures::default() };
-    let data = draw_page_data(trace(), &against(other_trace.write(folder.path(), "other.parquet")));
+    let options_against = |path| WasherFigures { against: Some(path), ..WasherFigures::default() };
+    let data = draw_page_data(
+        trace(),
+        &options_against(other_trace.write(folder.path(), "other.parquet")),
+    );
     let yaw = &data["chart"]["panels"][0]["series"];
     let name_and_grid =
         |k: usize| (yaw[k]["name"].as_str().unwrap().to_owned(), yaw[k]["grid"].as_u64().unwrap());
@@ -174,10 +177,10 @@ fn a_trace_is_compared_with_another() {
         (("another program".to_owned(), 1), 2)
     );
     assert!(
-        draw_svg(trace(), &against(trace().write(folder.path(), "same.parquet")))
+        draw_svg(trace(), &options_against(trace().write(folder.path(), "same.parquet")))
             .contains("difference 0.0e0 of")
     );
-    let modes = against(modes().write(folder.path(), "modes.parquet"));
+    let modes = options_against(modes().write(folder.path(), "modes.parquet"));
     assert!(
         error_message(draw(trace(), &modes, "a.svg"))
             .contains("this is a modes file; `sweep trace`")
@@ -414,7 +417,7 @@ fn options_without_effect_are_rejected() {
     let channel =
         |name: &str| WasherFigures { channels: vec![name.to_owned()], ..WasherFigures::default() };
     let resonances = WasherFigures { resonances_rpm: vec![100.0], ..WasherFigures::default() };
-    let against =
+    let options_against =
         WasherFigures { against: Some("b.parquet".into()), ..with_view(FigureView::Passages) };
     for (result, phrase) in [
         (draw(map(), &channel("body_yaw"), "a.svg"), "--quantity ratio_tub_yaw"),
@@ -422,7 +425,7 @@ fn options_without_effect_are_rejected() {
         (draw(map(), &resonances, "a.svg"), "`--resonances` is for traces"),
         (draw(map(), &with_view(FigureView::Time), "a.svg"), "`--view` is for traces"),
         (draw(trace(), &with_view(FigureView::Shapes), "a.svg"), "`--view` is for modes files"),
-        (draw(trace(), &against, "a.svg"), "`--against` is for traces over time"),
+        (draw(trace(), &options_against, "a.svg"), "`--against` is for traces over time"),
         (
             draw(SampleFile::default().numbers("x", "", [1.0]), &default_options(), "a.svg"),
             "no file that has a figure: study, dwell, stability, modes, map",

@@ -47,10 +47,10 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         None => model_prefixes.map(curve_name),
     };
     // The second curve is translucent, so that the first one shows through.
-    let front = compared_trace.as_ref().unwrap_or(table);
-    let front_time = Rc::new(front.numbers("time_s")?.to_vec());
+    let front_table = compared_trace.as_ref().unwrap_or(table);
+    let front_time = Rc::new(front_table.numbers("time_s")?.to_vec());
     let curve_sources =
-        [(table, Rc::clone(&time), NONLINEAR), (front, front_time, LINEAR.with_alpha(165))];
+        [(table, Rc::clone(&time), NONLINEAR), (front_table, front_time, LINEAR.with_alpha(165))];
     let model_curves = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         let curve = |k: usize| {
             let ((table, time, colour), name) = (&curve_sources[k], names[k].clone());
@@ -83,18 +83,19 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         let label = Label::new(&words, unit);
         panels.push(panel(&format!("residual_{name}"), label, is_shown, vec![residual]));
     }
-    let mut gaps = model_curves(&["gap_nonlinear_m", "gap_linear_m"].map(str::to_owned), 1e3);
-    if compared_trace.is_some() && gaps.len() < 2 {
-        gaps.clear();
+    let mut gap_series = model_curves(&["gap_nonlinear_m", "gap_linear_m"].map(str::to_owned), 1e3);
+    if compared_trace.is_some() && gap_series.len() < 2 {
+        gap_series.clear();
     }
-    let least_gaps = least_gaps(&gaps);
-    if !gaps.is_empty() {
+    let least_gaps = least_gaps(&gap_series);
+    if !gap_series.is_empty() {
         // If the gap stays wide, it would be a flat line at the top of a panel that reaches down to
         // contact.
-        let widest = gaps.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
-        let is_gap_small = least_gaps.iter().any(|(_, gap)| *gap < 0.5 * widest);
+        let greatest_gap =
+            gap_series.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
+        let is_gap_small = least_gaps.iter().any(|(_, gap)| *gap < 0.5 * greatest_gap);
         let levels = if is_gap_small { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
-        let gap_panel = panel("gap", Label::new("gap, drum to tub", "mm"), true, gaps);
+        let gap_panel = panel("gap", Label::new("gap, drum to tub", "mm"), true, gap_series);
         panels.push(ChartPanel { levels, ..gap_panel });
     }
     let mut marks = Vec::new();
@@ -220,8 +221,8 @@ fn distinct_names(first: &FigureTable, second: &FigureTable) -> [String; 2] {
     }
     let points = tables.map(|table| together::point_of_trace(&table.source));
     let differing_values = |index: usize| -> Vec<String> {
-        let differs = points[index].iter().filter(|value| !points[1 - index].contains(value));
-        differs.map(|(name, value)| format_parameter(name, *value)).collect()
+        let differing = points[index].iter().filter(|value| !points[1 - index].contains(value));
+        differing.map(|(name, value)| format_parameter(name, *value)).collect()
     };
     let value_names = [differing_values(0), differing_values(1)].map(|words| words.join(", "));
     if value_names[0] != value_names[1] && value_names.iter().all(|name| !name.is_empty()) {
@@ -237,12 +238,12 @@ fn format_parameter(name: &str, value: f64) -> String {
 
 /// Returns the notes on the least gaps and on the difference of two runs.
 fn common_notes(least_gaps_mm: &[(String, f64)], difference: Option<f64>) -> Vec<String> {
-    let gaps = least_gaps_mm.iter().map(|(name, gap)| format!("{gap:.2} mm {name}"));
-    let gaps = gaps.collect::<Vec<_>>().join(", ");
-    let gaps = (!gaps.is_empty()).then(|| format!("least gap {gaps}"));
+    let gap_phrases = least_gaps_mm.iter().map(|(name, gap)| format!("{gap:.2} mm {name}"));
+    let gap_phrases = gap_phrases.collect::<Vec<_>>().join(", ");
+    let gap_phrases = (!gap_phrases.is_empty()).then(|| format!("least gap {gap_phrases}"));
     let difference =
         difference.map(|difference| format!("largest difference {difference:.1e} of the peak"));
-    gaps.into_iter().chain(difference).collect()
+    gap_phrases.into_iter().chain(difference).collect()
 }
 
 /// Returns the least gap of each model that has one, in the displayed unit.
@@ -323,10 +324,13 @@ fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> 
     let mut passages = Vec::new();
     for k in 1..time.len().min(speed.len()) {
         for &resonance in resonances {
-            let before = speed[k - 1] - resonance;
-            let after = speed[k] - resonance;
-            if (before < 0.0) != (after < 0.0) && before.is_finite() && after.is_finite() {
-                let fraction = before / (before - after);
+            let distance_before = speed[k - 1] - resonance;
+            let distance_after = speed[k] - resonance;
+            if (distance_before < 0.0) != (distance_after < 0.0)
+                && distance_before.is_finite()
+                && distance_after.is_finite()
+            {
+                let fraction = distance_before / (distance_before - distance_after);
                 passages.push((time[k - 1] + fraction * (time[k] - time[k - 1]), resonance));
             }
         }

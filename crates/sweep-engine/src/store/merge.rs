@@ -83,7 +83,7 @@ pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Resul
     files::judge(output, job.layout.kind)?;
     let folder = atomic::parent(output);
     files::ready(folder)?;
-    let mut writer = MapWriter::begin(job, atomic::begin(folder)?, output)?;
+    let mut writer = MapWriter::begin(job, atomic::create_temporary(folder)?, output)?;
     batches.iter().try_for_each(|batch| writer.write(batch))?;
     let file = writer.finish()?;
     files::judge(output, job.layout.kind)?;
@@ -107,7 +107,7 @@ impl OpenRun {
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<Tally>, StoreError> {
         let output = self.folder.output.clone();
-        let file = atomic::begin(&self.folder.path)?;
+        let file = atomic::create_temporary(&self.folder.path)?;
         let mut writer = MapWriter::begin(job, file, &output)?;
         for chunk in 0..self.chunks() {
             if stop() {

@@ -15,7 +15,7 @@ use crate::engine::Carried;
 /// The data of a row: a motion of a point at a held speed, and one of the motion's turns.
 pub(crate) struct DwellRow {
     /// All motions of the point at this speed, or the reason why there are none.
-    pub(super) found: Result<Arc<Attractors>, Status>,
+    pub(super) attractors: Result<Arc<Attractors>, Status>,
     /// The number of the motion.
     pub(super) motion: usize,
     /// The number of the turn among the turns of which states are stored; 0 if there are none.
@@ -41,12 +41,12 @@ const STATUSES: [&str; 9] = [
 ];
 
 impl DwellRow {
-    fn found(&self) -> Option<&Attractors> {
-        self.found.as_deref().ok()
+    fn attractors(&self) -> Option<&Attractors> {
+        self.attractors.as_deref().ok()
     }
 
     fn motion(&self) -> Option<&Attractor> {
-        self.found()?.attractors.get(self.motion)
+        self.attractors()?.attractors.get(self.motion)
     }
 
     /// Returns the motion, if it stayed within the model's range.
@@ -56,7 +56,7 @@ impl DwellRow {
 
     /// Returns the periodic response of a machine that runs up.
     fn response(&self) -> Option<&Response> {
-        self.found()?.responses.first()
+        self.attractors()?.responses.first()
     }
 
     fn kind(&self) -> Option<usize> {
@@ -88,11 +88,11 @@ impl DwellRow {
 
     fn is_near_response(&self) -> Option<bool> {
         let motion = self.motion().filter(|motion| motion.status == AttractorStatus::NotSettled)?;
-        Some(self.found()?.is_near_response(motion))
+        Some(self.attractors()?.is_near_response(motion))
     }
 
     fn status(&self) -> &'static str {
-        match self.found {
+        match self.attractors {
             Ok(_) => match self.motion().map(|motion| motion.status) {
                 Some(AttractorStatus::Ok) => "ok",
                 Some(AttractorStatus::LeftRange { .. }) => "left_range",
@@ -156,8 +156,9 @@ pub(crate) fn columns(
     let description = "how many starts there were: the disturbed periodic responses, then kicks, \
                 two thirds of them along the modes that rock most, the others in random \
                 directions, every other one of the machine at rest";
-    columns
-        .push(count_column("starts_made", description, |row| Some(u64::from(row.found()?.starts))));
+    columns.push(count_column("starts_made", description, |row| {
+        Some(u64::from(row.attractors()?.starts))
+    }));
     let description = "smallest kick off the periodic response that led to it; 0: a disturbed \
                 periodic response did; null where only a kick of the machine at rest, a \
                 transient or the last speed's motion did";
@@ -228,7 +229,7 @@ pub(crate) fn columns(
             "rad/s",
             "smallest kick that does not come back to motion 0, of those tried; null where all do \
              or --threshold was not given",
-            |row| row.found()?.threshold_rad_per_s,
+            |row| row.attractors()?.threshold_rad_per_s,
         ),
     ];
     for (name, unit, description, value) in measured_columns {
@@ -259,7 +260,7 @@ pub(crate) fn columns(
 /// Returns the columns of the state that the search carries to the next speed. Chunks contain them,
 /// so that an interrupted run can continue.
 pub(super) fn carried_columns() -> impl Iterator<Item = DwellColumn> {
-    let bits = |i: usize| move |row: &DwellRow| Some(final_state(row.found()?)?[i].to_bits());
+    let bits = |i: usize| move |row: &DwellRow| Some(final_state(row.attractors()?)?[i].to_bits());
     (0..STATE_LEN)
         .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", CellType::Kept, bits(i)))
 }
@@ -275,7 +276,7 @@ pub(super) fn carried_state(known: &PointRows) -> Carried {
 fn section_columns() -> Vec<DwellColumn> {
     let description = "number of the turn among those kept, from 0: what follows is where it ends";
     let mut columns =
-        vec![count_column("turn", description, |row| row.found().map(|_| row.turn as u64))];
+        vec![count_column("turn", description, |row| row.attractors().map(|_| row.turn as u64))];
     for i in 0..STATE_LEN {
         let q = i % COORDINATES;
         let unit = if q < 4 { "m" } else { "rad" };

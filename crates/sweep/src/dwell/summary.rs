@@ -20,15 +20,15 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     let mut axes = places::axis_names(file);
     axes.push("speed_rpm".to_owned());
     let mut kinds: BTreeMap<String, u64> = BTreeMap::new();
-    let mut rows = 0_u64;
+    let mut row_count = 0_u64;
     let mut point_count = 0_u64;
     // The points and speeds with several motions, and their number of motions.
-    let mut multiple: Vec<(Vec<f64>, u64)> = Vec::new();
+    let mut points_with_several_motions: Vec<(Vec<f64>, u64)> = Vec::new();
     let mut farthest = FarthestByClass::default();
     let has_turns = file.schema().index_of("turn").is_ok();
     let channels = CHANNELS.map(|name| format!("nonlinear_{name}"));
     let has_kicks = file.schema().index_of("least_kick_rad_per_s").is_ok();
-    let mut listed: Vec<MotionLine> = Vec::new();
+    let mut listed_motions: Vec<MotionLine> = Vec::new();
     let names = ["kind", "status", "motion", "turn", "starts", "starts_made"].into_iter();
     let names = names.chain(has_kicks.then_some("least_kick_rad_per_s"));
     let names = names.chain(channels.iter().map(String::as_str));
@@ -43,9 +43,9 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         let point_and_speed =
             || (first_axis..names.len()).map(|column| row.value(column)).collect();
         let kind_text = row.word(0).or(row.word(1)).unwrap_or_default();
-        rows += 1;
-        if listed.len() <= MAX_LISTED_MOTIONS {
-            listed.push(MotionLine {
+        row_count += 1;
+        if listed_motions.len() <= MAX_LISTED_MOTIONS {
+            listed_motions.push(MotionLine {
                 point_and_speed: point_and_speed(),
                 motion: row.value(2),
                 kind_text: kind_text.replace('_', " "),
@@ -57,8 +57,12 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         *kinds.entry(kind_text.to_owned()).or_default() += 1;
         match row.value(2) {
             0.0 => point_count += 1,
-            1.0 => multiple.push((point_and_speed(), 2)),
-            _ => multiple.iter_mut().last().into_iter().for_each(|(_, count)| *count += 1),
+            1.0 => points_with_several_motions.push((point_and_speed(), 2)),
+            _ => points_with_several_motions
+                .iter_mut()
+                .last()
+                .into_iter()
+                .for_each(|(_, count)| *count += 1),
         }
         let status = row.word(1).unwrap_or_default();
         let deviations = [0, 1].map(|k| row.value(first_channel + k));
@@ -69,16 +73,18 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         kinds.iter().map(|(kind, count)| format!("{count} {}", kind.replace('_', " "))).collect();
     let plural = if point_count == 1 { "" } else { "s" };
     let summary = format!(
-        "{rows} at {point_count} point{plural} and speed{plural}: {}",
+        "{row_count} at {point_count} point{plural} and speed{plural}: {}",
         kind_counts.join(", ")
     );
     let mut lines = vec![("motions", summary)];
-    if rows as usize <= MAX_LISTED_MOTIONS {
-        lines.extend(listed.iter().map(|motion| ("motion", motion.sentence(&axes))));
-        lines.extend(kick_sentences(file, &axes, &listed).into_iter().map(|line| ("push", line)));
+    if row_count as usize <= MAX_LISTED_MOTIONS {
+        lines.extend(listed_motions.iter().map(|motion| ("motion", motion.sentence(&axes))));
+        lines.extend(
+            kick_sentences(file, &axes, &listed_motions).into_iter().map(|line| ("push", line)),
+        );
     }
     lines.extend(farthest.lines(&axes));
-    for (values, motions) in &multiple {
+    for (values, motions) in &points_with_several_motions {
         lines.push((
             "several",
             format!("{motions} motions at {}", places::point_text(&axes, values)),
@@ -111,7 +117,7 @@ struct FarthestMotion {
     deviation: f64,
     kind_text: String,
     /// The point and the speed.
-    at: Vec<f64>,
+    point_and_speed: Vec<f64>,
 }
 
 /// The motions with the greatest amplitudes, by the classes in [`MOTION_CLASSES`] and by channel.
@@ -126,16 +132,21 @@ impl FarthestByClass {
         status: &str,
         deviations: [f64; CHANNELS.len()],
         kind_text: &str,
-        place: &dyn Fn() -> Vec<f64>,
+        point_and_speed: &dyn Fn() -> Vec<f64>,
     ) {
         let Some(class) = MOTION_CLASSES.iter().position(|class| class.status == status) else {
             return;
         };
         for (deviation, farthest) in deviations.into_iter().zip(&mut self.0[class]) {
-            let known = farthest.as_ref().map_or(f64::NEG_INFINITY, |motion| motion.deviation);
-            if deviation > known {
+            let greatest_deviation =
+                farthest.as_ref().map_or(f64::NEG_INFINITY, |motion| motion.deviation);
+            if deviation > greatest_deviation {
                 let kind_text = kind_text.replace('_', " ");
-                *farthest = Some(FarthestMotion { deviation, kind_text, at: place() });
+                *farthest = Some(FarthestMotion {
+                    deviation,
+                    kind_text,
+                    point_and_speed: point_and_speed(),
+                });
             }
         }
     }
@@ -145,11 +156,13 @@ impl FarthestByClass {
         let mut lines = Vec::new();
         for (class, motions) in MOTION_CLASSES.iter().zip(&self.0) {
             for (name, motion) in CHANNELS.iter().zip(motions) {
-                let Some(FarthestMotion { deviation, kind_text, at }) = motion else { continue };
+                let Some(FarthestMotion { deviation, kind_text, point_and_speed }) = motion else {
+                    continue;
+                };
                 let name = name.replace('_', " ");
-                let at = places::point_text(axes, at);
+                let point_text = places::point_text(axes, point_and_speed);
                 let mrad = 1e3 * deviation;
-                let sentence = format!("{name} {mrad:.1} mrad, {kind_text}, at {at}");
+                let sentence = format!("{name} {mrad:.1} mrad, {kind_text}, at {point_text}");
                 lines.push((class.line, sentence + class.remark));
             }
         }
@@ -210,16 +223,19 @@ fn kick_sentences(file: &ParquetFile, axes: &[String], listed: &[MotionLine]) ->
     let Some(max_kick) = search["kick_rad_per_s"].as_f64() else { return Vec::new() };
     let mut lines = Vec::new();
     for motions in listed.chunk_by(|a, b| a.point_and_speed == b.point_and_speed) {
-        let at = places::point_text(axes, &motions[0].point_and_speed);
+        let point_and_speed = places::point_text(axes, &motions[0].point_and_speed);
         let other_motions = motions.iter().filter(|motion| motion.motion > 0.0);
         let kicks = other_motions.map(|motion| motion.least_kick).filter(|kick| kick.is_finite());
         if !motions[0].is_found() {
             continue;
         }
         lines.push(match kicks.reduce(f64::min) {
-            Some(kick) => format!("a kick of {kick:.2} rad/s leads elsewhere at {at}"),
+            Some(kick) => format!("a kick of {kick:.2} rad/s leads elsewhere at {point_and_speed}"),
             None => {
-                format!("no push up to {max_kick} rad/s that was tried leads elsewhere at {at}")
+                format!(
+                    "no push up to {max_kick} rad/s that was tried leads elsewhere at \
+                     {point_and_speed}"
+                )
             }
         });
     }

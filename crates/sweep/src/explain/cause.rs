@@ -51,22 +51,25 @@ pub(super) fn find_cause<'p>(
 ) -> Option<Cause> {
     let (position, _) = swept.verdict.greatest?;
     let channel = swept.channels[position].index();
-    let run = |model| {
+    let record_history = |model| {
         history(model, &Method::rk4(step_s), point, &InitialDeviation::default(), INTERVAL_S)
     };
-    let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(run);
-    let value = |history: &History<'_>, k: usize| Some(history.instant(k)?.channels[channel]);
-    let count = nonlinear.len().min(linear.len());
-    let values: Option<Vec<[f64; 2]>> =
-        (0..count).map(|k| Some([value(&nonlinear, k)?, value(&linear, k)?])).collect();
+    let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(record_history);
+    let channel_value =
+        |history: &History<'_>, k: usize| Some(history.instant(k)?.channels[channel]);
+    let instant_count = nonlinear.len().min(linear.len());
+    let values: Option<Vec<[f64; 2]>> = (0..instant_count)
+        .map(|k| Some([channel_value(&nonlinear, k)?, channel_value(&linear, k)?]))
+        .collect();
     let values = values?;
     let amplitude = *swept.amplitudes[1].get(position)?;
     let index = |time_s: f64| (time_s / INTERVAL_S) as usize;
-    let window = index(swept.window_s[0])..(index(swept.window_s[1]) + 1).min(count);
-    let times_s = (0..count).map(|k| k as f64 * INTERVAL_S);
+    let window = index(swept.window_s[0])..(index(swept.window_s[1]) + 1).min(instant_count);
+    let times_s = (0..instant_count).map(|k| k as f64 * INTERVAL_S);
     let speeds_rpm: Vec<f64> = spin.speeds_rpm(times_s).collect();
-    let passage_growths: Vec<PassageGrowth> =
-        passages.map(|(passage, growths)| passage_growth(passage, growths, &speeds_rpm)).collect();
+    let passage_growths: Vec<PassageGrowth> = passages
+        .map(|(passage, growths)| find_passage_growth(passage, growths, &speeds_rpm))
+        .collect();
     let limit = swept.limits.upper;
     let remainder =
         remove_growth(&values, &passage_growths, window, (amplitude, limit), has_passed)?;
@@ -83,15 +86,19 @@ pub(super) fn find_cause<'p>(
 ///
 /// The disturbance at the entry is the greatest difference of the models in the turn before it, or
 /// in the first turn of a run that begins in the tongue.
-fn passage_growth(passage: &Passage, growths: &[[f64; 2]], speeds_rpm: &[f64]) -> PassageGrowth {
+fn find_passage_growth(
+    passage: &Passage,
+    growths: &[[f64; 2]],
+    speeds_rpm: &[f64],
+) -> PassageGrowth {
     let [from_s, to_s] = passage.interval_s;
-    let last = speeds_rpm.len().saturating_sub(1);
-    let entry = ((from_s / INTERVAL_S) as usize).min(last);
-    let turn_s = 60.0 / speeds_rpm.get(entry).map_or(1.0, |rpm| rpm.abs().max(1.0));
-    let turn = (turn_s / INTERVAL_S).ceil() as usize;
-    let entry_instants = match entry.checked_sub(turn) {
-        Some(before) => before..=entry,
-        None => 0..=turn.min(last),
+    let last_index = speeds_rpm.len().saturating_sub(1);
+    let entry_index = ((from_s / INTERVAL_S) as usize).min(last_index);
+    let turn_s = 60.0 / speeds_rpm.get(entry_index).map_or(1.0, |rpm| rpm.abs().max(1.0));
+    let instants_per_turn = (turn_s / INTERVAL_S).ceil() as usize;
+    let entry_instants = match entry_index.checked_sub(instants_per_turn) {
+        Some(before) => before..=entry_index,
+        None => 0..=instants_per_turn.min(last_index),
     };
     let mut sum = 0.0;
     let e_folds = speeds_rpm.iter().enumerate().map(|(k, rpm)| {
@@ -136,14 +143,14 @@ fn remove_growth(
     has_passed: bool,
 ) -> Option<Remainder> {
     let difference = |k: usize| values.get(k).map_or(0.0, |[a, b]| (a - b).abs());
-    let entered: Vec<(f64, &[f64])> = passage_growths
+    let entered_tongues: Vec<(f64, &[f64])> = passage_growths
         .iter()
         .map(|growth| {
             let disturbance = growth.entry_instants.clone().map(difference).fold(0.0, f64::max);
             (disturbance, growth.e_folds.as_slice())
         })
         .collect();
-    let e_folds = |k: usize| -> f64 { entered.iter().map(|(_, e_folds)| e_folds[k]).sum() };
+    let e_folds = |k: usize| -> f64 { entered_tongues.iter().map(|(_, e_folds)| e_folds[k]).sum() };
     let deviation_without = |k: usize| -> f64 {
         let [nonlinear, linear] = values[k];
         let difference = difference(k);
@@ -152,18 +159,19 @@ fn remove_growth(
         }
         let mut added_share = -(-e_folds(k)).exp_m1();
         if !has_passed {
-            let added = |(entry, e_folds): &(f64, &[f64])| entry * e_folds[k].exp_m1();
-            let added: f64 = entered.iter().map(added).sum();
-            added_share = added_share.min(added / difference);
+            let added_by_tongue = |(entry, e_folds): &(f64, &[f64])| entry * e_folds[k].exp_m1();
+            let added_by_tongue: f64 = entered_tongues.iter().map(added_by_tongue).sum();
+            added_share = added_share.min(added_by_tongue / difference);
         }
         (linear + (nonlinear - linear) * (1.0 - added_share)).abs()
     };
     let deviation = |k: &usize| values[*k][0].abs();
-    let greatest = window.clone().max_by(|a, b| deviation(a).total_cmp(&deviation(b)))?;
-    let first = window.clone().find(|k| deviation(k) > limit * amplitude).unwrap_or(greatest);
+    let greatest_instant = window.clone().max_by(|a, b| deviation(a).total_cmp(&deviation(b)))?;
+    let first_beyond_limit =
+        window.clone().find(|k| deviation(k) > limit * amplitude).unwrap_or(greatest_instant);
     let amplitude_without = window.map(deviation_without).fold(0.0, f64::max);
     let ratio_without = amplitude_without / amplitude;
-    Some(Remainder { first, e_folds: e_folds(greatest), ratio_without })
+    Some(Remainder { first: first_beyond_limit, e_folds: e_folds(greatest_instant), ratio_without })
 }
 
 #[cfg(test)]
@@ -215,33 +223,33 @@ mod tests {
     #[test]
     fn a_tongue_after_the_deviation_is_no_cause() {
         let values = values(growing_difference(0.2, 300, 600, 3.0));
-        let without = ratio_without(&values, &[tongue(700, 900, 3.0)]);
-        assert!(without > 3.0, "{without}");
+        let ratio = ratio_without(&values, &[tongue(700, 900, 3.0)]);
+        assert!(ratio > 3.0, "{ratio}");
     }
 
     /// The difference grows by 3 e-folds, of which only 0.07 are in the tongue.
     #[test]
     fn a_tongue_with_little_growth_is_no_cause() {
         let values = values(growing_difference(0.2, 300, 600, 3.0));
-        let without = ratio_without(&values, &[tongue(300, 400, 0.07)]);
-        assert!(without > 3.0, "{without}");
+        let ratio = ratio_without(&values, &[tongue(300, 400, 0.07)]);
+        assert!(ratio > 3.0, "{ratio}");
     }
 
     /// A deviation that decays after the tongue is still due to the tongue.
     #[test]
     fn a_deviation_that_decays_after_a_tongue_is_due_to_it() {
-        let grown = growing_difference(0.5, 200, 400, 3.0);
-        let values = values(|k| grown(k) * (-0.005 * (k.max(400) - 400) as f64).exp());
-        let without = ratio_without(&values, &[tongue(200, 400, 3.0)]);
-        assert!((1.0..1.6).contains(&without), "{without}");
+        let difference = growing_difference(0.5, 200, 400, 3.0);
+        let values = values(|k| difference(k) * (-0.005 * (k.max(400) - 400) as f64).exp());
+        let ratio = ratio_without(&values, &[tongue(200, 400, 3.0)]);
+        assert!((1.0..1.6).contains(&ratio), "{ratio}");
     }
 
     /// A tongue that is passed with a small difference does not cause a later deviation.
     #[test]
     fn a_deviation_that_arises_after_a_tongue_is_not_due_to_it() {
         let values = values(|k| if k < 600 { 0.01 } else { 4.0 });
-        let without = ratio_without(&values, &[tongue(200, 400, 3.0)]);
-        assert!(without > 4.0, "{without}");
+        let ratio = ratio_without(&values, &[tongue(200, 400, 3.0)]);
+        assert!(ratio > 4.0, "{ratio}");
     }
 
     /// A deviation that has passed through a tongue may grow further after it.
@@ -265,7 +273,7 @@ mod tests {
         let values = values(|k| first(k) * second(k));
         let tongues = [tongue(100, 300, 1.7), tongue(400, 600, 1.7)];
         assert!(ratio_without(&values, &tongues[..1]) > 2.0);
-        let without = ratio_without(&values, &tongues);
-        assert!((1.0..1.2).contains(&without), "{without}");
+        let ratio = ratio_without(&values, &tongues);
+        assert!((1.0..1.2).contains(&ratio), "{ratio}");
     }
 }

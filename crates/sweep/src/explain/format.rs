@@ -97,13 +97,13 @@ const fn direction_prefix(is_backward: bool) -> &'static str {
 fn describe_stability(explanation: &Explanation, scan: &SpeedScan) -> String {
     let [from, to] = [scan.speeds.from, scan.speeds.to].map(decimal);
     let count = scan.speeds.values().len();
-    let missing = scan.without_response;
-    let unknown = format!(
-        "at {missing} of {count} speeds from {from} to {to} rpm no periodic response was found; \
-         `sweep dwell` finds the motions there"
+    let without_response = scan.without_response;
+    let unknown_text = format!(
+        "at {without_response} of {count} speeds from {from} to {to} rpm no periodic response was \
+         found; `sweep dwell` finds the motions there"
     );
-    if missing == count {
-        return unknown;
+    if without_response == count {
+        return unknown_text;
     }
     let tongues =
         explanation.tongues.iter().filter(|(tongue, _)| tongue.is_backward == scan.is_backward);
@@ -112,17 +112,19 @@ fn describe_stability(explanation: &Explanation, scan: &SpeedScan) -> String {
         let bands = describe_bands(ends.into_iter());
         let unstable =
             format!("the periodic response is unstable in {bands} from {from} to {to} rpm");
-        return if missing == 0 {
+        return if without_response == 0 {
             format!("{unstable}:")
         } else {
-            format!("{unstable}; {unknown}:")
+            format!("{unstable}; {unknown_text}:")
         };
     }
-    if missing == 0 {
+    if without_response == 0 {
         return format!("the periodic response is stable at every speed from {from} to {to} rpm");
     }
-    let known = count - missing;
-    format!("the periodic response is stable at {known} of the speeds looked at; {unknown}")
+    let with_response = count - without_response;
+    format!(
+        "the periodic response is stable at {with_response} of the speeds looked at; {unknown_text}"
+    )
 }
 
 /// Returns a sentence on the speeds (rpm) at which the response is not on the curve of a run-up.
@@ -148,12 +150,12 @@ fn describe_bands(ends: impl ExactSizeIterator<Item = [TongueEnd; 2]>) -> String
     }
 }
 
-fn milli(value: f64, channel: Channel) -> String {
-    format!("{} m{}", significant(1e3 * value), channel.unit())
+fn format_thousandths(value: f64, channel: Channel) -> String {
+    format!("{} m{}", format_significant(1e3 * value), channel.unit())
 }
 
 /// Returns a number with three significant digits.
-fn significant(value: f64) -> String {
+fn format_significant(value: f64) -> String {
     let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
     if !(-3.0..6.0).contains(&magnitude) {
         return format!("{value:.2e}");
@@ -164,26 +166,27 @@ fn significant(value: f64) -> String {
 fn push_verdict(text: &mut String, swept: &SweptResult) {
     let [from, to] = swept.window_s.map(decimal);
     let Some((position, ratio)) = swept.verdict.greatest else {
-        let when = swept.fail_time_s.map_or(String::new(), |at| format!(" at {at:.3} s"));
-        let why = match swept.status {
+        let fail_time_text = swept.fail_time_s.map_or(String::new(), |at| format!(" at {at:.3} s"));
+        let failure_text = match swept.status {
             "ok" => "every linear amplitude is zero".to_owned(),
-            status => format!("the run ends as `{status}`{when}"),
+            status => format!("the run ends as `{status}`{fail_time_text}"),
         };
-        push_line(text, "swept", format!("no ratio is defined: {why}"));
+        push_line(text, "swept", format!("no ratio is defined: {failure_text}"));
         return;
     };
     let channel = swept.channels[position];
-    let word = if swept.verdict.reliable == Some(true) { "reliable" } else { "not reliable" };
+    let verdict_text =
+        if swept.verdict.reliable == Some(true) { "reliable" } else { "not reliable" };
     let amplitudes: Vec<String> = swept
         .amplitudes
         .iter()
-        .filter_map(|model| model.get(position).map(|value| milli(*value, channel)))
+        .filter_map(|model| model.get(position).map(|value| format_thousandths(*value, channel)))
         .collect();
     let words = format!(
-        "the linear model is {word}: the greatest ratio is that of {}, where the nonlinear \
+        "the linear model is {verdict_text}: the greatest ratio is that of {}, where the nonlinear \
          amplitude is {} times the linear one ({} from {from} to {to} s); {}",
         channel.name(),
-        significant(ratio),
+        format_significant(ratio),
         amplitudes.join(" against "),
         match (decimal(swept.limits.upper), swept.limits.lower) {
             (most, None) => format!("the limit is {most}"),
@@ -192,18 +195,18 @@ fn push_verdict(text: &mut String, swept: &SweptResult) {
     );
     push_line(text, "swept", words);
     if over_estimates(swept) {
-        let below = format_number(swept.limits.over_estimate());
-        let words = format!("the linear model over-estimates: a ratio is below {below}");
+        let limit_text = format_number(swept.limits.over_estimate());
+        let words = format!("the linear model over-estimates: a ratio is below {limit_text}");
         push_line(text, "too high", words);
     }
     let ratios = swept.channels.iter().zip(&swept.verdict.ratios);
-    let others = ratios.filter(|(other, _)| **other != channel).map(|(other, ratio)| {
-        let ratio = ratio.map_or("none".to_owned(), significant);
+    let other_ratios = ratios.filter(|(other, _)| **other != channel).map(|(other, ratio)| {
+        let ratio = ratio.map_or("none".to_owned(), format_significant);
         format!("{} {ratio}", other.name())
     });
-    let others: Vec<String> = others.collect();
-    if !others.is_empty() {
-        push_line(text, "ratios", others.join(", "));
+    let other_ratios: Vec<String> = other_ratios.collect();
+    if !other_ratios.is_empty() {
+        push_line(text, "ratios", other_ratios.join(", "));
     }
 }
 
@@ -236,13 +239,18 @@ fn push_tongue(
     let direction = direction_prefix(tongue.is_backward);
     let words = format!("{direction}{from:.2} to {to:.2} rpm: {growth}{}", describe_ends(tongue));
     push_line(text, "tongue", words);
-    let low = response.frequency_cpm();
-    let high = response.speed_rpm - response.frequency_cpm();
+    let low_frequency_cpm = response.frequency_cpm();
+    let high_frequency_cpm = response.speed_rpm - response.frequency_cpm();
     let lines = match response.kind() {
-        StabilityKind::PeriodDoubling => format!("at half the speed, {low:.2} per minute"),
+        StabilityKind::PeriodDoubling => {
+            format!("at half the speed, {low_frequency_cpm:.2} per minute")
+        }
         StabilityKind::Fold => "none beside those of the turn".to_owned(),
         StabilityKind::QuasiPeriodic | StabilityKind::Stable => {
-            format!("at {low:.2} and {high:.2} per minute, which add up to the speed")
+            format!(
+                "at {low_frequency_cpm:.2} and {high_frequency_cpm:.2} per minute, which add up \
+                 to the speed"
+            )
         }
     };
     push_line(text, "lines", lines);
@@ -279,22 +287,22 @@ fn push_tongue(
 fn describe_ending(motion: &Attractor) -> String {
     let amplitudes = [Channel::TubYaw, Channel::TubPitch].map(|channel| {
         let name = channel.name().replace('_', " ");
-        format!("{name} {}", milli(motion.peaks[channel.index()], channel))
+        format!("{name} {}", format_thousandths(motion.peaks[channel.index()], channel))
     });
-    let after = format!("after {:.0} s", motion.time_s);
+    let time_text = format!("after {:.0} s", motion.time_s);
     let kind = match (motion.motion_kind, motion.status) {
         (Some(MotionKind::Periodic { turns: 1 }), _) => "repeating every turn".to_owned(),
         (Some(MotionKind::Periodic { turns }), _) => format!("repeating every {turns} turns"),
         (Some(MotionKind::QuasiPeriodic { .. }), _) => "with two frequencies".to_owned(),
         (Some(MotionKind::Chaotic), _) => "chaotic".to_owned(),
         (None, AttractorStatus::LeftRange { .. }) => {
-            return format!("beyond the model's range, {after}");
+            return format!("beyond the model's range, {time_text}");
         }
         (None, AttractorStatus::Transient { life_s }) => {
             format!("a transient that lasts {life_s:.0} s on average and then ends elsewhere")
         }
         (None, AttractorStatus::Ok | AttractorStatus::NotSettled) => {
-            format!("not settled {after}")
+            format!("not settled {time_text}")
         }
     };
     format!("{}, {kind}, if the drum is held there (`sweep dwell`)", amplitudes.join(", "))
@@ -303,13 +311,13 @@ fn describe_ending(motion: &Attractor) -> String {
 fn describe_ends(tongue: &Tongue) -> String {
     let mut words = String::new();
     for (rpm, end) in tongue.range_rpm.iter().zip(tongue.ends) {
-        let why = match end {
+        let reason = match end {
             TongueEnd::Edge => continue,
             TongueEnd::OtherKind => "the kind of growth changes",
             TongueEnd::Range => "the speeds looked at end, but the growth does not",
             TongueEnd::NoResponse => "no response is found beyond",
         };
-        words += &format!("; at {rpm:.2} rpm {why}");
+        words += &format!("; at {rpm:.2} rpm {reason}");
     }
     words
 }
@@ -329,32 +337,36 @@ fn describe_resonance(resonance: &ModeResonance, speed_rpm: f64) -> String {
         1 => "the speed".to_owned(),
         order => format!("{order} times the speed"),
     };
-    let multiple = f64::from(resonance.order) * speed_rpm;
-    let miss = 100.0 * (resonance.sum_cpm / multiple - 1.0);
+    let multiple_cpm = f64::from(resonance.order) * speed_rpm;
+    let deviation_percent = 100.0 * (resonance.sum_cpm / multiple_cpm - 1.0);
     let sum = format_sum(resonance);
-    let cpm = resonance.sum_cpm;
-    format!("{sum} = {cpm:.2} per minute, against {target}, {multiple:.2} ({miss:+.2} %)")
+    let sum_cpm = resonance.sum_cpm;
+    format!(
+        "{sum} = {sum_cpm:.2} per minute, against {target}, {multiple_cpm:.2} \
+         ({deviation_percent:+.2} %)"
+    )
 }
 
 fn push_passage(text: &mut String, passage: &Passage) {
     let [from, to] = passage.interval_s;
-    let cut = if passage.ends_inside { ", where the run ends" } else { "" };
-    let folds = passage.e_folds;
-    let factor = significant(passage.e_folds.exp());
-    let mut words =
-        format!("from {from:.3} to {to:.3} s{cut}: {folds:.2} e-folds, a factor of {factor}");
+    let end_note = if passage.ends_inside { ", where the run ends" } else { "" };
+    let e_folds = passage.e_folds;
+    let factor = format_significant(passage.e_folds.exp());
+    let mut words = format!(
+        "from {from:.3} to {to:.3} s{end_note}: {e_folds:.2} e-folds, a factor of {factor}"
+    );
     match &passage.effect {
         Err(LeftRangeError { time_s }) => {
             words += &format!("; the run leaves the model's range at {time_s:.3} s");
         }
         Ok(effect) => {
-            let amplification = significant(effect.amplification);
+            let amplification = format_significant(effect.amplification);
             words += &format!(
                 "; a small disturbance of the actual run grows at most {amplification}-fold"
             );
             if let [Some(before), Some(after)] = effect.departure_j {
                 let numbers = [1e3 * before, 1e3 * after, (after / before).sqrt()];
-                let [before, after, factor] = numbers.map(significant);
+                let [before, after, factor] = numbers.map(format_significant);
                 words += &format!(
                     "; the run's own departure from the periodic response changes from {before} \
                      to {after} mJ, a factor of {factor} in amplitude"
@@ -406,39 +418,40 @@ fn push_conclusion(text: &mut String, explanation: &Explanation) {
             None => "put on the periodic response as it enters each tongue, the run has no ratio"
                 .to_owned(),
             Some((ratio, channel)) => {
-                let same = format!(
+                let verdict_text = format!(
                     "the same run, put on the periodic response as it enters each tongue, has a \
                      ratio of {} in {}",
-                    significant(ratio),
+                    format_significant(ratio),
                     channel.name()
                 );
                 let growth = describe_growth(explanation.cause.as_ref());
                 let is_cause = explanation.cause.is_some_and(|cause| cause.is_enough);
                 match (is_within, ratio < swept.limits.upper) {
                     (false, true) if is_cause => format!(
-                        "{same}, within the limit: the verdict is due to motion left over from \
-                         before the tongue, and would change with the ramp; {growth}"
+                        "{verdict_text}, within the limit: the verdict is due to motion left over \
+                         from before the tongue, and would change with the ramp; {growth}"
                     ),
                     (false, true) => format!(
-                        "{same}, within the limit: the verdict is due to motion left over from \
-                         before the tongue, but the tongues are not what made it large: {growth}"
+                        "{verdict_text}, within the limit: the verdict is due to motion left over \
+                         from before the tongue, but the tongues are not what made it large: \
+                              {growth}"
                     ),
                     (false, false) if is_cause => format!(
-                        "{same}, still beyond the limit: the tongues alone cause the verdict, \
-                         without motion left over from earlier resonances; {growth}"
+                        "{verdict_text}, still beyond the limit: the tongues alone cause the \
+                         verdict, without motion left over from earlier resonances; {growth}"
                     ),
                     (false, false) => format!(
-                        "{same}, still beyond the limit, but the tongues are not its cause: \
-                         {growth}; the linear model fails on the nonlinear motion itself"
+                        "{verdict_text}, still beyond the limit, but the tongues are not its \
+                         cause: {growth}; the linear model fails on the nonlinear motion itself"
                     ),
                     (true, true) => format!(
-                        "{same}: the motion keeps the limit because the ramp leaves the tongue \
-                         before a disturbance has grown; at a speed held inside a tongue it would \
-                         not"
+                        "{verdict_text}: the motion keeps the limit because the ramp leaves the \
+                         tongue before a disturbance has grown; at a speed held inside a tongue \
+                         it would not"
                     ),
                     (true, false) => format!(
-                        "{same}, beyond the limit: motion left over from earlier resonances \
-                         happens to reduce the deviation"
+                        "{verdict_text}, beyond the limit: motion left over from earlier \
+                         resonances happens to reduce the deviation"
                     ),
                 }
             }
@@ -456,7 +469,7 @@ fn describe_growth(cause: Option<&Cause>) -> String {
         cause.time_s,
         cause.speed_rpm,
         cause.e_folds,
-        significant(cause.ratio_without)
+        format_significant(cause.ratio_without)
     )
 }
 
@@ -467,9 +480,11 @@ fn push_limitations(text: &mut String, explanation: &Explanation) {
          boundary is not the edge of a tongue",
         explanation.scans.first().map_or_else(String::new, |scan| decimal(scan.speeds.step))
     );
-    let without: usize = explanation.scans.iter().map(|scan| scan.without_response).sum();
-    if without > 0 {
-        words += &format!(". No response was found at {without} of the speeds, which are left out");
+    let without_response: usize = explanation.scans.iter().map(|scan| scan.without_response).sum();
+    if without_response > 0 {
+        words += &format!(
+            ". No response was found at {without_response} of the speeds, which are left out"
+        );
     }
     push_line(text, "limits", words);
 }
@@ -480,8 +495,12 @@ mod tests {
 
     #[test]
     fn numbers_have_three_significant_digits() {
-        let shown = [0.0, 1.0, 12.345, 123.45, 0.01234, 1234.5, 1e-5, 1e7].map(significant);
-        assert_eq!(shown, ["0.00", "1.00", "12.3", "123", "0.0123", "1234", "1.00e-5", "1.00e7"]);
+        let formatted =
+            [0.0, 1.0, 12.345, 123.45, 0.01234, 1234.5, 1e-5, 1e7].map(format_significant);
+        assert_eq!(
+            formatted,
+            ["0.00", "1.00", "12.3", "123", "0.0123", "1234", "1.00e-5", "1.00e7"]
+        );
     }
 
     #[test]
@@ -505,12 +524,19 @@ mod tests {
     #[test]
     fn a_band_continues_where_the_kind_of_growth_changes() {
         let words = |ends: &[[TongueEnd; 2]]| describe_bands(ends.iter().copied());
-        let edge = TongueEnd::Edge;
-        let other = TongueEnd::OtherKind;
-        assert_eq!(words(&[[edge, edge]]), "one band of speed (a \"tongue\")");
-        assert_eq!(words(&[[edge, edge], [edge, edge]]), "2 bands of speed (\"tongues\")");
+        let unstable_edge = TongueEnd::Edge;
+        let other_kind = TongueEnd::OtherKind;
+        assert_eq!(words(&[[unstable_edge, unstable_edge]]), "one band of speed (a \"tongue\")");
         assert_eq!(
-            words(&[[edge, edge], [edge, other], [other, edge]]),
+            words(&[[unstable_edge, unstable_edge], [unstable_edge, unstable_edge]]),
+            "2 bands of speed (\"tongues\")"
+        );
+        assert_eq!(
+            words(&[
+                [unstable_edge, unstable_edge],
+                [unstable_edge, other_kind],
+                [other_kind, unstable_edge]
+            ]),
             "2 bands of speed, with 3 kinds of growth (\"tongues\"),"
         );
     }

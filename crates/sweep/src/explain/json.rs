@@ -13,7 +13,7 @@ pub(crate) fn to_json(explanation: &Explanation) -> Value {
         .tongues
         .iter()
         .map(|(tongue, passages)| tongue_json(tongue, passages, &explanation.swept));
-    let without = explanation.without_departures.as_ref().map(|entered| match entered {
+    let without_departures = explanation.without_departures.as_ref().map(|entered| match entered {
         Ok(amplitudes) => {
             let greatest = explanation.swept.greatest_ratio(amplitudes);
             json!({
@@ -35,7 +35,7 @@ pub(crate) fn to_json(explanation: &Explanation) -> Value {
         "speeds_backwards": scan(true),
         "profile_rpm": explanation.profile_rpm,
         "tongues": tongues.collect::<Value>(),
-        "entered_on_responses": without,
+        "entered_on_responses": without_departures,
         "deviation": explanation.cause.map(|cause| json!({
             "time_s": cause.time_s,
             "speed_rpm": cause.speed_rpm,
@@ -100,9 +100,9 @@ fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Va
         "growth_at_rpm": response.speed_rpm,
         "frequency_cpm": response.frequency_cpm(),
         "other_frequency_cpm": response.speed_rpm - response.frequency_cpm(),
-        "modes": response.participating_modes.iter().map(participant).collect::<Value>(),
+        "modes": response.participating_modes.iter().map(participant_json).collect::<Value>(),
         "resonance": tongue.resonance,
-        "crossed": passages.iter().map(passage).collect::<Value>(),
+        "crossed": passages.iter().map(passage_json).collect::<Value>(),
         "ends_in": tongue.ending.as_ref().map(|motion| json!({
             "kind": Attractor::KIND_NAMES[motion.kind()],
             "amplitudes": by_channel(swept, &swept.plan_channels(&motion.peaks)),
@@ -112,7 +112,7 @@ fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Va
     })
 }
 
-fn participant(mode: &ParticipatingMode) -> Value {
+fn participant_json(mode: &ParticipatingMode) -> Value {
     json!({
         "mode": mode.mode,
         "name": mode.motion.to_string(),
@@ -121,13 +121,13 @@ fn participant(mode: &ParticipatingMode) -> Value {
     })
 }
 
-fn passage(passage: &Passage) -> Value {
-    let effect = passage.effect.as_ref();
+fn passage_json(passage_json: &Passage) -> Value {
+    let effect = passage_json.effect.as_ref();
     json!({
-        "from_s": passage.interval_s[0],
-        "to_s": passage.interval_s[1],
-        "is_cut_by_the_end": passage.ends_inside,
-        "e_folds": passage.e_folds,
+        "from_s": passage_json.interval_s[0],
+        "to_s": passage_json.interval_s[1],
+        "is_cut_by_the_end": passage_json.ends_inside,
+        "e_folds": passage_json.e_folds,
         "amplification": effect.ok().map(|effect| effect.amplification),
         "departure_j": effect.ok().map(|effect| effect.departure_j),
         "left_range_at_s": effect.err().map(|left| left.time_s),

@@ -16,7 +16,7 @@ const BISECTIONS: usize = 50;
 const INTEGRATION_PARTS: usize = 1000;
 
 /// Returns the lowest and the greatest speed (rpm) up to the run's end, negative backwards.
-pub(super) fn range(spin: &Spin, end_s: f64) -> [f64; 2] {
+pub(super) fn speed_range(spin: &Spin, end_s: f64) -> [f64; 2] {
     let mut lowest_rpm = f64::INFINITY;
     let mut greatest_rpm = f64::NEG_INFINITY;
     for speed_rpm in spin.speeds_rpm(instants_s(spin, end_s)) {
@@ -48,16 +48,16 @@ pub(super) fn times_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> 
     let is_inside = |time_s: f64| (low..=high).contains(&speed_rpm(time_s));
     let times = instants_s(spin, end_s);
     let mut intervals: Vec<[f64; 2]> = Vec::new();
-    let mut since_s = is_inside(0.0).then_some(0.0);
+    let mut entry_s = is_inside(0.0).then_some(0.0);
     for pair in times.windows(2) {
         let [from_s, to_s] = [pair[0], pair[1]];
-        let was_inside = since_s.is_some();
+        let was_inside = entry_s.is_some();
         let ends_inside = is_inside(to_s);
         // A ramp may pass the whole band between two instants.
         let from_rpm = speed_rpm(from_s);
         let to_rpm = speed_rpm(to_s);
-        let passes = !was_inside && !ends_inside && (from_rpm < low) != (to_rpm < low);
-        if passes {
+        let passes_band = !was_inside && !ends_inside && (from_rpm < low) != (to_rpm < low);
+        if passes_band {
             let is_rising = from_rpm < to_rpm;
             let edges_rpm = if is_rising { [low, high] } else { [high, low] };
             intervals.push(edges_rpm.map(|edge_rpm| {
@@ -66,13 +66,13 @@ pub(super) fn times_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> 
             }));
         } else if was_inside != ends_inside {
             let edge_s = bisect_s(&|time_s| is_inside(time_s) == was_inside, from_s, to_s);
-            match since_s.take() {
-                Some(since_s) => intervals.push([since_s, edge_s]),
-                None => since_s = Some(edge_s),
+            match entry_s.take() {
+                Some(entry_s) => intervals.push([entry_s, edge_s]),
+                None => entry_s = Some(edge_s),
             }
         }
     }
-    intervals.extend(since_s.map(|since_s| [since_s, end_s]));
+    intervals.extend(entry_s.map(|entry_s| [entry_s, end_s]));
     intervals.retain(|[from_s, to_s]| to_s > from_s);
     intervals
 }
@@ -97,8 +97,8 @@ pub(super) fn e_folds(spin: &Spin, [from_s, to_s]: [f64; 2], growths: &[[f64; 2]
 
 /// Returns the growth (1/s) at a speed (rpm), by linear interpolation.
 pub(super) fn growth_at(growths: &[[f64; 2]], speed_rpm: f64) -> f64 {
-    let above = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
-    match (above.checked_sub(1).map(|below| growths[below]), growths.get(above)) {
+    let next_node = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
+    match (next_node.checked_sub(1).map(|below| growths[below]), growths.get(next_node)) {
         (Some([low_rpm, low_growth]), Some([high_rpm, high_growth])) if high_rpm > &low_rpm => {
             low_growth + (high_growth - low_growth) * (speed_rpm - low_rpm) / (high_rpm - low_rpm)
         }
@@ -119,21 +119,25 @@ mod tests {
         }
     }
 
-    fn close(a: f64, b: f64) -> bool {
+    fn is_nearly_equal(a: f64, b: f64) -> bool {
         (a - b).abs() < 1e-9 * b.abs().max(1.0)
     }
 
     #[test]
     fn a_band_is_crossed_up_and_down() {
         let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
-        let inside = times_inside_s(&spin, 100.0, [140.0, 210.0]);
-        assert_eq!(inside.len(), 2);
-        for (found, meant) in inside.iter().flatten().zip([20.0, 30.0, 70.0, 80.0]) {
-            assert!(close(*found, meant), "{found} {meant}");
+        let intervals_s = times_inside_s(&spin, 100.0, [140.0, 210.0]);
+        assert_eq!(intervals_s.len(), 2);
+        for (found, meant) in intervals_s.iter().flatten().zip([20.0, 30.0, 70.0, 80.0]) {
+            assert!(is_nearly_equal(*found, meant), "{found} {meant}");
         }
         // A run that ends inside the band, and one that begins inside.
-        let inside = times_inside_s(&spin, 25.0, [140.0, 210.0]);
-        assert!(inside.len() == 1 && close(inside[0][0], 20.0) && inside[0][1] == 25.0);
+        let intervals_s = times_inside_s(&spin, 25.0, [140.0, 210.0]);
+        assert!(
+            intervals_s.len() == 1
+                && is_nearly_equal(intervals_s[0][0], 20.0)
+                && intervals_s[0][1] == 25.0
+        );
         assert_eq!(times_inside_s(&table(&[(0.0, 200.0)]), 9.0, [140.0, 210.0]), [[0.0, 9.0]]);
         assert!(times_inside_s(&spin, 100.0, [400.0, 500.0]).is_empty());
     }
@@ -141,10 +145,11 @@ mod tests {
     #[test]
     fn a_band_is_found_even_if_it_is_passed_quickly() {
         let spin = table(&[(0.0, 0.0), (50.0, 0.0), (50.001, 400.0), (70.0, 400.0), (70.01, 0.0)]);
-        let inside = times_inside_s(&spin, 100.0, [100.0, 200.0]);
-        assert_eq!(inside.len(), 2);
-        for (found, meant) in inside.iter().flatten().zip([50.00025, 50.0005, 70.005, 70.0075]) {
-            assert!(close(*found, meant), "{found} {meant}");
+        let intervals_s = times_inside_s(&spin, 100.0, [100.0, 200.0]);
+        assert_eq!(intervals_s.len(), 2);
+        for (found, meant) in intervals_s.iter().flatten().zip([50.00025, 50.0005, 70.005, 70.0075])
+        {
+            assert!(is_nearly_equal(*found, meant), "{found} {meant}");
         }
     }
 
@@ -160,14 +165,14 @@ mod tests {
     #[test]
     fn a_profile_may_turn_both_ways_and_pause() {
         let spin = table(&[(0.0, 0.0), (3.0, 100.0), (6.0, -50.0), (8.0, -50.0), (9.0, 0.0)]);
-        assert_eq!(range(&spin, 12.0), [-50.0, 100.0]);
-        assert_eq!(range(&spin, 3.0), [0.0, 100.0]);
-        let inside = times_inside_s(&spin, 12.0, [-40.0, -25.0]);
-        assert_eq!(inside.len(), 2);
-        for (found, meant) in inside.iter().flatten().zip([5.5, 5.8, 8.2, 8.5]) {
-            assert!(close(*found, meant), "{found} {meant}");
+        assert_eq!(speed_range(&spin, 12.0), [-50.0, 100.0]);
+        assert_eq!(speed_range(&spin, 3.0), [0.0, 100.0]);
+        let intervals_s = times_inside_s(&spin, 12.0, [-40.0, -25.0]);
+        assert_eq!(intervals_s.len(), 2);
+        for (found, meant) in intervals_s.iter().flatten().zip([5.5, 5.8, 8.2, 8.5]) {
+            assert!(is_nearly_equal(*found, meant), "{found} {meant}");
         }
         let growths = [[25.0, 0.5], [40.0, 0.5]];
-        assert!((e_folds(&spin, inside[0], &growths) - 0.15).abs() < 1e-9);
+        assert!((e_folds(&spin, intervals_s[0], &growths) - 0.15).abs() < 1e-9);
     }
 }

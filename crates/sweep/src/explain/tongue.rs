@@ -99,7 +99,7 @@ pub(crate) struct ResponseFinder<'a> {
 
 impl ResponseFinder<'_> {
     /// Follows the curve of responses up to a speed (rpm).
-    pub(crate) fn follow(&mut self, fastest_rpm: f64) {
+    pub(crate) fn follow_curves(&mut self, fastest_rpm: f64) {
         let cancel = Cancel::Flag(self.interrupt.flag());
         self.curves = ResponseCurves::continue_curves(&[(self.point, fastest_rpm)], None, cancel);
     }
@@ -107,13 +107,13 @@ impl ResponseFinder<'_> {
     /// Measures the time (s) of one thread for the response at a speed, by a few of the speeds.
     pub(crate) fn seconds_per_speed(&self, speeds: Speeds) -> f64 {
         let speeds_rpm = speeds.values();
-        let distance = speeds_rpm.len().div_ceil(TIMED_SPEEDS);
-        let timed: Vec<(usize, f64)> =
-            speeds_rpm.iter().step_by(distance).map(|&speed_rpm| (0, speed_rpm)).collect();
+        let stride = speeds_rpm.len().div_ceil(TIMED_SPEEDS);
+        let timed_speeds: Vec<(usize, f64)> =
+            speeds_rpm.iter().step_by(stride).map(|&speed_rpm| (0, speed_rpm)).collect();
         let cancel = Cancel::Flag(self.interrupt.flag());
-        let began = std::time::Instant::now();
-        ResponseCurves::find_at_speeds(&mut self.curves.clone(), &timed, cancel);
-        began.elapsed().as_secs_f64() / timed.len() as f64
+        let start_time = std::time::Instant::now();
+        ResponseCurves::find_at_speeds(&mut self.curves.clone(), &timed_speeds, cancel);
+        start_time.elapsed().as_secs_f64() / timed_speeds.len() as f64
     }
 
     /// Returns the response of a machine that runs up at each speed, if there is one. It uses all
@@ -126,10 +126,11 @@ impl ResponseFinder<'_> {
             if cancel.is_requested() {
                 return vec![None; speeds.len()];
             }
-            let found = ResponseCurves::find_at_speeds(&mut self.curves.clone(), &requests, cancel);
-            (self.count_speeds)(found.len());
-            let first = |answer: Result<Vec<_>, _>| answer.ok()?.into_iter().next();
-            found.into_iter().map(first).collect::<Vec<_>>()
+            let results =
+                ResponseCurves::find_at_speeds(&mut self.curves.clone(), &requests, cancel);
+            (self.count_speeds)(results.len());
+            let first_response = |answer: Result<Vec<_>, _>| answer.ok()?.into_iter().next();
+            results.into_iter().map(first_response).collect::<Vec<_>>()
         };
         let batches: Vec<_> = speeds_rpm.par_chunks(SPEED_BATCH).map(find_batch).collect();
         batches.into_iter().flatten().collect()
@@ -232,38 +233,43 @@ pub(crate) fn find_tongues(
     speeds: Speeds,
 ) -> (Vec<Tongue>, SpeedScan) {
     let responses = finder.find_responses(&speeds.values());
-    let found = || responses.iter().flatten();
-    let on_curve = found().filter(|response| response.is_on_curve);
+    let found_responses = || responses.iter().flatten();
+    let on_curve = found_responses().filter(|response| response.is_on_curve);
     let fold_speeds = on_curve.filter_map(|response| response.fold_speeds_rpm[1]);
     let mut jumps_rpm: Vec<f64> = fold_speeds.filter(|&rpm| rpm <= speeds.to).collect();
     jumps_rpm.dedup();
     let kind = |response: &Option<Response>| response.as_ref().map(Response::kind);
     let mut tongues = Vec::new();
-    let mut next = 0_usize;
+    let mut next_index = 0_usize;
     for same_kind in responses.chunk_by(|a, b| kind(a) == kind(b)) {
-        let before = next.checked_sub(1).map(|last| &responses[last]);
-        next += same_kind.len();
+        let response_before = next_index.checked_sub(1).map(|last| &responses[last]);
+        next_index += same_kind.len();
         let unstable_kind = kind(&same_kind[0]).filter(|kind| *kind != StabilityKind::Stable);
         let Some(unstable_kind) = unstable_kind else { continue };
-        let run: Vec<&Response> = same_kind.iter().flatten().collect();
-        let edge = |inside: &Response, outside: Option<&Option<Response>>| match outside {
+        let unstable_run: Vec<&Response> = same_kind.iter().flatten().collect();
+        let find_edge = |inside: &Response, outside: Option<&Option<Response>>| match outside {
             None => (inside.speed_rpm, TongueEnd::Range),
             Some(None) => (inside.speed_rpm, TongueEnd::NoResponse),
             Some(Some(other)) => {
                 let is_stable = other.kind() == StabilityKind::Stable;
                 let inside = speed_and_growth(inside);
-                let rpm = edge_rpm(finder, unstable_kind, inside, speed_and_growth(other));
+                let rpm = find_edge_rpm(finder, unstable_kind, inside, speed_and_growth(other));
                 (rpm, if is_stable { TongueEnd::Edge } else { TongueEnd::OtherKind })
             }
         };
-        let from = edge(run[0], before);
-        let to = edge(run[run.len() - 1], responses.get(next));
-        tongues.push(tongue(finder, unstable_kind, &run, [from, to]));
+        let lower_edge = find_edge(unstable_run[0], response_before);
+        let upper_edge = find_edge(unstable_run[unstable_run.len() - 1], responses.get(next_index));
+        tongues.push(measure_tongue(
+            finder,
+            unstable_kind,
+            &unstable_run,
+            [lower_edge, upper_edge],
+        ));
     }
     let without_response = responses.iter().filter(|response| response.is_none()).count();
     let exceeded_limit = |response: &Response| Some((response.speed_rpm, response.exceeded_limit?));
-    let exceeded_limits = found().filter_map(exceeded_limit).collect();
-    let off_curve = found().filter(|response| !response.is_on_curve);
+    let exceeded_limits = found_responses().filter_map(exceeded_limit).collect();
+    let off_curve = found_responses().filter(|response| !response.is_on_curve);
     let off_curve_rpm = off_curve.map(|response| response.speed_rpm).collect();
     let is_backward = finder.is_backward;
     let scan = SpeedScan {
@@ -283,37 +289,40 @@ pub(crate) fn find_endings(
     finder: &ResponseFinder<'_>,
     tongues: &[Tongue],
 ) -> Vec<Option<Attractor>> {
-    let dwell = |tongue: &Tongue| HeldSpeed {
+    let held_speed = |measure_tongue: &Tongue| HeldSpeed {
         point: finder.point,
-        speed_rpm: tongue.fastest_response.speed_rpm,
+        speed_rpm: measure_tongue.fastest_response.speed_rpm,
     };
-    let dwells: Vec<HeldSpeed<'_>> = tongues.iter().map(dwell).collect();
-    let responses =
-        tongues.iter().map(|tongue| Ok(vec![tongue.fastest_response.clone()])).collect();
+    let held_speeds: Vec<HeldSpeed<'_>> = tongues.iter().map(held_speed).collect();
+    let responses = tongues
+        .iter()
+        .map(|measure_tongue| Ok(vec![measure_tongue.fastest_response.clone()]))
+        .collect();
     let starts = StartRule { count: 1, ..StartRule::default() };
     let cancel = Cancel::Flag(finder.interrupt.flag());
     let attractors =
-        find_attractors_from_responses(finder.simd, &dwells, responses, &[], &starts, cancel);
-    let first = attractors.into_iter().map(|found| found.ok()?.attractors.into_iter().next());
-    first.collect()
+        find_attractors_from_responses(finder.simd, &held_speeds, responses, &[], &starts, cancel);
+    let first_attractors =
+        attractors.into_iter().map(|found| found.ok()?.attractors.into_iter().next());
+    first_attractors.collect()
 }
 
 /// Returns the tongue of a run of speeds with responses of one kind, between two ends.
-fn tongue(
+fn measure_tongue(
     finder: &ResponseFinder<'_>,
     kind: StabilityKind,
-    run: &[&Response],
-    [from, to]: [(f64, TongueEnd); 2],
+    responses: &[&Response],
+    [lower_edge, upper_edge]: [(f64, TongueEnd); 2],
 ) -> Tongue {
     let mut growths: Vec<[f64; 2]> =
-        run.iter().map(|response| [response.speed_rpm, response.growth_per_s()]).collect();
-    for (rpm, end) in [from, to] {
+        responses.iter().map(|response| [response.speed_rpm, response.growth_per_s()]).collect();
+    for (rpm, end) in [lower_edge, upper_edge] {
         if end == TongueEnd::Edge {
             growths.push([rpm, 0.0]);
         }
     }
     growths.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let fastest_response = fastest_response(finder, kind, run, &growths);
+    let fastest_response = fastest_response(finder, kind, responses, &growths);
     let speed_rpm = fastest_response.speed_rpm;
     let index = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
     if growths.get(index).is_none_or(|[rpm, _]| *rpm != speed_rpm) {
@@ -322,8 +331,8 @@ fn tongue(
     let resonance = nearest_resonance(finder.point, &fastest_response);
     Tongue {
         is_backward: finder.is_backward,
-        range_rpm: [from.0, to.0],
-        ends: [from.1, to.1],
+        range_rpm: [lower_edge.0, upper_edge.0],
+        ends: [lower_edge.1, upper_edge.1],
         growths,
         fastest_response,
         resonance,
@@ -344,23 +353,23 @@ fn speed_and_growth(response: &Response) -> [f64; 2] {
 
 /// Returns trial values between `open` and `closed`, in this order, about the root of the growth.
 /// Each of the two is a value with its growth; the growth is taken as linear between them.
-fn trials_about_root(open: [f64; 2], closed: [f64; 2], tolerance: f64) -> Vec<f64> {
-    let interpolated = (open[1] / (open[1] - closed[1])).clamp(0.0, 1.0);
+fn trials_about_root(inside: [f64; 2], outside: [f64; 2], tolerance: f64) -> Vec<f64> {
+    let interpolated = (inside[1] / (inside[1] - outside[1])).clamp(0.0, 1.0);
     let root = if interpolated.is_nan() { 0.5 } else { interpolated };
-    let distance = closed[0] - open[0];
-    let about_root = ROOT_OFFSETS.map(|offset| root + offset * tolerance / distance.abs());
+    let distance = outside[0] - inside[0];
+    let shares_about_root = ROOT_OFFSETS.map(|offset| root + offset * tolerance / distance.abs());
     let mut shares: Vec<f64> =
-        about_root.into_iter().filter(|share| *share > 0.0 && *share < 1.0).collect();
+        shares_about_root.into_iter().filter(|share| *share > 0.0 && *share < 1.0).collect();
     if shares.len() < ROOT_OFFSETS.len() {
         shares.push(0.5);
         shares.sort_by(f64::total_cmp);
     }
-    shares.into_iter().map(|share| open[0] + share * distance).collect()
+    shares.into_iter().map(|share| inside[0] + share * distance).collect()
 }
 
 /// Returns the speed (rpm) at which a kind of instability ends, between a speed with it and one
 /// without it. Each of the two is a speed with its growth.
-fn edge_rpm(
+fn find_edge_rpm(
     finder: &ResponseFinder<'_>,
     kind: StabilityKind,
     mut inside: [f64; 2],
@@ -389,11 +398,12 @@ fn edge_rpm(
 fn fastest_response(
     finder: &ResponseFinder<'_>,
     kind: StabilityKind,
-    run: &[&Response],
+    responses: &[&Response],
     growths: &[[f64; 2]],
 ) -> Response {
     let by_growth = |a: &&Response, b: &&Response| a.growth_per_s().total_cmp(&b.growth_per_s());
-    let mut fastest: Response = (*run.iter().copied().max_by(by_growth).unwrap_or(run[0])).clone();
+    let mut fastest: Response =
+        (*responses.iter().copied().max_by(by_growth).unwrap_or(responses[0])).clone();
     let index = growths.partition_point(|[rpm, _]| *rpm < fastest.speed_rpm);
     let rpm_at = |k: usize| growths.get(k).map_or(fastest.speed_rpm, |[rpm, _]| *rpm);
     let mut bracket_rpm = [rpm_at(index.saturating_sub(1)), rpm_at(index + 1)];
@@ -417,8 +427,8 @@ fn fastest_response(
 /// one mode.
 fn nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance> {
     let frequencies = |speed_rpm: f64| -> Option<Vec<f64>> {
-        let found = modes(point, 0.0, speed_rpm * core::f64::consts::TAU / 60.0).ok()?;
-        Some(found.modes.iter().map(washer_model::Mode::frequency_rpm).collect())
+        let modes_at_speed = modes(point, 0.0, speed_rpm * core::f64::consts::TAU / 60.0).ok()?;
+        Some(modes_at_speed.modes.iter().map(washer_model::Mode::frequency_rpm).collect())
     };
     let frequencies = frequencies(response.speed_rpm)?;
     let participants: Vec<usize> =
@@ -446,31 +456,31 @@ fn nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance
         ModeResonance { modes: modes.map(|mode| mode + 1), frequencies_cpm, sign, sum_cpm, order }
     };
     let orders = || (1..=MAX_ORDER).filter(is_admitted);
-    let all = pairs.iter().flat_map(|&pair| {
-        let signed =
+    let candidates = pairs.iter().flat_map(|&pair| {
+        let resonances_of_pair =
             [1.0, -1.0].into_iter().flat_map(|sign| orders().map(move |order| (sign, order)));
-        signed.map(move |(sign, order)| resonance(pair, sign, order))
+        resonances_of_pair.map(move |(sign, order)| resonance(pair, sign, order))
     });
     let distance = |resonance: &ModeResonance| {
         let multiple_rpm = f64::from(resonance.order) * response.speed_rpm;
         (resonance.sum_cpm / multiple_rpm - 1.0).abs()
     };
-    let nearest = all.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let nearest = candidates.min_by(|a, b| distance(a).total_cmp(&distance(b)));
     nearest.filter(|nearest| distance(nearest) < MAX_RESONANCE_DISTANCE)
 }
 
 /// Returns the factors to try next, above `open`, which leaves growth, and below `closed`, which
 /// leaves none, once such a factor is known. Each of the two is a factor with the growth that
 /// remains.
-fn trial_factors(open: [f64; 2], closed: Option<[f64; 2]>) -> Vec<f64> {
+fn trial_factors(open_trial: [f64; 2], closed_trial: Option<[f64; 2]>) -> Vec<f64> {
     let above_limit = |[factor, growth]: [f64; 2]| [factor, growth + CLOSED_DECAY_PER_S];
-    match closed {
-        None => {
-            (1..=DAMPING_FACTORS).map(|k| open[0] * DAMPING_FACTOR_RATIO.powi(k as i32)).collect()
-        }
-        Some(closed) => {
-            let tolerance = DAMPING_FACTOR_TOLERANCE * open[0];
-            trials_about_root(above_limit(open), above_limit(closed), tolerance)
+    match closed_trial {
+        None => (1..=DAMPING_FACTORS)
+            .map(|k| open_trial[0] * DAMPING_FACTOR_RATIO.powi(k as i32))
+            .collect(),
+        Some(closed_trial) => {
+            let tolerance = DAMPING_FACTOR_TOLERANCE * open_trial[0];
+            trials_about_root(above_limit(open_trial), above_limit(closed_trial), tolerance)
         }
     }
 }
@@ -484,27 +494,29 @@ impl Tongue {
             return Closing::NoDampers;
         }
         // Pairs of a factor and the growth that it leaves.
-        let mut open = [1.0, self.fastest_response.growth_per_s()];
-        let mut closed: Option<[f64; 2]> = None;
-        while closed.is_none_or(|closed| closed[0] - open[0] > DAMPING_FACTOR_TOLERANCE * open[0]) {
-            let factors = trial_factors(open, closed);
+        let mut open_trial = [1.0, self.fastest_response.growth_per_s()];
+        let mut closed_trial: Option<[f64; 2]> = None;
+        while closed_trial.is_none_or(|closed_trial| {
+            closed_trial[0] - open_trial[0] > DAMPING_FACTOR_TOLERANCE * open_trial[0]
+        }) {
+            let factors = trial_factors(open_trial, closed_trial);
             let growths = self.remaining_growths(finder, &factors);
             for (factor, growth) in factors.into_iter().zip(growths) {
                 if growth <= -CLOSED_DECAY_PER_S {
-                    closed = Some([factor, growth]);
+                    closed_trial = Some([factor, growth]);
                     break;
                 }
-                open = [factor, growth];
+                open_trial = [factor, growth];
             }
-            if closed.is_none() && open[0] > MAX_DAMPING_FACTOR {
+            if closed_trial.is_none() && open_trial[0] > MAX_DAMPING_FACTOR {
                 return Closing::NotUpTo { factor: MAX_DAMPING_FACTOR };
             }
         }
-        let closed = closed.map_or(MAX_DAMPING_FACTOR, |[factor, _]| factor);
-        let first = dampers[0].damping_n_s_per_m;
-        let is_common = dampers.iter().all(|damper| damper.damping_n_s_per_m == first);
-        let damping_n_s_per_m = is_common.then_some(closed * first);
-        Closing::Factor { factor: closed, damping_n_s_per_m, stable_rpm: self.searched_rpm() }
+        let closed_trial = closed_trial.map_or(MAX_DAMPING_FACTOR, |[factor, _]| factor);
+        let first_damping = dampers[0].damping_n_s_per_m;
+        let is_common = dampers.iter().all(|damper| damper.damping_n_s_per_m == first_damping);
+        let damping_n_s_per_m = is_common.then_some(closed_trial * first_damping);
+        Closing::Factor { factor: closed_trial, damping_n_s_per_m, stable_rpm: self.searched_rpm() }
     }
 
     /// Returns the lowest and the greatest speed (rpm) at which growth is sought in machines with
@@ -518,55 +530,62 @@ impl Tongue {
     /// Returns the greatest growth (1/s) about the tongue for each factor of the damping, infinite
     /// if a response is missing. The machines share the lanes.
     fn remaining_growths(&self, finder: &ResponseFinder<'_>, factors: &[f64]) -> Vec<f64> {
-        let machine = |factor: f64| {
+        let prepare_with_factor = |factor: f64| {
             let mut scenario = finder.scenario.clone();
             for damper in &mut scenario.model.machine.dampers {
                 damper.damping_n_s_per_m *= factor;
             }
             prepare_scenario(finder.plan, &scenario).ok()
         };
-        let points: Vec<Option<Point>> = factors.iter().map(|&factor| machine(factor)).collect();
+        let points: Vec<Option<Point>> =
+            factors.iter().map(|&factor| prepare_with_factor(factor)).collect();
         let range_rpm = self.searched_rpm();
         let cancel = Cancel::Flag(finder.interrupt.flag());
-        let machines: Vec<(&Point, f64)> =
+        let points_and_speeds: Vec<(&Point, f64)> =
             points.iter().flatten().map(|point| (point, range_rpm[1])).collect();
         // The curves begin below the tongue, at the response of the machine with its own damping.
-        let below = finder.find_responses(&[range_rpm[0]]).pop().flatten();
-        let mut curves = ResponseCurves::continue_curves(&machines, below.as_ref(), cancel);
-        let mut growths = vec![f64::NEG_INFINITY; machines.len()];
-        let mut brackets_rpm = vec![range_rpm; machines.len()];
-        let mut count = DAMPING_TRIAL_SPEEDS;
+        let response_below = finder.find_responses(&[range_rpm[0]]).pop().flatten();
+        let mut curves =
+            ResponseCurves::continue_curves(&points_and_speeds, response_below.as_ref(), cancel);
+        let mut growths = vec![f64::NEG_INFINITY; points_and_speeds.len()];
+        let mut brackets_rpm = vec![range_rpm; points_and_speeds.len()];
+        let mut speed_count = DAMPING_TRIAL_SPEEDS;
         for _ in 0..=PEAK_ROUNDS {
             // A machine with growth at one speed needs no further ones: its tongue is open.
-            let may_be_closed = (0..machines.len()).filter(|&k| growths[k] <= -CLOSED_DECAY_PER_S);
+            let may_be_closed =
+                (0..points_and_speeds.len()).filter(|&k| growths[k] <= -CLOSED_DECAY_PER_S);
             let requests: Vec<(usize, f64)> = may_be_closed
                 .flat_map(|k| {
                     let [low, high] = brackets_rpm[k];
-                    let ends = if count == DAMPING_TRIAL_SPEEDS { vec![low, high] } else { vec![] };
-                    let speeds = ends.into_iter().chain(speeds_between(low, high, count));
+                    let range_ends =
+                        if speed_count == DAMPING_TRIAL_SPEEDS { vec![low, high] } else { vec![] };
+                    let speeds =
+                        range_ends.into_iter().chain(speeds_between(low, high, speed_count));
                     speeds.map(move |rpm| (k, rpm))
                 })
                 .collect();
             let answers = ResponseCurves::find_at_speeds(&mut curves, &requests, cancel);
             (finder.count_speeds)(answers.len());
             // The speed of a greater growth than before; 0 if this round has none.
-            let mut greatest_rpm = vec![0.0; machines.len()];
+            let mut greatest_rpm = vec![0.0; points_and_speeds.len()];
             for ((k, rpm), responses) in requests.into_iter().zip(answers) {
-                let first = responses.ok().and_then(|responses| responses.into_iter().next());
-                let growth = first.map_or(f64::INFINITY, |response| response.growth_per_s());
+                let first_response =
+                    responses.ok().and_then(|responses| responses.into_iter().next());
+                let growth =
+                    first_response.map_or(f64::INFINITY, |response| response.growth_per_s());
                 if growth > growths[k] {
                     growths[k] = growth;
                     greatest_rpm[k] = rpm;
                 }
             }
             for (bracket_rpm, rpm) in brackets_rpm.iter_mut().zip(greatest_rpm) {
-                let step_rpm = (bracket_rpm[1] - bracket_rpm[0]) / (count + 1) as f64;
+                let step_rpm = (bracket_rpm[1] - bracket_rpm[0]) / (speed_count + 1) as f64;
                 if rpm > 0.0 {
                     *bracket_rpm = [rpm - step_rpm, rpm + step_rpm]
                         .map(|rpm| rpm.clamp(range_rpm[0], range_rpm[1]));
                 }
             }
-            count = TRIALS_BETWEEN;
+            speed_count = TRIALS_BETWEEN;
         }
         let mut growths = growths.into_iter();
         let growth = |point: &Option<Point>| point.as_ref().and_then(|_| growths.next());

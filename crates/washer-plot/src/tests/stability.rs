@@ -36,8 +36,8 @@ fn draw_chart(sample: SampleFile, options: &impl DrawOptions) -> Value {
 }
 
 fn ranges(shades: &Value) -> Vec<[f64; 2]> {
-    let ends = |range: &Value| [0, 1].map(|end| range[end].as_f64().unwrap());
-    shades.as_array().unwrap().iter().map(ends).collect()
+    let range_ends = |range: &Value| [0, 1].map(|end| range[end].as_f64().unwrap());
+    shades.as_array().unwrap().iter().map(range_ends).collect()
 }
 
 #[test]
@@ -70,8 +70,8 @@ fn each_point_has_a_curve_up_to_a_maximum() {
         ["Unbalance mass 0.2 kg", "Unbalance mass 0.4 kg"]
     );
     let many_masses: Vec<f64> = (1..=20).map(|k| 0.05 * f64::from(k)).collect();
-    let shown = curve_names(&many_masses, Vec::new());
-    assert_eq!((shown.len(), shown[5].as_str()), (6, "Unbalance mass 1 kg"));
+    let shown_names = curve_names(&many_masses, Vec::new());
+    assert_eq!((shown_names.len(), shown_names[5].as_str()), (6, "Unbalance mass 1 kg"));
     assert_eq!(curve_names(&[0.2, 0.4], vec![("unbalance_mass_kg".to_owned(), 0.4)]), ["growth"]);
 }
 
