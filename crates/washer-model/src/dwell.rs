@@ -1,6 +1,6 @@
 //! The attractors of a machine at a held speed, by trajectories from many starts.
 //!
-//! This is a search, not a proof: a motion that no start leads to is not found.
+//! An attractor is not found if no trajectory leads to it.
 
 mod exponent;
 mod lines;
@@ -59,7 +59,7 @@ pub struct StartRule {
     pub max_time_s: f64,
     /// Whether to search for the smallest kick after which the machine does not return.
     pub with_threshold: bool,
-    /// Further records of each motion.
+    /// The recorders of additional outputs of each motion.
     pub recorders: Recorders,
 }
 
@@ -129,15 +129,15 @@ pub struct Attractor {
     /// response led to it, `None` if only a kick of the machine at rest, a transient or a carried
     /// state led to it.
     pub least_kick_rad_per_s: Option<f64>,
-    /// The largest deviations from equilibrium over the last turns (32 of a periodic motion, 128 of
-    /// one with two frequencies, else 256), in the order of
+    /// The largest deviations from equilibrium over the last turns (32 turns of a periodic motion,
+    /// 128 of a motion with two frequencies, 256 of all others), in the order of
     /// [`Channel::ALL`](crate::Channel::ALL) (m, rad).
     pub peaks: [f64; CHANNELS],
     /// The least gap between drum and tub at the ends of steps of these turns (m).
     pub min_gap_m: f64,
-    /// The rate at which neighbouring trajectories separate: of periodic motions from their
-    /// multipliers, without an error; of others from a perturbed run, unless their spectrum shows
-    /// two frequencies.
+    /// The rate at which neighbouring trajectories separate. It comes from the Floquet multipliers
+    /// of periodic motions, without an error, and from a perturbed run for other motions; `None` if
+    /// the spectrum shows two frequencies.
     pub exponent: Option<Exponent>,
     /// The length of the trajectory (s).
     pub time_s: f64,

@@ -52,8 +52,9 @@ pub(super) fn distance(setup: &TurnSetup<'_>, a: &[f64; STATES], b: &[f64; STATE
     TUB.iter().map(difference).fold(0.0, f64::max)
 }
 
-/// Returns the exponents of trajectories from these states, each with the direction of speeds of
-/// its initial perturbation; `None` if a run leaves the model's range.
+/// Returns the largest Lyapunov exponents of trajectories from `requests`: initial states, each
+/// with the direction of speeds of the initial perturbation; `None` if a run leaves the model's
+/// range.
 pub(super) fn compute_exponents(
     simd: Simd,
     requests: &[(HeldState<'_>, [f64; COORDINATES])],

@@ -15,12 +15,12 @@ const FREQUENCIES_AT_ONCE: usize = 8;
 /// interval. Doubling it reaches rounding.
 const TERNARY_ROUNDS: usize = 40;
 
-/// Number of multiples of a frequency that are subtracted from a signal. Doubling it leaves a
-/// smaller residual of curves with sharp bends.
+/// Number of harmonics of a line that are subtracted from a signal. Doubling it reduces the
+/// residual of curves with sharp bends.
 const HARMONICS: usize = 12;
 
-/// Number of times that all multiples are subtracted. Basis: windowed lines overlap, so that one
-/// pass leaves a part of each. Doubling it leaves a smaller residual.
+/// Number of passes in each of which all harmonics are subtracted. Basis: windowed lines overlap,
+/// so that one pass leaves a part of each line. Doubling it reduces the residual.
 const SUBTRACTION_PASSES: usize = 4;
 
 /// The strongest line in the spectrum of several signals.
@@ -79,7 +79,8 @@ fn powers<const M: usize>(
     powers
 }
 
-/// Finds the strongest line of signals of one length, apart from their means.
+/// Returns the strongest line of signals of equal length, after their means are subtracted; `None`
+/// if the signals are too short or constant.
 pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> {
     let count = signals.first()?.len();
     let windows: Vec<f64> = (0..count).map(|n| window(n, count)).collect();

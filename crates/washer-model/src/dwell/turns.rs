@@ -30,9 +30,9 @@ pub(super) struct TurnRecord {
     pub(super) min_gap_m: f64,
 }
 
-/// Integrates a number of turns from each state. A trajectory that leaves the model's range has
-/// fewer records. Trajectories share lanes of `simd` or of a narrower instruction set, and do not
-/// depend on each other.
+/// Integrates a number of turns from each state, and returns the records of each trajectory's
+/// turns. A trajectory that leaves the model's range has fewer records. Trajectories share lanes of
+/// `simd` or of a narrower instruction set, and do not depend on each other.
 pub(super) fn integrate_turns(
     simd: Simd,
     held_states: &[HeldState<'_>],

@@ -5,9 +5,9 @@
 //! The predictor of second order follows the tangent and its change; Newton's method corrects the
 //! point in the plane across the tangent. Steps grow if few corrections are needed and shrink if
 //! many are. The curve depends on the machine alone. At a requested speed, the responses are those
-//! on the part of the curve before it first reaches [`OVERSHOOT_RATIO`] times the speed. A curve
-//! that does not reach it is lost, and a second curve, continued from a high speed down, has
-//! further responses.
+//! on the part of the curve before it first reaches [`OVERSHOOT_RATIO`] times the speed. If the
+//! curve ends at a lower speed, a second curve is continued from a high speed down, and has further
+//! responses.
 
 use super::monodromy::{INSTANTS, StateMatrix};
 use super::newton::{
@@ -53,8 +53,8 @@ const MIN_STEP_LENGTH: f64 = 1e-3;
 /// the greatest length again. Derivatives at few instants may be the reason for short steps.
 const ALL_INSTANTS_STEP_LENGTH: f64 = 0.5;
 
-/// The factor of a step's length after few corrections. Basis: steps of most curves are as long as
-/// they may be. Doubling it makes steps fail.
+/// The factor of a step's length after few corrections. Basis: steps of most curves have the
+/// longest length. Doubling it makes more steps fail.
 const STEP_INCREASE: f64 = 1.6;
 /// The greatest number of corrections after which the step grows. Basis: a curve that hardly bends
 /// takes four. Doubling it makes all steps longer until they fail.
@@ -64,7 +64,7 @@ const FEW_CORRECTIONS: usize = 4;
 /// Doubling it makes steps longer.
 const STEP_DECREASE: f64 = 0.7;
 /// The least number of corrections after which the step shrinks. Basis: one more than the number
-/// with which the length is kept. Doubling it shortens no step.
+/// after which the length does not change. Doubling it shortens no step.
 const MANY_CORRECTIONS: usize = 6;
 
 /// The greatest number of corrections, after which the step is repeated with half its length.
@@ -87,8 +87,8 @@ const MIN_TANGENT_COSINE: f64 = 0.8;
 /// greater one may be on another part of the curve, and its step is rejected.
 const MAX_CORRECTION_SHARE: f64 = 0.5;
 
-/// The greatest distance of a node from the predicted point, with whose derivatives its tangent is
-/// computed, for the tangent to count as the node's own.
+/// The greatest distance between a node and its predicted point at which a tangent from derivatives
+/// at the predicted point counts as the node's tangent.
 const MAX_OWN_TANGENT_DISTANCE: f64 = 1e-3;
 
 /// The relative difference of speeds for the derivative of the period map by the speed. Doubling it
@@ -331,8 +331,8 @@ impl<'a> ResponseCurve<'a> {
         }
         if self.step_length < MIN_STEP_LENGTH {
             // A curve has stairs if the steps of a turn are longer than the width of corners, and
-            // jumps if the number of steps changes with the speed. It may be continued with shorter
-            // steps of a turn.
+            // jumps if the number of steps changes with the speed. Shorter steps of a turn may
+            // allow the continuation to proceed.
             let kept_arclength = last.arclength - FIRST_STEP_LENGTH;
             if !self.goes_down && self.settings.refine_continuation() {
                 let kept_nodes =
@@ -420,7 +420,7 @@ impl<'a> ResponseCurve<'a> {
         );
     }
 
-    /// Corrects the current point by the state at the end of a turn from it.
+    /// Corrects the current point, from the state at the end of a turn that starts at this point.
     fn correct_position(&mut self, mut step: CorrectorStep, end: &[f64; STATES]) {
         let Some(jacobian) = &step.jacobian else { return self.reject_step() };
         let speed_rpm = to_speed_rpm(&self.position);
