@@ -29,7 +29,7 @@ static INTEGRATION_METHODS: [IntegrationMethod; 3] = [
         name: "rk4-halved",
         description: "rk4 in steps that are halved until two runs agree",
         settings: &[ACCURACY],
-        steps: StepRule::Checked,
+        step_rule: StepRule::Checked,
     },
 ];
 

@@ -52,14 +52,14 @@ pub use keys::{Key, KeyWalk, Keys};
 pub use points::{check_columns, not_numbers, other_length};
 pub use report::{Diagnostic, Diagnostics, Mistake, Report};
 pub use section::{Field, Section, quoted, refused_number, short, unknown_word, written_twice};
-pub use sections::plain_name;
+pub use sections::parse_name;
 pub use source::{Located, Location, SourceId, Sources};
 pub use written::NamedArgument;
 
 use serde_json::Value;
 
 use crate::Model;
-use crate::plan::{Plan, ReadingNotes, WrittenIn};
+use crate::plan::{NumberSources, Plan, ReadingNotes};
 
 /// A grid as a user gives it: a file or a text, with constants `NAME=VALUE` that override its own.
 #[derive(Clone, Debug)]
@@ -72,8 +72,10 @@ pub struct GridInput<M> {
     text: Option<String>,
     /// The text of the model's own file, if it is not the one that the grid names.
     pub own_file: Option<String>,
+    /// The arguments NAME=VALUE of `--set`.
     sets: Vec<String>,
-    at: Vec<String>,
+    /// The arguments NAME=VALUE of `--at`.
+    at_arguments: Vec<String>,
     model: PhantomData<M>,
 }
 
@@ -83,8 +85,8 @@ impl<M: Model> GridInput<M> {
         let name = None;
         let text = None;
         let own_file = None;
-        let at = Vec::new();
-        Self { path, name, text, own_file, sets, at, model: PhantomData }
+        let at_arguments = Vec::new();
+        Self { path, name, text, own_file, sets, at_arguments, model: PhantomData }
     }
 
     /// Returns the input of a grid's text. `name` stands in messages, and is the run's name if the
@@ -116,8 +118,8 @@ impl<M: Model> GridInput<M> {
     /// Returns the input with additional constants `NAME=VALUE`, which also fix parameters that an
     /// axis sweeps.
     #[must_use]
-    pub fn with_fixed(self, at: &[String]) -> Self {
-        Self { at: at.to_vec(), ..self }
+    pub fn with_fixed(self, at_arguments: &[String]) -> Self {
+        Self { at_arguments: at_arguments.to_vec(), ..self }
     }
 
     /// Returns the input with this name of the run, if there is one.
@@ -134,14 +136,17 @@ impl<M: Model> GridInput<M> {
         resolve(self, |_| ()).map(|(plan, ())| plan)
     }
 
-    /// Reads the grid for one point. `at` has arguments NAME=VALUE for each axis of several values
-    /// (on the grid or between its points) and for other parameters. Returns the plan, which has no
-    /// axes and the point's model, and these values by name.
+    /// Reads the grid for one point. `at_arguments` has arguments NAME=VALUE for each axis of
+    /// several values (on the grid or between its points) and for other parameters. Returns the
+    /// plan, which has no axes and the point's model, and these values by name.
     ///
     /// # Errors
     /// Every mistake found, in one pass.
-    pub fn load_point(&self, at: &[String]) -> Result<(Plan<M>, NamedValues), Diagnostics> {
-        resolve(self, |draft| parameters::point(at, draft))
+    pub fn load_point(
+        &self,
+        at_arguments: &[String],
+    ) -> Result<(Plan<M>, NamedValues), Diagnostics> {
+        resolve(self, |draft| parameters::fix_point(at_arguments, draft))
     }
 }
 
@@ -153,13 +158,13 @@ fn resolve<M: Model, T>(
     finish: impl FnOnce(&mut Draft<'_, M>) -> T,
 ) -> Result<(Plan<M>, T), Diagnostics> {
     let report = Report::default();
-    let loaded_draft = grid::draft(input, &report).map(|mut draft| {
+    let result = grid::draft(input, &report).map(|mut draft| {
         let finish_result = finish(&mut draft);
         whole::steps(&draft);
         M::check(&draft);
-        let written = WrittenIn(report.written());
-        let aside = ReadingNotes { notes: report.take_notes(), ..draft.plan.aside };
-        (Plan { written, aside, ..draft.plan }, finish_result)
+        let sources = NumberSources(report.parameter_sources());
+        let reading_notes = ReadingNotes { notes: report.take_notes(), ..draft.plan.reading_notes };
+        (Plan { sources, reading_notes, ..draft.plan }, finish_result)
     });
-    report.finish(loaded_draft)
+    report.finish(result)
 }

@@ -75,22 +75,22 @@ pub struct IntegrationMethod {
     /// The settings.
     pub settings: &'static [Setting],
     /// The step control.
-    pub steps: StepRule,
+    pub step_rule: StepRule,
 }
 
-/// The classical method with fixed steps; models list it under a name of their own.
+/// The classical method with fixed steps. A model may list it under another name.
 pub const RK4: IntegrationMethod = IntegrationMethod {
     name: "rk4",
     description: "classical Runge-Kutta of order 4, in fixed steps",
     settings: &[STEP_S],
-    steps: StepRule::Fixed,
+    step_rule: StepRule::Fixed,
 };
-/// The adaptive method of Dormand and Prince; models list it under a name of their own.
+/// The adaptive method of Dormand and Prince. A model may list it under another name.
 pub const DOPRI5: IntegrationMethod = IntegrationMethod {
     name: "dopri5",
     description: "Dormand-Prince 5(4), adaptive",
     settings: &[RTOL, ATOL],
-    steps: StepRule::ByError,
+    step_rule: StepRule::ByError,
 };
 
 /// The steps of a method with its settings.
@@ -115,16 +115,16 @@ pub struct Integrator {
 impl IntegrationMethod {
     /// Returns the method with every setting at its default.
     pub fn with_defaults(&'static self) -> Integrator {
-        self.with(|setting| setting.default)
+        self.with_settings(|setting| setting.default)
     }
 
     /// Returns the method with the value that a function gives each setting.
-    pub fn with(&'static self, value: impl FnMut(&Setting) -> f64) -> Integrator {
+    pub fn with_settings(&'static self, value: impl FnMut(&Setting) -> f64) -> Integrator {
         Integrator { method: self, values: self.settings.iter().map(value).collect() }
     }
 
     /// Returns whether the method has a setting.
-    pub fn has(&self, key: &str) -> bool {
+    pub fn has_setting(&self, key: &str) -> bool {
         self.settings.iter().any(|setting| setting.key == key)
     }
 }
@@ -141,13 +141,13 @@ impl Integrator {
         keys.zip(self.values.iter().copied()).collect()
     }
 
-    /// Returns how the method chooses its steps, with the step or the accuracy of its settings.
+    /// Returns the steps of the method, with the length or the accuracy from its settings.
     pub fn steps(&self) -> Steps {
-        let first = self.values.first().copied().unwrap_or_default();
-        match self.method.steps {
-            StepRule::Fixed => Steps::Fixed(first),
+        let first_value = self.values.first().copied().unwrap_or_default();
+        match self.method.step_rule {
+            StepRule::Fixed => Steps::Fixed(first_value),
             StepRule::ByError => Steps::ByError,
-            StepRule::Checked => Steps::Checked(first),
+            StepRule::Checked => Steps::Checked(first_value),
         }
     }
 

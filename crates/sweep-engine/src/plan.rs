@@ -54,9 +54,9 @@ pub struct Plan<M: Model> {
     /// The values of `--set`, by name.
     pub set: Vec<(String, Value)>,
     /// The sources of the numbers.
-    pub written: WrittenIn,
+    pub sources: NumberSources,
     /// The notes of reading the grid file.
-    pub aside: ReadingNotes,
+    pub reading_notes: ReadingNotes,
 }
 
 /// The notes of reading a grid file. Results do not depend on them, and plans that differ only in
@@ -76,15 +76,15 @@ impl PartialEq for ReadingNotes {
 }
 
 /// The prefix of the source of an assumed number, whose value follows from other numbers by a rule.
-pub const ASSUMED: &str = "assumed: ";
+pub const ASSUMED_PREFIX: &str = "assumed: ";
 
 /// The source of each number, by its parameter's name: the file or option that wrote it last, or
-/// the rule of an assumed number, which begins with [`ASSUMED`]. Results do not depend on sources,
-/// and plans that differ only in them are equal.
+/// the rule of an assumed number, which begins with [`ASSUMED_PREFIX`]. Results do not depend on
+/// sources, and plans that differ only in them are equal.
 #[derive(Clone, Debug, Default)]
-pub struct WrittenIn(pub BTreeMap<String, String>);
+pub struct NumberSources(pub BTreeMap<String, String>);
 
-impl WrittenIn {
+impl NumberSources {
     /// Returns the sources of the numbers of these names, in words; `None` if these numbers have no
     /// source.
     pub fn source(&self, names: &[impl AsRef<str>]) -> Option<String> {
@@ -92,7 +92,7 @@ impl WrittenIn {
             names.iter().filter_map(|name| Some(self.0.get(name.as_ref())?.as_str())).collect();
         sources.dedup();
         let assumption_rules: Vec<&str> =
-            sources.extract_if(.., |place| place.starts_with(ASSUMED)).collect();
+            sources.extract_if(.., |source| source.starts_with(ASSUMED_PREFIX)).collect();
         let given_sources = (!sources.is_empty()).then(|| format!("given: {}", sources.join(", ")));
         let all_sources: Vec<&str> =
             given_sources.as_deref().into_iter().chain(assumption_rules).collect();
@@ -101,11 +101,11 @@ impl WrittenIn {
 
     /// Returns whether a number is assumed.
     pub fn is_assumed(&self, name: &str) -> bool {
-        self.0.get(name).is_some_and(|place| place.starts_with(ASSUMED))
+        self.0.get(name).is_some_and(|source| source.starts_with(ASSUMED_PREFIX))
     }
 }
 
-impl PartialEq for WrittenIn {
+impl PartialEq for NumberSources {
     fn eq(&self, _: &Self) -> bool {
         true
     }
@@ -213,7 +213,7 @@ impl AxisValues {
 
     /// Returns the value at a fraction (0 to 1) of the way from the first to the last value, on a
     /// linear or logarithmic scale. A list returns one of its own values.
-    pub fn between(&self, fraction: f64) -> f64 {
+    pub fn interpolate(&self, fraction: f64) -> f64 {
         match *self {
             Self::List(ref values) => {
                 values[((fraction * values.len() as f64) as usize).min(values.len() - 1)]
@@ -245,7 +245,7 @@ impl<M: Model> Plan<M> {
 
     /// The greatest number of points at which machines are prepared before a run. Basis: the
     /// preparation of that many points takes a second. Doubling it doubles that time.
-    const MAX_PREPARED: u64 = 256;
+    const MAX_PREPARED_CORNERS: u64 = 256;
 
     /// Returns the number of points of the design or grid; 1 without axes.
     pub fn points(&self) -> u64 {
@@ -259,7 +259,7 @@ impl<M: Model> Plan<M> {
     pub fn axis_values(&self, point: u64) -> Vec<f64> {
         if let Some(design) = &self.design {
             let value = |(k, axis): (usize, &Axis<M>)| match design.position(point, k) {
-                Some(place) => axis.values.between(place),
+                Some(fraction) => axis.values.interpolate(fraction),
                 None => axis.values.value(point),
             };
             return self.axes.iter().enumerate().map(value).collect();
@@ -281,13 +281,13 @@ impl<M: Model> Plan<M> {
     /// Returns the scenario at values of the axes, on the grid or between its points.
     pub fn scenario_at(&self, axis_values: &[f64]) -> Scenario<M> {
         let mut scenario = Scenario { model: self.model.clone(), window_s: self.window_s };
-        self.place(&mut scenario, axis_values);
+        self.write_axis_values(&mut scenario, axis_values);
         scenario
     }
 
     /// Writes values of the axes into a scenario of this plan. Scenarios of a plan differ in
     /// nothing else.
-    pub fn place(&self, scenario: &mut Scenario<M>, axis_values: &[f64]) {
+    pub fn write_axis_values(&self, scenario: &mut Scenario<M>, axis_values: &[f64]) {
         for (axis, &value) in self.axes.iter().zip(axis_values) {
             scenario.write(&axis.parameter, value);
         }
@@ -315,16 +315,17 @@ impl<M: Model> Plan<M> {
         self.axes.iter().enumerate().map(end).collect()
     }
 
-    /// Returns at most `MAX_PREPARED` corners, because a list may have many and a machine's modes
-    /// are expensive to compute. Of a longer list, the points at which an axis has its least or
-    /// greatest value come first, and the rest are spread evenly.
+    /// Returns at most `MAX_PREPARED_CORNERS` corners, because a list may have many and a machine's
+    /// modes are expensive to compute. Of a longer list, the points at which an axis has its least
+    /// or greatest value come first, and the rest are spread evenly.
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
         let corners = self.corners();
-        if corners <= Self::MAX_PREPARED {
+        if corners <= Self::MAX_PREPARED_CORNERS {
             return (0..corners).map(|corner| self.corner(corner)).collect();
         }
         let mut selected = self.extreme_points();
-        let remaining_count = Self::MAX_PREPARED.saturating_sub(selected.len() as u64).max(1);
+        let remaining_count =
+            Self::MAX_PREPARED_CORNERS.saturating_sub(selected.len() as u64).max(1);
         selected.extend(
             (0..remaining_count)
                 .map(|k| u128::from(k) * u128::from(corners) / u128::from(remaining_count))

@@ -111,8 +111,8 @@ pub fn run(
     let start_time = Instant::now();
     let started_unix_s = provenance::now_unix_s();
     let progress = Progress::new(options.progress, points, stored);
-    let work = Runner { engine, job, threads, progress: &progress, interrupt };
-    let result = work.compute_and_join(&mut run);
+    let runner = Runner { engine, job, threads, progress: &progress, interrupt };
+    let result = runner.compute_and_join(&mut run);
     progress.finish();
     let wall_s = start_time.elapsed().as_secs_f64();
     let computed = run.own_points().1.saturating_sub(stored);

@@ -1,6 +1,9 @@
 //! The columns of a file and their metadata.
 
+use std::collections::HashMap;
+
 use arrow_schema::{DataType, Field, Schema};
+use serde_json::Value;
 use sweep_parameter::Worse;
 
 use crate::{cells, key};
@@ -57,6 +60,51 @@ impl Column {
     }
 }
 
+/// The metadata of a column, which the field of a file carries as pairs of texts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ColumnMetadata {
+    /// The unit as the file has it: `1` for pure numbers.
+    pub unit: String,
+    /// The description, in one line.
+    pub description: String,
+    /// The direction in which values get worse, if there is one.
+    pub worse: Option<Worse>,
+    /// The limit between good and bad values, if there is one.
+    pub limit: Option<f64>,
+    /// Whether summaries of the file report the column's worst value.
+    pub is_in_summary: bool,
+}
+
+/// The key of a field's unit.
+const UNIT: &str = "unit";
+/// The key of a field's description.
+const DESCRIPTION: &str = "description";
+
+impl ColumnMetadata {
+    /// Returns the pairs that a field carries.
+    pub fn to_pairs(&self) -> HashMap<String, String> {
+        let worse = self.worse.map(|worse| (key::WORSE, worse.name().to_owned()));
+        let limit = self.limit.map(|limit| (key::LIMIT, Value::from(limit).to_string()));
+        let summary = self.is_in_summary.then(|| (key::SUMMARY, true.to_string()));
+        let mut pairs = vec![(UNIT, self.unit.clone()), (DESCRIPTION, self.description.clone())];
+        pairs.extend([worse, limit, summary].into_iter().flatten());
+        pairs.into_iter().map(|(key, text)| (key.to_owned(), text)).collect()
+    }
+
+    /// Reads the pairs of a field. A missing pair is an empty text, and an unknown word of another
+    /// program is left out.
+    pub fn from_field(field: &Field) -> Self {
+        let text = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
+        Self {
+            unit: text(UNIT),
+            description: text(DESCRIPTION),
+            worse: Worse::named(&text(key::WORSE)),
+            limit: text(key::LIMIT).parse().ok(),
+            is_in_summary: text(key::SUMMARY) == true.to_string(),
+        }
+    }
+}
+
 /// Returns the columns of a schema that have a supported type.
 pub fn columns(schema: &Schema) -> Vec<Column> {
     let fields = schema.fields().iter().enumerate();
@@ -70,17 +118,39 @@ fn column(field: &Field, place: usize) -> Option<Column> {
         number if cells::is_number(number) => CellKind::Number,
         _ => return None,
     };
-    let metadata = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
-    let unit = metadata("unit");
+    let ColumnMetadata { unit, description, worse, limit, is_in_summary } =
+        ColumnMetadata::from_field(field);
     Some(Column {
         name: field.name().clone(),
         unit: if unit == "1" { String::new() } else { unit },
-        description: metadata("description"),
+        description,
         kind,
         whole: field.data_type().is_integer(),
-        worse: Worse::named(&metadata(key::WORSE)),
-        limit: metadata(key::LIMIT).parse().ok(),
-        is_in_summary: metadata(key::SUMMARY) == "true",
+        worse,
+        limit,
+        is_in_summary,
         field: place,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metadata_that_is_written_is_read_again() {
+        let full = ColumnMetadata {
+            unit: "N s/m".to_owned(),
+            description: "damping".to_owned(),
+            worse: Some(Worse::Less),
+            limit: Some(0.1),
+            is_in_summary: true,
+        };
+        let plain = ColumnMetadata { unit: "1".to_owned(), ..ColumnMetadata::default() };
+        for metadata in [full, plain] {
+            let field = Field::new("x", DataType::Float64, true);
+            let field = field.with_metadata(metadata.to_pairs());
+            assert_eq!(ColumnMetadata::from_field(&field), metadata);
+        }
+    }
 }

@@ -36,7 +36,7 @@ pub mod seal;
 mod thrift;
 mod writer;
 
-pub use columns::{CellKind, Column, columns};
+pub use columns::{CellKind, Column, ColumnMetadata, columns};
 pub use error::FileError;
 pub use kind::{EXPORTED_CSV, FileKind, OWN_FILE, PDF_START, beside};
 pub use leaves::{Step, dotted, leaves};

@@ -12,7 +12,7 @@ use arrow_schema::{Field, Schema};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Value, json};
-use sweep_files::{ResultTable, Writer, key};
+use sweep_files::{ColumnMetadata, ResultTable, Writer, key};
 use sweep_parameter::Worse;
 
 /// A column to be written: name, unit, cells.
@@ -33,11 +33,12 @@ pub(crate) fn texts(values: &[&str]) -> ArrayRef {
 /// Writes a file of these columns and key-value metadata.
 pub(crate) fn write(path: &Path, columns: Vec<ColumnData>, key_values: &[(&str, Value)]) {
     let field = |(name, unit, array): &ColumnData| {
-        let unit = ("unit".to_owned(), (*unit).to_owned());
-        let is_gap = name.starts_with("min_gap");
-        let worse = is_gap.then(|| (key::WORSE.to_owned(), Worse::Less.name().to_owned()));
-        let metadata: std::collections::HashMap<_, _> = [unit].into_iter().chain(worse).collect();
-        Field::new(*name, array.data_type().clone(), true).with_metadata(metadata)
+        let metadata = ColumnMetadata {
+            unit: (*unit).to_owned(),
+            worse: name.starts_with("min_gap").then_some(Worse::Less),
+            ..ColumnMetadata::default()
+        };
+        Field::new(*name, array.data_type().clone(), true).with_metadata(metadata.to_pairs())
     };
     let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()));
     let arrays = columns.into_iter().map(|(_, _, array)| array).collect();

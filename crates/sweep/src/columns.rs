@@ -3,7 +3,7 @@
 use std::mem::take;
 
 use sweep_engine::columns::{
-    Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
+    Compared, ResultColumn, amplitude_columns, declared, run_columns, verdict_columns,
 };
 use sweep_engine::store::{CellType, DeclaredColumn, PointRows};
 use sweep_parameter::{Limit, RatioLimits, Worse};
@@ -89,7 +89,10 @@ impl Columns {
     /// Returns the rows of a point's outcome.
     pub(crate) fn done(&self, outcome: Outcome) -> PointRows {
         let point = outcome.point;
-        let rows = outcome.into_rows().map(|outcome| row(&self.columns, &Self::result(outcome)));
+        let rows = outcome.into_rows().map(|outcome| {
+            let row = Self::result(outcome);
+            self.columns.iter().map(|column| (column.cell)(&row)).collect()
+        });
         PointRows { point, rows: rows.collect() }
     }
 

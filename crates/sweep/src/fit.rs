@@ -217,7 +217,7 @@ fn free_parameter(
         Err(error) => {
             let parameters = MachineParameter::all(machine, spin);
             let title = format!("`{name}` cannot be fitted: {error}");
-            let refusal = Diagnostic::new(title).at(location, "expected a parameter");
+            let refusal = Diagnostic::new(title).at_location(location, "expected a parameter");
             mistakes
                 .push(refusal.nearest(name, parameters.iter().map(|parameter| parameter.name())));
             return None;

@@ -127,7 +127,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
 /// Returns the resonances of the machine at the middle of every axis, up to its greatest speed, as
 /// rows of text: motion, speed and damping ratio. A machine without modes has none.
 pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
-    let middle: Vec<f64> = plan.axes.iter().map(|axis| axis.values.between(0.5)).collect();
+    let middle: Vec<f64> = plan.axes.iter().map(|axis| axis.values.interpolate(0.5)).collect();
     let Washer { machine, spin, .. } = plan.scenario_at(&middle).model;
     let greatest_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
     let count = (greatest_rpm / MODE_STEP_RPM).ceil() as u32;

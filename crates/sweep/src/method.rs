@@ -30,25 +30,25 @@ pub(crate) static METHODS: [IntegrationMethod; 4] = [
         description: "ARK5(4)8L[2]SA, adaptive, the springs of bearings and hinge implicit: for \
                       bearings too stiff for the others",
         settings: &[RTOL, ATOL],
-        steps: StepRule::ByError,
+        step_rule: StepRule::ByError,
     },
     IntegrationMethod {
         name: "rk4-mass-scaled",
         description: "the fast method: capped modes of the bearings, at finer and finer levels \
                       until two agree",
         settings: &[LEVELS_ACCURACY],
-        steps: StepRule::Checked,
+        step_rule: StepRule::Checked,
     },
 ];
 
 /// Returns the classical Runge-Kutta method in fixed steps (s).
 pub fn rk4(step_s: f64) -> Integrator {
-    METHODS[0].with(|_| step_s)
+    METHODS[0].with_settings(|_| step_s)
 }
 
 /// Returns the fast method with a relative accuracy.
 pub fn rk4_mass_scaled(accuracy: f64) -> Integrator {
-    METHODS[3].with(|_| accuracy)
+    METHODS[3].with_settings(|_| accuracy)
 }
 
 /// Returns the method by which each trajectory is integrated; `None` for the fast method, which
@@ -108,7 +108,8 @@ mod tests {
 
     #[test]
     fn methods_are_shown_and_written_as_ever() {
-        let method = METHODS[1].with(|setting| if setting.key == "rtol" { 1e-5 } else { 1e-8 });
+        let method =
+            METHODS[1].with_settings(|setting| if setting.key == "rtol" { 1e-5 } else { 1e-8 });
         assert_eq!(method.to_string(), "dopri5, rtol 1e-5, atol 1e-8");
         assert_eq!(method.to_json(), json!({ "method": "dopri5", "rtol": 1e-5, "atol": 1e-8 }));
     }

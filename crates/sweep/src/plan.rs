@@ -119,8 +119,8 @@ mod tests {
                 channels: Washer::ABOUT.channels.to_vec(),
             },
             set: Vec::new(),
-            written: Default::default(),
-            aside: Default::default(),
+            sources: Default::default(),
+            reading_notes: Default::default(),
         }
     }
 

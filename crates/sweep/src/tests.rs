@@ -71,7 +71,7 @@ fn trace_boundary(
 ) -> Result<TracedBoundary, SearchStop> {
     let engine = Washer::engine(&task.plan, task.column()).unwrap();
     let evaluator = CachedEvaluator::new(engine, threads, interrupt, None, &|_| {}).unwrap();
-    trace(&task.distances(&evaluator), &task.firsts, task.curves, &task.search, &mut |_| {})
+    trace(&task.distances(&evaluator), &task.first_values, task.curves, &task.search, &mut |_| {})
 }
 
 /// Returns the axis values of all points of a grid.
@@ -281,7 +281,7 @@ fn an_interrupted_search_repeats_no_trial_and_ends_the_same() {
             CachedEvaluator::new(engine, 2, &interrupt, Some(trials), &stop_after_five_trials)
                 .unwrap();
         let distances = task.distances(&evaluator);
-        let result = trace(&distances, &task.firsts, task.curves, &task.search, &mut |_| {});
+        let result = trace(&distances, &task.first_values, task.curves, &task.search, &mut |_| {});
         drop(distances);
         let trials = evaluator.into_cache().unwrap();
         match result {

@@ -135,7 +135,7 @@ mod tests {
 
     use super::*;
     use sweep_engine::commands::parameters::{as_json, list_parameters};
-    use sweep_engine::plan::WrittenIn;
+    use sweep_engine::plan::NumberSources;
 
     #[test]
     fn json_has_every_parameter() {
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn a_number_that_a_user_wrote_has_the_user_as_its_source() {
         let folder = tempfile::tempdir().unwrap();
-        let machine = crate::config::machine_file(&Machine::paper(), &WrittenIn::default())
+        let machine = crate::config::machine_file(&Machine::paper(), &NumberSources::default())
             + "friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n";
         std::fs::write(folder.path().join("own.toml"), machine).unwrap();
         let grid = folder.path().join("grid.toml");

@@ -241,12 +241,6 @@ impl Outcome {
             has_motion.then(|| nonlinear.iter().zip(linear).map(ratio).fold(0.0, f64::max))
         }));
     }
-
-    /// Removes the deviations by turn, which only [`Self::compare`] needs.
-    pub fn drop_turns(&mut self) {
-        self.nonlinear.turns = Vec::new();
-        self.linear.turns = Vec::new();
-    }
 }
 
 #[cfg(test)]

@@ -64,8 +64,8 @@ pub struct Trajectory {
     /// and the one at which the linear model takes its friction. `None` without friction, if the
     /// model failed, and for the nonlinear model if no speed amplitude is given.
     pub friction_speed_off: Option<f64>,
-    /// The largest deviations in each turn of the drum, until both models have been compared by
-    /// them.
+    /// The largest deviations in each turn of the drum, by which both models are compared; empty
+    /// without the envelope criterion.
     pub turns: Vec<Deviations>,
 }
 

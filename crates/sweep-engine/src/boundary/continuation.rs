@@ -105,22 +105,22 @@ fn extrapolate(points: &[[f64; 2]], position: f64) -> (f64, f64) {
 /// A line, the neighbour with which it is compared, and the line beyond the neighbour.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LinePair<'a> {
-    pub own: Neighbour<'a>,
+    pub line: Neighbour<'a>,
     pub neighbour: Neighbour<'a>,
     pub second_neighbour: Option<Neighbour<'a>>,
 }
 
 impl LinePair<'_> {
     /// Returns the intervals on which the line is not on the side that its neighbour predicts.
-    pub(super) fn disputed(&self, cell: f64, span: &Span) -> Vec<[f64; 2]> {
-        let own = self.own.intervals;
+    pub(super) fn find_disputed(&self, cell: f64, span: &Span) -> Vec<[f64; 2]> {
+        let intervals = self.line.intervals;
         let predicted = self.move_neighbour(span);
         // A crossing and its prediction are a pair between which the sides differ, by as much as
         // the prediction is wrong.
-        let mut prediction_errors = shared_crossings(own, &predicted);
+        let mut prediction_errors = shared_crossings(intervals, &predicted);
         prediction_errors
             .retain(|[is, predicted]| (is - predicted).abs() <= DISPUTED_FRACTION * cell);
-        let mut interval_ends: Vec<f64> = own
+        let mut interval_ends: Vec<f64> = intervals
             .iter()
             .chain(&predicted)
             .flat_map(|interval| [interval.from, interval.to])
@@ -134,7 +134,7 @@ impl LinePair<'_> {
             let middle = 0.5 * (from + to);
             let is_prediction_error =
                 prediction_errors.iter().any(|[a, b]| a.min(*b) <= from && to <= a.max(*b));
-            if !is_prediction_error && side_at(own, middle) != side_at(&predicted, middle) {
+            if !is_prediction_error && side_at(intervals, middle) != side_at(&predicted, middle) {
                 disputed.push([from, to]);
             }
         }
@@ -148,12 +148,12 @@ impl LinePair<'_> {
         let second_neighbour = self
             .second_neighbour
             .filter(|second_neighbour| second_neighbour.agrees_with(&self.neighbour));
-        let shared = shared_crossings(self.own.intervals, self.neighbour.intervals);
+        let shared = shared_crossings(self.line.intervals, self.neighbour.intervals);
         let displacement = |k: usize, position: f64| match second_neighbour {
             Some(second_neighbour) => {
                 let slope = (position - second_neighbour.intervals[k].from)
                     / (self.neighbour.position - second_neighbour.position);
-                slope * (self.own.position - self.neighbour.position)
+                slope * (self.line.position - self.neighbour.position)
             }
             None => {
                 let gap = |pair: &&[f64; 2]| (pair[1] - position).abs();
@@ -249,13 +249,13 @@ mod tests {
         let neighbour = intervals(neighbour);
         let second_neighbour = second_neighbour.map(intervals);
         let pair = LinePair {
-            own: Neighbour { position: 3.0, intervals: &own },
+            line: Neighbour { position: 3.0, intervals: &own },
             neighbour: Neighbour { position: 2.0, intervals: &neighbour },
             second_neighbour: second_neighbour
                 .as_ref()
                 .map(|intervals| Neighbour { position: 1.0, intervals }),
         };
-        pair.disputed(CELL, &SPAN)
+        pair.find_disputed(CELL, &SPAN)
     }
 
     #[test]

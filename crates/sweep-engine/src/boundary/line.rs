@@ -31,8 +31,8 @@ pub(super) struct LineSearch {
 
 impl LineSearch {
     /// Requests samples at these positions, clamped to the range, except where samples exist.
-    pub(super) fn request(&mut self, places: impl IntoIterator<Item = f64>, span: &Span) {
-        for place in places {
+    pub(super) fn request(&mut self, positions: impl IntoIterator<Item = f64>, span: &Span) {
+        for place in positions {
             let position = place.clamp(span.least, span.greatest);
             if self.sample_at(position).is_none() {
                 self.requested.push(position);
@@ -72,7 +72,7 @@ impl LineSearch {
 
     /// Takes the positions to evaluate next: those requested, or else a step in every open bracket;
     /// none if every bracket is narrow.
-    pub(super) fn take_places(&mut self, span: &Span) -> Vec<f64> {
+    pub(super) fn take_positions(&mut self, span: &Span) -> Vec<f64> {
         if self.has_requests() {
             return std::mem::take(&mut self.requested);
         }

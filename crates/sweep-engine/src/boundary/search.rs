@@ -57,7 +57,7 @@ pub struct BoundaryTask<M: Model> {
     /// The expression that computes the quantity; `None` where it is a column.
     pub expression: Option<Goal>,
     /// The values of the first axis, in grid order.
-    pub firsts: Vec<f64>,
+    pub first_values: Vec<f64>,
     /// The number of curves: combinations of the axes beyond the second.
     pub curves: usize,
     /// The search along the second axis.
@@ -132,18 +132,18 @@ impl<M: Model> BoundaryTask<M> {
             tolerance: requested_tolerance,
             lattice: options.lattice.into(),
         };
-        let firsts = (0..first.values.len()).map(|k| first.values.value(k)).collect();
-        Ok(Self { plan, quantity, expression, firsts, curves: curves as usize, search })
+        let first_values = (0..first.values.len()).map(|k| first.values.value(k)).collect();
+        Ok(Self { plan, quantity, expression, first_values, curves: curves as usize, search })
     }
 
     /// Returns the largest size of a cell of the lattice along the first and the second axis, in
     /// their units.
     pub fn cell(&self) -> [f64; 2] {
-        let mut firsts = self.firsts.clone();
-        firsts.sort_by(f64::total_cmp);
-        let lines: Vec<f64> = lattice_ranks(firsts.len(), self.search.lattice)
+        let mut first_values = self.first_values.clone();
+        first_values.sort_by(f64::total_cmp);
+        let lines: Vec<f64> = lattice_ranks(first_values.len(), self.search.lattice)
             .into_iter()
-            .map(|rank| firsts[rank])
+            .map(|rank| first_values[rank])
             .collect();
         let columns: Vec<f64> = columns(&self.search.span(), self.search.lattice)
             .into_iter()

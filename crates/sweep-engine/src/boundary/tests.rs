@@ -22,7 +22,7 @@ fn masses(count: u32) -> Vec<f64> {
 
 pub(crate) fn traced(
     distance: impl Fn(f64, f64) -> Option<f64>,
-    firsts: &[f64],
+    first_values: &[f64],
     search: &SearchRange,
 ) -> TracedBoundary {
     let evaluated = RefCell::new(Vec::<BoundaryTrial>::new());
@@ -32,8 +32,8 @@ pub(crate) fn traced(
         batches.borrow_mut().push(trials.len());
         Ok(trials.iter().map(|trial| distance(trial.first, trial.second)).collect())
     };
-    let mut check_lines = |rows| assert!(rows < firsts.len(), "{rows}");
-    let Ok::<_, Infallible>(traced) = trace(&evaluate, firsts, 1, search, &mut check_lines);
+    let mut check_lines = |rows| assert!(rows < first_values.len(), "{rows}");
+    let Ok::<_, Infallible>(traced) = trace(&evaluate, first_values, 1, search, &mut check_lines);
     let evaluated = evaluated.borrow();
     let batches = batches.borrow();
     assert!(batches.iter().all(|&trials| trials > 0), "{batches:?}");
@@ -83,11 +83,11 @@ pub(crate) fn check_edges(
 
 #[test]
 fn a_smooth_boundary_takes_a_fifth_of_the_grids_points() {
-    let firsts = masses(39);
-    let traced = traced(fig12_distance, &firsts, &SEARCH);
+    let first_values = masses(39);
+    let traced = traced(fig12_distance, &first_values, &SEARCH);
     check_edges(&traced, fig12_distance, 0.5);
     assert!(traced.trials <= 39 * 33 / 5, "{}", traced.trials);
-    for (row, &mass) in traced.curves[0].iter().zip(&firsts) {
+    for (row, &mass) in traced.curves[0].iter().zip(&first_values) {
         assert_eq!((row.first, row.edges.len()), (mass, 1));
         let edge = row.edges[0];
         if line(mass) <= 60.0 {
@@ -263,8 +263,8 @@ fn undefined_quantities_are_reported() {
     let partly_undefined = |mass: f64, damping: f64| {
         if damping < 100.0 { None } else { fig12_distance(mass, damping) }
     };
-    let rows_of = |distance: &dyn Fn(f64, f64) -> Option<f64>, firsts: &[f64]| {
-        traced(distance, firsts, &SEARCH).curves.remove(0)
+    let rows_of = |distance: &dyn Fn(f64, f64) -> Option<f64>, first_values: &[f64]| {
+        traced(distance, first_values, &SEARCH).curves.remove(0)
     };
     let rows = rows_of(&partly_undefined, &[0.2, 0.6]);
     let kinds: Vec<Vec<EdgeKind>> =
@@ -313,7 +313,7 @@ fn the_search_of_noise_ends() {
 fn logarithmic_axes_are_searched_in_their_logarithms() {
     let line = |first: f64| 1e5 * first.powf(1.5);
     let distance = |first: f64, second: f64| Some((line(first) / second).ln().clamp(-1.0, 1.0));
-    let firsts: Vec<f64> = (0..20).map(|k| 10.0_f64.powf(f64::from(k) / 10.0)).collect();
+    let first_values: Vec<f64> = (0..20).map(|k| 10.0_f64.powf(f64::from(k) / 10.0)).collect();
     let search = SearchRange {
         least: 1e4,
         greatest: 1e9,
@@ -322,7 +322,7 @@ fn logarithmic_axes_are_searched_in_their_logarithms() {
         tolerance: 0.01,
         ..SEARCH
     };
-    for row in &traced(distance, &firsts, &search).curves[0] {
+    for row in &traced(distance, &first_values, &search).curves[0] {
         let edge = row.edges[0];
         let [low, high] = edge.bracket.unwrap();
         assert!((high / low).ln() <= 0.0101, "{edge:?}");
@@ -336,9 +336,9 @@ fn curves_share_batches() {
         let distance = |t: &BoundaryTrial| fig12_distance(t.first, t.second - 9.0 * t.curve as f64);
         Ok(trials.iter().map(distance).collect())
     };
-    let firsts = masses(39);
+    let first_values = masses(39);
     let [Ok(one_curve), Ok(three_curves)] =
-        [1, 3].map(|n| trace(&evaluate_shifted, &firsts, n, &SEARCH, &mut |_| {}));
+        [1, 3].map(|n| trace(&evaluate_shifted, &first_values, n, &SEARCH, &mut |_| {}));
     assert!(
         three_curves.rounds <= one_curve.rounds + 4,
         "{} for {}",
@@ -359,13 +359,13 @@ fn curves_share_batches() {
 
 #[test]
 fn rows_in_any_order_give_the_same_edges() {
-    let firsts = masses(13);
-    let mut shuffled = firsts.clone();
+    let first_values = masses(13);
+    let mut shuffled = first_values.clone();
     shuffled.swap(0, 7);
     shuffled.reverse();
     let mut rows = traced(fig12_distance, &shuffled, &SEARCH).curves.remove(0);
     rows.sort_by(|a, b| a.first.total_cmp(&b.first));
-    assert_eq!(rows, traced(fig12_distance, &firsts, &SEARCH).curves[0]);
+    assert_eq!(rows, traced(fig12_distance, &first_values, &SEARCH).curves[0]);
 }
 
 #[test]

@@ -42,24 +42,24 @@ const MIN_GAP_FRACTION: f64 = 0.125;
 /// The error with which `evaluate` stopped.
 pub fn trace<E>(
     evaluate: &dyn Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, E>,
-    firsts: &[f64],
+    first_values: &[f64],
     curves: usize,
     search: &SearchRange,
     report_lines: &mut dyn FnMut(usize),
 ) -> Result<TracedBoundary, E> {
     let mut boundary =
         TracedBoundary { curves: Vec::with_capacity(curves), ..TracedBoundary::default() };
-    let curves_at_once = (MAX_BLOCK_LINES / firsts.len().max(1)).max(1);
+    let curves_at_once = (MAX_BLOCK_LINES / first_values.len().max(1)).max(1);
     while boundary.curves.len() < curves {
         let first_curve = boundary.curves.len();
         let end = (first_curve + curves_at_once).min(curves);
-        let mut block = Block::new(first_curve..end, firsts, search);
+        let mut block = Block::new(first_curve..end, first_values, search);
         loop {
             let batch = block.next_batch();
             if batch.is_empty() {
                 break;
             }
-            report_lines(first_curve * firsts.len() + block.lines_traced());
+            report_lines(first_curve * first_values.len() + block.lines_traced());
             let trials: Vec<BoundaryTrial> = batch.iter().map(|request| request.trial).collect();
             let distances = evaluate(&trials)?;
             for (request, distance) in batch.iter().zip(distances) {
@@ -85,12 +85,12 @@ struct TrialRequest {
 /// Curves that are traced together.
 struct Block<'a> {
     first_curve: usize,
-    firsts: &'a [f64],
+    first_values: &'a [f64],
     search: SearchRange,
     span: Span,
     columns: Vec<f64>,
     /// The width of a lattice cell along the second axis.
-    cell: f64,
+    cell_width: f64,
     lines: Vec<PlannedLine>,
     /// The states of the lines, by curve and rank.
     curves: Vec<Vec<LineState>>,
@@ -103,30 +103,30 @@ struct LineState {
     search: Option<LineSearch>,
     /// The sides that the parents predict for the first samples, until they are compared with these
     /// samples.
-    predicted: Vec<PredictedSide>,
+    predicted_sides: Vec<PredictedSide>,
     /// The intervals of one side, while all brackets are narrow.
     intervals: Option<Vec<SideInterval>>,
     /// Whether the line needs no further samples, unless a neighbour disagrees.
     is_traced: bool,
     /// The number of samples taken because neighbours disagree.
-    disputed: usize,
+    disputed_samples: usize,
 }
 
 impl<'a> Block<'a> {
-    fn new(curves: std::ops::Range<usize>, firsts: &'a [f64], search: &SearchRange) -> Self {
+    fn new(curves: std::ops::Range<usize>, first_values: &'a [f64], search: &SearchRange) -> Self {
         let span = search.span();
         let cells = search.lattice.max(1);
-        let places: Vec<f64> =
-            firsts.iter().map(|first| coordinate(*first, search.first_log)).collect();
+        let positions: Vec<f64> =
+            first_values.iter().map(|first| coordinate(*first, search.first_log)).collect();
         Self {
             first_curve: curves.start,
-            firsts,
+            first_values,
             search: *search,
             span,
             columns: columns(&span, cells),
-            cell: (span.greatest - span.least) / cells as f64,
-            lines: plan_lines(&places, cells),
-            curves: vec![vec![LineState::default(); firsts.len()]; curves.len()],
+            cell_width: (span.greatest - span.least) / cells as f64,
+            lines: plan_lines(&positions, cells),
+            curves: vec![vec![LineState::default(); first_values.len()]; curves.len()],
         }
     }
 
@@ -139,16 +139,16 @@ impl<'a> Block<'a> {
             }
             for rank in 0..self.lines.len() {
                 if self.curves[curve][rank].search.is_none() && self.may_begin(curve, rank) {
-                    self.begin(curve, rank);
+                    self.begin_line(curve, rank);
                     self.advance(curve, rank, &mut batch);
                 }
             }
-            for (rank, places) in self.disputes(curve) {
+            for (rank, positions) in self.find_disputes(curve) {
                 let state = &mut self.curves[curve][rank];
                 let Some(search) = &mut state.search else { continue };
-                state.disputed += places.len();
+                state.disputed_samples += positions.len();
                 state.is_traced = false;
-                search.request(places, &self.span);
+                search.request(positions, &self.span);
                 self.advance(curve, rank, &mut batch);
             }
         }
@@ -157,8 +157,8 @@ impl<'a> Block<'a> {
 
     /// Adds the trials that a line needs next to the batch.
     fn advance(&mut self, curve: usize, rank: usize, batch: &mut Vec<TrialRequest>) {
-        let first = self.firsts[self.lines[rank].index];
-        for position in self.next_places(curve, rank) {
+        let first = self.first_values[self.lines[rank].index];
+        for position in self.next_positions(curve, rank) {
             let second = self.search.value(position);
             let trial = BoundaryTrial { curve: self.first_curve + curve, first, second };
             batch.push(TrialRequest { trial, curve, rank, position });
@@ -167,19 +167,19 @@ impl<'a> Block<'a> {
 
     /// Returns the positions that a line needs next: those requested, the columns of the lattice if
     /// a prediction failed, steps in brackets, or else those of the search for pairs of roots.
-    fn next_places(&mut self, curve: usize, rank: usize) -> Vec<f64> {
+    fn next_positions(&mut self, curve: usize, rank: usize) -> Vec<f64> {
         let span = self.span;
         let state = &mut self.curves[curve][rank];
         let Some(search) = state.search.as_mut().filter(|_| !state.is_traced) else {
             return Vec::new();
         };
         if !search.has_requests() {
-            let predicted = std::mem::take(&mut state.predicted);
+            let predicted = std::mem::take(&mut state.predicted_sides);
             if !predicted.iter().all(|predicted| search.confirms(predicted)) {
                 search.request(self.columns.iter().copied(), &span);
             }
         }
-        let positions = search.take_places(&span);
+        let positions = search.take_positions(&span);
         if !positions.is_empty() {
             state.intervals = None;
             return positions;
@@ -187,10 +187,10 @@ impl<'a> Block<'a> {
         // Other lines begin from these intervals while the search for pairs of roots goes on.
         state.intervals = Some(search.intervals(&span));
         if self.lines[rank].is_lattice_line() {
-            let min_gap = (MIN_GAP_FRACTION * self.cell).max(span.tolerance);
+            let min_gap = (MIN_GAP_FRACTION * self.cell_width).max(span.tolerance);
             search.request(lipschitz::candidates(search.samples(), min_gap), &span);
         }
-        let positions = search.take_places(&span);
+        let positions = search.take_positions(&span);
         state.is_traced = positions.is_empty();
         positions
     }
@@ -203,14 +203,14 @@ impl<'a> Block<'a> {
 
     /// Begins a line: around the crossings that its parents predict, or else at the columns of the
     /// lattice.
-    fn begin(&mut self, curve: usize, rank: usize) {
+    fn begin_line(&mut self, curve: usize, rank: usize) {
         let line = &self.lines[rank];
         let find_parents = |ranks: &Vec<usize>| {
             ranks.iter().filter_map(|rank| self.neighbour(curve, *rank)).collect()
         };
         let parents = line.parents.each_ref().map(find_parents);
         let mut search = LineSearch::default();
-        let predicted = predict(line.position, &parents, self.cell, &self.span);
+        let predicted = predict(line.position, &parents, self.cell_width, &self.span);
         match &predicted {
             Some(sides) => {
                 search.request(sides.iter().map(|predicted| predicted.position), &self.span)
@@ -219,7 +219,7 @@ impl<'a> Block<'a> {
         }
         let state = &mut self.curves[curve][rank];
         state.search = Some(search);
-        state.predicted = predicted.unwrap_or_default();
+        state.predicted_sides = predicted.unwrap_or_default();
     }
 
     /// Returns a line for comparison with others, if all its brackets are narrow.
@@ -230,22 +230,22 @@ impl<'a> Block<'a> {
 
     /// Returns, by rank, the positions that subdivide the intervals about which neighbours
     /// disagree.
-    fn disputes(&self, curve: usize) -> Vec<(usize, Vec<f64>)> {
+    fn find_disputes(&self, curve: usize) -> Vec<(usize, Vec<f64>)> {
         let mut disputes = Vec::new();
         for (rank, state) in self.curves[curve].iter().enumerate() {
-            if !state.is_traced || state.disputed >= MAX_DISPUTED_SAMPLES {
+            if !state.is_traced || state.disputed_samples >= MAX_DISPUTED_SAMPLES {
                 continue;
             }
             let Some(search) = &state.search else { continue };
-            let Some(own) = self.neighbour(curve, rank) else { continue };
+            let Some(line) = self.neighbour(curve, rank) else { continue };
             let mut positions = Vec::new();
             for step in [-1, 1] {
                 let neighbour_at = |offset| self.neighbour(curve, rank.checked_add_signed(offset)?);
                 let Some(neighbour) = neighbour_at(step) else { continue };
-                let pair = LinePair { own, neighbour, second_neighbour: neighbour_at(2 * step) };
-                for interval in pair.disputed(self.cell, &self.span) {
+                let pair = LinePair { line, neighbour, second_neighbour: neighbour_at(2 * step) };
+                for interval in pair.find_disputed(self.cell_width, &self.span) {
                     let width = interval[1] - interval[0];
-                    let max_gap = DISPUTED_FRACTION * self.cell.min(width);
+                    let max_gap = DISPUTED_FRACTION * self.cell_width.min(width);
                     let max_gap = max_gap.max(0.5 * self.span.tolerance);
                     positions.extend(search.subdivide(interval, max_gap, &self.span));
                 }
@@ -279,7 +279,7 @@ impl<'a> Block<'a> {
             for &rank in &ranks {
                 let Some(search) = &states[rank].search else { continue };
                 rows.push(BoundaryRow {
-                    first: self.firsts[self.lines[rank].index],
+                    first: self.first_values[self.lines[rank].index],
                     edges: search.edges(&self.span, &value),
                     trials: search.samples().len(),
                 });

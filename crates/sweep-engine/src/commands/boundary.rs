@@ -204,7 +204,7 @@ pub fn search<M: Model>(
     execution: Execution<'_>,
 ) -> Result<(Option<TracedBoundary>, Option<Trials>), Error> {
     let stored_points = trials.as_ref().map_or(0, |trials| trials.count() as u64);
-    let rows = (task.firsts.len() * task.curves) as u64;
+    let rows = (task.first_values.len() * task.curves) as u64;
     let rows_done = AtomicU64::new(0);
     let progress = Progress::for_search(execution.progress, rows, "rows", stored_points);
     let show_points = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
@@ -214,7 +214,8 @@ pub fn search<M: Model>(
         CachedEvaluator::new(engine, threads, execution.interrupt, trials, &show_points)?;
     let mut record_rows_done = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let distances = task.distances(&evaluator);
-    let traced = trace(&distances, &task.firsts, task.curves, &task.search, &mut record_rows_done);
+    let traced =
+        trace(&distances, &task.first_values, task.curves, &task.search, &mut record_rows_done);
     drop(distances);
     progress.finish();
     Ok((SearchStop::interrupted_to_none(traced)?, evaluator.into_cache()))

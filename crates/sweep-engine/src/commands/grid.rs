@@ -24,7 +24,7 @@ pub struct GridArgs {
     #[arg(long, value_name = "RATIO")]
     pub ratio_limit: Option<f64>,
     /// Name of the run, in place of the grid file's: it names the result file and titles figures
-    #[arg(long, value_name = "NAME", value_parser = config::plain_name)]
+    #[arg(long, value_name = "NAME", value_parser = config::parse_name)]
     pub name: Option<String>,
 }
 
@@ -67,7 +67,7 @@ impl GridArgs {
     /// Shows the notes of reading the grid file, and a note if `--set end_s` leaves the end of the
     /// window unchanged.
     fn show_notes<M: Model>(&self, plan: &Plan<M>) {
-        plan.aside.notes.iter().for_each(|note| tell(note));
+        plan.reading_notes.notes.iter().for_each(|note| tell(note));
         let is_set = |name| self.sets.iter().any(|set| name_of(set) == name);
         let ([from, to], end_s) = (plan.window_s, plan.end_s);
         if is_set("end_s") && !is_set("window_to_s") && to < end_s {
@@ -100,7 +100,7 @@ impl ResultArgs {
         let grid = &self.grid;
         let path_text = |path: &PathBuf| path.display().to_string();
         let sets = grid.sets().into_iter().map(|set| ("set", set));
-        let other_options = grid.at.iter().map(|at| ("at", at.clone()));
+        let other_options = grid.at.iter().map(|argument| ("at", argument.clone()));
         let other_options =
             other_options.chain(grid.name.iter().map(|name| ("name", name.clone())));
         let other_options = other_options.chain(self.out.iter().map(|out| ("out", path_text(out))));

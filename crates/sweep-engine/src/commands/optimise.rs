@@ -246,13 +246,14 @@ fn summarise<M: Model>(
     // The least value of the first objective before and in the last third of the candidates.
     let mut least_objective = [f64::INFINITY; 2];
     let mut late_on_front = 0;
-    let first_late = study.evolution.first_late();
+    let first_of_last_third = study.evolution.first_of_last_third();
     file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
         if cells[1] == Cell::Flag(true) {
             feasible += 1;
             let objective = cells.get(3 + study.parameters.len()).and_then(Cell::number);
-            let period_least = &mut least_objective[usize::from(row.index() >= first_late)];
+            let period_least =
+                &mut least_objective[usize::from(row.index() >= first_of_last_third)];
             *period_least = period_least.min(
                 objective.map_or(f64::INFINITY, |objective| study.objectives[0].sign * objective),
             );
@@ -265,7 +266,7 @@ fn summarise<M: Model>(
             nearest_cells = Some(cells.clone());
         }
         if cells[2] == Cell::Flag(true) {
-            late_on_front += usize::from(row.index() >= first_late);
+            late_on_front += usize::from(row.index() >= first_of_last_third);
             front.push(cells);
         }
         Ok::<(), Error>(())
@@ -285,7 +286,7 @@ fn summarise<M: Model>(
     if let Some(values) = values.as_ref().filter(|_| !study.conditions.is_empty()) {
         text.extend(slack_lines(study, values, execution)?);
     }
-    if least_objective[0].is_finite() && first_late < candidate_count {
+    if least_objective[0].is_finite() && first_of_last_third < candidate_count {
         let Objective { name, sign, .. } = &study.objectives[0];
         let advice = "; more may take it farther";
         let progress = match [least_objective[0], least_objective[0].min(least_objective[1])]
@@ -299,7 +300,7 @@ fn summarise<M: Model>(
         };
         text.line(
             "search",
-            format!("the last {} candidates {progress}", candidate_count - first_late),
+            format!("the last {} candidates {progress}", candidate_count - first_of_last_third),
         );
     }
     front.sort_by(|a, b| {
@@ -308,7 +309,7 @@ fn summarise<M: Model>(
         first_objective(a).unwrap_or(f64::NAN).total_cmp(&first_objective(b).unwrap_or(f64::NAN))
     });
     let is_at_end = |(searched_parameter, value): &(&SearchedParameter, &f64)| {
-        [0.0, 1.0].into_iter().any(|end| searched_parameter.bounds.between(end) == **value)
+        [0.0, 1.0].into_iter().any(|end| searched_parameter.bounds.interpolate(end) == **value)
     };
     let parameter_values = study.parameters.iter().zip(values.iter().flatten());
     let parameters_at_bounds: Vec<&str> = parameter_values

@@ -49,7 +49,7 @@ pub fn list_parameters<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<
         };
         // A parameter of several numbers has the sources of all of them.
         let plan_source = plan.filter(|_| !parameter.is_in_grid);
-        let plan_source = plan_source.and_then(|plan| plan.written.source(&parameter.parts));
+        let plan_source = plan_source.and_then(|plan| plan.sources.source(&parameter.parts));
         let source = plan_source.unwrap_or_else(|| parameter.source.to_owned());
         ListedParameter { parameter, value, source }
     };
@@ -62,8 +62,8 @@ pub fn list_parameters<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<
 
 fn as_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
     let value_text = |row: &ListedParameter<M>| {
-        let shown = row.value.map(|value| without_rounding_noise(value).to_string());
-        shown.unwrap_or_else(|| "-".to_owned())
+        let value_text = row.value.map(|value| without_rounding_noise(value).to_string());
+        value_text.unwrap_or_else(|| "-".to_owned())
     };
     let max_width =
         |length: &dyn Fn(&ListedParameter<M>) -> usize| rows.iter().map(length).max().unwrap_or(0);

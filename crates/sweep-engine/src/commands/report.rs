@@ -126,8 +126,11 @@ pub fn run<M: Model>(
     if let Ok(loaded_plan) = &loaded_plan {
         let resonance_rows: Vec<_> = resonances(loaded_plan).into_iter().map(Vec::from).collect();
         let headings = ["motion", "resonance", "damping ratio"];
-        let middle_values: Vec<_> =
-            loaded_plan.axes.iter().map(|axis| Cell::Number(axis.values.between(0.5))).collect();
+        let middle_values: Vec<_> = loaded_plan
+            .axes
+            .iter()
+            .map(|axis| Cell::Number(axis.values.interpolate(0.5)))
+            .collect();
         let title = format!("Resonances at {}", format_axis_values(&file, &middle_values));
         body += &html_table(title.trim_end_matches(" at "), &headings, &resonance_rows);
     }

@@ -254,14 +254,24 @@ pub(super) fn format_named_values<'a>(values: impl Iterator<Item = (&'a str, f64
     words.collect::<Vec<_>>().join(", ")
 }
 
+/// Returns the share of so many rows among those with a verdict, as `share(reliable)` counts it;
+/// `None` if no row has a verdict.
+fn verdict_share(rows: u64, tally: &Tally) -> Option<Share> {
+    Share::wilson(rows, tally.reliable + tally.unreliable)
+}
+
+/// Formats a fraction as a percentage.
+fn percent(fraction: f64) -> String {
+    format!("{:.1}", 100.0 * fraction)
+}
+
 /// Formats the share of reliable points among those with a verdict, with its 95 % confidence
 /// interval for independent random points.
 fn format_share(tally: &Tally) -> String {
-    match Share::wilson(tally.reliable, tally.reliable + tally.unreliable) {
+    match verdict_share(tally.reliable, tally) {
         None => "no point has a verdict".to_owned(),
         Some(Share { fraction, low, high }) => {
-            let [share, low, high] =
-                [fraction, low, high].map(|fraction| format!("{:.1}", 100.0 * fraction));
+            let [share, low, high] = [fraction, low, high].map(percent);
             format!(
                 "{share} % reliable, with 95 % confidence {low} to {high} % for points at random"
             )
@@ -277,11 +287,6 @@ pub fn count_lines_at(
     axis_values: &dyn Fn(u64) -> String,
 ) -> String {
     let mut text = String::new();
-    // The share of rows that have a verdict, as `share(reliable)` counts them.
-    let percent = |count: u64| {
-        let judged = tally.reliable + tally.unreliable;
-        100.0 * count as f64 / judged.max(1) as f64
-    };
     let upper = limits.upper;
     let range = limits.lower.map_or_else(
         || format!("below ratio {upper}"),
@@ -289,15 +294,20 @@ pub fn count_lines_at(
     );
     let Tally { reliable, unreliable, undefined, over_estimated, sensitive, unconverged, .. } =
         tally;
-    let share = percent(*reliable);
-    let uncounted = if *undefined > 0 { ", which the share leaves out" } else { "" };
-    let others = format!("{unreliable} not, {undefined} undefined{uncounted}");
-    text.line("reliable", format!("{reliable} ({share:.1} %) {range}, {others}"));
+    let other_counts = format!("{unreliable} not, {undefined} undefined");
+    let verdicts = match verdict_share(*reliable, tally) {
+        None => format!("{reliable} {range}, {other_counts}: no row has a verdict"),
+        Some(share) => {
+            let uncounted = if *undefined > 0 { ", which the share leaves out" } else { "" };
+            format!("{reliable} ({} %) {range}, {other_counts}{uncounted}", percent(share.fraction))
+        }
+    };
+    text.line("reliable", verdicts);
     text.push_str(&motionless_line(tally, axis_values));
-    if *over_estimated > 0 {
-        let share = percent(*over_estimated);
+    // An over-estimated row has a ratio, so that it has a verdict.
+    if let Some(share) = verdict_share(*over_estimated, tally).filter(|_| *over_estimated > 0) {
         let below = format_number(limits.over_estimate());
-        let rows = format!("in {over_estimated} ({share:.1} %)");
+        let rows = format!("in {over_estimated} ({} %)", percent(share.fraction));
         let row_counts = format!("{rows}, {} of them reliable", tally.over_estimated_reliable);
         let description =
             format!("{row_counts}: the linear model over-estimates, a ratio is below {below}");
@@ -348,16 +358,16 @@ pub fn count_lines_at(
 }
 
 /// Formats the reason why rows without a failure have no verdict; empty if there are none.
-fn motionless_line(tally: &Tally, at: &dyn Fn(u64) -> String) -> String {
+fn motionless_line(tally: &Tally, axis_values: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
     let Some(first) = tally.first_motionless else { return text };
     let rows = counted(tally.motionless as usize, "row");
-    let place = match at(first) {
-        place if place.is_empty() => place,
-        place => format!(", the first at {place}"),
+    let location = match axis_values(first) {
+        values if values.is_empty() => values,
+        values => format!(", the first at {values}"),
     };
     let reason = "the linear model does not move in the window, so that no ratio is defined";
-    text.line("undefined", format!("{rows} without a failure{place}: {reason}"));
+    text.line("undefined", format!("{rows} without a failure{location}: {reason}"));
     text
 }
 
@@ -394,6 +404,14 @@ mod tests {
     }
 
     #[test]
+    fn a_result_without_a_verdict_has_no_share() {
+        let tally = Tally { points: 8, undefined: 8, ..Tally::default() };
+        let summary = count_lines_at(&tally, 2.0.into(), &|_| String::new());
+        let line = "reliable  0 below ratio 2, 0 not, 8 undefined: no row has a verdict\n";
+        assert!(summary.contains(line), "{summary}");
+    }
+
+    #[test]
     fn an_infinite_error_is_left_out() {
         let greatest_error = Some(Extreme { value: f64::INFINITY, point: 0 });
         let by_method = [("capped_1".to_owned(), 1)].into();
@@ -404,15 +422,15 @@ mod tests {
 
     #[test]
     fn rows_without_motion_are_explained() {
-        let said = |motionless, first_motionless| {
+        let summary = |motionless, first_motionless| {
             let tally =
                 Tally { points: 3, undefined: 3, motionless, first_motionless, ..Tally::default() };
             count_lines_at(&tally, 2.0.into(), &|point| format!("mass_kg {point}"))
         };
         let sentence = " undefined  2 rows without a failure, the first at mass_kg 1: the linear \
                         model does not move in the window, so that no ratio is defined\n";
-        assert!(said(2, Some(1)).contains(sentence), "{}", said(2, Some(1)));
-        assert!(!said(0, None).contains("does not move"), "{}", said(0, None));
+        assert!(summary(2, Some(1)).contains(sentence), "{}", summary(2, Some(1)));
+        assert!(!summary(0, None).contains("does not move"), "{}", summary(0, None));
     }
 
     #[test]

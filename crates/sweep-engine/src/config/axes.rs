@@ -36,8 +36,8 @@ fn claim<M: Model>(
                 constant.name.value
             );
             let diagnostic = Diagnostic::new(title)
-                .at(&constant.name.location, "expected a parameter that no axis sweeps");
-            report.push(diagnostic.at(&name.location, "swept here"));
+                .at_location(&constant.name.location, "expected a parameter that no axis sweeps");
+            report.push(diagnostic.at_location(&name.location, "swept here"));
         }
     }
     true
@@ -55,7 +55,7 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
     let report = root.report;
     let mut claimed = ClaimedNumbers::default();
     let sections = root.tables("axis");
-    if let (Some(design), Some(location)) = (&design, report.place("design")) {
+    if let (Some(design), Some(location)) = (&design, report.location("design")) {
         let max_count = if matches!(design, Design::Spread { rule: DesignRule::Sobol, .. }) {
             MAX_AXES
         } else {
@@ -81,8 +81,8 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
             Some(design) => read_design_values(&section, &swept, design.points()),
             None => values(&section, &swept),
         };
-        let has_tolerance = section.key_at("tolerance").is_some()
-            || section.key_inside("distribution", "tolerance");
+        let has_tolerance = section.key_location("tolerance").is_some()
+            || section.has_inner_key("distribution", "tolerance");
         section.finish();
         if parameter.as_ref().is_some_and(|parameter| is_fixed(parameter, draft)) {
             continue;
@@ -114,7 +114,7 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
 
 /// Adds an axis to the plan.
 pub fn add<M: Model>(axis: Axis<M>, location: Location, draft: &mut Draft<'_, M>) {
-    draft.report.put(format!("axis[{}]", draft.plan.axes.len()), location);
+    draft.report.record_location(format!("axis[{}]", draft.plan.axes.len()), location);
     draft.plan.axes.push(axis);
 }
 
@@ -123,10 +123,10 @@ pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Dra
     let report = root.report;
     for section in root.tables("axis") {
         let expected = "the columns of the list are the axes; remove this";
-        report.refuse::<()>(section.at(), "an [[axis]] beside a list of points", expected);
+        report.refuse::<()>(section.location(), "an [[axis]] beside a list of points", expected);
     }
     let mut claimed = ClaimedNumbers::default();
-    list.table.notes().into_iter().for_each(|note| report.note(format!("the list: {note}")));
+    list.table.notes().into_iter().for_each(|note| report.add_note(format!("the list: {note}")));
     for column in std::mem::take(&mut list.table.columns) {
         let name =
             Located { value: column.name.value.as_str(), location: column.name.location.clone() };
@@ -148,7 +148,7 @@ pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Dra
                 refused_number(
                     &description,
                     value,
-                    &list.table.place(sources, column.place, row),
+                    &list.table.locate(sources, column.index, row),
                     range,
                 )
             });
@@ -163,9 +163,11 @@ pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Dra
         let refusal = Diagnostic::new("the list of points has no column of a parameter")
             .help("`[columns]` in the grid file may name what its columns hold");
         let expected = "expected a file whose header names parameters";
-        let location = report.place("design.file");
+        let location = report.location("design.file");
         report.push(
-            location.into_iter().fold(refusal, |refusal, location| refusal.at(&location, expected)),
+            location
+                .into_iter()
+                .fold(refusal, |refusal, location| refusal.at_location(&location, expected)),
         );
     }
     draft.plan.design = Some(list.design);
@@ -213,7 +215,7 @@ impl<'p> SweptParameter<'p> {
     /// Reads `tolerance`: a range about the model's own number, as a distance in the parameter's
     /// unit or in percent of the number.
     fn tolerance(&self, section: &Section<'_>) -> Field<ToleranceRange> {
-        section.text_or_number("tolerance").then(|found| {
+        section.text_or_number("tolerance").and_then(|found| {
             let report = section.report;
             let location = found.location;
             let text = found.value.trim();
@@ -316,7 +318,7 @@ fn read_distribution(
     swept: &SweptParameter<'_>,
     points: u64,
 ) -> Option<Located<SpreadValues>> {
-    let location = section.at().clone();
+    let location = section.location().clone();
     let report = section.report;
     let range = swept.range;
     let field = section.choice("kind", &DISTRIBUTIONS.map(|(kind, _)| kind));
@@ -325,7 +327,7 @@ fn read_distribution(
     let number = |key, range, is_required: bool| {
         let field = section.number(key, range);
         let field = section.expect(field, key, is_required.then_some("a number"));
-        field.given().map(|number| number.value)
+        field.into_located().map(|number| number.value)
     };
     let field = swept.tolerance(&section);
     let mut tolerance = None;
@@ -357,7 +359,7 @@ fn read_distribution(
         let reason = "`tolerance` gives it, about the machine's own number";
         section.misplace(&["mean", "sd", "median", "sigma", "from", "to"], reason);
         section.finish();
-        let range = field.given()?.value;
+        let range = field.into_located()?.value;
         if kind? == 1 && range.from <= 0.0 {
             let title = format!("a tolerance down to {} has no logarithm", decimal(range.from));
             return report.refuse(
@@ -422,10 +424,10 @@ fn read_design_values(
     if !matches!(tolerance, Field::Absent) {
         section.misplace(&["range", "distribution"], TOLERANCE_EXCLUDES);
         section.misplace(&["count"], "the number of points belongs in [design], as `points`");
-        let Located { value: range, location } = tolerance.given()?;
+        let Located { value: range, location } = tolerance.into_located()?;
         return Some(Located { value: range.values(2), location });
     }
-    match section.table("distribution", "distribution = { kind, ... }").given() {
+    match section.table("distribution", "distribution = { kind, ... }").into_located() {
         Some(distributed) => {
             section.misplace(&["range"], "the distribution has its own `from` and `to`");
             read_distribution(distributed.value, swept, points)
@@ -461,9 +463,9 @@ fn values(section: &Section<'_>, swept: &SweptParameter<'_>) -> Option<Located<S
     if !matches!(tolerance, Field::Absent) {
         section.misplace(&["values", "range"], TOLERANCE_EXCLUDES);
         let expected = "the number of values, both ends included";
-        let count = section.whole("count", &(2..=MAX_POINTS));
+        let count = section.whole_number("count", &(2..=MAX_POINTS));
         let count = section.require(count, "count", expected);
-        let Located { value: range, location } = tolerance.given()?;
+        let Located { value: range, location } = tolerance.into_located()?;
         let count = count?.value;
         if let Some(max_count) =
             max_distinct_values(range.from, range.to).filter(|&max_count| max_count < count)
@@ -477,32 +479,32 @@ fn values(section: &Section<'_>, swept: &SweptParameter<'_>) -> Option<Located<S
         }
         return Some(Located { value: range.values(count), location });
     }
-    let value_list = section.right_numbers("values", range);
+    let value_list = section.valid_numbers("values", range);
     let range_section = section.table("range", "range = { from, to, count }");
     match (value_list, range_section) {
         (Field::Absent, Field::Absent) => {
-            section.missing(
+            section.report_missing(
                 "values",
                 "`values = [...]` or `range = { from = ..., to = ..., count = ... }`",
             );
             None
         }
-        (Field::Given(value_list), Field::Absent) => {
+        (Field::Present(value_list), Field::Absent) => {
             list(value_list, section.report).map(without_tolerance)
         }
-        (Field::Absent, Field::Given(range_section)) => {
+        (Field::Absent, Field::Present(range_section)) => {
             spacing(range_section.value, range, None).map(without_tolerance)
         }
-        (Field::Given(value_list), Field::Given(range_section)) => {
+        (Field::Present(value_list), Field::Present(range_section)) => {
             let diagnostic = Diagnostic::new("an axis has both `values` and `range`");
             section.report.push(
                 diagnostic
-                    .at(&range_section.location, "expected only one of them")
-                    .at(&value_list.location, "given here"),
+                    .at_location(&range_section.location, "expected only one of them")
+                    .at_location(&value_list.location, "given here"),
             );
             None
         }
-        (Field::Bad, _) | (_, Field::Bad) => None,
+        (Field::Rejected, _) | (_, Field::Rejected) => None,
     }
 }
 
@@ -526,8 +528,8 @@ fn list(
         if pair[0].value == pair[1].value {
             let title = format!("the value {} is twice on this axis", decimal(pair[1].value));
             let diagnostic =
-                Diagnostic::new(title).at(&pair[1].location, "expected each value once");
-            report.push(diagnostic.at(&pair[0].location, "first given here"));
+                Diagnostic::new(title).at_location(&pair[1].location, "expected each value once");
+            report.push(diagnostic.at_location(&pair[0].location, "first given here"));
             is_valid = false;
         }
     }
@@ -541,14 +543,14 @@ pub fn spacing(
     range: Range,
     points: Option<u64>,
 ) -> Option<Located<AxisValues>> {
-    let location = section.at().clone();
+    let location = section.location().clone();
     let report = section.report;
     let [from, to] =
         ["from", "to"].map(|key| section.require(section.number(key, range), key, "a number"));
     let count = match points {
         None => {
             let expected = "the number of values, both ends included";
-            section.require(section.whole("count", &(1..=MAX_POINTS)), "count", expected)
+            section.require(section.whole_number("count", &(1..=MAX_POINTS)), "count", expected)
         }
         Some(value) => {
             let reason = "the number of points belongs in [design], as `points`";
@@ -556,7 +558,7 @@ pub fn spacing(
             Some(Located { value, location: location.clone() })
         }
     };
-    let logarithmic = section.choice("spacing", &["linear", "log"]).or(0);
+    let logarithmic = section.choice("spacing", &["linear", "log"]).or_default(0);
     section.finish();
     let from = from?;
     let to = to?;

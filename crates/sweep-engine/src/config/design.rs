@@ -17,13 +17,13 @@ const MAX_SOBOL_POINTS: u64 = 1 << 32;
 /// Walks over the section. After reading, a list has no points yet.
 pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
     keys.table(Key::new("design", ""), |keys| {
-        let rules = DesignRule::ALL.map(|(_, name, about)| (name, about));
-        let all = [&rules[..], &[("list", "points as listed")]].concat();
+        let rules = DesignRule::ALL.map(|(_, name, description)| (name, description));
+        let words = [&rules[..], &[("list", "points as listed")]].concat();
         let current_rule = design.as_ref().map(Design::method);
-        let current_rule = all.iter().position(|(name, _)| Some(*name) == current_rule);
+        let current_rule = words.iter().position(|(name, _)| Some(*name) == current_rule);
         let key =
-            Key::new("method", "").needed("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
-        let variants = Variants { all, default: None, set: 0 };
+            Key::new("method", "").required("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
+        let variants = Variants { words, default: None, settable_count: 0 };
         let selected_rule =
             keys.variants(key, &variants, current_rule, |keys, k| match DesignRule::ALL.get(k) {
                 Some((rule, ..)) => walk_spread(*rule, design, keys),
@@ -53,11 +53,11 @@ fn walk_list(design: &mut Option<Design>, keys: &mut Keys<'_>) {
         Some(Design::List { file, points, hash }) => (file, points, hash),
         _ => Default::default(),
     };
-    let key = key.needed("a CSV or Parquet file, relative to this file");
+    let key = key.required("a CSV or Parquet file, relative to this file");
     let field = keys.key(key, &Form::Text, &mut file);
     keys.write("points", points.into());
     keys.write("hash", hash.as_str().into());
-    if field.given().is_some() || keys.section().is_none() {
+    if field.into_located().is_some() || keys.section().is_none() {
         *design = Some(Design::List { file, points, hash });
     }
 }
@@ -71,12 +71,13 @@ fn walk_spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_
     // Placeholders for rejected numbers let the axes be read.
     let (mut points, mut seed) = numbers.unwrap_or((1, DEFAULT_SEED));
     let max_points = if rule == DesignRule::Sobol { MAX_SOBOL_POINTS } else { MAX_POINTS };
-    let key = Key::new("points", "the number of points").needed("the number of points").set();
+    let key =
+        Key::new("points", "the number of points").required("the number of points").settable();
     let points_field = keys.key(key, &Form::Whole(1..=max_points), &mut points);
-    let key = Key::new("seed", "the seed of the random positions").set();
+    let key = Key::new("seed", "the seed of the random positions").settable();
     let seed_field = keys.key(key, &Form::Whole(0..=MAX_SEED), &mut seed);
     for (name, field) in [("points", points_field), ("seed", seed_field)] {
-        if let (None, Field::Given(_)) = (numbers, field) {
+        if let (None, Field::Present(_)) = (numbers, field) {
             let title =
                 format!("`{name}` belongs to a design, and this grid has none that takes it");
             keys.refuse(name, &title, "expected a grid file with [design]");

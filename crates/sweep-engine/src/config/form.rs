@@ -33,11 +33,11 @@ pub struct Numbers {
     /// The range of each number in the schema.
     pub range: Range,
     /// The range of each number when it is read, if it is checked later.
-    pub read: Range,
+    pub read_range: Range,
     /// The number of entries.
     pub count: RangeInclusive<usize>,
     /// The keys of the entries' locations, if they are not the array's key with an index.
-    pub places: Vec<String>,
+    pub location_keys: Vec<String>,
     /// The expectation in the message about a wrong number of entries.
     pub expected: String,
     /// The help of that message.
@@ -55,10 +55,12 @@ impl Form<'_> {
     ) -> Field<Value> {
         match self {
             Self::Number(range) => section.number(key, *range).map(|found| found.value.into()),
-            Self::Whole(bounds) => section.whole(key, bounds).map(|found| found.value.into()),
+            Self::Whole(bounds) => {
+                section.whole_number(key, bounds).map(|found| found.value.into())
+            }
             Self::Text => section.text(key).map(|found| found.value.into()),
             Self::Word(all) => section.choice(key, all).map(|found| all[found.value].into()),
-            Self::Words(what, all) => names(section, key, what, all),
+            Self::Words(noun, all) => names(section, key, noun, all),
             Self::Numbers(numbers) => numbers.read(section, key, location_key),
             Self::Own(read, _) => read(section, key),
         }
@@ -68,9 +70,9 @@ impl Form<'_> {
     pub fn read_option(&self, written: &NamedArgument<'_>) -> Option<Value> {
         Some(match self {
             Self::Number(range) => written.number(*range)?.value.into(),
-            Self::Whole(bounds) => written.whole(bounds)?.into(),
+            Self::Whole(bounds) => written.whole_number(bounds)?.into(),
             Self::Word(all) => all[written.choice(all)?].into(),
-            Self::Words(what, all) => written.list(what, all)?.into(),
+            Self::Words(noun, all) => written.list(noun, all)?.into(),
             Self::Text | Self::Numbers(_) | Self::Own(..) => return None,
         })
     }
@@ -103,31 +105,32 @@ impl Numbers {
     pub fn new(range: Range, count: RangeInclusive<usize>, expected: impl Into<String>) -> Self {
         Self {
             range,
-            read: range,
+            read_range: range,
             count,
-            places: Vec::new(),
+            location_keys: Vec::new(),
             expected: expected.into(),
             help: None,
         }
     }
 
     fn read(&self, section: &Section<'_>, key: &'static str, location_key: &str) -> Field<Value> {
-        section.numbers(key, self.read).then(|found| {
+        section.numbers(key, self.read_range).and_then(|found| {
             if !self.count.contains(&found.value.len()) {
                 let title = format!("`{key}` has {} numbers", found.value.len());
-                let refusal = Diagnostic::new(title).at(&found.location, self.expected.as_str());
+                let refusal =
+                    Diagnostic::new(title).at_location(&found.location, self.expected.as_str());
                 section.report.push(self.help.into_iter().fold(refusal, Diagnostic::help));
                 return None;
             }
-            let put = |(k, number): (usize, Located<f64>)| {
-                let own_key = self.places.get(k).cloned();
-                section.report.put(
+            let record = |(k, number): (usize, Located<f64>)| {
+                let own_key = self.location_keys.get(k).cloned();
+                section.report.record_location(
                     own_key.unwrap_or_else(|| format!("{location_key}[{k}]")),
                     number.location,
                 );
                 number.value
             };
-            let value = found.value.into_iter().enumerate().map(put).collect();
+            let value = found.value.into_iter().enumerate().map(record).collect();
             Some(Located { value, location: found.location })
         })
     }

@@ -2,7 +2,7 @@
 
 use super::draft::Draft;
 use super::keys::Options;
-use super::sections::{described, sections, walk};
+use super::sections::{describe_keys, walk, walk_sections};
 use super::source::{Location, SourceId, is_blank};
 use super::syntax::{self, parse};
 use super::written::name_of;
@@ -16,7 +16,7 @@ use toml::de::DeTable;
 
 /// Reads the grid file and applies the constants. Returns `None` if the file has no text.
 pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
-    let GridInput { path, text, sets, at, .. } = input;
+    let GridInput { path, text, sets, at_arguments, .. } = input;
     let path_text = path.display();
     let (text, source) = match text {
         Some(text) => (text.clone(), report.add(path_text.to_string(), text.as_str())),
@@ -25,7 +25,7 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
     if is_blank(&text) {
         let location = Location::new(source, 0..0);
         let refusal = Diagnostic::new(format!("the grid file {path_text} is empty"))
-            .at(&location, "expected a grid");
+            .at_location(&location, "expected a grid");
         report.push(M::ABOUT.to_start.into_iter().fold(refusal, Diagnostic::help));
         return None;
     }
@@ -37,12 +37,12 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
 
     let mut keys = Keys::new(KeyWalk::Read(root));
     let mut draft = Draft { plan: Plan::blank(), report, constants: Vec::new() };
-    sections(&mut draft.plan, &mut keys, Some(input));
-    let names = described::<M>().set;
+    walk_sections(&mut draft.plan, &mut keys, Some(input));
+    let names = describe_keys::<M>().settable_keys;
     let (options, sets): (Vec<&String>, _) =
         sets.iter().partition(|set| set.contains('=') && names.contains(&name_of(set)));
-    parameters::constants(keys.section()?, sets, at, &mut draft);
-    draft.plan.aside.columns = columns(keys.section()?);
+    parameters::set_constants(keys.section()?, sets, at_arguments, &mut draft);
+    draft.plan.reading_notes.columns = columns(keys.section()?);
     let design_field = design::walk(&mut draft.plan.design, &mut keys);
     let root = keys.section()?;
     match (design_field, draft.plan.design.take()) {
@@ -52,14 +52,14 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
                 let parameter = model.find(name).ok()?;
                 Some((parameter.name.into_owned(), parameter.unit.to_owned()))
             };
-            let names = list::Names { known: &known, renamed: &draft.plan.aside.columns };
+            let names = list::Names { known: &known, renamed: &draft.plan.reading_notes.columns };
             match list::read(&file, path, &names, report) {
                 Some(list) => axes::listed_axes(root, list, &mut draft),
                 None => drop(root.tables("axis")),
             }
         }
         // If [design] is no table, it is unknown whether the axes are those of a grid or a design.
-        (Field::Bad, None) => drop(root.tables("axis")),
+        (Field::Rejected, None) => drop(root.tables("axis")),
         (_, design) => axes::axes(root, design, &mut draft),
     }
     keys.finish();
@@ -71,7 +71,9 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
 
 /// Reads `[columns]`: headers of lists and measurements with the names that they stand for.
 fn columns(root: &Section<'_>) -> Vec<(String, String)> {
-    let Some(section) = root.table("columns", "[columns]").given() else { return Vec::new() };
+    let Some(section) = root.table("columns", "[columns]").into_located() else {
+        return Vec::new();
+    };
     let section = section.value;
     let named_header = |header: Located<&str>| {
         let name = section.text_named(header.value)?;
@@ -92,7 +94,7 @@ pub fn is_another<M: Model>(
     source: SourceId,
     report: &Report,
 ) -> bool {
-    let grid = described::<M>().finish();
+    let grid = describe_keys::<M>().finish();
     let has_key = |kind: &str, key: &str| match kind {
         "grid" => {
             ["set", "axis", "columns"].contains(&key) || grid["properties"].get(key).is_some()
@@ -122,7 +124,7 @@ pub fn is_another<M: Model>(
             _ => format!("a grid file names it: {kind} = {name:?}"),
         };
         Diagnostic::new(format!("this is a {kind} file"))
-            .at(&Location::new(source, 0..0), format!("expected a {own} file"))
+            .at_location(&Location::new(source, 0..0), format!("expected a {own} file"))
             .help(help)
     });
     true

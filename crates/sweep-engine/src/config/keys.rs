@@ -17,27 +17,27 @@ pub struct Key<'k> {
     /// The description in schemas.
     description: &'k str,
     /// The expected value, if the key is required.
-    needed: Option<&'k str>,
+    expected: Option<&'k str>,
     /// Whether `--set` can change the key.
-    is_set: bool,
+    can_be_set: bool,
 }
 
 impl<'k> Key<'k> {
     /// Returns an optional key.
     pub const fn new(name: &'static str, description: &'k str) -> Self {
-        Self { name, description, needed: None, is_set: false }
+        Self { name, description, expected: None, can_be_set: false }
     }
 
     /// Returns the key as a required one.
     #[must_use]
-    pub const fn needed(self, expected: &'k str) -> Self {
-        Self { needed: Some(expected), ..self }
+    pub const fn required(self, expected: &'k str) -> Self {
+        Self { expected: Some(expected), ..self }
     }
 
     /// Returns the key as one that `--set` can change.
     #[must_use]
-    pub const fn set(self) -> Self {
-        Self { is_set: true, ..self }
+    pub const fn settable(self) -> Self {
+        Self { can_be_set: true, ..self }
     }
 }
 
@@ -79,13 +79,13 @@ impl<'a> Options<'a> {
         let Some(written) = self.written.iter().find(|written| written.name.value == name) else {
             return Field::Absent;
         };
-        let Some(value) = kind.read_option(written) else { return Field::Bad };
+        let Some(value) = kind.read_option(written) else { return Field::Rejected };
         if value != *old_value {
             // The change to a list of words has the text of the argument.
             let change = if value.is_array() { written.value.value.into() } else { value.clone() };
             self.changed.borrow_mut().push((name.to_owned(), change));
         }
-        Field::Given(Located { value, location: written.value.location.clone() })
+        Field::Present(Located { value, location: written.value.location.clone() })
     }
 }
 
@@ -97,7 +97,7 @@ pub struct Description {
     required: Vec<&'static str>,
     variants: Vec<Value>,
     /// The keys of this table and its inner tables that `--set` can change.
-    pub set: Vec<&'static str>,
+    pub settable_keys: Vec<&'static str>,
 }
 
 impl Description {
@@ -107,8 +107,8 @@ impl Description {
             if !key.description.is_empty() {
                 value["description"] = key.description.into();
             }
-            self.required.extend(key.needed.map(|_| key.name));
-            self.set.extend(key.is_set.then_some(key.name));
+            self.required.extend(key.expected.map(|_| key.name));
+            self.settable_keys.extend(key.can_be_set.then_some(key.name));
         }
         self.entries.insert(key.name.to_owned(), value);
     }
@@ -116,7 +116,7 @@ impl Description {
     /// Returns the description of an inner table.
     fn describe_inner<'a>(&mut self, walk: impl FnOnce(&mut Keys<'a>)) -> Value {
         let mut description = Keys::described(self.is_schema, walk);
-        self.set.append(&mut description.set);
+        self.settable_keys.append(&mut description.settable_keys);
         description.finish()
     }
 
@@ -126,12 +126,12 @@ impl Description {
         let variant_has_property = |schema: &Value| {
             schema["oneOf"].as_array().is_some_and(|all| all.iter().any(has_property))
         };
-        let entry = |table: &str| {
+        let has_key = |table: &str| {
             self.entries
                 .get(table)
                 .is_some_and(|schema| has_property(schema) || variant_has_property(schema))
         };
-        tables.iter().copied().find(|table| entry(table))
+        tables.iter().copied().find(|table| has_key(table))
     }
 
     /// Returns the table, or its schema.
@@ -149,7 +149,7 @@ pub struct Keys<'a> {
     /// The purpose of the walk.
     pub walk: KeyWalk<'a>,
     /// The prefix of the keys under which locations are recorded.
-    pub places: String,
+    pub location_prefix: String,
     /// Whether the table's variant is unknown. Then only the keys that are present are checked.
     is_lenient: bool,
 }
@@ -157,7 +157,7 @@ pub struct Keys<'a> {
 impl<'a> Keys<'a> {
     /// Returns the keys of the top table.
     pub fn new(walk: KeyWalk<'a>) -> Self {
-        Self { walk, places: String::new(), is_lenient: false }
+        Self { walk, location_prefix: String::new(), is_lenient: false }
     }
 
     /// Returns the description of a walk: a schema, or values.
@@ -227,22 +227,22 @@ impl<'a> Keys<'a> {
         kind: &Form<'_>,
         value: &mut T,
     ) -> Field<()> {
-        let location_key = format!("{}{}", self.places, key.name);
+        let location_key = format!("{}{}", self.location_prefix, key.name);
         let old_value = json!(value);
         // An empty value is neither described nor a default.
         let is_present = ![json!(null), json!([]), json!("")].contains(&old_value);
-        let found = match &mut self.walk {
-            KeyWalk::Read(section) if self.is_lenient && section.is_known(key.name) => {
+        let field = match &mut self.walk {
+            KeyWalk::Read(section) if self.is_lenient && section.has_read(key.name) => {
                 Field::Absent
             }
             KeyWalk::Read(section) => {
-                let field = kind.read(section, key.name, &location_key);
-                section.expect(field, key.name, key.needed.filter(|_| !self.is_lenient))
+                let read_field = kind.read(section, key.name, &location_key);
+                section.expect(read_field, key.name, key.expected.filter(|_| !self.is_lenient))
             }
-            KeyWalk::Set(options) if key.is_set => options.value(key.name, kind, &old_value),
+            KeyWalk::Set(options) if key.can_be_set => options.value(key.name, kind, &old_value),
             KeyWalk::Describe(description) if description.is_schema => {
                 let mut schema = kind.schema();
-                if is_present && key.needed.is_none() {
+                if is_present && key.expected.is_none() {
                     schema["default"] = old_value;
                 }
                 description.add(key, schema);
@@ -254,9 +254,9 @@ impl<'a> Keys<'a> {
             }
             KeyWalk::Set(_) | KeyWalk::Describe(_) => Field::Absent,
         };
-        found.then(|Located { value: found, location }| {
-            *value = serde_json::from_value(found).ok()?;
-            self.report()?.put(location_key, location.clone());
+        field.and_then(|Located { value: json, location }| {
+            *value = serde_json::from_value(json).ok()?;
+            self.report()?.record_location(location_key, location.clone());
             Some(Located { value: (), location })
         })
     }
@@ -271,9 +271,9 @@ impl<'a> Keys<'a> {
         value: &mut Vec<T>,
     ) -> Field<()> {
         let names: Vec<&str> = all.iter().copied().map(name).collect();
-        let mut words: Vec<String> = value.iter().map(|one| name(*one).to_owned()).collect();
+        let mut words: Vec<String> = value.iter().map(|item| name(*item).to_owned()).collect();
         let field = self.key(key, &Form::Words(noun, &names), &mut words);
-        let find = |word: &String| all.iter().copied().find(|one| name(*one) == word);
+        let find = |word: &String| all.iter().copied().find(|item| name(*item) == word);
         *value = words.iter().filter_map(find).collect();
         field
     }
@@ -281,12 +281,12 @@ impl<'a> Keys<'a> {
     /// Walks over a table under a key.
     pub fn table(&mut self, key: Key<'_>, walk: impl FnOnce(&mut Keys<'a>)) -> Field<()> {
         let name = key.name;
-        let keys = |inner| Keys { places: format!("{name}."), ..Keys::new(inner) };
+        let keys = |inner| Keys { location_prefix: format!("{name}."), ..Keys::new(inner) };
         match &mut self.walk {
             KeyWalk::Read(root) => root
-                .expect(root.table(name, &format!("[{name}]")), name, key.needed)
+                .expect(root.table(name, &format!("[{name}]")), name, key.expected)
                 .map(|section| {
-                    root.report.put(name, section.location);
+                    root.report.record_location(name, section.location);
                     let mut keys = keys(KeyWalk::Read(section.value));
                     walk(&mut keys);
                     keys.finish();
@@ -323,7 +323,7 @@ impl<'a> Keys<'a> {
         let value = if description.is_schema {
             let items = description.describe_inner(|keys| walk(keys, 0));
             let mut schema = json!({ "type": "array", "items": items });
-            if key.needed.is_some() {
+            if key.expected.is_some() {
                 schema["minItems"] = 1.into();
             }
             schema
@@ -353,30 +353,38 @@ impl<'a> Keys<'a> {
         if let KeyWalk::Describe(table) = &mut self.walk
             && table.is_schema
         {
-            for (k, (name, description)) in variants.all.iter().enumerate() {
-                let needed = (variants.default != Some(k)).then_some("");
+            for (k, (name, description)) in variants.words.iter().enumerate() {
+                let expected = (variants.default != Some(k)).then_some("");
                 let variant = table.describe_inner(|keys| {
-                    keys.describe(Key { description, needed, ..key }, |_| json!({ "const": name }));
+                    keys.describe(
+                        Key { description, expected, ..key },
+                        |_| json!({ "const": name }),
+                    );
                     walk(keys, k);
                 });
                 table.variants.push(variant);
             }
             return None;
         }
-        let names: Vec<&str> = variants.all.iter().map(|(name, _)| *name).collect();
-        let expected = list_choices(&names);
-        let needed = key.needed.or(variants.default.is_none().then_some(&expected));
-        let can_be = if let KeyWalk::Set(_) = self.walk { variants.set } else { names.len() };
+        let names: Vec<&str> = variants.words.iter().map(|(name, _)| *name).collect();
+        let choices = list_choices(&names);
+        let expected = key.expected.or(variants.default.is_none().then_some(&choices));
+        let allowed_count =
+            if let KeyWalk::Set(_) = self.walk { variants.settable_count } else { names.len() };
         let mut word = current.map(|current| names[current].to_owned());
-        let field = self.key(Key { needed, ..key }, &Form::Word(&names[..can_be]), &mut word);
-        if let (KeyWalk::Set(options), Field::Given(field)) = (&self.walk, &field) {
+        let field =
+            self.key(Key { expected, ..key }, &Form::Word(&names[..allowed_count]), &mut word);
+        if let (KeyWalk::Set(options), Field::Present(field)) = (&self.walk, &field) {
             // The word decides on the whole table, so that its location is that of the table.
-            options.report.put(self.places.trim_end_matches('.'), field.location.clone());
+            options.report.record_location(
+                self.location_prefix.trim_end_matches('.'),
+                field.location.clone(),
+            );
         }
         let word = names.iter().position(|name| word.as_deref() == Some(name));
         let selected = match (&self.walk, field) {
             (KeyWalk::Read(_), Field::Absent) => variants.default,
-            (KeyWalk::Read(_), Field::Bad) => None,
+            (KeyWalk::Read(_), Field::Rejected) => None,
             _ => word,
         };
         self.is_lenient = selected.is_none() && self.section().is_some();
@@ -392,11 +400,11 @@ impl<'a> Keys<'a> {
 /// The words of a key that decides which other keys a table has.
 pub struct Variants {
     /// The words with their descriptions.
-    pub all: Vec<(&'static str, &'static str)>,
-    /// The word that is chosen if a file names none; `None` if it must name one.
+    pub words: Vec<(&'static str, &'static str)>,
+    /// The index of the word that applies if a file names none; `None` if it must name one.
     pub default: Option<usize>,
     /// The number of words that `--set` may choose, from the first on.
-    pub set: usize,
+    pub settable_count: usize,
 }
 
 /// Returns the schema of an object with these properties and no others.

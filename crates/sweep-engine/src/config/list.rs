@@ -57,7 +57,7 @@ pub struct NumberTable {
     pub columns: Vec<ListColumn>,
     rows: RowLocations,
     /// The number of lines before the line of names.
-    preamble: usize,
+    preamble_lines: usize,
 }
 
 impl NumberTable {
@@ -65,7 +65,7 @@ impl NumberTable {
     pub fn read(path: &Path, names: &Names<'_>, report: &Report) -> Option<Self> {
         let path_text = show_path(path);
         let file = Location::new(report.add(path_text.as_str(), String::new()), 0..0);
-        match table(path, &file, true, names, report) {
+        match read_table(path, &file, true, names, report) {
             Ok((table, _)) => report.is_clean().then_some(table),
             Err(reason) => {
                 let title = format!("cannot read {path_text}: {reason}");
@@ -84,9 +84,10 @@ impl NumberTable {
         report: &Report,
     ) -> Self {
         let headers: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-        let (source, places) = report.header(name, &headers);
+        let (source, locations) = report.add_header(name, &headers);
         let mut table = Vec::new();
-        for (place, ((header, values), location)) in columns.into_iter().zip(places).enumerate() {
+        for (index, ((header, values), location)) in columns.into_iter().zip(locations).enumerate()
+        {
             let known_name = names.find(&header, None).unwrap_or_else(|[title, expected]| {
                 report.refuse::<()>(&location, title, expected);
                 None
@@ -100,12 +101,12 @@ impl NumberTable {
                 None => (header.clone(), Vec::new()),
             };
             let name = Located { value, location };
-            table.push(ListColumn { name, header, place, is_known, values, is_clock: false });
+            table.push(ListColumn { name, header, index, is_known, values, is_clock: false });
         }
         Self {
             columns: table,
             rows: RowLocations::Binary(Location::new(source, 0..0)),
-            preamble: 0,
+            preamble_lines: 0,
         }
     }
 
@@ -116,7 +117,7 @@ impl NumberTable {
 
     /// Returns the location of a value. `column` is the index of the column in the file, and `row`
     /// the index of the row, both from 0.
-    pub fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
+    pub fn locate(&self, sources: &Sources, column: usize, row: usize) -> Location {
         match &self.rows {
             RowLocations::Binary(location) => location.clone(),
             RowLocations::Lines { source, starts, separator } => {
@@ -128,32 +129,41 @@ impl NumberTable {
         }
     }
 
-    /// Returns the text of a value in a file of text; the indices are those of [`Self::place`].
+    /// Returns the text of a value in a file of text; the indices are those of [`Self::locate`].
     pub fn cell(&self, report: &Report, column: usize, row: usize) -> Option<String> {
         let RowLocations::Lines { source, .. } = &self.rows else { return None };
         let sources = report.sources();
-        let cell = sources.text(*source).get(self.place(&sources, column, row).span)?;
+        let cell = sources.text(*source).get(self.locate(&sources, column, row).span)?;
         Some(cell.trim_matches('"').to_owned())
     }
 
     /// Returns notes on ignored lines and columns and on renamed columns, a line each.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        if self.preamble > 0 {
-            notes.push(format!("{} before the names left out", counted(self.preamble, "line")));
+        if self.preamble_lines > 0 {
+            notes.push(format!(
+                "{} before the names left out",
+                counted(self.preamble_lines, "line")
+            ));
         }
-        let ignored: Vec<String> =
-            self.columns.iter().filter(|it| !it.is_known).map(|it| quoted(&it.header)).collect();
+        let ignored: Vec<String> = self
+            .columns
+            .iter()
+            .filter(|column| !column.is_known)
+            .map(|column| quoted(&column.header))
+            .collect();
         if !ignored.is_empty() {
             let (named, ellipsis) = ignored.split_at(ignored.len().min(MAX_NAMED_COLUMNS));
             let ellipsis = if ellipsis.is_empty() { "" } else { ", ..." };
             let columns = if ignored.len() == 1 { "the column" } else { "the columns" };
             notes.push(format!("left out {columns} {}{ellipsis}", named.join(", ")));
         }
-        let renamed_columns =
-            self.columns.iter().filter(|it| it.is_known && it.header != it.name.value);
-        let renamed_columns =
-            renamed_columns.map(|it| format!("{} is {}", quoted(&it.header), it.name.value));
+        let renamed_columns = self
+            .columns
+            .iter()
+            .filter(|column| column.is_known && column.header != column.name.value);
+        let renamed_columns = renamed_columns
+            .map(|column| format!("{} is {}", quoted(&column.header), column.name.value));
         let renamed_columns: Vec<String> = renamed_columns.collect();
         if !renamed_columns.is_empty() {
             notes.push(renamed_columns.join(", "));
@@ -181,7 +191,7 @@ pub struct ListColumn {
     /// The name in the file.
     pub header: String,
     /// The index in the file, from 0.
-    pub place: usize,
+    pub index: usize,
     /// Whether the reader knows the name. An unknown column has no values.
     pub is_known: bool,
     /// The value of each row.
@@ -216,28 +226,28 @@ fn show_path(path: &Path) -> String {
 
 /// Reads the table of a file and the hash of its bytes; mistakes are reported at `file`. With
 /// `allows_missing`, a missing value is NaN; otherwise NaN marks a rejected value.
-fn table(
+fn read_table(
     path: &Path,
     file: &Location,
     allows_missing: bool,
     names: &Names<'_>,
     report: &Report,
 ) -> Result<(NumberTable, String), ListError> {
-    let bytes = bytes(path)?;
+    let bytes = read_bytes(path)?;
     let hash = blake3::hash(&bytes).to_hex().to_string();
     if bytes.starts_with(b"PAR1") {
         let mut columns = Vec::new();
-        for (place, parquet_column) in
+        for (index, parquet_column) in
             parquet::columns(bytes, allows_missing, names)?.into_iter().enumerate()
         {
             let parquet::ParquetColumn { name, header, values, is_clock } = parquet_column;
             let name = Located { value: name, location: file.clone() };
             let is_known = values.is_some();
             let values = values.unwrap_or_default();
-            columns.push(ListColumn { name, header, place, is_known, values, is_clock });
+            columns.push(ListColumn { name, header, index, is_known, values, is_clock });
         }
         return Ok((
-            NumberTable { columns, rows: RowLocations::Binary(file.clone()), preamble: 0 },
+            NumberTable { columns, rows: RowLocations::Binary(file.clone()), preamble_lines: 0 },
             hash,
         ));
     }
@@ -245,10 +255,14 @@ fn table(
     // The report gets the text after it is read, because this function borrows it until then.
     let source = report.add(show_path(path), String::new());
     let text_table = csv::read(&text, source, allows_missing, names, report);
-    report.fill(source, text);
+    report.set_text(source, text);
     let csv::TextTable { columns, starts, separator, preamble } = text_table?;
     Ok((
-        NumberTable { columns, rows: RowLocations::Lines { source, starts, separator }, preamble },
+        NumberTable {
+            columns,
+            rows: RowLocations::Lines { source, starts, separator },
+            preamble_lines: preamble,
+        },
         hash,
     ))
 }
@@ -256,10 +270,10 @@ fn table(
 /// Reads a list of points.
 pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) -> Option<List> {
     let path = beside(grid, file);
-    let location = report.place("design.file")?;
+    let location = report.location("design.file")?;
     let path_text = show_path(&path);
-    let (table, hash) = match table(&path, &location, false, names, report) {
-        Ok(read) => read,
+    let (table, hash) = match read_table(&path, &location, false, names, report) {
+        Ok(table_and_hash) => table_and_hash,
         Err(reason) => {
             let title = format!("cannot read the list of points {path_text}: {reason}");
             let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
@@ -288,7 +302,7 @@ pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) 
     Some(List { design, table })
 }
 
-fn bytes(path: &Path) -> Result<Vec<u8>, ListError> {
+fn read_bytes(path: &Path) -> Result<Vec<u8>, ListError> {
     let mut bytes = Vec::new();
     let byte_count = regular::open(path)
         .and_then(|file| file.take(MAX_LIST_BYTES + 1).read_to_end(&mut bytes))

@@ -5,7 +5,7 @@ use sweep_parameter::{Range, UnknownParameter};
 use super::draft::{ClaimedNumbers, Draft, SetConstant};
 use super::written::name_of;
 use super::{
-    Diagnostic, Located, NamedArgument, NamedValues, Section, quoted, sections::described,
+    Diagnostic, Located, NamedArgument, NamedValues, Section, quoted, sections::describe_keys,
 };
 use crate::Model;
 use crate::{ModelParameter, Plan, program};
@@ -15,23 +15,23 @@ use crate::{ModelParameter, Plan, program};
 pub(super) const MAX_COMPARED_NAMES: usize = 400;
 
 /// Reads `[set]`, then `--set` and `--at`, which override it, and writes them into the plan.
-pub fn constants<M: Model>(
+pub fn set_constants<M: Model>(
     root: &Section<'_>,
     sets: Vec<&String>,
-    at: &[String],
+    at_arguments: &[String],
     draft: &mut Draft<'_, M>,
 ) {
     let mut constants = Vec::new();
-    if let Some(section) = root.table("set", "[set]").given() {
+    if let Some(section) = root.table("set", "[set]").into_located() {
         let section = section.value;
         for name in section.names() {
             let number = |range: Range| section.number_named(name.value, range);
-            constants.extend(constant(name.clone(), number, false, draft));
+            constants.extend(read_constant(name.clone(), number, false, draft));
         }
         apply(&constants, draft);
     }
-    let mut constants = arguments("--set", sets, draft);
-    constants.extend(arguments("--at", at, draft));
+    let mut constants = read_arguments("--set", sets, draft);
+    constants.extend(read_arguments("--at", at_arguments, draft));
     let plan_before = draft.plan.clone();
     apply(&constants, draft);
     // A constant that equals the file's value does not change the plan.
@@ -47,22 +47,22 @@ pub fn constants<M: Model>(
         .collect();
 }
 
-/// Replaces the axes by one point. `at` has an argument NAME=VALUE for each axis of several values,
-/// and may have arguments for other parameters.
-pub fn point<M: Model>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
-    let constants = arguments("--at", at, draft);
-    let is_given = |name: &str| at.iter().any(|argument| name_of(argument) == name);
+/// Replaces the axes by one point. `at_arguments` has an argument NAME=VALUE for each axis of
+/// several values, and may have arguments for other parameters.
+pub fn fix_point<M: Model>(at_arguments: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
+    let constants = read_arguments("--at", at_arguments, draft);
+    let is_given = |name: &str| at_arguments.iter().any(|argument| name_of(argument) == name);
     for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
         if is_given(&axis.parameter.name) {
             continue;
         }
         if axis.values.len() == 1 {
             write(&axis.parameter, &mut draft.plan, axis.values.value(0));
-        } else if let Some(place) = draft.report.place(&format!("axis[{k}]")) {
+        } else if let Some(location) = draft.report.location(&format!("axis[{k}]")) {
             let name = &axis.parameter.name;
             let title = format!("a point of the grid needs a value of `{name}`");
             let expected = format!("expected --at {name}=VALUE for this axis");
-            draft.report.refuse::<()>(&place, title, expected);
+            draft.report.refuse::<()>(&location, title, expected);
         }
     }
     draft.plan.design = None;
@@ -71,20 +71,21 @@ pub fn point<M: Model>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
 }
 
 /// Reads NAME=VALUE arguments.
-fn arguments<'a, M: Model>(
+fn read_arguments<'a, M: Model>(
     option: &str,
     arguments: impl IntoIterator<Item = &'a String>,
     draft: &Draft<'a, M>,
 ) -> Vec<SetConstant<M>> {
     let named_arguments =
-        arguments.into_iter().filter_map(|one| NamedArgument::read(option, one, draft.report));
-    let constant =
-        |one: NamedArgument<'a>| constant(one.name.clone(), |range| one.number(range), true, draft);
-    named_arguments.filter_map(constant).collect()
+        arguments.into_iter().filter_map(|text| NamedArgument::read(option, text, draft.report));
+    let read_constant = |argument: NamedArgument<'a>| {
+        read_constant(argument.name.clone(), |range| argument.number(range), true, draft)
+    };
+    named_arguments.filter_map(read_constant).collect()
 }
 
 /// Returns a constant if its name is a parameter and `number` gives a value in its range.
-fn constant<M: Model>(
+fn read_constant<M: Model>(
     name: Located<&str>,
     number: impl FnOnce(Range) -> Option<Located<f64>>,
     overrides_file: bool,
@@ -98,20 +99,22 @@ fn constant<M: Model>(
 
 /// Finds the parameter of this name; an unknown name is reported.
 pub fn find<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) -> Option<ModelParameter<M>> {
-    let refuse = |error| draft.report.push_with(|_| unknown(name, &error, &draft.plan.model));
+    let refuse =
+        |error| draft.report.push_with(|_| unknown_parameter(name, &error, &draft.plan.model));
     draft.plan.model.find(name.value).map_err(refuse).ok()
 }
 
 /// Returns the mistake of a name that is no parameter.
-pub fn unknown<M: Model>(
+pub fn unknown_parameter<M: Model>(
     name: &Located<&str>,
     UnknownParameter { reason, is_in_no_model }: &UnknownParameter,
     model: &M,
 ) -> Diagnostic {
     let title = format!("unknown parameter {}", quoted(name.value));
-    let diagnostic = Diagnostic::new(title).at(&name.location, reason.as_str());
+    let diagnostic = Diagnostic::new(title).at_location(&name.location, reason.as_str());
     let tables = ["time", "integrator", "reliability"];
-    let table = is_in_no_model.then(|| described::<M>().table_of(name.value, &tables)).flatten();
+    let table =
+        is_in_no_model.then(|| describe_keys::<M>().table_of(name.value, &tables)).flatten();
     match (is_in_no_model, table) {
         (true, Some(table)) => {
             let set = format!("`{}` is set in [{table}] of the grid file", name.value);
@@ -124,7 +127,7 @@ pub fn unknown<M: Model>(
             let parameters = model.parameters();
             let with_suggestion = diagnostic.nearest(
                 name.value,
-                parameters.iter().take(MAX_COMPARED_NAMES).map(|one| &*one.name),
+                parameters.iter().take(MAX_COMPARED_NAMES).map(|parameter| &*parameter.name),
             );
             with_suggestion.help(format!("`{} parameters` lists every name", program()))
         }
@@ -139,7 +142,7 @@ fn apply<M: Model>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
         if claimed.claim(&constant.name, constant.parameter.parts.clone(), draft.report) {
             write(&constant.parameter, &mut draft.plan, constant.value.value);
             for part in &constant.parameter.parts {
-                draft.report.put(part.clone(), constant.value.location.clone());
+                draft.report.record_location(part.clone(), constant.value.location.clone());
             }
             draft.constants.push(constant.clone());
         }

@@ -1,6 +1,6 @@
 //! Checks of a table whose columns are the axes of a plan, in place of its grid.
 
-use super::parameters::unknown;
+use super::parameters::unknown_parameter;
 use super::{Diagnostic, Diagnostics, Located, Location, Report, quoted, refused_number};
 use crate::Model;
 use crate::{Axis, Plan};
@@ -22,7 +22,7 @@ where
     V: Iterator<Item = Option<f64>>,
 {
     let report = Report::default();
-    let (source, places) = report.header("table", names);
+    let (source, places) = report.add_header("table", names);
     let mut axis_columns: Vec<Option<usize>> = vec![None; plan.axes.len()];
     for (k, (&value, location)) in names.iter().zip(&places).enumerate() {
         let name = Located { value, location: location.clone() };
@@ -33,8 +33,9 @@ where
         };
         if let Some(first) = axis_columns[axis_index] {
             let title = format!("the column {} is given twice", quoted(name.value));
-            let diagnostic = Diagnostic::new(title).at(&name.location, "expected each axis once");
-            report.push(diagnostic.at(&places[first], "first given here"));
+            let diagnostic =
+                Diagnostic::new(title).at_location(&name.location, "expected each axis once");
+            report.push(diagnostic.at_location(&places[first], "first given here"));
             continue;
         }
         axis_columns[axis_index] = Some(k);
@@ -55,7 +56,7 @@ where
             let whole_header =
                 Location::new(source, 0..places.last().map_or(0, |last| last.span.end));
             let expected = "expected a column for every axis of the plan";
-            report.push(Diagnostic::new(title).at(&whole_header, expected));
+            report.push(Diagnostic::new(title).at_location(&whole_header, expected));
         }
     }
     report.finish(Some(axis_columns))
@@ -63,21 +64,21 @@ where
 
 /// Returns the mistake of a column that holds no numbers.
 pub fn not_numbers(names: &[String], column: usize, found: &str) -> Diagnostics {
-    let what = format!("the column {} holds no numbers", quoted(&names[column]));
-    column_mistake(names, column, what, format!("expected numbers, found {found}"))
+    let title = format!("the column {} holds no numbers", quoted(&names[column]));
+    column_mistake(names, column, title, format!("expected numbers, found {found}"))
 }
 
 /// Returns the mistake of a column whose length differs from that of the first column.
 pub fn other_length(names: &[String], column: usize, length: usize, first: usize) -> Diagnostics {
-    let what = format!("the column {} has {length} values", quoted(&names[column]));
-    column_mistake(names, column, what, format!("expected {first}, as the first column has"))
+    let title = format!("the column {} has {length} values", quoted(&names[column]));
+    column_mistake(names, column, title, format!("expected {first}, as the first column has"))
 }
 
 fn column_mistake(names: &[String], column: usize, title: String, expected: String) -> Diagnostics {
     let report = Report::default();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let (_, places) = report.header("table", &names);
-    report.push(Diagnostic::new(title).at(&places[column], expected));
+    let (_, places) = report.add_header("table", &names);
+    report.push(Diagnostic::new(title).at_location(&places[column], expected));
     report.into_diagnostics()
 }
 
@@ -93,7 +94,7 @@ fn value_off_axis<M: Model>(
     let range = axis.parameter.range;
     match value {
         None => Diagnostic::new(format!("{description} has no value"))
-            .at(&name.location, format!("expected {range}")),
+            .at_location(&name.location, format!("expected {range}")),
         Some(value) if !range.contains(value) => {
             refused_number(&description, value, &name.location, range)
         }
@@ -102,7 +103,7 @@ fn value_off_axis<M: Model>(
             let expected = format!("expected a number from {least} to {greatest}");
             let axis = &axis.parameter.name;
             Diagnostic::new(title)
-                .at(&name.location, expected)
+                .at_location(&name.location, expected)
                 .help(format!("give `{axis}` a wider range in the plan's [[axis]]"))
         }
     }
@@ -111,7 +112,7 @@ fn value_off_axis<M: Model>(
 /// Returns the mistake of a column that is no axis: a fixed parameter, or an unknown name.
 fn column_without_axis<M: Model>(name: &Located<&str>, plan: &Plan<M>) -> Diagnostic {
     if let Err(error) = plan.model.find(name.value) {
-        return unknown(name, &error, &plan.model);
+        return unknown_parameter(name, &error, &plan.model);
     }
     let axes: Vec<String> = plan.axes.iter().map(|axis| quoted(&axis.parameter.name)).collect();
     let expected = match axes.as_slice() {
@@ -119,7 +120,7 @@ fn column_without_axis<M: Model>(name: &Located<&str>, plan: &Plan<M>) -> Diagno
         axes => format!("expected the plan's axes: {}", axes.join(", ")),
     };
     let title = format!("{} is no axis of this plan", quoted(name.value));
-    Diagnostic::new(title).at(&name.location, expected).help(format!(
+    Diagnostic::new(title).at_location(&name.location, expected).help(format!(
         "add [[axis]] with parameter = \"{}\" and the range that the table may cover",
         name.value
     ))

@@ -28,7 +28,7 @@ fn render_diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -
     let mut group = Group::with_title(Level::ERROR.primary_title(diagnostic.title.as_str()));
     // Locations on one line share its snippet.
     let mut shown: Vec<(usize, &Location)> = Vec::new();
-    for (k, (location, _)) in diagnostic.places.iter().enumerate() {
+    for (k, (location, _)) in diagnostic.locations.iter().enumerate() {
         let number = sources.line(location).number;
         if shown.iter().any(|&(line, other)| line == number && other.source == location.source) {
             continue;
@@ -47,12 +47,12 @@ fn add_snippet<'a>(
     sources: &'a Sources,
     k: usize,
 ) -> Group<'a> {
-    let location = &diagnostic.places[k].0;
+    let location = &diagnostic.locations[k].0;
     let line = sources.line(location);
     let window = window(&line);
     let column = line.text[..line.span.start].chars().count() + 1;
     let mut snippet = Snippet::source(&line.text[window.clone()]).line_start(line.number);
-    for (j, (other, label)) in diagnostic.places.iter().enumerate() {
+    for (j, (other, label)) in diagnostic.locations.iter().enumerate() {
         let marked = sources.line(other);
         let is_in_window = other.source == location.source
             && marked.number == line.number
@@ -99,11 +99,11 @@ impl Diagnostics {
 
     fn text(&self, colour: bool) -> String {
         let mut text = String::new();
-        for found in &self.found {
-            text.push_str(&render_diagnostic(found, &self.sources, colour));
+        for diagnostic in &self.kept {
+            text.push_str(&render_diagnostic(diagnostic, &self.sources, colour));
             text.push_str("\n\n");
         }
-        text.push_str(&render_summary(self.count(), self.beyond, colour));
+        text.push_str(&render_summary(self.count(), self.omitted, colour));
         text
     }
 }

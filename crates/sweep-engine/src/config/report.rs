@@ -4,7 +4,7 @@ use std::cell::{Ref, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::source::{Location, SourceId, Sources};
-use crate::plan::ASSUMED;
+use crate::plan::ASSUMED_PREFIX;
 use sweep_results::nearest;
 
 /// Maximum number of mistakes that are kept; later ones are only counted. Basis: a wrong file must
@@ -18,7 +18,7 @@ pub struct Diagnostic {
     pub title: String,
     /// The locations, each with the text that is expected at it. The first is the location of the
     /// mistake; the others explain the mistake.
-    pub places: Vec<(Location, String)>,
+    pub locations: Vec<(Location, String)>,
     /// The advice.
     pub help: Vec<String>,
 }
@@ -26,19 +26,19 @@ pub struct Diagnostic {
 impl Diagnostic {
     /// Returns a mistake without locations.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), places: Vec::new(), help: Vec::new() }
+        Self { title: title.into(), locations: Vec::new(), help: Vec::new() }
     }
 
     /// Returns the mistake of an expression at this location.
     pub fn from_expression(mistake: sweep_results::ExpressionError, location: &Location) -> Self {
         let (typed, names) = mistake.candidates.unwrap_or_default();
         let names = names.iter().map(String::as_str);
-        Self::new(mistake.title).at(location, mistake.expected).nearest(&typed, names)
+        Self::new(mistake.title).at_location(location, mistake.expected).nearest(&typed, names)
     }
 
     /// Adds a location, with the text that is expected at it.
-    pub fn at(mut self, location: &Location, expected: impl Into<String>) -> Self {
-        self.places.push((location.clone(), expected.into()));
+    pub fn at_location(mut self, location: &Location, expected: impl Into<String>) -> Self {
+        self.locations.push((location.clone(), expected.into()));
         self
     }
 
@@ -61,34 +61,36 @@ impl Diagnostic {
 #[derive(Debug, Default)]
 pub struct Report {
     sources: RefCell<Sources>,
-    found: RefCell<Mistakes>,
+    mistakes: RefCell<Mistakes>,
     /// The locations of numbers, for checks that are made later.
-    places: RefCell<BTreeMap<String, Location>>,
+    locations: RefCell<BTreeMap<String, Location>>,
     /// The numbers that were rejected or missing, and are replaced by placeholders.
-    doubtful: RefCell<BTreeSet<String>>,
+    invalid_keys: RefCell<BTreeSet<String>>,
     /// The rules of the numbers that a file leaves out, by parameter.
-    assumed: RefCell<BTreeMap<String, String>>,
+    default_rules: RefCell<BTreeMap<String, String>>,
     /// The notes for the user on how input was read.
     notes: RefCell<Vec<String>>,
 }
 
 #[derive(Debug, Default)]
 struct Mistakes {
-    found: Vec<Diagnostic>,
-    beyond: usize,
+    /// The mistakes that are shown.
+    kept: Vec<Diagnostic>,
+    /// The number of further mistakes.
+    omitted: usize,
     /// The lines that are not TOML. Other mistakes on them may come from the parser's recovery, so
     /// they are dropped.
-    broken: BTreeMap<SourceId, BTreeSet<usize>>,
+    malformed_lines: BTreeMap<SourceId, BTreeSet<usize>>,
     /// The start of an array that is never closed, for each text.
-    swallowed: BTreeMap<SourceId, usize>,
+    unclosed_arrays: BTreeMap<SourceId, usize>,
 }
 
 impl Mistakes {
-    fn keep(&mut self, diagnostic: Diagnostic) {
-        if self.found.len() >= MAX_MISTAKES {
-            self.beyond += 1;
+    fn add(&mut self, diagnostic: Diagnostic) {
+        if self.kept.len() >= MAX_MISTAKES {
+            self.omitted += 1;
         } else {
-            self.found.push(diagnostic);
+            self.kept.push(diagnostic);
         }
     }
 }
@@ -101,7 +103,7 @@ impl Report {
 
     /// Adds column names as a line of text under the name that messages show. Returns their
     /// locations.
-    pub fn header(&self, name: &str, columns: &[&str]) -> (SourceId, Vec<Location>) {
+    pub fn add_header(&self, name: &str, columns: &[&str]) -> (SourceId, Vec<Location>) {
         let source = self.add(name, columns.join(","));
         let mut next = 0;
         let column_location = |column: &&str| {
@@ -113,8 +115,8 @@ impl Report {
     }
 
     /// Sets the text of a source that was added without one.
-    pub fn fill(&self, id: SourceId, text: String) {
-        self.sources.borrow_mut().fill(id, text);
+    pub fn set_text(&self, id: SourceId, text: String) {
+        self.sources.borrow_mut().set_text(id, text);
     }
 
     /// Returns the texts that are read.
@@ -125,22 +127,22 @@ impl Report {
     /// Records the location of a number by its key: a parameter's name, `time.end_s` and the like
     /// for other keys of the grid file, `spin.time_s[3]` for an entry of an array, `axis[0]` for an
     /// axis.
-    pub fn put(&self, key: impl Into<String>, location: Location) {
-        self.places.borrow_mut().insert(key.into(), location);
+    pub fn record_location(&self, key: impl Into<String>, location: Location) {
+        self.locations.borrow_mut().insert(key.into(), location);
     }
 
     /// Marks a number as rejected or missing, so that checks that depend on it are skipped.
-    pub fn doubt(&self, key: impl Into<String>) {
-        self.doubtful.borrow_mut().insert(key.into());
+    pub fn mark_invalid(&self, key: impl Into<String>) {
+        self.invalid_keys.borrow_mut().insert(key.into());
     }
 
     /// Records the rule that gives a parameter its value if a file leaves it out.
-    pub fn assume(&self, name: &str, rule: &str) {
-        self.assumed.borrow_mut().insert(name.to_owned(), format!("{ASSUMED}{rule}"));
+    pub fn record_default_rule(&self, name: &str, rule: &str) {
+        self.default_rules.borrow_mut().insert(name.to_owned(), format!("{ASSUMED_PREFIX}{rule}"));
     }
 
     /// Adds a note for the user.
-    pub fn note(&self, note: impl Into<String>) {
+    pub fn add_note(&self, note: impl Into<String>) {
         self.notes.borrow_mut().push(note.into());
     }
 
@@ -150,24 +152,24 @@ impl Report {
     }
 
     /// Returns the location of a number, if it was written.
-    pub fn place(&self, key: &str) -> Option<Location> {
-        self.places.borrow().get(key).cloned()
+    pub fn location(&self, key: &str) -> Option<Location> {
+        self.locations.borrow().get(key).cloned()
     }
 
     /// Returns the source of each parameter: the text that wrote it last, or the rule that gives it
     /// if no text writes it.
-    pub fn written(&self) -> BTreeMap<String, String> {
-        let places = self.places.borrow();
+    pub fn parameter_sources(&self) -> BTreeMap<String, String> {
+        let locations = self.locations.borrow();
         let sources = self.sources.borrow();
-        let parameters = places.iter().filter(|(key, _)| !key.contains(['.', '[']));
+        let parameters = locations.iter().filter(|(key, _)| !key.contains(['.', '[']));
         let written_sources = parameters
             .map(|(key, location)| (key.clone(), sources.name(location.source).to_owned()));
-        self.assumed.borrow().clone().into_iter().chain(written_sources).collect()
+        self.default_rules.borrow().clone().into_iter().chain(written_sources).collect()
     }
 
     /// Returns whether a number was rejected or missing.
-    pub fn is_doubtful(&self, key: &str) -> bool {
-        self.doubtful.borrow().contains(key)
+    pub fn is_invalid(&self, key: &str) -> bool {
+        self.invalid_keys.borrow().contains(key)
     }
 
     /// Adds a mistake, unless its line has a mistake of syntax.
@@ -177,7 +179,7 @@ impl Report {
 
     /// Adds help to the mistake that was kept last, if there is one.
     pub fn add_help(&self, help: &str) {
-        if let Some(last) = self.found.borrow_mut().found.last_mut() {
+        if let Some(last) = self.mistakes.borrow_mut().kept.last_mut() {
             last.help.push(help.to_owned());
         }
     }
@@ -189,7 +191,7 @@ impl Report {
         title: impl Into<String>,
         expected: impl Into<String>,
     ) -> Option<T> {
-        self.push(Diagnostic::new(title).at(location, expected));
+        self.push(Diagnostic::new(title).at_location(location, expected));
         None
     }
 
@@ -197,63 +199,64 @@ impl Report {
     /// a million mistakes would take minutes.
     pub fn push_with(&self, diagnose: impl FnOnce(&Sources) -> Diagnostic) {
         if self.is_full() {
-            self.found.borrow_mut().beyond += 1;
+            self.mistakes.borrow_mut().omitted += 1;
             return;
         }
         let sources = self.sources.borrow();
         let diagnostic = diagnose(&sources);
-        let mut found = self.found.borrow_mut();
-        let broken = diagnostic.places.first().is_some_and(|(location, _)| {
-            let swallowed = found
-                .swallowed
+        let mut mistakes = self.mistakes.borrow_mut();
+        let is_on_malformed_line = diagnostic.locations.first().is_some_and(|(location, _)| {
+            let is_in_unclosed_array = mistakes
+                .unclosed_arrays
                 .get(&location.source)
                 .is_some_and(|&start| location.span.start >= start);
-            let broken = found.broken.get(&location.source);
-            swallowed || broken.is_some_and(|lines| lines.contains(&sources.line(location).number))
+            let lines = mistakes.malformed_lines.get(&location.source);
+            is_in_unclosed_array
+                || lines.is_some_and(|lines| lines.contains(&sources.line(location).number))
         });
-        if !broken {
-            found.keep(diagnostic);
+        if !is_on_malformed_line {
+            mistakes.add(diagnostic);
         }
     }
 
     /// Adds a mistake of syntax, the first of each line.
     pub fn push_syntax(&self, diagnostic: Diagnostic) {
-        let mut found = self.found.borrow_mut();
-        let is_kept = found.found.len() >= MAX_MISTAKES
-            || diagnostic.places.first().is_none_or(|(location, _)| {
+        let mut mistakes = self.mistakes.borrow_mut();
+        let is_first_of_line = mistakes.kept.len() >= MAX_MISTAKES
+            || diagnostic.locations.first().is_none_or(|(location, _)| {
                 let number = self.sources.borrow().line(location).number;
-                found.broken.entry(location.source).or_default().insert(number)
+                mistakes.malformed_lines.entry(location.source).or_default().insert(number)
             });
-        if is_kept {
-            found.keep(diagnostic);
+        if is_first_of_line {
+            mistakes.add(diagnostic);
         }
     }
 
     /// Marks the text from a location on as the inside of an array that is never closed.
-    pub fn swallow(&self, from: &Location) {
-        self.found.borrow_mut().swallowed.insert(from.source, from.span.start);
+    pub fn mark_unclosed_array(&self, from: &Location) {
+        self.mistakes.borrow_mut().unclosed_arrays.insert(from.source, from.span.start);
     }
 
     /// Adds the mistake of a missing key, unless wrong syntax may hide it.
     pub fn push_missing(&self, diagnostic: Diagnostic) {
-        let mut found = self.found.borrow_mut();
+        let mut mistakes = self.mistakes.borrow_mut();
         if !diagnostic
-            .places
+            .locations
             .iter()
-            .any(|(location, _)| found.broken.contains_key(&location.source))
+            .any(|(location, _)| mistakes.malformed_lines.contains_key(&location.source))
         {
-            found.keep(diagnostic);
+            mistakes.add(diagnostic);
         }
     }
 
     /// Returns whether further mistakes are only counted.
     pub fn is_full(&self) -> bool {
-        self.found.borrow().found.len() >= MAX_MISTAKES
+        self.mistakes.borrow().kept.len() >= MAX_MISTAKES
     }
 
     /// Returns whether there are no mistakes so far.
     pub fn is_clean(&self) -> bool {
-        self.found.borrow().found.is_empty()
+        self.mistakes.borrow().kept.is_empty()
     }
 
     /// Returns the value if there is one and there are no mistakes.
@@ -263,11 +266,11 @@ impl Report {
 
     /// Returns all mistakes.
     pub fn into_diagnostics(self) -> Diagnostics {
-        let Mistakes { mut found, beyond, .. } = self.found.into_inner();
-        found.sort_by_key(|d| {
-            d.places.first().map(|(location, _)| (location.source, location.span.start))
+        let Mistakes { mut kept, omitted, .. } = self.mistakes.into_inner();
+        kept.sort_by_key(|diagnostic| {
+            diagnostic.locations.first().map(|(location, _)| (location.source, location.span.start))
         });
-        Diagnostics { sources: self.sources.into_inner(), found, beyond }
+        Diagnostics { sources: self.sources.into_inner(), kept, omitted }
     }
 }
 
@@ -278,20 +281,22 @@ impl Report {
 #[derive(Debug)]
 pub struct Diagnostics {
     pub(super) sources: Sources,
-    pub(super) found: Vec<Diagnostic>,
-    pub(super) beyond: usize,
+    /// The mistakes that are shown.
+    pub(super) kept: Vec<Diagnostic>,
+    /// The number of further mistakes.
+    pub(super) omitted: usize,
 }
 
 impl Diagnostics {
     /// Returns the number of mistakes, at least 1.
     pub fn count(&self) -> usize {
-        self.found.len() + self.beyond
+        self.kept.len() + self.omitted
     }
 
     /// Returns the mistakes that are kept, in the order of the text.
     pub fn mistakes(&self) -> Vec<Mistake> {
-        let mistake = |Diagnostic { title, places, help }: &Diagnostic| {
-            let main_location = places.first();
+        let mistake = |Diagnostic { title, locations, help }: &Diagnostic| {
+            let main_location = locations.first();
             let line = main_location.map(|(location, _)| self.sources.line(location));
             Mistake {
                 file: main_location
@@ -303,7 +308,7 @@ impl Diagnostics {
                 hints: help.clone(),
             }
         };
-        self.found.iter().map(mistake).collect()
+        self.kept.iter().map(mistake).collect()
     }
 }
 
@@ -335,7 +340,7 @@ mod tests {
             report.push(Diagnostic::new("wrong"));
         }
         let diagnostics = report.into_diagnostics();
-        assert_eq!((diagnostics.count(), diagnostics.found.len()), (1000, MAX_MISTAKES));
+        assert_eq!((diagnostics.count(), diagnostics.kept.len()), (1000, MAX_MISTAKES));
         assert!(diagnostics.to_string().contains("1000 mistakes"));
     }
 }

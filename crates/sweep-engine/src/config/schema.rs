@@ -7,7 +7,7 @@ use sweep_parameter::{Parameter, Range};
 use super::axes::DISTRIBUTIONS;
 use super::form::{describe_parameter, number};
 use super::keys::table;
-use super::sections::described;
+use super::sections::describe_keys;
 use super::{Form, Key};
 use crate::Model;
 use crate::plan::MAX_POINTS;
@@ -17,7 +17,7 @@ const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 /// Returns the schema of a model's grid files.
 pub fn grid<M: Model>() -> Value {
-    let mut described = described::<M>();
+    let mut described = describe_keys::<M>();
     let key = Key::new("set", "constants, by the names of `sweep parameters`");
     described.add(key, M::schema_of_set());
     let axis_description = "headers of lists and measurements with the names of what they hold";

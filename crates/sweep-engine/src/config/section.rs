@@ -12,48 +12,48 @@ use toml::de::{DeTable, DeValue};
 
 use super::{Diagnostic, Located, Location, Report};
 
-/// The value of a key: absent, rejected (already reported), or given.
+/// The value of a key: absent, rejected, or present with its location.
 pub enum Field<T> {
     /// The key is not in the table.
     Absent,
     /// The value was rejected and reported.
-    Bad,
+    Rejected,
     /// The value with its location.
-    Given(Located<T>),
+    Present(Located<T>),
 }
 
 impl<T> Field<T> {
     /// Returns the value, or the default if it is absent; `None` if it was rejected.
-    pub fn or(self, default: T) -> Option<T> {
+    pub fn or_default(self, default: T) -> Option<T> {
         match self {
             Self::Absent => Some(default),
-            Self::Bad => None,
-            Self::Given(found) => Some(found.value),
+            Self::Rejected => None,
+            Self::Present(found) => Some(found.value),
         }
     }
 
-    /// Returns the value with its location, if it was given.
-    pub fn given(self) -> Option<Located<T>> {
+    /// Returns the value with its location, if it is in the table.
+    pub fn into_located(self) -> Option<Located<T>> {
         match self {
-            Self::Given(found) => Some(found),
-            Self::Absent | Self::Bad => None,
+            Self::Present(found) => Some(found),
+            Self::Absent | Self::Rejected => None,
         }
     }
 
     /// Maps the value at the same location.
     pub fn map<U>(self, map_value: impl FnOnce(Located<T>) -> U) -> Field<U> {
-        self.then(|found| {
+        self.and_then(|found| {
             let location = found.location.clone();
             Some(Located { value: map_value(found), location })
         })
     }
 
     /// Maps the value at the same location, or rejects it after the function has reported it.
-    pub fn then<U>(self, map_value: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
+    pub fn and_then<U>(self, map_value: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
         match self {
             Self::Absent => Field::Absent,
-            Self::Bad => Field::Bad,
-            Self::Given(found) => map_value(found).map_or(Field::Bad, Field::Given),
+            Self::Rejected => Field::Rejected,
+            Self::Present(found) => map_value(found).map_or(Field::Rejected, Field::Present),
         }
     }
 }
@@ -68,7 +68,8 @@ pub struct Section<'a> {
     table: &'a DeTable<'a>,
     /// The report of mistakes.
     pub report: &'a Report,
-    known: RefCell<Vec<&'static str>>,
+    /// The keys that were read.
+    read_keys: RefCell<Vec<&'static str>>,
     /// The keys that are valid in another place or variant, with the reason why they are rejected.
     misplaced: RefCell<BTreeMap<&'static str, String>>,
 }
@@ -81,39 +82,42 @@ impl<'a> Section<'a> {
         table: &'a DeTable<'a>,
         report: &'a Report,
     ) -> Self {
-        let (known, misplaced) = Default::default();
-        Self { title: title.into(), location, table, report, known, misplaced }
+        let read_keys = RefCell::default();
+        let misplaced = RefCell::default();
+        Self { title: title.into(), location, table, report, read_keys, misplaced }
     }
 
     /// Returns the location of the table.
-    pub fn at(&self) -> &Location {
+    pub fn location(&self) -> &Location {
         &self.location
     }
 
-    fn place(&self, span: std::ops::Range<usize>) -> Location {
+    /// Returns the location of a byte range in the text of this table.
+    fn locate(&self, span: std::ops::Range<usize>) -> Location {
         Location::new(self.location.source, span)
     }
 
+    /// Returns the value of a key, which counts as read.
     fn get(&self, key: &'static str) -> Option<&'a Value<'a>> {
         // A key that may be a number or a word is read twice.
-        if !self.is_known(key) {
-            self.known.borrow_mut().push(key);
+        if !self.has_read(key) {
+            self.read_keys.borrow_mut().push(key);
         }
         self.table.get(key)
     }
 
     /// Returns whether a key was read.
-    pub fn is_known(&self, key: &str) -> bool {
-        self.known.borrow().contains(&key)
+    pub fn has_read(&self, key: &str) -> bool {
+        self.read_keys.borrow().contains(&key)
     }
 
     /// Returns the location of a key, if it is written.
-    pub fn key_at(&self, key: &str) -> Option<Location> {
-        self.table.get_key_value(key).map(|(key, _)| self.place(key.span()))
+    pub fn key_location(&self, key: &str) -> Option<Location> {
+        self.table.get_key_value(key).map(|(key, _)| self.locate(key.span()))
     }
 
     /// Returns whether the table under a key has an inner key.
-    pub fn key_inside(&self, table: &str, key: &str) -> bool {
+    pub fn has_inner_key(&self, table: &str, key: &str) -> bool {
         let table = self.table.get(table).map(Spanned::get_ref);
         matches!(table, Some(DeValue::Table(table)) if table.contains_key(key))
     }
@@ -129,22 +133,22 @@ impl<'a> Section<'a> {
 
     /// Returns a required value; a missing one is reported.
     pub fn require<T>(&self, field: Field<T>, key: &str, expected: &str) -> Option<Located<T>> {
-        self.expect(field, key, Some(expected)).given()
+        self.expect(field, key, Some(expected)).into_located()
     }
 
     /// Returns the field; a missing one is reported if a value is expected.
     pub fn expect<T>(&self, field: Field<T>, key: &str, expected: Option<&str>) -> Field<T> {
         if let (Field::Absent, Some(expected)) = (&field, expected) {
-            self.missing(key, expected);
+            self.report_missing(key, expected);
         }
         field
     }
 
     /// Reports a required key that is missing.
-    pub fn missing(&self, key: &str, expected: &str) {
+    pub fn report_missing(&self, key: &str, expected: &str) {
         let title = format!("`{key}` is missing in {}", self.title);
         self.report.push_missing(
-            Diagnostic::new(title).at(&self.location, format!("expected {expected}")),
+            Diagnostic::new(title).at_location(&self.location, format!("expected {expected}")),
         );
     }
 
@@ -155,13 +159,18 @@ impl<'a> Section<'a> {
         read: impl FnOnce(&'a Value<'a>, &Location) -> Option<T>,
     ) -> Field<T> {
         let Some(value) = self.get(key) else { return Field::Absent };
-        let location = self.place(value.span());
-        let found = read(value, &location);
-        found.map_or(Field::Bad, |value| Field::Given(Located { value, location }))
+        let location = self.locate(value.span());
+        let value_read = read(value, &location);
+        value_read.map_or(Field::Rejected, |value| Field::Present(Located { value, location }))
     }
 
     /// Reports a value of the wrong type.
-    fn wrong<T>(&self, description: &str, value: &Value<'_>, expected: &str) -> Option<T> {
+    fn report_wrong_type<T>(
+        &self,
+        description: &str,
+        value: &Value<'_>,
+        expected: &str,
+    ) -> Option<T> {
         let type_name = match value.get_ref() {
             DeValue::String(_) => "a string",
             DeValue::Integer(_) => "a whole number",
@@ -174,22 +183,24 @@ impl<'a> Section<'a> {
         let text = value.get_ref().as_str().filter(|_| expected.contains("number"));
         let is_number = text.is_some_and(|text| text.parse::<f64>().is_ok());
         let help = is_number.then_some("write the number without quotes");
-        let refusal = Diagnostic::new(format!("{description} has the wrong type"))
-            .at(&self.place(value.span()), format!("expected {expected}, found {type_name}"));
+        let refusal = Diagnostic::new(format!("{description} has the wrong type")).at_location(
+            &self.locate(value.span()),
+            format!("expected {expected}, found {type_name}"),
+        );
         self.report.push(help.into_iter().fold(refusal, Diagnostic::help));
         None
     }
 
     /// Reads a finite number in a range.
     pub fn number(&self, key: &'static str, range: Range) -> Field<f64> {
-        self.read(key, |value, _| Some(self.number_of(&quoted(key), value, range)?.value))
+        self.read(key, |value, _| Some(self.expect_number(&quoted(key), value, range)?.value))
     }
 
     /// Reads a whole number within bounds.
-    pub fn whole(&self, key: &'static str, bounds: &RangeInclusive<u64>) -> Field<u64> {
+    pub fn whole_number(&self, key: &'static str, bounds: &RangeInclusive<u64>) -> Field<u64> {
         self.read(key, |value, location| {
             let DeValue::Integer(integer) = value.get_ref() else {
-                return self.wrong(&quoted(key), value, "a whole number");
+                return self.report_wrong_type(&quoted(key), value, "a whole number");
             };
             let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
             count.filter(|count| bounds.contains(count)).or_else(|| {
@@ -204,7 +215,7 @@ impl<'a> Section<'a> {
 
     /// Reads a string.
     pub fn text(&self, key: &'static str) -> Field<&'a str> {
-        self.read(key, |value, _| Some(self.text_of(&quoted(key), value)?.value))
+        self.read(key, |value, _| Some(self.expect_text(&quoted(key), value)?.value))
     }
 
     /// Reads a string, or the text of a number.
@@ -212,7 +223,7 @@ impl<'a> Section<'a> {
         self.read(key, |value, _| match value.get_ref() {
             DeValue::Integer(integer) if integer.radix() == 10 => Some(integer.as_str()),
             DeValue::Float(float) => Some(float.as_str()),
-            _ => Some(self.text_of(&quoted(key), value)?.value),
+            _ => Some(self.expect_text(&quoted(key), value)?.value),
         })
     }
 
@@ -223,7 +234,7 @@ impl<'a> Section<'a> {
 
     /// Reads a word, as its index in `choices`.
     pub fn choice(&self, key: &'static str, choices: &[&str]) -> Field<usize> {
-        self.text(key).then(|found| {
+        self.text(key).and_then(|found| {
             let position = choices.iter().position(|&choice| choice == found.value);
             if position.is_none() {
                 self.report.push_with(|_| unknown_word(key, &found, choices));
@@ -234,20 +245,20 @@ impl<'a> Section<'a> {
 
     /// Reads an array of finite numbers in a range; one wrong number rejects all.
     pub fn numbers(&self, key: &'static str, range: Range) -> Field<Vec<Located<f64>>> {
-        self.right_numbers(key, range).then(|found| {
-            let (numbers, all) = found.value;
-            all.then_some(Located { value: numbers, location: found.location })
+        self.valid_numbers(key, range).and_then(|found| {
+            let (numbers, are_all_valid) = found.value;
+            are_all_valid.then_some(Located { value: numbers, location: found.location })
         })
     }
 
     /// Reads the valid numbers of an array, and whether all are valid.
-    pub fn right_numbers(
+    pub fn valid_numbers(
         &self,
         key: &'static str,
         range: Range,
     ) -> Field<(Vec<Located<f64>>, bool)> {
         self.items(key, "an array of numbers").map(|items| {
-            let number = |item| self.number_of(&entry(key), item, range);
+            let number = |item| self.expect_number(&entry(key), item, range);
             let numbers: Vec<_> = items.value.iter().filter_map(number).collect();
             let are_all_valid = numbers.len() == items.value.len();
             (numbers, are_all_valid)
@@ -257,14 +268,14 @@ impl<'a> Section<'a> {
     /// Reads the valid strings of an array; others are reported.
     pub fn texts(&self, key: &'static str) -> Field<Vec<Located<&'a str>>> {
         self.items(key, "an array of strings").map(|items| {
-            items.value.iter().filter_map(|item| self.text_of(&entry(key), item)).collect()
+            items.value.iter().filter_map(|item| self.expect_text(&entry(key), item)).collect()
         })
     }
 
     fn items(&self, key: &'static str, kind: &str) -> Field<&'a [Value<'a>]> {
         self.read(key, |value, _| match value.get_ref() {
             DeValue::Array(items) => Some(&items[..]),
-            _ => self.wrong(&quoted(key), value, kind),
+            _ => self.report_wrong_type(&quoted(key), value, kind),
         })
     }
 
@@ -274,20 +285,20 @@ impl<'a> Section<'a> {
             DeValue::Table(table) => {
                 Some(Section::new(title, location.clone(), table, self.report))
             }
-            _ => self.wrong(&quoted(key), value, &format!("a table, {title}")),
+            _ => self.report_wrong_type(&quoted(key), value, &format!("a table, {title}")),
         })
     }
 
     /// Reads an array of tables, `[[key]]`; it is empty if the key is absent.
     pub fn tables(&self, key: &'static str) -> Vec<Section<'a>> {
         let kind = format!("tables, each under [[{key}]]");
-        let items = self.items(key, &kind).given().map_or(&[][..], |items| items.value);
+        let items = self.items(key, &kind).into_located().map_or(&[][..], |items| items.value);
         let section = |(k, item): (usize, &'a Value<'a>)| {
             let DeValue::Table(table) = item.get_ref() else {
-                return self.wrong(&entry(key), item, &kind);
+                return self.report_wrong_type(&entry(key), item, &kind);
             };
             let title = format!("[[{key}]] number {}", k + 1);
-            Some(Section::new(title, self.place(item.span()), table, self.report))
+            Some(Section::new(title, self.locate(item.span()), table, self.report))
         };
         items.iter().enumerate().filter_map(section).collect()
     }
@@ -295,30 +306,30 @@ impl<'a> Section<'a> {
     /// Returns every key as written, for tables whose keys are names of parameters.
     pub fn names(&self) -> Vec<Located<&'a str>> {
         let keys = self.table.keys();
-        keys.map(|key| Located { value: &**key.get_ref(), location: self.place(key.span()) })
+        keys.map(|key| Located { value: &**key.get_ref(), location: self.locate(key.span()) })
             .collect()
     }
 
     /// Reads the number under a name from [`Section::names`].
     pub fn number_named(&self, name: &str, range: Range) -> Option<Located<f64>> {
-        self.number_of(&quoted(name), self.table.get(name)?, range)
+        self.expect_number(&quoted(name), self.table.get(name)?, range)
     }
 
     /// Reads the string under a name from [`Section::names`].
     pub fn text_named(&self, name: &str) -> Option<Located<&'a str>> {
-        self.text_of(&quoted(name), self.table.get(name)?)
+        self.expect_text(&quoted(name), self.table.get(name)?)
     }
 
-    fn text_of(&self, description: &str, value: &'a Value<'a>) -> Option<Located<&'a str>> {
+    fn expect_text(&self, description: &str, value: &'a Value<'a>) -> Option<Located<&'a str>> {
         match value.get_ref() {
             DeValue::String(text) => {
-                Some(Located { value: text, location: self.place(value.span()) })
+                Some(Located { value: text, location: self.locate(value.span()) })
             }
-            _ => self.wrong(description, value, "a string"),
+            _ => self.report_wrong_type(description, value, "a string"),
         }
     }
 
-    fn number_of(
+    fn expect_number(
         &self,
         description: &str,
         value: &Value<'_>,
@@ -330,19 +341,19 @@ impl<'a> Section<'a> {
             DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix())
                 .ok()
                 .map(|value| value as f64),
-            _ => return self.wrong(description, value, "a number"),
+            _ => return self.report_wrong_type(description, value, "a number"),
         };
         let number = number.unwrap_or(f64::INFINITY);
-        check_number(description, number, self.place(value.span()), range, self.report)
+        check_number(description, number, self.locate(value.span()), range, self.report)
     }
 
     /// Reports every key that was not read.
     pub fn finish(self) {
-        let known = self.known.into_inner();
+        let read_keys = self.read_keys.into_inner();
         let misplaced = self.misplaced.into_inner();
         for key in self.table.keys() {
             let name: &str = key.get_ref();
-            if known.contains(&name) {
+            if read_keys.contains(&name) {
                 continue;
             }
             self.report.push_with(|_| {
@@ -350,12 +361,15 @@ impl<'a> Section<'a> {
                 match misplaced.get(name) {
                     Some(reason) => {
                         Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
-                            .at(&location, reason.as_str())
+                            .at_location(&location, reason.as_str())
                     }
                     None => {
                         Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
-                            .at(&location, format!("expected {}", list_choices(&known)))
-                            .nearest(name, known.iter().copied())
+                            .at_location(
+                                &location,
+                                format!("expected {}", list_choices(&read_keys)),
+                            )
+                            .nearest(name, read_keys.iter().copied())
                     }
                 }
             });
@@ -373,8 +387,8 @@ pub fn written_twice(
         (name, other) => format!("`{other}` and `{name}` write the same number"),
     };
     Diagnostic::new(title)
-        .at(&second.location, "expected each number once")
-        .at(&first.location, "first written here")
+        .at_location(&second.location, "expected each number once")
+        .at_location(&first.location, "first written here")
 }
 
 /// A word of earlier versions that was removed.
@@ -403,7 +417,7 @@ pub fn unknown_word(description: &str, found: &Located<&str>, choices: &[&str]) 
             && choices.contains(&removed_word.successor)
     });
     let refusal = Diagnostic::new(format!("unknown {description} \"{}\"", short(found.value)))
-        .at(&found.location, format!("expected {}", list_choices(choices)));
+        .at_location(&found.location, format!("expected {}", list_choices(choices)));
     match removed_word {
         Some(RemovedWord { key, word, successor, reason }) => refusal.help(format!(
             "\"{word}\" was removed: write {key} = \"{successor}\" in its place; {reason}"
@@ -479,5 +493,5 @@ pub fn refused_number(
     } else {
         format!("{description} = {} is out of range", decimal(value))
     };
-    Diagnostic::new(title).at(location, format!("expected {}", range.describe_for(value)))
+    Diagnostic::new(title).at_location(location, format!("expected {}", range.describe_for(value)))
 }

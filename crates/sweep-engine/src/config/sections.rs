@@ -13,7 +13,7 @@ use super::{
     design,
 };
 use crate::method::{IntegrationMethod, Integrator, Setting};
-use crate::plan::{MAX_END_S, Plan, RATIO_MIN, ReadingNotes, Reliability, WrittenIn};
+use crate::plan::{MAX_END_S, NumberSources, Plan, RATIO_MIN, ReadingNotes, Reliability};
 use crate::{GridTable, Model};
 
 impl<M: Model> Plan<M> {
@@ -33,25 +33,25 @@ impl<M: Model> Plan<M> {
                 channels: M::ABOUT.default_channels.to_vec(),
             },
             set: Vec::new(),
-            written: WrittenIn::default(),
-            aside: ReadingNotes::default(),
+            sources: NumberSources::default(),
+            reading_notes: ReadingNotes::default(),
         }
     }
 }
 
 /// Walks over every key of a plan except its axes and `[set]`.
 pub fn walk<M: Model>(plan: &mut Plan<M>, keys: &mut Keys<'_>) {
-    sections(plan, keys, None);
+    walk_sections(plan, keys, None);
     design::walk(&mut plan.design, keys);
 }
 
 /// Returns the description of the keys of grid files, except axes and `[set]`.
-pub fn described<M: Model>() -> Description {
+pub fn describe_keys<M: Model>() -> Description {
     Keys::described(true, |keys| walk(&mut Plan::<M>::blank(), keys))
 }
 
 /// Walks over the keys that are read before `[set]`; `input` is the grid that is read.
-pub(super) fn sections<M: Model>(
+pub(super) fn walk_sections<M: Model>(
     plan: &mut Plan<M>,
     keys: &mut Keys<'_>,
     input: Option<&GridInput<M>>,
@@ -60,29 +60,31 @@ pub(super) fn sections<M: Model>(
     let description =
         "name of the run and of its result file; the grid file's own name if left out";
     let schema = json!({ "type": "string", "pattern": "^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$" });
-    let read_name = |root: &Section<'_>, _| {
+    let read_run_name = |root: &Section<'_>, _| {
         let path = input.map_or(Path::new(""), |input| &input.path);
         let overriding_name = input.and_then(|input| input.name.as_deref());
         let name =
-            self::name(root, path, overriding_name, "add `name = \"...\"`, or pass `--name`");
-        Field::Given(Located { value: name.into(), location: root.at().clone() })
+            self::read_name(root, path, overriding_name, "add `name = \"...\"`, or pass `--name`");
+        Field::Present(Located { value: name.into(), location: root.location().clone() })
     };
-    keys.key(Key::new("name", description), &Form::Own(&read_name, schema), name);
+    keys.key(Key::new("name", description), &Form::Own(&read_run_name, schema), name);
     model.walk(GridTable::Top, keys, input);
-    keys.table(Key::new("time", "").needed("a section [time]"), |keys| time(end_s, window_s, keys));
-    keys.table(Key::new("integrator", ""), |keys| method(M::ABOUT.methods, integrator, keys));
+    keys.table(Key::new("time", "").required("a section [time]"), |keys| {
+        walk_time(end_s, window_s, keys)
+    });
+    keys.table(Key::new("integrator", ""), |keys| walk_method(M::ABOUT.methods, integrator, keys));
     keys.table(Key::new("reliability", ""), |keys| {
         model.walk(GridTable::Reliability, keys, input);
         let Reliability { limits, channels } = reliability;
         let key = Key::new("ratio_limit", "a point is reliable where every ratio is below this");
-        keys.key(key.set(), &Form::Number(Range::Positive), &mut limits.upper);
+        keys.key(key.settable(), &Form::Number(Range::Positive), &mut limits.upper);
         let description = "if given, a point is reliable where every ratio is above this too";
         keys.key(
-            Key::new("ratio_min", description).set(),
+            Key::new("ratio_min", description).settable(),
             &Form::Number(RATIO_MIN),
             &mut limits.lower,
         );
-        let key = Key::new("channels", "channels that are compared").set();
+        let key = Key::new("channels", "channels that are compared").settable();
         keys.words(key, "channel", M::ABOUT.channels, |channel| channel.name, channels);
     });
 }
@@ -100,40 +102,45 @@ fn is_file_name(name: &str) -> bool {
 }
 
 /// Parses a run's name from the command line.
-pub fn plain_name(text: &str) -> Result<String, String> {
+pub fn parse_name(text: &str) -> Result<String, String> {
     if is_file_name(text) { Ok(text.to_owned()) } else { Err(format!("expected {FILE_NAME_RULE}")) }
 }
 
 /// Returns the run's name: `overriding_name`, the name in the file, or the file's own name, in this
 /// order. `help` is the advice for a file without any of them.
-pub fn name(root: &Section<'_>, path: &Path, overriding_name: Option<&str>, help: &str) -> String {
+pub fn read_name(
+    root: &Section<'_>,
+    path: &Path,
+    overriding_name: Option<&str>,
+    help: &str,
+) -> String {
     match root.text("name") {
-        Field::Given(found) if is_file_name(found.value) => {
+        Field::Present(found) if is_file_name(found.value) => {
             return overriding_name.unwrap_or(found.value).to_owned();
         }
-        Field::Given(found) => {
+        Field::Present(found) => {
             let title = "`name` is not a plain file name";
             root.report.refuse::<()>(&found.location, title, format!("expected {FILE_NAME_RULE}"));
         }
-        Field::Bad => {}
+        Field::Rejected => {}
         Field::Absent => {
             let stem = || path.file_stem().and_then(|stem| stem.to_str());
             if let Some(name) = overriding_name.or_else(stem).filter(|name| is_file_name(name)) {
                 return name.to_owned();
             }
             let title = "`name` is missing, and the file's own name cannot replace it";
-            let refusal =
-                Diagnostic::new(title).at(root.at(), format!("expected {FILE_NAME_RULE}"));
+            let refusal = Diagnostic::new(title)
+                .at_location(root.location(), format!("expected {FILE_NAME_RULE}"));
             root.report.push_missing(refusal.help(help));
         }
     }
     String::new()
 }
 
-/// Walks over the end and the window.
-fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
-    let description = Key::new("end_s", "end of the integration, s").set();
-    let key = description.needed("the end of the integration in s");
+/// Walks over the keys of `[time]`: the end and the window.
+fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
+    let description = Key::new("end_s", "end of the integration, s").settable();
+    let key = description.required("the end of the integration in s");
     let described = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": MAX_END_S });
     let (kind, expected) = match &keys.walk {
         KeyWalk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
@@ -141,18 +148,19 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
         _ => (Form::Own(&|_, _| Field::Absent, described), ""),
     };
     let mut value = *end_s;
-    let end = keys.key(key, &kind, &mut value).given().and_then(|Located { location, .. }| {
-        if 0.0 < value && value <= MAX_END_S {
-            return Some(Located { value, location });
-        }
-        let title = format!("`end_s` = {} is out of range", decimal(value));
-        keys.report()?.refuse(
-            &location,
-            title,
-            format!("expected {expected}at most {MAX_END_S:e} s"),
-        )
-    });
-    let is_window_written = |report: &Report| report.place(WINDOW_PARAMETERS[1]).is_some();
+    let end =
+        keys.key(key, &kind, &mut value).into_located().and_then(|Located { location, .. }| {
+            if 0.0 < value && value <= MAX_END_S {
+                return Some(Located { value, location });
+            }
+            let title = format!("`end_s` = {} is out of range", decimal(value));
+            keys.report()?.refuse(
+                &location,
+                title,
+                format!("expected {expected}at most {MAX_END_S:e} s"),
+            )
+        });
+    let is_window_written = |report: &Report| report.location(WINDOW_PARAMETERS[1]).is_some();
     if let Some(end) = &end {
         *end_s = end.value;
         // The default window ends at the end of the run.
@@ -165,13 +173,13 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
                  out";
     let expected = "expected two, [from, to], in s";
     let kind = Form::Numbers(Numbers {
-        places: WINDOW_PARAMETERS.map(str::to_owned).to_vec(),
+        location_keys: WINDOW_PARAMETERS.map(str::to_owned).to_vec(),
         ..Numbers::new(Range::NonNegative, 2..=2, expected)
     });
     let mut edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
     let window_field = keys.key(Key::new("window_s", description), &kind, &mut edges);
-    if let (Field::Given(window_field), Some(report)) = (window_field, keys.report())
-        && let Some(window) = window(&window_field.location, &edges, end.as_ref(), report)
+    if let (Field::Present(window_field), Some(report)) = (window_field, keys.report())
+        && let Some(window) = check_window(&window_field.location, &edges, end.as_ref(), report)
         && end.is_some()
     {
         *window_s = window;
@@ -182,7 +190,7 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
 const WINDOW_PARAMETERS: [&str; 2] = ["window_from_s", "window_to_s"];
 
 /// Returns the window that was read, if it is valid.
-fn window(
+fn check_window(
     location: &Location,
     edges: &[f64],
     end: Option<&Located<f64>>,
@@ -197,31 +205,35 @@ fn window(
     }
     if let Some(end) = end.filter(|end| to > end.value) {
         let title = format!("the window ends at {to_text} s, after the integration");
-        let refusal = Diagnostic::new(title).at(
-            &report.place(WINDOW_PARAMETERS[1])?,
+        let refusal = Diagnostic::new(title).at_location(
+            &report.location(WINDOW_PARAMETERS[1])?,
             format!("expected at most {}", decimal(end.value)),
         );
-        report.push(refusal.at(&end.location, "the integration ends here"));
+        report.push(refusal.at_location(&end.location, "the integration ends here"));
         return None;
     }
     Some([from, to])
 }
 
-/// Walks over the method and its settings.
-fn method(all: &'static [IntegrationMethod], integrator: &mut Integrator, keys: &mut Keys<'_>) {
+/// Walks over the keys of `[integrator]`: the method and its settings.
+fn walk_method(
+    all: &'static [IntegrationMethod],
+    integrator: &mut Integrator,
+    keys: &mut Keys<'_>,
+) {
     let variants = Variants {
-        all: all.iter().map(|entry| (entry.name, entry.description)).collect(),
+        words: all.iter().map(|method| (method.name, method.description)).collect(),
         default: Some(all.len() - 1),
-        set: all.len(),
+        settable_count: all.len(),
     };
-    let current_method = all.iter().position(|entry| entry.name == integrator.name());
-    keys.variants(Key::new("method", "").set(), &variants, current_method, |keys, method| {
-        let entry = &all[method];
-        let name = entry.name;
+    let current_method = all.iter().position(|method| method.name == integrator.name());
+    keys.variants(Key::new("method", "").settable(), &variants, current_method, |keys, index| {
+        let method = &all[index];
+        let name = method.name;
         let others = all.iter().flat_map(|other| other.settings).map(|setting| setting.key);
-        for key in others.filter(|key| !entry.has(key)).collect::<BTreeSet<_>>() {
+        for key in others.filter(|key| !method.has_setting(key)).collect::<BTreeSet<_>>() {
             let methods_with_key =
-                all.iter().filter(|other| other.has(key)).map(|other| other.name);
+                all.iter().filter(|other| other.has_setting(key)).map(|other| other.name);
             let methods_with_key: Vec<&str> = methods_with_key.collect();
             let (noun, verb) =
                 if methods_with_key.len() == 1 { ("method", "has") } else { ("methods", "have") };
@@ -239,20 +251,23 @@ fn method(all: &'static [IntegrationMethod], integrator: &mut Integrator, keys: 
         }
         // Settings that the old and the new method share keep their values.
         let old_settings = integrator.settings();
-        *integrator = entry.with(|&Setting { key, range, default, description, help }| {
-            let old_settings = old_settings.iter().find(|(known, _)| *known == key);
-            let mut number = old_settings.map_or(default, |(_, number)| *number);
-            let setting = Key::new(key, description).set();
-            let field = keys.key(setting, &Form::Number(range), &mut number);
-            if let (Field::Bad, false, Some(report)) = (field, help.is_empty(), keys.report()) {
-                report.add_help(help);
-            }
-            if let Some((section, location)) =
-                keys.section().and_then(|s| Some((s, s.key_at(key)?)))
-            {
-                section.report.put(format!("integrator.{key}"), location);
-            }
-            number
-        });
+        *integrator =
+            method.with_settings(|&Setting { key, range, default, description, help }| {
+                let old_settings = old_settings.iter().find(|(known, _)| *known == key);
+                let mut number = old_settings.map_or(default, |(_, number)| *number);
+                let setting = Key::new(key, description).settable();
+                let field = keys.key(setting, &Form::Number(range), &mut number);
+                if let (Field::Rejected, false, Some(report)) =
+                    (field, help.is_empty(), keys.report())
+                {
+                    report.add_help(help);
+                }
+                if let Some((section, location)) =
+                    keys.section().and_then(|section| Some((section, section.key_location(key)?)))
+                {
+                    section.report.record_location(format!("integrator.{key}"), location);
+                }
+                number
+            });
     });
 }

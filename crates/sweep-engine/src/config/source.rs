@@ -89,7 +89,7 @@ impl Sources {
     }
 
     /// Sets the text of a source that was added without one.
-    pub fn fill(&mut self, id: SourceId, text: String) {
+    pub fn set_text(&mut self, id: SourceId, text: String) {
         self.0[id.0].text = text;
     }
 

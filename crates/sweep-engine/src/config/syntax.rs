@@ -44,9 +44,9 @@ pub fn parse<'a>(text: &'a str, source: SourceId, report: &Report) -> Spanned<De
         let location = Location::new(source, errors[first].span().unwrap_or(0..0));
         report.push_syntax(
             Diagnostic::new("an array is not closed")
-                .at(&location, "expected `,` or `]` before this"),
+                .at_location(&location, "expected `,` or `]` before this"),
         );
-        report.swallow(&location);
+        report.mark_unclosed_array(&location);
         errors.truncate(first);
     }
     for error in errors {
@@ -68,7 +68,7 @@ fn describe_error(error: &Error, text: &str, source: SourceId) -> Diagnostic {
     match what {
         "duplicate key" => {
             Diagnostic::new(format!("the key {} is given twice", quoted(wrong_text)))
-                .at(&location, "expected each key once")
+                .at_location(&location, "expected each key once")
         }
         "string values must be quoted" => {
             let title = if wrong_text.is_empty() {
@@ -77,8 +77,8 @@ fn describe_error(error: &Error, text: &str, source: SourceId) -> Diagnostic {
                 format!("{} is no value", quoted(wrong_text))
             };
             Diagnostic::new(title)
-                .at(&location, "expected a number, a string in quotes, or an array")
+                .at_location(&location, "expected a number, a string in quotes, or an array")
         }
-        what => Diagnostic::new(what).at(&location, expected),
+        what => Diagnostic::new(what).at_location(&location, expected),
     }
 }

@@ -51,7 +51,9 @@ pub fn refuse<M: Model>(draft: &Draft<'_, M>, title: String, keys: &[String], ex
         locations
             .iter()
             .zip(labels)
-            .fold(Diagnostic::new(title), |all, (location, label)| all.at(location, label))
+            .fold(Diagnostic::new(title), |diagnostic, (location, label)| {
+                diagnostic.at_location(location, label)
+            })
     });
 }
 
@@ -66,20 +68,20 @@ fn find_locations<M: Model>(
         parameter.parts.iter().any(|part| keys.iter().any(|key| key == part))
     };
     let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| writes_key(&axis.parameter));
-    let axes = axes.filter_map(|(k, _)| draft.report.place(&format!("axis[{k}]")));
+    let axes = axes.filter_map(|(k, _)| draft.report.location(&format!("axis[{k}]")));
     let mut locations: Vec<Location> = Vec::new();
-    for place in axes.chain(keys.iter().filter_map(|key| draft.report.place(key))) {
+    for location in axes.chain(keys.iter().filter_map(|key| draft.report.location(key))) {
         // Numbers on one line, such as a vector's, share a location.
-        let line = sources.line(&place).number;
+        let line = sources.line(&location).number;
         let same_line = locations
             .iter_mut()
-            .find(|other| other.source == place.source && sources.line(other).number == line);
+            .find(|other| other.source == location.source && sources.line(other).number == line);
         match same_line {
             Some(other) => {
-                other.span =
-                    other.span.start.min(place.span.start)..other.span.end.max(place.span.end);
+                other.span = other.span.start.min(location.span.start)
+                    ..other.span.end.max(location.span.end);
             }
-            None => locations.push(place.clone()),
+            None => locations.push(location.clone()),
         }
     }
     locations
@@ -100,14 +102,18 @@ pub fn steps<M: Model>(draft: &Draft<'_, M>) {
     };
     let expected = format!("expected a step from {:e} s to {end} s", shortest_step_s(end_s));
     let refusal = refuse_step(draft, title, &expected);
-    let end = draft.report.place("time.end_s").into_iter();
-    draft.report.push(end.fold(refusal, |all, end| all.at(&end, "and this")));
+    let end = draft.report.location("time.end_s").into_iter();
+    draft
+        .report
+        .push(end.fold(refusal, |diagnostic, end| diagnostic.at_location(&end, "and this")));
 }
 
 /// Returns the mistake of a step. It is at the step's location, or at the section if the file gives
 /// no step.
 pub fn refuse_step<M: Model>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
-    let step = draft.report.place("integrator.step_s").or_else(|| draft.report.place("integrator"));
-    step.into_iter()
-        .fold(Diagnostic::new(title), |diagnostic, location| diagnostic.at(&location, expected))
+    let step =
+        draft.report.location("integrator.step_s").or_else(|| draft.report.location("integrator"));
+    step.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
+        diagnostic.at_location(&location, expected)
+    })
 }

@@ -33,11 +33,11 @@ pub fn known_words<'t>(
             Some(first) => {
                 let title = format!("the {noun} \"{}\" is given twice", found.value);
                 let refusal = Diagnostic::new(title)
-                    .at(&found.location, format!("expected each {noun} once"));
+                    .at_location(&found.location, format!("expected each {noun} once"));
                 // Names of one argument share a location.
                 report.push(match first.location == found.location {
                     true => refusal,
-                    false => refusal.at(&first.location, "first given here"),
+                    false => refusal.at_location(&first.location, "first given here"),
                 });
             }
             None => valid_words.push(found),

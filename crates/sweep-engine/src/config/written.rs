@@ -55,7 +55,7 @@ impl<'a> NamedArgument<'a> {
     }
 
     /// Parses a whole number within bounds.
-    pub fn whole(&self, bounds: &RangeInclusive<u64>) -> Option<u64> {
+    pub fn whole_number(&self, bounds: &RangeInclusive<u64>) -> Option<u64> {
         let number = self.value.value.parse().ok();
         number.filter(|number| bounds.contains(number)).or_else(|| {
             let title = format!("`{}` is not a valid number", short(self.value.value));

@@ -19,13 +19,13 @@ use std::cmp::Ordering;
 
 use crate::design::{Design, DesignRule};
 
-/// Share of a trial's coordinates that come from the mutant. Basis: the papers' usual value.
+/// The share of a trial's coordinates that come from the mutant. Basis: the papers' usual value.
 /// Doubling it is not possible; halving it moves along fewer axes at once.
-const CROSSOVER: f64 = 0.9;
-/// Range of the factor of the difference, which is uniformly distributed. Basis: S. Das, A. Konar,
-/// U. K. Chakraborty, Two improved differential evolution schemes for faster global search, GECCO
-/// 2005. Doubling it makes trials leave the box.
-const FACTOR_RANGE: [f64; 2] = [0.3, 0.9];
+const CROSSOVER_RATE: f64 = 0.9;
+/// The range of the factor of the difference, which is uniformly distributed. Basis: S. Das, A.
+/// Konar, U. K. Chakraborty, Two improved differential evolution schemes for faster global search,
+/// GECCO 2005. Doubling it makes trials leave the box.
+const DIFFERENCE_FACTOR_RANGE: [f64; 2] = [0.3, 0.9];
 
 /// The settings of a search.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +46,7 @@ pub struct Evolution {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// The position in the unit box.
-    pub place: Vec<f64>,
+    pub position: Vec<f64>,
     /// The objectives, then the constraint violations; `None` if one of them is missing.
     pub responses: Option<Vec<f64>>,
     /// The generation, from 0.
@@ -56,7 +56,7 @@ pub struct Candidate {
 impl Evolution {
     /// Returns the index of the first trial of the last third, if that third begins after the first
     /// generation. With one objective, these trials start from the best candidate.
-    pub fn first_late(&self) -> u64 {
+    pub fn first_of_last_third(&self) -> u64 {
         let Self { candidates, population, .. } = *self;
         (candidates - candidates / 3).max(population.min(candidates))
     }
@@ -65,7 +65,9 @@ impl Evolution {
 impl Candidate {
     /// Returns whether the candidate has all responses and violates no constraint.
     pub fn is_feasible(&self, objectives: usize) -> bool {
-        self.responses.as_ref().is_some_and(|all| all[objectives..].iter().all(|&one| one <= 0.0))
+        self.responses.as_ref().is_some_and(|responses| {
+            responses[objectives..].iter().all(|&violation| violation <= 0.0)
+        })
     }
 }
 
@@ -88,11 +90,11 @@ pub fn evolve<E>(
         }
         let first = evaluated.len();
         let ranks = Ranks::new(&evaluated, objectives);
-        let better = |a, b| if ranks.compare(b, a) == Some(Ordering::Less) { b } else { a };
-        let best = members.iter().copied().reduce(better);
+        let choose_better = |a, b| if ranks.compare(b, a) == Some(Ordering::Less) { b } else { a };
+        let best = members.iter().copied().reduce(choose_better);
         let initial_design =
             Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed };
-        let place = |k: u64| -> Vec<f64> {
+        let position = |k: u64| -> Vec<f64> {
             if generation == 0 {
                 return (0..parameters)
                     .filter_map(|axis| initial_design.position(k, axis))
@@ -100,14 +102,14 @@ pub fn evolve<E>(
             }
             let number = first as u64 + k;
             let start_candidate =
-                best.filter(|_| objectives == 1 && number >= evolution.first_late());
+                best.filter(|_| objectives == 1 && number >= evolution.first_of_last_third());
             create_trial(&evaluated, &members, (k as usize, start_candidate), number, evolution)
         };
-        let positions: Vec<Vec<f64>> = (0..count).map(place).collect();
+        let positions: Vec<Vec<f64>> = (0..count).map(position).collect();
         let responses = evaluate(&positions)?;
         let trials = positions.into_iter().zip(responses);
-        evaluated.extend(trials.map(|(place, responses)| Candidate {
-            place,
+        evaluated.extend(trials.map(|(position, responses)| Candidate {
+            position,
             responses,
             generation,
         }));
@@ -116,16 +118,16 @@ pub fn evolve<E>(
             continue;
         }
         let ranks = Ranks::new(&evaluated, objectives);
-        let mut next = Vec::with_capacity(2 * members.len());
+        let mut survivors = Vec::with_capacity(2 * members.len());
         for (k, &member) in members.iter().enumerate() {
             let trial = Some(first + k).filter(|&trial| trial < evaluated.len());
             match trial.map(|trial| (trial, ranks.compare(trial, member))) {
-                Some((trial, Some(Ordering::Less | Ordering::Equal))) => next.push(trial),
-                Some((trial, None)) => next.extend([member, trial]),
-                Some((_, Some(Ordering::Greater))) | None => next.push(member),
+                Some((trial, Some(Ordering::Less | Ordering::Equal))) => survivors.push(trial),
+                Some((trial, None)) => survivors.extend([member, trial]),
+                Some((_, Some(Ordering::Greater))) | None => survivors.push(member),
             }
         }
-        members = ranks.best(next, population as usize);
+        members = ranks.select_best(survivors, population as usize);
     }
     Ok(evaluated)
 }
@@ -133,7 +135,7 @@ pub fn evolve<E>(
 /// Returns the position of the trial that challenges a member. `number` selects its random numbers;
 /// `start_candidate` is the best candidate, if the trial starts from it.
 fn create_trial(
-    tried: &[Candidate],
+    candidates: &[Candidate],
     members: &[usize],
     (member, start_candidate): (usize, Option<usize>),
     number: u64,
@@ -155,22 +157,24 @@ fn create_trial(
             others[k] = (draw() * members.len() as f64) as usize;
         }
     }
-    let [own, base, plus, minus] = others.map(|other| tried[members[other]].place.as_slice());
-    let factor = FACTOR_RANGE[0] + (FACTOR_RANGE[1] - FACTOR_RANGE[0]) * draw();
-    let (base, factor) =
-        start_candidate.map_or((base, factor), |best| (tried[best].place.as_slice(), 0.5 * factor));
-    let from_mutant = (draw() * own.len() as f64) as usize;
+    let [member_position, base, plus, minus] =
+        others.map(|other| candidates[members[other]].position.as_slice());
+    let factor = DIFFERENCE_FACTOR_RANGE[0]
+        + (DIFFERENCE_FACTOR_RANGE[1] - DIFFERENCE_FACTOR_RANGE[0]) * draw();
+    let (base, factor) = start_candidate
+        .map_or((base, factor), |best| (candidates[best].position.as_slice(), 0.5 * factor));
+    let from_mutant = (draw() * member_position.len() as f64) as usize;
     let coordinate = |k: usize| {
         let mutated = (base[k] + factor * (plus[k] - minus[k])).clamp(0.0, 1.0);
-        if draw() < CROSSOVER || k == from_mutant { mutated } else { own[k] }
+        if draw() < CROSSOVER_RATE || k == from_mutant { mutated } else { member_position[k] }
     };
-    (0..own.len()).map(coordinate).collect()
+    (0..member_position.len()).map(coordinate).collect()
 }
 
 /// Returns the Pareto front: the feasible candidates that no other one dominates.
-pub fn front(tried: &[Candidate], objectives: usize) -> Vec<usize> {
-    let ranks = Ranks::new(tried, objectives);
-    let feasible = (0..tried.len()).filter(|&k| tried[k].is_feasible(objectives));
+pub fn find_front(candidates: &[Candidate], objectives: usize) -> Vec<usize> {
+    let ranks = Ranks::new(candidates, objectives);
+    let feasible = (0..candidates.len()).filter(|&k| candidates[k].is_feasible(objectives));
     let feasible: Vec<usize> = feasible.collect();
     let dominated =
         |k: usize| feasible.iter().any(|&other| ranks.compare(other, k) == Some(Ordering::Less));
@@ -179,33 +183,36 @@ pub fn front(tried: &[Candidate], objectives: usize) -> Vec<usize> {
 
 /// The order of candidates by constraint violation and dominance.
 struct Ranks<'a> {
-    tried: &'a [Candidate],
+    candidates: &'a [Candidate],
     objectives: usize,
     /// The sum of each candidate's violations, each divided by the greatest of all candidates.
     violations: Vec<f64>,
 }
 
 impl<'a> Ranks<'a> {
-    fn new(tried: &'a [Candidate], objectives: usize) -> Self {
-        let excesses =
-            || tried.iter().filter_map(|one| Some(&one.responses.as_ref()?[objectives..]));
+    fn new(candidates: &'a [Candidate], objectives: usize) -> Self {
+        let excesses = || {
+            candidates
+                .iter()
+                .filter_map(|candidate| Some(&candidate.responses.as_ref()?[objectives..]))
+        };
         let conditions = excesses().next().map_or(0, <[f64]>::len);
         let greatest: Vec<f64> = (0..conditions)
             .map(|k| excesses().map(|all| all[k]).fold(f64::MIN_POSITIVE, f64::max))
             .collect();
-        let violation = |one: &Candidate| match &one.responses {
-            Some(all) => all[objectives..]
+        let violation = |candidate: &Candidate| match &candidate.responses {
+            Some(responses) => responses[objectives..]
                 .iter()
                 .zip(&greatest)
-                .map(|(own, max_count)| own / max_count)
+                .map(|(excess, greatest)| excess / greatest)
                 .sum(),
             None => f64::INFINITY,
         };
-        Self { tried, objectives, violations: tried.iter().map(violation).collect() }
+        Self { candidates, objectives, violations: candidates.iter().map(violation).collect() }
     }
 
     fn objectives(&self, candidate: usize) -> &[f64] {
-        self.tried[candidate].responses.as_ref().map_or(&[], |all| &all[..self.objectives])
+        self.candidates[candidate].responses.as_ref().map_or(&[], |all| &all[..self.objectives])
     }
 
     /// Compares two candidates: `Less` if the first is better, `None` if neither dominates.
@@ -225,7 +232,7 @@ impl<'a> Ranks<'a> {
 
     /// Returns at most `max_count` of these candidates, front by front; the most crowded of the
     /// last front are removed.
-    fn best(&self, mut remaining: Vec<usize>, max_count: usize) -> Vec<usize> {
+    fn select_best(&self, mut remaining: Vec<usize>, max_count: usize) -> Vec<usize> {
         let mut selected = Vec::with_capacity(max_count);
         while remaining.len() + selected.len() > max_count && selected.len() < max_count {
             let dominated = |k: &usize| {
@@ -234,7 +241,7 @@ impl<'a> Ranks<'a> {
             let (dominated_rest, mut front): (Vec<usize>, Vec<usize>) =
                 remaining.iter().partition(|k| dominated(k));
             while front.len() + selected.len() > max_count {
-                front.remove(self.most_crowded(&front));
+                front.remove(self.find_most_crowded(&front));
             }
             selected.extend(front);
             remaining = dominated_rest;
@@ -246,10 +253,10 @@ impl<'a> Ranks<'a> {
     }
 
     /// Returns the index of the member of a front with the least crowding distance.
-    fn most_crowded(&self, front: &[usize]) -> usize {
+    fn find_most_crowded(&self, front: &[usize]) -> usize {
         let mut distances = vec![0.0; front.len()];
         for k in 0..self.objectives {
-            let value = |place: usize| self.objectives(front[place]).get(k).copied().unwrap_or(0.0);
+            let value = |index: usize| self.objectives(front[index]).get(k).copied().unwrap_or(0.0);
             let mut order: Vec<usize> = (0..front.len()).collect();
             order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
             let [low, high] = [order[0], order[order.len() - 1]];
@@ -271,14 +278,22 @@ mod tests {
 
     use super::*;
 
-    fn tried(evolution: Evolution, respond: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Candidate> {
+    fn run_evolution(
+        evolution: Evolution,
+        respond: impl Fn(&[f64]) -> Option<Vec<f64>>,
+    ) -> Vec<Candidate> {
         let mut evaluate = |positions: &[Vec<f64>]| {
-            Ok::<_, Infallible>(positions.iter().map(|place| respond(place)).collect())
+            Ok::<_, Infallible>(positions.iter().map(|position| respond(position)).collect())
         };
-        let Ok(tried) = evolve(&evolution, &mut evaluate);
-        assert_eq!(tried.len() as u64, evolution.candidates);
-        assert!(tried.iter().flat_map(|one| &one.place).all(|x| (0.0..=1.0).contains(x)));
-        tried
+        let Ok(candidates) = evolve(&evolution, &mut evaluate);
+        assert_eq!(candidates.len() as u64, evolution.candidates);
+        assert!(
+            candidates
+                .iter()
+                .flat_map(|candidate| &candidate.position)
+                .all(|x| (0.0..=1.0).contains(x))
+        );
+        candidates
     }
 
     const SEARCH: Evolution =
@@ -288,37 +303,38 @@ mod tests {
     fn rosenbrocks_function_is_minimised() {
         // The function is Rosenbrock's in [-2, 2], with its minimum at (1, 1): (0.75, 0.75) of the
         // box.
-        let candidates = tried(SEARCH, |at| {
-            let [x, y] = [4.0 * at[0] - 2.0, 4.0 * at[1] - 2.0];
+        let candidates = run_evolution(SEARCH, |position| {
+            let [x, y] = [4.0 * position[0] - 2.0, 4.0 * position[1] - 2.0];
             Some(vec![(1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2)])
         });
-        let best = &candidates[front(&candidates, 1)[0]];
-        assert!(best.place.iter().all(|x| (x - 0.75).abs() < 2e-3), "{best:?}");
+        let best = &candidates[find_front(&candidates, 1)[0]];
+        assert!(best.position.iter().all(|x| (x - 0.75).abs() < 2e-3), "{best:?}");
     }
 
     #[test]
     fn the_minimum_is_feasible_and_has_objectives() {
         // The minimum of x + y with x y >= 0.25 is at (0.5, 0.5); there are no responses for x >
         // 0.9.
-        let candidates = tried(SEARCH, |at| {
-            let number = vec![at[0] + at[1], (0.25 - at[0] * at[1]).max(0.0)];
-            (at[0] <= 0.9).then_some(number)
+        let candidates = run_evolution(SEARCH, |position| {
+            let number =
+                vec![position[0] + position[1], (0.25 - position[0] * position[1]).max(0.0)];
+            (position[0] <= 0.9).then_some(number)
         });
-        let best = &candidates[front(&candidates, 1)[0]];
+        let best = &candidates[find_front(&candidates, 1)[0]];
         let sum = best.responses.as_ref().unwrap()[0];
         assert!(best.is_feasible(1) && (1.0..1.0005).contains(&sum), "{best:?}");
-        assert_eq!(front(&candidates[..0], 1), [0; 0]);
+        assert_eq!(find_front(&candidates[..0], 1), [0; 0]);
     }
 
     #[test]
     fn a_pareto_front_is_covered_from_end_to_end() {
         // The problem is Schaffer's, with the front from x = 0 to 2, where sqrt(f) + sqrt(g) = 2.
         let two_objectives = Evolution { parameters: 1, objectives: 2, ..SEARCH };
-        let candidates = tried(two_objectives, |at| {
-            let x = 20.0 * at[0] - 10.0;
+        let candidates = run_evolution(two_objectives, |position| {
+            let x = 20.0 * position[0] - 10.0;
             Some(vec![x * x, (x - 2.0) * (x - 2.0)])
         });
-        let mut roots: Vec<f64> = front(&candidates, 2)
+        let mut roots: Vec<f64> = find_front(&candidates, 2)
             .iter()
             .map(|&k| candidates[k].responses.as_ref().unwrap()[0].sqrt())
             .collect();
@@ -330,11 +346,12 @@ mod tests {
     #[test]
     fn a_short_search_ends_close_to_the_minimum() {
         // Without trials from the best candidate, the median of the minima exceeds 1e-4.
-        let bowl = |at: &[f64]| (at[0] - 0.3).powi(2) + 3.0 * (at[1] - 0.6).powi(2);
+        let bowl =
+            |position: &[f64]| (position[0] - 0.3).powi(2) + 3.0 * (position[1] - 0.6).powi(2);
         let least = |seed| {
             let short = Evolution { candidates: 256, seed, ..SEARCH };
-            let candidates = tried(short, |at| Some(vec![bowl(at)]));
-            bowl(&candidates[front(&candidates, 1)[0]].place)
+            let candidates = run_evolution(short, |position| Some(vec![bowl(position)]));
+            bowl(&candidates[find_front(&candidates, 1)[0]].position)
         };
         let mut minima: Vec<f64> = (0..21).map(least).collect();
         minima.sort_by(f64::total_cmp);
@@ -343,9 +360,12 @@ mod tests {
 
     #[test]
     fn equal_answers_lead_to_equal_candidates() {
-        let sphere = |at: &[f64]| Some(vec![at.iter().map(|x| x * x).sum()]);
+        let sphere = |position: &[f64]| Some(vec![position.iter().map(|x| x * x).sum()]);
         let short = Evolution { candidates: 150, ..SEARCH };
-        assert_eq!(tried(SEARCH, sphere)[..100], tried(short, sphere)[..100]);
-        assert_ne!(tried(short, sphere), tried(Evolution { seed: 2, ..short }, sphere));
+        assert_eq!(run_evolution(SEARCH, sphere)[..100], run_evolution(short, sphere)[..100]);
+        assert_ne!(
+            run_evolution(short, sphere),
+            run_evolution(Evolution { seed: 2, ..short }, sphere)
+        );
     }
 }

@@ -4,24 +4,26 @@ use sweep_files::key;
 use sweep_results::Goal;
 
 use super::study::Objective;
-use super::{Candidate, Study, front};
+use super::{Candidate, Study, find_front};
 use crate::store::{CellType, DeclaredColumn, TrialColumns};
 use crate::{Axis, GridInput, Model, Table};
 
 /// Returns the table of a study's candidates.
-pub fn table<M: Model>(study: &Study<M>, tried: &[Candidate]) -> Table {
+pub fn table<M: Model>(study: &Study<M>, candidates: &[Candidate]) -> Table {
     let objectives = study.objectives.len();
-    let front = front(tried, objectives);
+    let front = find_front(candidates, objectives);
     let mut table = Table::new(M::ABOUT.build);
-    table.counts("candidate", "index, in the order of trial", 0..tried.len() as u64);
-    table.counts("generation", "from 0", tried.iter().map(|one| one.generation));
-    let values: Vec<Vec<f64>> = tried.iter().map(|one| study.values(&one.place)).collect();
+    table.counts("candidate", "index, in the order of trial", 0..candidates.len() as u64);
+    table.counts("generation", "from 0", candidates.iter().map(|candidate| candidate.generation));
+    let values: Vec<Vec<f64>> = candidates.iter().map(|one| study.values(&one.position)).collect();
     for (k, Axis { parameter, .. }) in parameters(study).iter().enumerate() {
         let column = values.iter().map(|values| Some(values[k]));
         table.parameter(parameter, column);
     }
     let signed_response = |k: usize, sign: f64| {
-        tried.iter().map(move |one| one.responses.as_ref().map(|responses| sign * responses[k]))
+        candidates
+            .iter()
+            .map(move |one| one.responses.as_ref().map(|responses| sign * responses[k]))
     };
     for (k, one) in study.objectives.iter().enumerate() {
         let unit = objective_unit(&one.goal);
@@ -34,12 +36,12 @@ pub fn table<M: Model>(study: &Study<M>, tried: &[Candidate]) -> Table {
             format!("how far the rows are from keeping {}; 0 where they do", goal.text());
         table.numbers(&excess_name(k), "1", &description, signed_response(objectives + k, 1.0));
     }
-    let feasible = tried.iter().map(|one| one.is_feasible(objectives));
+    let feasible = candidates.iter().map(|candidate| candidate.is_feasible(objectives));
     table.flags("feasible", "whether every condition holds", feasible);
-    let on_front = (0..tried.len()).map(|k| front.contains(&k));
+    let on_front = (0..candidates.len()).map(|k| front.contains(&k));
     table.flags("on_front", "whether no feasible candidate beats it in every objective", on_front);
     let mut optimum = study.settings();
-    optimum["best"] = find_best(tried, &front, objectives).into();
+    optimum["best"] = find_best(candidates, &front, objectives).into();
     let job = study.job();
     table.metadata(key::PLAN, &job.plan);
     table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
@@ -88,13 +90,13 @@ pub fn parameters<M: Model>(study: &Study<M>) -> &[Axis<M>] {
 
 /// Returns the candidate of the front that is closest to the minimum of every objective, each as a
 /// share of its range over the front.
-fn find_best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize> {
+fn find_best(candidates: &[Candidate], front: &[usize], objectives: usize) -> Option<usize> {
     let value = |candidate: usize, k: usize| {
-        tried[candidate].responses.as_ref().map_or(f64::INFINITY, |responses| responses[k])
+        candidates[candidate].responses.as_ref().map_or(f64::INFINITY, |responses| responses[k])
     };
     let extents: Vec<[f64; 2]> = (0..objectives)
         .map(|k| {
-            let values = || front.iter().map(|&one| value(one, k));
+            let values = || front.iter().map(|&candidate| value(candidate, k));
             [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
         })
         .collect();

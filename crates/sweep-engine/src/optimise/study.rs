@@ -13,7 +13,7 @@ use crate::config::design::{DEFAULT_SEED, MAX_SEED};
 use crate::config::grid::{STUDY_KEYS, draft, is_another};
 use crate::config::parameters::find;
 use crate::config::section::list_choices;
-use crate::config::sections::name;
+use crate::config::sections::read_name;
 use crate::config::source::beside;
 use crate::config::syntax::{self, parse};
 use crate::config::{
@@ -95,7 +95,7 @@ impl<M: Model> Study<M> {
         }
         let root =
             Section::new("the study file", Location::new(source, 0..0), table.get_ref(), report);
-        let name = name(&root, path, None, "add `name = \"...\"`, or rename the file");
+        let name = read_name(&root, path, None, "add `name = \"...\"`, or rename the file");
         let [_, grid, parameter, population, candidates, seed, objective, conditions] = STUDY_KEYS;
         let grid = root.require(root.text(grid), grid, "a grid file, relative to this file");
         let input = grid.map(|grid| GridInput::file(beside(path, grid.value), sets.to_vec()));
@@ -106,9 +106,9 @@ impl<M: Model> Study<M> {
         }
         let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
         let parameters = parameters(&root, root.tables(parameter), design, &mut draft);
-        let population = root.whole(population, &(4..=MAX_CANDIDATES)).or(0);
-        let candidates = root.whole(candidates, &(1..=MAX_CANDIDATES)).or(0);
-        let seed = root.whole(seed, &(0..=MAX_SEED)).or(DEFAULT_SEED);
+        let population = root.whole_number(population, &(4..=MAX_CANDIDATES)).or_default(0);
+        let candidates = root.whole_number(candidates, &(1..=MAX_CANDIDATES)).or_default(0);
+        let seed = root.whole_number(seed, &(0..=MAX_SEED)).or_default(DEFAULT_SEED);
         // Populations of multiples of 8 fill the lanes of candidates with a single row.
         let default_population = (10 * parameters.len() as u64).next_multiple_of(8).max(32);
         let population = population.filter(|&count| count > 0).unwrap_or(default_population);
@@ -125,11 +125,11 @@ impl<M: Model> Study<M> {
         let rows = grid.as_ref().map_or(1, Plan::points);
         if rows > MAX_ROWS {
             let title = format!("a grid of {rows} points for every candidate");
-            report.refuse::<()>(root.at(), title, format!("expected at most {}", MAX_ROWS));
+            report.refuse::<()>(root.location(), title, format!("expected at most {}", MAX_ROWS));
         }
         let goals = GoalReader { known, is_sound: report.is_clean(), rows, text: &text, report };
         let objectives = objectives(&root, root.tables(objective), &goals, &names);
-        let conditions = root.texts(conditions).given();
+        let conditions = root.texts(conditions).into_located();
         let conditions = conditions.into_iter().flat_map(|texts| texts.value);
         let conditions =
             conditions.filter_map(|text| goals.read(&text, Goal::constraint)).collect();
@@ -161,7 +161,7 @@ impl<M: Model> Study<M> {
     /// Returns the candidate's parameters at a position in the box of their bounds.
     pub fn values(&self, place: &[f64]) -> Vec<f64> {
         let values = self.parameters.iter().zip(place);
-        values.map(|(parameter, &place)| parameter.bounds.between(place)).collect()
+        values.map(|(parameter, &place)| parameter.bounds.interpolate(place)).collect()
     }
 
     /// Returns the values of the plan's axes in a row of a candidate.
@@ -232,11 +232,11 @@ fn parameters<M: Model>(
         let title = format!("{} tables [[parameter]]", sections.len());
         let expected =
             format!("expected from 1 to {}, each with name, from and to", MAX_PARAMETERS);
-        report.push_missing(Diagnostic::new(title).at(root.at(), expected));
+        report.push_missing(Diagnostic::new(title).at_location(root.location(), expected));
     }
     let mut searched = Vec::new();
     for section in sections {
-        let location = section.at().clone();
+        let location = section.location().clone();
         let name = section.require(section.text("name"), "name", "the name of a parameter");
         let tolerance = section.number("tolerance", Range::NonNegative);
         let expression =
@@ -245,11 +245,11 @@ fn parameters<M: Model>(
         section.misplace(&["count"], "the study has `candidates`, and finds the values itself");
         let bounds = spacing(section, range, Some(2));
         let spread_tolerance = match tolerance {
-            Field::Given(part) if part.value >= 1.0 => {
+            Field::Present(part) if part.value >= 1.0 => {
                 let title = "a tolerance of the whole value or more";
                 report.refuse(&part.location, title, "expected a part of the value, as 0.05")
             }
-            Field::Given(part) if draft.is_some() && !has_free_dimension(design, draft) => {
+            Field::Present(part) if draft.is_some() && !has_free_dimension(design, draft) => {
                 let title = "a tolerance without a design that spreads it";
                 let expected = format!(
                     "expected a [design] in the grid file, by \"sobol\" over at most {MAX_AXES} \
@@ -257,7 +257,7 @@ fn parameters<M: Model>(
                 );
                 report.refuse(&part.location, title, expected)
             }
-            Field::Given(part) => Some(part.value),
+            Field::Present(part) => Some(part.value),
             _ => Some(0.0),
         };
         let (Some(name), Some(parameter), Some(bounds), Some(tolerance), Some(draft)) =
@@ -275,7 +275,7 @@ fn parameters<M: Model>(
         let sweeping_axis = || {
             let mut axes = draft.plan.axes.iter().enumerate();
             let (k, axis) = axes.find(|(_, axis)| shares_number(&axis.parameter))?;
-            let location = report.place(&format!("axis[{k}]"))?;
+            let location = report.location(&format!("axis[{k}]"))?;
             Some(Located { value: axis.parameter.name.to_string(), location })
         };
         if let Some(first) =
@@ -319,11 +319,11 @@ fn objectives(
     const VERBS: [(&str, f64); 2] = [("minimise", 1.0), ("maximise", -1.0)];
     let mut objectives: Vec<Objective> = Vec::new();
     if sections.is_empty() {
-        root.missing("objective", "[[objective]] with `minimise` or `maximise`");
+        root.report_missing("objective", "[[objective]] with `minimise` or `maximise`");
     }
     for section in sections {
-        let location = section.at().clone();
-        let texts = VERBS.map(|(verb, sign)| (section.text(verb).given(), sign));
+        let location = section.location().clone();
+        let texts = VERBS.map(|(verb, sign)| (section.text(verb).into_located(), sign));
         section.finish();
         let [text] = &texts
             .into_iter()

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::error::StoreError;
-use sweep_files::{Column, FileKind, ParquetFile, columns, key};
+use sweep_files::{Column, ColumnMetadata, FileKind, ParquetFile, columns, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
 
@@ -290,13 +290,16 @@ pub struct Overview {
 /// # Errors
 /// [`StoreError::File`].
 pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
-    let empty_range = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
-        name: field.name().clone(),
-        unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
-        worse: field.metadata().get(key::WORSE).and_then(|name| Worse::named(name)),
-        nulls: 0,
-        range: None,
-        names: Vec::new(),
+    let empty_range = |field: &std::sync::Arc<arrow_schema::Field>| {
+        let ColumnMetadata { unit, worse, .. } = ColumnMetadata::from_field(field);
+        ColumnRange {
+            name: field.name().clone(),
+            unit: Some(unit).filter(|unit| !unit.is_empty()),
+            worse,
+            nulls: 0,
+            range: None,
+            names: Vec::new(),
+        }
     };
     let mut ranges: Vec<ColumnRange> = file.schema().fields().iter().map(empty_range).collect();
     // Columns of types that files of this program do not have are not read.

@@ -1,7 +1,6 @@
 //! The columns of a result, which depend on the plan alone. The file has their units and
 //! descriptions. Rows are lists of cells, so that the store does not depend on a model's numbers.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray as _;
@@ -18,7 +17,7 @@ use parquet::schema::types::ColumnPath;
 use serde_json::Value;
 
 use super::Job;
-use sweep_files::{CREATED_BY, FileKind, key};
+use sweep_files::{CREATED_BY, ColumnMetadata, FileKind, key};
 use sweep_parameter::{Limit, Worse};
 
 /// The number of rows of a row group, which is fixed so that the file does not depend on chunks.
@@ -167,16 +166,14 @@ impl DeclaredColumn {
     /// Returns the Arrow field of the column, with its unit, description, worse side, limit and
     /// mark for summaries as metadata.
     pub(crate) fn arrow_field(&self, data_type: DataType, nullable: bool) -> Field {
-        let mut metadata = HashMap::from([
-            ("unit".to_owned(), self.unit.clone()),
-            ("description".to_owned(), self.description.clone()),
-        ]);
-        metadata.extend(self.worse.map(|worse| (key::WORSE.to_owned(), worse.name().to_owned())));
-        metadata.extend(
-            self.limit.map(|limit| (key::LIMIT.to_owned(), Value::from(limit.value).to_string())),
-        );
-        metadata.extend(self.is_in_summary.then(|| (key::SUMMARY.to_owned(), true.to_string())));
-        Field::new(&self.name, data_type, nullable).with_metadata(metadata)
+        let metadata = ColumnMetadata {
+            unit: self.unit.clone(),
+            description: self.description.clone(),
+            worse: self.worse,
+            limit: self.limit.map(|limit| limit.value),
+            is_in_summary: self.is_in_summary,
+        };
+        Field::new(&self.name, data_type, nullable).with_metadata(metadata.to_pairs())
     }
 
     /// Returns the array of the column's cells. A missing count becomes 0, and a missing axis value

@@ -78,7 +78,7 @@ impl Assumed {
                 .iter()
                 .any(|axis| axis.parameter.parts.iter().any(|part| part == parameter.name()));
             let Some(assumption) = parameter.assumption() else { continue };
-            if is_swept || !plan.written.is_assumed(parameter.name()) {
+            if is_swept || !plan.sources.is_assumed(parameter.name()) {
                 continue;
             }
             let Some(value) = parameter.get(machine, spin) else { continue };

@@ -63,7 +63,7 @@ on from there. docs/fit.md explains every line.";
 pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let grid: WasherGridInput = args.grid.input().with_fixed(&args.grid.at);
     let mut cases = Vec::new();
-    let columns = [args.columns.clone(), grid.load()?.aside.columns].concat();
+    let columns = [args.columns.clone(), grid.load()?.reading_notes.columns].concat();
     for text in &args.measurement {
         let (path, constants) = parted(text);
         let measurement = Measurement::read(path, &columns)?;

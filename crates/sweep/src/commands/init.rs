@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use washer_model::Machine;
 
 use crate::config;
-use sweep_engine::plan::WrittenIn;
+use sweep_engine::plan::NumberSources;
 use sweep_engine::{Error, Exit, print, tell};
 use sweep_files::{FileError, atomic};
 
@@ -36,7 +36,7 @@ pub(crate) fn run(args: &InitArgs) -> Result<Exit, Error> {
     let text = match (args.machine, args.short) {
         (true, true) => SHORT_MACHINE.to_owned(),
         // Scripts read the complete file, in which no number is left to the rules of assumption.
-        (true, false) => config::machine_file(&Machine::paper(), &WrittenIn::default()),
+        (true, false) => config::machine_file(&Machine::paper(), &NumberSources::default()),
         (false, _) => GRID.to_owned(),
     };
     let default = if args.machine { "machine.toml" } else { "grid.toml" };

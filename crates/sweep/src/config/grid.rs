@@ -49,7 +49,7 @@ fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
     if let Some(text) = &input.own_file {
         return parse_machine(text, "its machine", report);
     }
-    let Some(name) = root.text("machine").given() else { return Machine::paper() };
+    let Some(name) = root.text("machine").into_located() else { return Machine::paper() };
     if name.value == DEFAULT_MACHINE {
         return Machine::paper();
     }
@@ -61,7 +61,7 @@ fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
             let title = format!("cannot read the machine file {short_path}: {error}");
             let expected =
                 format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
-            let refusal = Diagnostic::new(title).at(&name.location, expected);
+            let refusal = Diagnostic::new(title).at_location(&name.location, expected);
             report.push(refusal.nearest(name.value, MACHINES));
             Machine::paper()
         }
@@ -90,7 +90,7 @@ pub(super) fn walk_stability(
 ) {
     let held_metric = metrics.iter().find(|metric| metric.is_at_held_speeds());
     let needs_speeds = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
-    if let (KeyWalk::Set(_), Field::Given(location)) = (&keys.walk, metrics_field) {
+    if let (KeyWalk::Set(_), Field::Present(location)) = (&keys.walk, metrics_field) {
         if let (Some(metric), None, Some(report)) = (held_metric, &speeds, keys.report()) {
             let expected = "expected a grid file with this metric and a section [stability]";
             report.refuse::<()>(&location.location, needs_speeds(metric), expected);
@@ -107,8 +107,9 @@ pub(super) fn walk_stability(
             section.text_or_number(key).map(|found| found.value.into())
         };
         let kind = Form::Own(&read, json!({ "type": ["string", "number"] }));
-        let field = keys.key(Key::new("speed_rpm", description).needed(expected), &kind, &mut text);
-        let (Field::Given(found), Some(text), Some(report)) = (field, text, keys.report()) else {
+        let field =
+            keys.key(Key::new("speed_rpm", description).required(expected), &kind, &mut text);
+        let (Field::Present(found), Some(text), Some(report)) = (field, text, keys.report()) else {
             return;
         };
         match text.parse() {
@@ -121,7 +122,7 @@ pub(super) fn walk_stability(
     });
     let Some(root) = keys.section() else { return };
     match (field, held_metric) {
-        (Field::Given(section), None) => {
+        (Field::Present(section), None) => {
             let title =
                 "[stability] is for the metrics `growth` and `dwell`, and neither is asked for";
             let expected = "expected metrics = [\"growth\"] or [\"dwell\"] at the top of the \
@@ -131,7 +132,8 @@ pub(super) fn walk_stability(
         (Field::Absent, Some(metric)) => {
             let expected =
                 "expected a section [stability] with speed_rpm = 250 or \"FROM:TO:STEP\"";
-            let refusal = Diagnostic::new(needs_speeds(metric)).at(root.at(), expected);
+            let refusal =
+                Diagnostic::new(needs_speeds(metric)).at_location(root.location(), expected);
             root.report.push_missing(refusal);
         }
         _ => {}
@@ -160,8 +162,8 @@ pub(crate) fn check_metrics(metrics: &[Metric], machine: &Machine, root: &Sectio
     for metric in metrics {
         if let Some(part) = missing_part(*metric, machine) {
             let title = format!("the metric `{}` needs a machine with more parts", metric.name());
-            let refusal =
-                Diagnostic::new(title).at(root.at(), format!("the machine has no {part}"));
+            let refusal = Diagnostic::new(title)
+                .at_location(root.location(), format!("the machine has no {part}"));
             root.report.push(refusal);
         }
     }

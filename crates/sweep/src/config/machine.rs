@@ -15,7 +15,7 @@ use sweep_engine::config::keys;
 use sweep_engine::config::schema::{document, parameter_schema};
 use sweep_engine::config::source::is_blank;
 use sweep_engine::config::{Diagnostic, Field, Form, KeyWalk, Keys, Report, Section};
-use sweep_engine::plan::WrittenIn;
+use sweep_engine::plan::NumberSources;
 
 use sheet::{MOVING_MASS, SheetKeys, UNBALANCE_X, UNBALANCES};
 
@@ -130,7 +130,7 @@ impl MachineSection {
         sheet: &mut SheetKeys,
         keys: &mut Keys<'_>,
     ) {
-        keys.places = format!("{}.", self.name);
+        keys.location_prefix = format!("{}.", self.name);
         sheet.walk(self, k, keys);
         section_keys.iter().for_each(|key| key.walk(self, k, machine, sheet, keys));
     }
@@ -250,8 +250,10 @@ pub(super) fn read(text: &str, root: Section<'_>) -> Machine {
     let mut machine = Machine::paper();
     let report = root.report;
     if is_blank(text) {
-        report
-            .push(Diagnostic::new("the machine file is empty").at(root.at(), "expected a machine"));
+        report.push(
+            Diagnostic::new("the machine file is empty")
+                .at_location(root.location(), "expected a machine"),
+        );
         return machine;
     }
     let mut keys = Keys::new(KeyWalk::Read(root));
@@ -305,7 +307,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 let expected = format!("a section {}", section.header());
                 let is_assumed = section_keys.iter().all(|key| key.is_assumed(section, machine));
                 let is_needed = !(is_assumed && (sheet.is_given || keys.is_schema()));
-                let table = if is_needed { table.needed(&expected) } else { table };
+                let table = if is_needed { table.required(&expected) } else { table };
                 let field = keys
                     .table(table, |keys| section.walk(section_keys, 0, machine, &mut sheet, keys));
                 if !is_needed && matches!(field, Field::Absent) && keys.section().is_some() {
@@ -314,7 +316,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                     continue;
                 }
                 if let (None, Some(report)) =
-                    (field.given(), keys.section().map(|section| section.report))
+                    (field.into_located(), keys.section().map(|section| section.report))
                 {
                     section_keys
                         .iter()
@@ -349,7 +351,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
     let Some(root) = keys.section() else { return };
     if machine.springs.is_empty() && machine.bushings.is_empty() {
         let expected = "at least one [[springs]] or [[bushings]]: nothing else carries the machine";
-        root.missing("springs", expected);
+        root.report_missing("springs", expected);
         // With the built-in machine's springs later checks do not report this mistake again.
         machine.springs = Machine::paper().springs;
     }
@@ -369,7 +371,7 @@ fn element_tables<'a>(section: &MachineSection, root: &Section<'a>) -> Vec<Secti
     if let Some(first_beyond) = sections.get(MAX_ELEMENTS) {
         let title = format!("the machine has {} {}", sections.len(), section.name);
         let expected = format!("expected at most {MAX_ELEMENTS}");
-        root.report.push(Diagnostic::new(title).at(first_beyond.at(), expected));
+        root.report.push(Diagnostic::new(title).at_location(first_beyond.location(), expected));
         sections.truncate(MAX_ELEMENTS);
     }
     sections
@@ -398,7 +400,7 @@ impl MachineKey {
             _ if self.is_vector() => {
                 let three = Numbers::new(first.range(), 3..=3, "expected three numbers");
                 (
-                    Form::Numbers(Numbers { places: names.clone(), ..three }),
+                    Form::Numbers(Numbers { location_keys: names.clone(), ..three }),
                     String::new(),
                     "an array of three numbers".to_owned(),
                 )
@@ -425,7 +427,7 @@ impl MachineKey {
             sheet.has_plane(section, k, &self.name) || may_have_plane && self.name == UNBALANCE_X;
         let is_needed = self.if_omitted == IfOmitted::Refused && !is_assumed && !has_plane;
         let key = keys::Key::new(&self.name, &description);
-        let key = if is_needed { key.needed(&expected) } else { key };
+        let key = if is_needed { key.required(&expected) } else { key };
         let mut value = match self.if_omitted {
             _ if !keys.is_schema() => self.json(section, k, machine),
             IfOmitted::Auto => AUTO.into(),
@@ -436,19 +438,19 @@ impl MachineKey {
         let Some(report) = keys.section().map(|section| section.report) else { return };
         let numbers = value.as_array().map_or(slice::from_ref(&value), Vec::as_slice);
         match field {
-            Field::Given(location) => {
+            Field::Present(location) => {
                 let numbers = numbers.iter().filter_map(Value::as_f64);
                 for (parameter, number) in parameters.iter().zip(numbers) {
                     parameter.set(machine, &mut no_spin(), number);
                     if !self.is_vector() {
-                        report.put(parameter.name(), location.location.clone());
+                        report.record_location(parameter.name(), location.location.clone());
                     }
                 }
             }
             Field::Absent if has_plane => {}
             Field::Absent if is_assumed => sheet.omitted.extend(parameters),
             Field::Absent if !is_needed => {}
-            Field::Absent | Field::Bad => mark_doubtful(names, report),
+            Field::Absent | Field::Rejected => mark_doubtful(names, report),
         }
     }
 
@@ -467,7 +469,7 @@ impl MachineKey {
 
 /// Marks parameters as doubtful, so that later checks skip them.
 fn mark_doubtful(names: Vec<String>, report: &Report) {
-    names.into_iter().for_each(|name| report.doubt(name));
+    names.into_iter().for_each(|name| report.mark_invalid(name));
 }
 
 /// Returns the parameter of a name, if the machine has it.
@@ -483,7 +485,7 @@ fn parameter_value(name: &str, machine: &Machine) -> Option<f64> {
 /// Returns the text of a machine file, in which each number has its description and source. A
 /// number that no file gave has the source of the built-in machine's number. The text reads back to
 /// the same machine, bit for bit.
-pub(crate) fn to_toml(machine: &Machine, written: &WrittenIn) -> String {
+pub(crate) fn to_toml(machine: &Machine, written: &NumberSources) -> String {
     let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the \
                     bearings before loading: x along the\n\
          # drum axis towards the door, y up, z sideways. Inertia about each body's own mass \

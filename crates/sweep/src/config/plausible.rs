@@ -23,7 +23,7 @@ const MAX_NOTES: usize = 8;
 pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
     let Washer { machine, spin, .. } = &plan.model;
-    let written = draft.report.written();
+    let written = draft.report.parameter_sources();
     let mut notes = Vec::new();
     for parameter in MachineParameter::all(machine, spin) {
         let is_written_once =
@@ -46,9 +46,9 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
         ));
     }
     let further = notes.len().saturating_sub(MAX_NOTES);
-    notes.into_iter().take(MAX_NOTES).for_each(|note| draft.report.note(note));
+    notes.into_iter().take(MAX_NOTES).for_each(|note| draft.report.add_note(note));
     if further > 0 {
-        draft.report.note(format!("{further} more numbers are as unusual"));
+        draft.report.add_note(format!("{further} more numbers are as unusual"));
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) fn walk_top(washer: &mut Washer, keys: &mut Keys<'_>, input: Option<&
     grid::walk_machine(machine, keys, input);
     let path = input.map_or(Path::new(""), |input| &input.path);
     spin::walk(spin, path, keys);
-    let key = Key::new("metrics", "further columns of the result").set();
+    let key = Key::new("metrics", "further columns of the result").settable();
     let metrics_field =
         keys.words(key, "metric", &Metric::ALL, Metric::name, &mut measures.metrics);
     measures.stops = machine.stops.len();
@@ -41,7 +41,7 @@ pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
         || keys.is_schema()
         || *criterion != Criterion::default()
     {
-        let key = Key::new("criterion", description).set();
+        let key = Key::new("criterion", description).settable();
         let mut word = criterion.name().to_owned();
         keys.key(key, &Form::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
         *criterion = Criterion::named(&word).unwrap_or_default();

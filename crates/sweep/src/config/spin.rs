@@ -41,8 +41,8 @@ const NEEDS_FILE_PROFILE: &str = "only the profile \"file\" has it, which needs 
 
 /// Walks over the section of the grid file at `path`.
 pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
-    keys.table(Key::new("spin", "").needed("a section [spin]"), |keys| {
-        keys.places = "spin_".to_owned();
+    keys.table(Key::new("spin", "").required("a section [spin]"), |keys| {
+        keys.location_prefix = "spin_".to_owned();
         let from_table = (
             TABLE_PROFILE,
             "linear between given points, constant after the last; a first speed other than 0 is \
@@ -55,18 +55,19 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
         let all = Profile::ALL.map(|profile| (profile.name(), profile_description(profile)));
         let table_index = all.len();
         // The key `file` implies its profile.
-        let has_file = keys.section().is_some_and(|section| section.key_at(FILE_PROFILE).is_some());
+        let has_file =
+            keys.section().is_some_and(|section| section.key_location(FILE_PROFILE).is_some());
         let is_default = has_file || keys.is_schema();
         let variants = Variants {
-            all: all.into_iter().chain([from_table, from_file]).collect(),
+            words: all.into_iter().chain([from_table, from_file]).collect(),
             default: is_default.then_some(table_index + 1),
-            set: table_index,
+            settable_count: table_index,
         };
         let current = match spin {
             Spin::Ramped { profile, .. } => *profile as usize,
             Spin::Table { .. } => table_index,
         };
-        let key = Key::new("profile", "").set();
+        let key = Key::new("profile", "").settable();
         let chosen =
             keys.variants(key, &variants, Some(current), |keys, k| match Profile::ALL.get(k) {
                 Some(&profile) => walk_ramp(profile, spin, keys),
@@ -88,13 +89,13 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
                  this file";
     let mut file_name = String::new();
     let key =
-        Key::new(FILE_PROFILE, description).needed("a CSV or Parquet file of times and speeds");
+        Key::new(FILE_PROFILE, description).required("a CSV or Parquet file of times and speeds");
     let file_field = keys.key(key, &Form::Text, &mut file_name);
     let description = "straight lines between the rows, or monotone cubics";
     let names = Joints::ALL.map(|(_, name)| name);
     let mut word = names[0].to_owned();
     keys.key(Key::new("joints", description), &Form::Word(&names), &mut word);
-    let (Field::Given(location), Some(report)) = (file_field, keys.report()) else {
+    let (Field::Present(location), Some(report)) = (file_field, keys.report()) else {
         if keys.section().is_some() {
             *spin = PLACEHOLDER;
         }
@@ -106,7 +107,8 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
         Some((time_s, speed_rpm)) => {
             for (column, values) in [("time_s", &time_s), ("speed_rpm", &speed_rpm)] {
                 for k in 0..values.len() {
-                    report.put(format!("spin_{column}[{k}]"), location.location.clone());
+                    report
+                        .record_location(format!("spin_{column}[{k}]"), location.location.clone());
                 }
             }
             Spin::Table { time_s, speed_rpm }
@@ -134,9 +136,9 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
             let range = parameter.range();
             let description =
                 describe_parameter(&engine_parameter(parameter, &Machine::paper(), &PLACEHOLDER));
-            let key = Key::new(key, &description).needed(expected);
+            let key = Key::new(key, &description).required(expected);
             let field = keys.key(key, &Form::Number(range), value);
-            is_valid &= matches!(field, Field::Given(_)) || keys.section().is_none();
+            is_valid &= matches!(field, Field::Present(_)) || keys.section().is_none();
         }
     }
     *spin_profile = profile;
@@ -158,11 +160,12 @@ fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
         ..Numbers::new(Range::NonNegative, 0..=MAX_ROWS, format!("expected at most {MAX_ROWS}"))
     };
     // The range of the speeds is checked with the whole table.
-    let speeds = Numbers { range: Range::Within(-1e5, 1e5), read: Range::Any, ..times.clone() };
+    let speeds =
+        Numbers { range: Range::Within(-1e5, 1e5), read_range: Range::Any, ..times.clone() };
     let mut column =
         |key: &'static str, description: &'static str, numbers, column: &mut Vec<f64>| {
-            let key = Key::new(key, description).needed("an array of numbers");
-            matches!(keys.key(key, &Form::Numbers(numbers), column), Field::Given(_))
+            let key = Key::new(key, description).required("an array of numbers");
+            matches!(keys.key(key, &Form::Numbers(numbers), column), Field::Present(_))
         };
     let are_given = [
         column("time_s", "increasing times from 0, s", times, &mut time_s),
@@ -172,7 +175,7 @@ fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
         // Mistakes of the columns have been reported; the empty table that replaces them is not a
         // further one.
         if let Some(report) = keys.report() {
-            report.doubt("spin_time_s");
+            report.mark_invalid("spin_time_s");
         }
         (time_s, speed_rpm) = Default::default();
     }

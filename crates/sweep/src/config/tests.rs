@@ -24,7 +24,7 @@ use super::*;
 use crate::method::{METHODS, rk4, rk4_mass_scaled};
 use crate::plan::AxisValues;
 use sweep_engine::design::{Design, DesignRule};
-use sweep_engine::plan::WrittenIn;
+use sweep_engine::plan::NumberSources;
 
 /// The format of the fuzzer's inputs.
 #[path = "../../../../fuzz/src/input.rs"]
@@ -134,7 +134,7 @@ fn omitted_keys_have_their_defaults() {
     );
     let adaptive = |name: &str, rtol: f64, atol: f64| {
         let method = METHODS.iter().find(|method| method.name == name).unwrap();
-        method.with(|setting| if setting.key == "rtol" { rtol } else { atol })
+        method.with_settings(|setting| if setting.key == "rtol" { rtol } else { atol })
     };
     let method = |text: &str| {
         load_text(format!("{MINIMAL_GRID}[integrator]\n{text}"), &[]).unwrap().integrator
@@ -241,7 +241,7 @@ fn a_written_machine_reads_back_the_same_bits() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(
             folder.path().join("machine.toml"),
-            machine_file(&machine, &WrittenIn::default()),
+            machine_file(&machine, &NumberSources::default()),
         )
         .unwrap();
         let grid = folder.path().join("grid.toml");
@@ -253,7 +253,7 @@ fn a_written_machine_reads_back_the_same_bits() {
 /// Returns the message about a machine file, which is changed from that of the built-in machine.
 fn machine_mistakes(change: impl FnOnce(String) -> String, sets: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let file = change(machine_file(&Machine::paper(), &WrittenIn::default()));
+    let file = change(machine_file(&Machine::paper(), &NumberSources::default()));
     std::fs::write(folder.path().join("machine.toml"), file).unwrap();
     let grid = folder.path().join("grid.toml");
     std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
@@ -315,7 +315,7 @@ fn a_machine_has_at_most_a_thousand_springs() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(
             folder.path().join("machine.toml"),
-            machine_file(&machine, &WrittenIn::default()),
+            machine_file(&machine, &NumberSources::default()),
         )
         .unwrap();
         let grid = folder.path().join("grid.toml");
@@ -550,7 +550,7 @@ proptest! {
         line in 0_usize..60,
         value in any::<f64>(),
     ) {
-        let machine = machine_file(&Machine::paper(), &WrittenIn::default());
+        let machine = machine_file(&Machine::paper(), &NumberSources::default());
         let mut lines: Vec<String> = machine.lines().map(str::to_owned).collect();
         let line = line % lines.len();
         if let Some((key, rest)) = lines[line].clone().split_once(" = ") {

@@ -57,7 +57,7 @@ pub(crate) fn check_scenarios(draft: &Draft<'_, Washer>) {
             // No further mistake would be shown.
             break;
         }
-        plan.place(&mut scenario, &plan.corner(corner));
+        plan.write_axis_values(&mut scenario, &plan.corner(corner));
         check.check_corner(&scenario, varying);
     }
 }
@@ -108,9 +108,9 @@ impl VaryingParts {
             "too many points to check: {points}, each with {elements} springs, dampers \
              and the like and a spin of {rows} rows"
         );
-        let axis = draft.report.place("axis[0]");
+        let axis = draft.report.location("axis[0]");
         draft.report.push(axis.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
-            diagnostic.at(
+            diagnostic.at_location(
                 &location,
                 format!("expected at most {max_points} points of this machine and spin"),
             )
@@ -148,7 +148,7 @@ impl CornerCheck<'_> {
 
     fn report_violations(&mut self, violations: Vec<Violation>) {
         for Violation { title, parameters, expected } in violations {
-            let is_certain = !parameters.iter().any(|key| self.draft.report.is_doubtful(key));
+            let is_certain = !parameters.iter().any(|key| self.draft.report.is_invalid(key));
             if is_certain && self.reported.insert(parameters.clone()) {
                 refuse(self.draft, title, &parameters, &format!("expected {expected}"));
             }
@@ -162,7 +162,7 @@ fn check_turns(
     scenario: &Scenario,
     reported: &mut BTreeSet<Vec<String>>,
 ) {
-    let Some(criterion) = draft.report.place("reliability.criterion") else { return };
+    let Some(criterion) = draft.report.location("reliability.criterion") else { return };
     if draft.plan.model.measures.criterion != Criterion::Envelope {
         return;
     }
@@ -175,7 +175,7 @@ fn check_turns(
         format!("the drum makes {turns:.0} turns in the window, too many to compare one by one");
     let expected =
         format!("expected at most {MAX_COMPARED_TURNS} turns for \"{name}\": shorten the window");
-    draft.report.push(Diagnostic::new(title).at(&criterion, expected));
+    draft.report.push(Diagnostic::new(title).at_location(&criterion, expected));
 }
 
 /// Refuses a machine whose highest frequency is too high for the method: for the greatest accepted
@@ -211,9 +211,9 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         let needs = format!("\"{name}\" needs {steps:.1e} steps to {end_s} s");
         let title = format!("the machine is too stiff: {needs}");
         let place =
-            ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.place(key));
+            ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.location(key));
         let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
-            diagnostic.at(&location, format!("expected at most {MAX_STEPS:e} steps"))
+            diagnostic.at_location(&location, format!("expected at most {MAX_STEPS:e} steps"))
         });
         let way_out = if is_too_fast(highest_additive_rad_per_s(draft)) {
             ""

@@ -241,7 +241,6 @@ impl Pool<'_> {
         state.busy_threads -= 1;
         drop(state);
         self.changed.notify_all();
-        done.iter_mut().for_each(|(outcome, _)| outcome.drop_turns());
         let model = &self.engine.plan.model;
         if let Some(speeds) = &model.held_speeds {
             let is_stopped = || self.context.stopped();

@@ -249,7 +249,7 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
     let title = format!("the column `{}` does not name a channel", column.header);
     let expected = "expected a channel of `sweep trace` with its unit, as in \
                     tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";
-    let refusal = Diagnostic::new(title).at(&column.name.location, expected);
+    let refusal = Diagnostic::new(title).at_location(&column.name.location, expected);
     Some(refusal.nearest(&column.header, names.iter().map(String::as_str)))
 }
 
@@ -281,7 +281,7 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
         let at = &column.name.location;
         if known_names.contains(&name) {
             let title = format!("the column `{name}` is given twice");
-            report.push(Diagnostic::new(title).at(at, "expected each column once"));
+            report.push(Diagnostic::new(title).at_location(at, "expected each column once"));
             continue;
         }
         known_names.push(name);
@@ -289,7 +289,8 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
             report.push_with(|sources| {
                 let title = format!("`{name}` is infinite in row {}", row + 1);
                 let expected = "expected a number, or nothing where no sample is";
-                Diagnostic::new(title).at(&table.place(sources, column.place, row), expected)
+                Diagnostic::new(title)
+                    .at_location(&table.locate(sources, column.index, row), expected)
             });
         }
         let values = &column.values[first_row..];
@@ -303,7 +304,9 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
             ("speed_rpm", _) => measurement.speed_rpm = Some(values.to_vec()),
             (_, Some(_)) if samples >= MIN_SAMPLES && is_still(values) => {
                 let title = format!("the column `{name}` never changes");
-                report.push(Diagnostic::new(title).at(at, "expected what a sensor measured"));
+                report.push(
+                    Diagnostic::new(title).at_location(at, "expected what a sensor measured"),
+                );
             }
             (_, Some(quantity)) if samples >= MIN_SAMPLES => {
                 measurement.signals.push(Signal { quantity, values: values.to_vec() });
@@ -311,7 +314,8 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
             (_, Some(_)) => {
                 let title = format!("the column `{name}` has {samples} samples");
                 report.push(
-                    Diagnostic::new(title).at(at, format!("expected {MIN_SAMPLES} at least")),
+                    Diagnostic::new(title)
+                        .at_location(at, format!("expected {MIN_SAMPLES} at least")),
                 );
             }
             (_, None) => {
@@ -377,7 +381,7 @@ fn clock_time(
     row: usize,
     report: &Report,
 ) -> Option<String> {
-    let text = table.cell(report, column.place, row).filter(|cell| cell.contains(':'));
+    let text = table.cell(report, column.index, row).filter(|cell| cell.contains(':'));
     text.or_else(|| column.clock_time(row))
 }
 
@@ -430,7 +434,7 @@ fn read_pulses(
     if measurement.speed_rpm.is_some() || measurement.pulses.is_some() {
         let title = format!("the column `{name}` is a second tachometer");
         let expected = "expected speed_rpm or one column of pulses";
-        report.push(Diagnostic::new(title).at(&column.name.location, expected));
+        report.push(Diagnostic::new(title).at_location(&column.name.location, expected));
         return;
     }
     let counted_name = name.replace("pulses", "count");
@@ -477,10 +481,10 @@ fn read_pulses(
         };
     report.push_with(|sources| {
         let location = match row {
-            Some(row) => table.place(sources, column.place, measurement.early + row),
+            Some(row) => table.locate(sources, column.index, measurement.early + row),
             None => column.name.location.clone(),
         };
-        Diagnostic::new(title).at(&location, expected)
+        Diagnostic::new(title).at_location(&location, expected)
     });
 }
 
@@ -516,7 +520,8 @@ fn check_times(table: &NumberTable, column: &ListColumn, report: &Report) {
         }
         report.push_with(|sources| {
             let expected = "expected times in s that rise from row to row, 0 where the run begins";
-            Diagnostic::new(description).at(&table.place(sources, column.place, row), expected)
+            Diagnostic::new(description)
+                .at_location(&table.locate(sources, column.index, row), expected)
         });
     }
     if reported == [false; 4] {
@@ -549,7 +554,8 @@ fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
             "expected a run of at most {LONGEST_RUN_S} s: remove stray rows, cut the record, or \
              convert its times to s"
         );
-        Diagnostic::new(title).at(&table.place(sources, column.place, run_start + row), expected)
+        Diagnostic::new(title)
+            .at_location(&table.locate(sources, column.index, run_start + row), expected)
     });
 }
 

@@ -19,7 +19,7 @@ use crate::engine::reference_step_s;
 use crate::method::direct;
 use crate::plan::{Plan, prepare_point};
 use lane_ode::Cancel;
-use sweep_engine::plan::WrittenIn;
+use sweep_engine::plan::NumberSources;
 
 /// The step of a difference quotient, as a part of the number. Basis: the square root of the
 /// rounding error of a trajectory. Doubling it doubles the error of derivatives by curvature.
@@ -191,9 +191,9 @@ impl Problem<'_> {
     }
 
     /// Returns the sources of the numbers of the first case's machine.
-    pub(crate) fn written(&self) -> WrittenIn {
+    pub(crate) fn written(&self) -> NumberSources {
         let plan = &self.cases[0].plan;
-        let mut written = plan.written.clone();
+        let mut written = plan.sources.clone();
         for free in self.free.iter().filter(|free| free.belongs_to(0)) {
             let files = self.cases.iter().enumerate().filter(|(case, _)| free.belongs_to(*case));
             let files: Vec<&str> = files.map(|(_, case)| &*case.measurement.name).collect();

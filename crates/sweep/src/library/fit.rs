@@ -24,7 +24,7 @@ pub fn fit_tables(
         return Err(Error::option("table", "[]", "a table or more"));
     }
     options.check()?;
-    let columns = grid.load()?.aside.columns;
+    let columns = grid.load()?.reading_notes.columns;
     let mut cases = Vec::with_capacity(tables.len());
     for (k, (table, constants)) in tables.into_iter().enumerate() {
         let mut measurement = Measurement::from_columns(table.into_columns(), &columns)?;

@@ -26,9 +26,7 @@ fn assert_is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
     let errors = checked.errors[0].zip(checked.errors[1]).map(|(a, b)| a.max(b));
     assert_eq!(errors, outcome.error, "{values:?}");
     assert_eq!(checked.methods[0], outcome.method, "{values:?}");
-    let mut row = checked.outcome;
-    row.drop_turns();
-    assert_eq!((row, values), (Outcome { point: 0, ..outcome.clone() }, values));
+    assert_eq!((checked.outcome, values), (Outcome { point: 0, ..outcome.clone() }, values));
     for (amplitudes, run) in checked.amplitudes.iter().zip([&outcome.nonlinear, &outcome.linear]) {
         let channels = setup.rule.channels.iter();
         let amplitudes: Vec<f64> = channels.map(|channel| amplitudes[channel.index()]).collect();

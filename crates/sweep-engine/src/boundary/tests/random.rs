@@ -185,8 +185,8 @@ fn random_level_sets() {
     let clock_seed =
         std::time::SystemTime::UNIX_EPOCH.elapsed().map_or(0, |now| now.as_nanos() as u64);
     let seed = std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(clock_seed);
-    let firsts: Vec<f64> = (0..ROWS).map(|k| f64::from(k) / f64::from(ROWS - 1)).collect();
-    let lattice = lattice_ranks(firsts.len(), SEARCH.lattice);
+    let first_values: Vec<f64> = (0..ROWS).map(|k| f64::from(k) / f64::from(ROWS - 1)).collect();
+    let lattice = lattice_ranks(first_values.len(), SEARCH.lattice);
     let cell_rows = lattice.windows(2).map(|pair| pair[1] - pair[0] + 1).max().unwrap_or(1);
     let cell_width = (SEARCH.greatest - SEARCH.least) / SEARCH.lattice as f64;
     let mut guaranteed = 0;
@@ -197,11 +197,12 @@ fn random_level_sets() {
     for k in 0..LEVEL_SETS {
         let level_set = LevelSet::draw(seed.wrapping_add(k));
         let distance = |x, y| Some(level_set.distance(x, y));
-        let traced = traced(distance, &firsts, &SEARCH);
+        let traced = traced(distance, &first_values, &SEARCH);
         check_edges(&traced, distance, SEARCH.tolerance);
         trials += traced.trials;
         let found: Vec<Vec<RowStretch>> = traced.curves[0].iter().map(traced_stretches).collect();
-        let sides: Vec<Vec<bool>> = firsts.iter().map(|first| level_set.sides(*first)).collect();
+        let sides: Vec<Vec<bool>> =
+            first_values.iter().map(|first| level_set.sides(*first)).collect();
         for (first, islands) in common_stretches(&sides, cell_rows) {
             for island in islands.iter().filter(|island| island.width() >= cell_width) {
                 for (row, found) in found.iter().enumerate().skip(first).take(cell_rows) {

@@ -1,9 +1,9 @@
 //! Times of day as data loggers write them: 12:34:56.789, with or without a date.
 
-/// Seconds of a day.
+use chrono::{DateTime, NaiveDate};
+
+/// The seconds of a day.
 const DAY_S: f64 = 86_400.0;
-/// Days from the first of March of the year 0 to the first of January 1970, counted from 1.
-const DAYS_BEFORE_1970: f64 = 719_469.0;
 
 /// Returns the seconds since midnight of a time of day, or since 1970 if it has a date.
 pub(super) fn seconds(cell: &str) -> Option<f64> {
@@ -24,30 +24,16 @@ pub(super) fn seconds(cell: &str) -> Option<f64> {
 }
 
 /// Returns the clock time of the seconds since 1970, with its date, or of the seconds since
-/// midnight, to a millisecond.
+/// midnight, to a millisecond. A time whose date has no year of the calendar is returned in
+/// seconds.
 pub(super) fn text(seconds: f64) -> String {
     let milliseconds = (1e3 * seconds).round() as i64;
-    let day = milliseconds.div_euclid(86_400_000);
-    let time = milliseconds.rem_euclid(86_400_000);
-    let [hours, minutes] = [time / 3_600_000, time / 60_000 % 60];
-    let time = format!("{hours:02}:{minutes:02}:{:06.3}", (time % 60_000) as f64 / 1e3);
-    if day == 0 { time } else { format!("{} {time}", date(day)) }
-}
-
-/// Returns the date of a day since 1970 as year, month and day.
-fn date(day: i64) -> String {
-    // Years begin in March, and 400 of them have 146,097 days.
-    let day = day + DAYS_BEFORE_1970 as i64 - 1;
-    let cycle = day.div_euclid(146_097);
-    let day = day.rem_euclid(146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let day = day - (153 * month + 2) / 5 + 1;
-    let is_early = month >= 10;
-    let year = 400 * cycle + year + i64::from(is_early);
-    let month = if is_early { month - 9 } else { month + 3 };
-    format!("{year:04}-{month:02}-{day:02}")
+    let format = match milliseconds.div_euclid(86_400_000) {
+        0 => "%H:%M:%S%.3f",
+        _ => "%Y-%m-%d %H:%M:%S%.3f",
+    };
+    DateTime::from_timestamp_millis(milliseconds)
+        .map_or_else(|| format!("{seconds} s"), |time| time.format(format).to_string())
 }
 
 /// Returns a whole number of at most four digits, if it is no greater than `max`.
@@ -67,16 +53,10 @@ fn days(date: &str) -> Option<f64> {
         (_, 4, true) => (last, first),
         _ => return None,
     };
-    let year = parse_whole(year, 9999)?;
-    let month = parse_whole(month, 12).filter(|month| *month > 0.0)?;
-    let day = parse_whole(day, 31).filter(|day| *day > 0.0)?;
-    // Years begin in March, so that the leap day is their last.
-    let is_january_or_february = month <= 2.0;
-    let year = if is_january_or_february { year - 1.0 } else { year };
-    let month = if is_january_or_february { month + 9.0 } else { month - 3.0 };
-    let days_of_years = 365.0 * year + (year / 4.0).floor() - (year / 100.0).floor();
-    let days_of_months = ((153.0 * month + 2.0) / 5.0).floor();
-    Some(days_of_years + (year / 400.0).floor() + days_of_months + day - DAYS_BEFORE_1970)
+    let [year, month, day] =
+        [parse_whole(year, 9999)?, parse_whole(month, 12)?, parse_whole(day, 31)?];
+    let date = NaiveDate::from_ymd_opt(year as i32, month as u32, day as u32)?;
+    Some(f64::from(date.to_epoch_days()))
 }
 
 #[cfg(test)]
@@ -110,16 +90,26 @@ mod tests {
         ] {
             assert_eq!(seconds(expected).map(text).as_deref(), Some(expected));
         }
-        for day in (-200_000..200_000).step_by(7) {
-            assert_eq!(days(&date(day)), Some(day as f64), "{}", date(day));
+        for day in (-200_000..200_000).step_by(7).filter(|day| *day != 0) {
+            let midnight_s = f64::from(day) * DAY_S;
+            assert_eq!(seconds(&text(midnight_s)), Some(midnight_s), "{}", text(midnight_s));
         }
     }
 
     #[test]
     fn invalid_times_are_rejected() {
-        for cell in
-            ["", "12", "25:00:00", "1:60", "1:2:-3", "1:2:3:4", "03/04/2026 1:00", "a 1:00", "1:+2"]
-        {
+        for cell in [
+            "",
+            "12",
+            "25:00:00",
+            "1:60",
+            "1:2:-3",
+            "1:2:3:4",
+            "03/04/2026 1:00",
+            "a 1:00",
+            "1:+2",
+            "2026-02-29 1:00",
+        ] {
             assert_eq!(seconds(cell), None, "{cell}");
         }
     }

@@ -94,7 +94,7 @@ pub(super) fn read(
             report.push_with(|_| {
                 let title = format!("`{}` is not a number", short(cell));
                 let expected = "expected a number such as 0.25, 80 or 1e7";
-                Diagnostic::new(title).at(&Location::new(source, location), expected)
+                Diagnostic::new(title).at_location(&Location::new(source, location), expected)
             });
         }
     }
@@ -134,7 +134,7 @@ fn headers<'t>(
 /// the factor for an ignored column.
 fn column(
     header: &str,
-    place: usize,
+    index: usize,
     unit: Option<&str>,
     location: Location,
     names: &Names<'_>,
@@ -143,7 +143,7 @@ fn column(
     let named_column = |name: String, is_known| ListColumn {
         name: Located { value: name, location: location.clone() },
         header: header.to_owned(),
-        place,
+        index,
         is_known,
         values: Vec::new(),
         is_clock: false,
@@ -178,7 +178,7 @@ fn wrong_row_length(
     let [names, numbers] = ["name", "number"].map(|noun| counted(width, noun));
     let title = format!("a row of {} under {names}", counted(count, "number"));
     let expected = format!("expected {numbers}, separated by {}", separator_words(separator));
-    let refusal = Diagnostic::new(title).at(&location, expected);
+    let refusal = Diagnostic::new(title).at_location(&location, expected);
     let help = "commas separate cells here: if they separate decimals or thousands too, write the \
                 file with semicolons or tabs between cells";
     if separator == ',' && count > width { refusal.help(help) } else { refusal }
@@ -216,8 +216,11 @@ fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
                 short(&comma.cell)
             );
             Diagnostic::new(title)
-                .at(&evidence_location(comma), "expected one decimal mark in the whole file")
-                .at(&evidence_location(point), "the other one")
+                .at_location(
+                    &evidence_location(comma),
+                    "expected one decimal mark in the whole file",
+                )
+                .at_location(&evidence_location(point), "the other one")
                 .help("write every number of the file with the same decimal mark")
         }
         Unclear::OneCell(evidence) => {
@@ -228,7 +231,7 @@ fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
                  {decimals}0"
             );
             let expected = "expected a number without separators of thousands";
-            Diagnostic::new(title).at(&evidence_location(evidence), expected).help(help)
+            Diagnostic::new(title).at_location(&evidence_location(evidence), expected).help(help)
         }
     }
 }

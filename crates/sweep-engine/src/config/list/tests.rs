@@ -211,7 +211,7 @@ fn a_file_has_one_decimal_mark() {
         let report = Report::default();
         let source = report.add("list.csv", String::new());
         let table = csv::read(text, source, true, &ANY_NAMES, &report);
-        report.fill(source, text.to_owned());
+        report.set_text(source, text.to_owned());
         assert!(table.unwrap().columns.iter().all(|column| column.values.is_empty()));
         report.into_diagnostics().to_string()
     };

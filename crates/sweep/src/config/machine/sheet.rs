@@ -71,8 +71,8 @@ impl SheetKeys {
     /// Creates the data sheet of a file whose keys have not been read.
     pub(super) fn new(keys: &Keys<'_>) -> Self {
         let has_any = |root: &Section<'_>| {
-            let is_drum_key = |key: &str| root.key_inside("drum", key);
-            root.key_at(MOVING_MASS).is_some() || DRUM_SIZES.into_iter().any(is_drum_key)
+            let is_drum_key = |key: &str| root.has_inner_key("drum", key);
+            root.key_location(MOVING_MASS).is_some() || DRUM_SIZES.into_iter().any(is_drum_key)
         };
         Self { is_given: keys.section().is_some_and(has_any), ..Self::default() }
     }
@@ -107,15 +107,15 @@ impl SheetKeys {
         let field =
             keys.key(keys::Key::new(UNBALANCE_PLANE, description), &Form::Word(&names), &mut word);
         let plane = DrumPlane::ALL.into_iter().find(|(_, name)| word.as_deref() == Some(name));
-        let (Field::Given(location), Some((plane, _))) = (field, plane) else { return };
+        let (Field::Present(location), Some((plane, _))) = (field, plane) else { return };
         let Some(table) = keys.section() else { return };
-        if table.key_at(UNBALANCE_X).is_some() {
+        if table.key_location(UNBALANCE_X).is_some() {
             let title = format!("`{UNBALANCE_PLANE}` beside `{UNBALANCE_X}`");
             let expected = "expected only one of them: both say where the unbalance is";
             table.report.refuse::<()>(&location.location, title, expected);
         }
         let name = format!("{}{UNBALANCE_X}", section.prefix(k));
-        table.report.put(name.as_str(), location.location);
+        table.report.record_location(name.as_str(), location.location);
         // The paper's machine has no further unbalances, so it has no parameters of them.
         let machine = with_unbalances(k + 1);
         self.planes.extend(find_parameter(&name, &machine).map(|parameter| (parameter, plane)));
@@ -140,21 +140,22 @@ impl SheetKeys {
         };
         let is_complete = self.drum_radius_m.is_some() && self.drum_depth_m.is_some();
         if !self.omitted.is_empty() {
-            for key in DRUM_SIZES.into_iter().filter(|key| !root.key_inside("drum", key)) {
+            for key in DRUM_SIZES.into_iter().filter(|key| !root.has_inner_key("drum", key)) {
                 let expected = "the drum's inner radius_m and depth_m in [drum], from which the \
                                 numbers that are left out follow";
-                root.missing(key, expected);
+                root.report_missing(key, expected);
             }
         }
         if sheet.moving_mass_kg.is_some() && !are_masses_omitted[0] {
             let title = format!("`{MOVING_MASS}` beside the tub's mass");
             let expected =
                 "expected no `mass_kg` in [tub]: it is the moving mass less shaft and drum";
-            let location = root.key_at(MOVING_MASS).unwrap_or_else(|| root.at().clone());
+            let location =
+                root.key_location(MOVING_MASS).unwrap_or_else(|| root.location().clone());
             report.refuse::<()>(&location, title, expected);
         } else if are_masses_omitted.contains(&true) && sheet.moving_mass_kg.is_none() {
             let expected = "the mass of tub, shaft and drum without laundry, or `mass_kg` of each";
-            root.missing(MOVING_MASS, expected);
+            root.report_missing(MOVING_MASS, expected);
         } else if is_complete {
             sheet.fill(&self.omitted, machine);
         }
@@ -164,10 +165,14 @@ impl SheetKeys {
                 let name = parameter.name();
                 let range = parameter.range();
                 let title = format!("the rule for the left-out `{name}` gives {value:.4}");
-                report.refuse::<()>(root.at(), title, format!("expected {range}: give the number"));
+                report.refuse::<()>(
+                    root.location(),
+                    title,
+                    format!("expected {range}: give the number"),
+                );
             }
             if let Some(assumption) = parameter.assumption() {
-                report.assume(parameter.name(), assumption.rule);
+                report.record_default_rule(parameter.name(), assumption.rule);
             }
         }
     }

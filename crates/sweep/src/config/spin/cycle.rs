@@ -46,7 +46,7 @@ pub(super) fn read(
 ) -> Option<CyclePoints> {
     let table =
         NumberTable::read(path, &Names { known: &quantity_and_unit, renamed: &[] }, report)?;
-    table.notes().into_iter().for_each(|note| report.note(format!("the cycle: {note}")));
+    table.notes().into_iter().for_each(|note| report.add_note(format!("the cycle: {note}")));
     let times = column(&table, "time_s", "time", location, report);
     let speeds = column(&table, "speed_rpm", "speed", location, report);
     let times = times?;
@@ -103,7 +103,7 @@ fn column<'t>(
         let title = format!("the cycle's file has no column of {quantity} with its unit");
         let expected = "expected a header such as `time_s` or `Time [min]`, and one such as \
             `speed_rpm`, `Speed [Hz]` or `n (rad/s)`";
-        let refusal = Diagnostic::new(title).at(location, expected);
+        let refusal = Diagnostic::new(title).at_location(location, expected);
         report.push(refusal.help(format!("its columns are {headers:?}")));
     }
     first
@@ -119,8 +119,8 @@ fn check_columns(
 ) -> bool {
     let refuse = |column: &ListColumn, row: usize, title: String, expected: &str| {
         report.push_with(|sources| {
-            let at = table.place(sources, column.place, row);
-            Diagnostic::new(title).at(&at, expected)
+            let at = table.locate(sources, column.index, row);
+            Diagnostic::new(title).at_location(&at, expected)
         });
     };
     let values = &times.values;

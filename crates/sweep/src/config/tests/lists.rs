@@ -22,7 +22,7 @@ fn units_are_converted_and_ignored_columns_are_noted() {
     let names: Vec<&str> = plan.axes.iter().map(|axis| &*axis.parameter.name).collect();
     assert_eq!(names, ["unbalance_mass_kg", "damping_n_s_per_m"]);
     assert_eq!([plan.axis_values(0), plan.axis_values(1)], [[0.3, 120.0], [0.45, 100.0]]);
-    let notes = plan.aside.notes.join("\n");
+    let notes = plan.reading_notes.notes.join("\n");
     assert!(notes.contains("left out the column `weather`"), "{notes}");
     assert!(notes.contains("`Unbalance mass [g]` is unbalance_mass_kg"), "{notes}");
 }

@@ -4,12 +4,12 @@ use washer_model::Machine;
 
 use super::super::WasherGridInput;
 use super::super::machine_file;
-use sweep_engine::plan::WrittenIn;
+use sweep_engine::plan::NumberSources;
 
 /// Loads the file of the built-in machine with a change.
 fn load(change: impl Fn(String) -> String) -> Result<Machine, String> {
     let folder = tempfile::tempdir().unwrap();
-    let machine = change(machine_file(&Machine::paper(), &WrittenIn::default()));
+    let machine = change(machine_file(&Machine::paper(), &NumberSources::default()));
     std::fs::write(folder.path().join("m.toml"), machine).unwrap();
     let grid = "machine = \"m.toml\"\n[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n\
         [time]\nend_s = 2\n";
@@ -59,7 +59,7 @@ fn loads_have_angles_and_dampers_have_stages() {
     assert_eq!(machine.dampers[0].outer_damping_n_s_per_m, 30.0);
     assert_eq!(machine.dampers[1].free_stroke_m, 0.0);
     // The text of the machine reads back to the same machine.
-    let written = machine_file(&machine, &WrittenIn::default());
+    let written = machine_file(&machine, &NumberSources::default());
     assert_eq!(load(|_| written.clone()).unwrap(), machine);
     let refusal = load(|file| file + &with_angle.replace("-120", "500")).unwrap_err();
     assert!(refusal.contains("angle_deg"), "{refusal}");

@@ -7,7 +7,7 @@ fn notes(sections: &str, sets: &[&str]) -> Vec<String> {
         "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n".to_owned();
     let sets = sets.iter().map(|set| (*set).to_owned()).collect();
     let input = WasherGridInput::text("plan", format!("{grid}{sections}"), sets);
-    input.load().unwrap_or_else(|mistakes| panic!("{mistakes}")).aside.notes
+    input.load().unwrap_or_else(|mistakes| panic!("{mistakes}")).reading_notes.notes
 }
 
 #[test]
@@ -37,7 +37,11 @@ fn usual_numbers_have_no_notes() {
     assert_eq!(notes("", &["damping_n_s_per_m=0", "unbalance_mass_kg=1.5"]), [""; 0]);
     let [compact, industrial] = ["compact_grid", "industrial_grid"].map(|name| {
         let path = format!("{}/../../docs/examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-        WasherGridInput::file(path.into(), Vec::new()).load().expect("it is right").aside.notes
+        WasherGridInput::file(path.into(), Vec::new())
+            .load()
+            .expect("it is right")
+            .reading_notes
+            .notes
     });
     assert_eq!((compact, industrial), (Vec::new(), Vec::new()));
 }

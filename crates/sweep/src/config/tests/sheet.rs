@@ -23,11 +23,11 @@ fn a_data_sheet_makes_a_machine_near_the_built_in_one() {
     let mut assumed = 0;
     for parameter in washer_model::MachineParameter::all(machine, spin) {
         let Some(assumption) = parameter.assumption() else { continue };
-        if !plan.written.is_assumed(parameter.name()) {
+        if !plan.sources.is_assumed(parameter.name()) {
             continue;
         }
         assumed += 1;
-        let source = plan.written.source(&[parameter.name()]);
+        let source = plan.sources.source(&[parameter.name()]);
         assert_eq!(source, Some(format!("assumed: {}", assumption.rule)));
         let [value, paper] =
             [machine, &built_in].map(|machine| parameter.get(machine, spin).unwrap());
@@ -39,7 +39,7 @@ fn a_data_sheet_makes_a_machine_near_the_built_in_one() {
     }
     assert_eq!(assumed, 27);
     // The complete file has the rule of each number.
-    let complete = machine_file(machine, &plan.written);
+    let complete = machine_file(machine, &plan.sources);
     assert!(
         complete.contains("[assumed: half the drum's depth before O, as the built-in machine]")
     );
