@@ -95,15 +95,15 @@ fn join_segments(links: &mut BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridE
     let mut lines = Vec::new();
     for start in line_ends.into_iter().chain(edges) {
         let mut line = vec![start];
-        let mut edge = start;
-        while let Some(next) = links.get_mut(&edge).and_then(Vec::pop) {
+        let mut current_edge = start;
+        while let Some(next) = links.get_mut(&current_edge).and_then(Vec::pop) {
             if let Some(links_back) = links.get_mut(&next)
-                && let Some(index) = links_back.iter().position(|&edge| edge == edge)
+                && let Some(index) = links_back.iter().position(|&edge| edge == current_edge)
             {
                 links_back.remove(index);
             }
             line.push(next);
-            edge = next;
+            current_edge = next;
         }
         if line.len() > 1 {
             lines.push(line);
