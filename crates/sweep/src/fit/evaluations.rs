@@ -64,19 +64,19 @@ impl Evaluations {
     ) -> Result<Option<NormalEquations>, E> {
         let key: TrialKey = x.iter().map(|x| x.to_bits()).collect();
         if let Some(cells) = lock(&self.trials).find_response(&key) {
-            return Ok(self.from_cells(cells));
+            return Ok(self.read_equations(cells));
         }
         let start_time = Instant::now();
-        let from_cells = find()?;
+        let equations = find()?;
         let is_costly = start_time.elapsed() >= MIN_TIME_OF_IMMEDIATE_WRITE;
-        let cells = self.cells(from_cells.as_ref());
+        let cells = self.cells(equations.as_ref());
         let mut trials = lock(&self.trials);
         trials.add(key, cells)?;
         if is_costly || trials.is_due() {
             trials.write()?;
         }
         drop(trials);
-        Ok(from_cells)
+        Ok(equations)
     }
 
     /// Writes the evaluations that are only in memory.
@@ -94,16 +94,16 @@ impl Evaluations {
     }
 
     /// Returns the cells of normal equations, in the order of [`columns`].
-    fn cells(&self, from_cells: Option<&NormalEquations>) -> RowCells {
-        let Some(NormalEquations { cost, sigma, normal, rhs }) = from_cells else {
+    fn cells(&self, equations: Option<&NormalEquations>) -> RowCells {
+        let Some(NormalEquations { cost, sigma, normal, rhs }) = equations else {
             return vec![None; 1 + self.signals + (self.unknowns + 1) * self.unknowns];
         };
         let numbers = std::iter::once(cost).chain(sigma).chain(normal.iter().flatten()).chain(rhs);
         numbers.map(|number| Some(number.to_bits())).collect()
     }
 
-    /// Returns the normal equations that some cells hold; `None` for a failed evaluation.
-    fn from_cells(&self, cells: &RowCells) -> Option<NormalEquations> {
+    /// Returns the normal equations of these cells; `None` for a failed evaluation.
+    fn read_equations(&self, cells: &RowCells) -> Option<NormalEquations> {
         let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
         let numbers = numbers?;
         let (cost, rest) = numbers.split_first()?;
