@@ -59,9 +59,9 @@ there.";
 /// of a terminal. Doubling it lists twice as many.
 const MAX_LISTED: usize = 12;
 
-/// The slack, relative to the limit, up to which a condition is said to bind. Basis: searches of a
-/// hundred candidates come within a percent of the limit that stops them. Doubling it calls
-/// conditions binding that are twice as far from their limits.
+/// The slack, relative to the limit, up to which a condition is said to bind. Basis: a choice for
+/// the reader of the summary, on which no result depends. Doubling it calls conditions binding that
+/// are twice as far from their limits.
 const BINDING_SLACK: f64 = 0.02;
 
 /// Runs the search of a study, and prints a summary.
