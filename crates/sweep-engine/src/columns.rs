@@ -1,7 +1,7 @@
 //! Columns as functions of a row: those that compare a nonlinear with a linear motion, and
 //! constructors for a model's own columns.
 
-use sweep_parameter::{Channel, Limit, RatioLimits, Verdict, Worse};
+use sweep_parameter::{Channel, RatioLimits, Verdict, Worse};
 
 use crate::store::{CellType, DeclaredColumn, RowCells};
 
@@ -93,19 +93,21 @@ impl<R> ResultColumn<R> {
 
     /// Sets the direction in which values are worse.
     pub fn worse(mut self, worse: Worse) -> Self {
-        self.declared.worse = Some(worse);
+        self.declared.metadata.worse = Some(worse);
         self
     }
 
     /// Marks the column as one whose worst value is in summaries of a result.
     pub fn in_summary(mut self) -> Self {
-        self.declared.is_in_summary = true;
+        self.declared.metadata.is_in_summary = true;
         self
     }
 
-    /// Sets the limit between good and bad values.
+    /// Sets the limit between good and bad values, and the difference from it that is as important
+    /// as a factor of e is for a ratio.
     pub fn limit(mut self, value: f64, scale: f64) -> Self {
-        self.declared.limit = Some(Limit { value, scale });
+        self.declared.metadata.limit = Some(value);
+        self.declared.limit_scale = Some(scale);
         self
     }
 }

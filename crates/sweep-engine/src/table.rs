@@ -57,7 +57,7 @@ impl Table {
     /// Sets the direction in which values of the last column are worse.
     pub fn worse(&mut self, worse: Worse) {
         if let Some((column, _)) = self.columns.last_mut() {
-            column.worse = Some(worse);
+            column.metadata.worse = Some(worse);
         }
     }
 

@@ -30,40 +30,38 @@ impl CellKind {
     }
 }
 
-/// The description of a column.
+/// A column of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// The name in the file.
     pub name: String,
-    /// The unit, from the field's metadata; empty for pure numbers and words.
-    pub unit: String,
-    /// The description, from the field's metadata; may be empty.
-    pub description: String,
+    /// The metadata of the column's field; each part is empty where the file has none.
+    pub metadata: ColumnMetadata,
     /// The kind of the cells.
     pub kind: CellKind,
     /// Whether the column's type in the file is an integer.
     pub whole: bool,
-    /// The direction in which values of the column get worse, if the file's metadata has one.
-    pub worse: Option<Worse>,
-    /// The limit between good and bad values, if the file's metadata has one.
-    pub limit: Option<f64>,
-    /// Whether summaries of the file report the column's worst value.
-    pub is_in_summary: bool,
     /// The index among the fields of the schema.
     pub field: usize,
 }
 
 impl Column {
-    /// Whether the column's cells are numbers.
+    /// Returns whether the column's cells are numbers.
     pub fn is_number(&self) -> bool {
         self.kind == CellKind::Number
     }
+
+    /// Returns the unit to show: empty for pure numbers and words.
+    pub fn unit(&self) -> &str {
+        self.metadata.shown_unit()
+    }
 }
 
-/// The metadata of a column, which the field of a file carries as pairs of texts.
+/// The metadata of a column, which the field of a file carries as pairs of texts. Columns that are
+/// declared to be written and columns that are read have it in common.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColumnMetadata {
-    /// The unit as the file has it: `1` for pure numbers.
+    /// The unit as the file has it: `1` for pure numbers, empty for words.
     pub unit: String,
     /// The description, in one line.
     pub description: String,
@@ -81,6 +79,11 @@ const UNIT: &str = "unit";
 const DESCRIPTION: &str = "description";
 
 impl ColumnMetadata {
+    /// Returns the unit to show: empty for pure numbers and words.
+    pub fn shown_unit(&self) -> &str {
+        if self.unit == "1" { "" } else { &self.unit }
+    }
+
     /// Returns the pairs that a field carries.
     pub fn to_pairs(&self) -> HashMap<String, String> {
         let worse = self.worse.map(|worse| (key::WORSE, worse.name().to_owned()));
@@ -118,17 +121,11 @@ fn column(field: &Field, place: usize) -> Option<Column> {
         number if cells::is_number(number) => CellKind::Number,
         _ => return None,
     };
-    let ColumnMetadata { unit, description, worse, limit, is_in_summary } =
-        ColumnMetadata::from_field(field);
     Some(Column {
         name: field.name().clone(),
-        unit: if unit == "1" { String::new() } else { unit },
-        description,
+        metadata: ColumnMetadata::from_field(field),
         kind,
         whole: field.data_type().is_integer(),
-        worse,
-        limit,
-        is_in_summary,
         field: place,
     })
 }

@@ -158,7 +158,7 @@ impl CellReduction {
         match column.name.as_str() {
             "point" | "ratio_max_channel" => Self::AtGreatestRatio,
             _ if !column.is_number() => Self::Common,
-            _ if column.worse == Some(Worse::Less) => Self::Least,
+            _ if column.metadata.worse == Some(Worse::Less) => Self::Least,
             _ => Self::Greatest,
         }
     }

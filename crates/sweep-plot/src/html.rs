@@ -299,7 +299,7 @@ fn rows_json(source: &FigureFile) -> Value {
         json!({
             "name": quantity.name,
             "words": quantity.words,
-            "unit": label::display_unit(&quantity.columns[0].1.unit).0,
+            "unit": label::display_unit(quantity.columns[0].1.unit()).0,
             "columns": [column(0), column(1), ratio.as_ref()],
         })
     };
@@ -315,11 +315,11 @@ fn axis_json(axis: &GridAxis) -> Value {
 /// Returns every column of numbers as 32-bit floats in grid order, NaN where the file has no value.
 fn columns_json(table: &FigureTable) -> Value {
     let encode_numbers = |column: &FigureColumn| {
-        let (unit, factor) = label::display_unit(&column.facts.unit);
+        let (unit, factor) = label::display_unit(column.facts.unit());
         let data = json!({
             "unit": unit,
             "factor": factor,
-            "description": column.facts.description,
+            "description": column.facts.metadata.description,
             "data": embed::encode_floats(column.numbers()?.iter().copied()),
         });
         Some((column.facts.name.clone(), data))

@@ -234,7 +234,7 @@ impl ShownColumn {
 
     /// Returns the direction in which values are bad, if there is one.
     pub(crate) const fn worse(&self) -> Option<Worse> {
-        self.facts.worse
+        self.facts.metadata.worse
     }
 
     /// Returns whether the verdict depends on this column alone.
@@ -248,7 +248,7 @@ impl ShownColumn {
     /// [`PlotError::Undrawable`] if the file does not have the column.
     pub(crate) fn layer(&self, map: &CellMap) -> Result<Layer> {
         let values = map.table.numbers(self.name())?;
-        let (unit, factor) = label::display_unit(&self.facts.unit);
+        let (unit, factor) = label::display_unit(self.facts.unit());
         let (range, sides) = &map.ranges_and_sides[self.name()];
         let range = range.values().map(|value| value * factor);
         let source = &map.table.source;
@@ -302,7 +302,7 @@ impl ShownColumn {
     pub(crate) fn title_and_label(&self, source: &FigureFile) -> (String, String) {
         let compared_quantity = source.compared_quantity();
         // The description of a column of differences says which file is divided by which.
-        let description = self.facts.description.split(';').next().unwrap_or_default();
+        let description = self.facts.metadata.description.split(';').next().unwrap_or_default();
         match (self.group, self.channel.as_deref().map(label::channel_in_words)) {
             (ColumnGroup::Ratio, None) if source.kind == FigureKind::DIFFERENCES => (
                 capitalise(description),
@@ -343,7 +343,7 @@ impl ShownColumn {
     pub(crate) fn dividing_limit(&self, source: &FigureFile) -> Option<DividingLimit> {
         let limit = source.column_limit(&self.facts)?;
         let worse = self.worse().unwrap_or(Worse::Greater);
-        let (unit, factor) = label::display_unit(&self.facts.unit);
+        let (unit, factor) = label::display_unit(self.facts.unit());
         let value = limit * factor;
         let is_log = self.group == ColumnGroup::Ratio;
         let phrase = label::with_value("", value, unit);

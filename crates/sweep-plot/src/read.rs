@@ -7,7 +7,6 @@ use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use arrow_schema::Schema;
 use serde_json::Value;
 
 use super::error::{PlotError, Result};
@@ -123,8 +122,7 @@ impl FigureFile {
         });
         let provenance: Vec<(String, Value)> = provenance.collect();
         let columns = files::columns(file.schema()).into_iter();
-        let columns: Vec<ColumnFacts> =
-            columns.map(|column| complete_by_name(column, file.schema())).collect();
+        let columns: Vec<ColumnFacts> = columns.map(complete_by_name).collect();
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
         let kind = model_kinds.all_kinds().find(|kind| kind.matches_columns(&names));
         let kind = kind.ok_or_else(|| PlotError::Undrawable {
@@ -303,7 +301,7 @@ impl FigureFile {
     /// in a file of differences have no limit, because each of the two runs has its own.
     pub fn column_limit(&self, column: &ColumnFacts) -> Option<f64> {
         let has_run_limit = is_ratio(column) && self.kind != FigureKind::DIFFERENCES;
-        column.limit.or_else(|| has_run_limit.then(|| self.ratio_limit()))
+        column.metadata.limit.or_else(|| has_run_limit.then(|| self.ratio_limit()))
     }
 
     /// Returns the ratio from which a point is unreliable: the run's limit, or else that of the
@@ -420,14 +418,13 @@ pub fn bracket_columns<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
 
 /// Completes unit and bad direction from the column's name, for files that lost their metadata in
 /// another program.
-fn complete_by_name(column: ColumnFacts, schema: &Schema) -> ColumnFacts {
-    let unit = schema.field(column.field).metadata().get("unit");
-    let unit = match unit.is_none_or(String::is_empty) {
-        true => label::unit_of_name(&column.name),
-        false => column.unit,
-    };
+fn complete_by_name(mut column: ColumnFacts) -> ColumnFacts {
+    if column.metadata.unit.is_empty() {
+        column.metadata.unit = label::unit_of_name(&column.name);
+    }
     let worse = column.name.starts_with("min_").then_some(Worse::Less);
-    ColumnFacts { unit, worse: column.worse.or(worse), ..column }
+    column.metadata.worse = column.metadata.worse.or(worse);
+    column
 }
 
 #[cfg(test)]

@@ -111,7 +111,7 @@ impl Scatter {
             ));
         };
         let facts = source.column(column.name());
-        let (unit, factor) = label::display_unit(facts.map_or("", |facts| &facts.unit));
+        let (unit, factor) = label::display_unit(facts.map_or("", |facts| facts.unit()));
         let (title, quantity_label) = column.title_and_label(&source);
         let limit = column.dividing_limit(&source);
         let is_ratio = column.group == ColumnGroup::Ratio;
@@ -151,7 +151,7 @@ impl Scatter {
             let varies = values.iter().any(|value| *value != values[0]);
             varies.then(|| DesignParameter {
                 name: (*name).to_owned(),
-                label: Label::new(&label::name_in_words(name), &facts.unit),
+                label: Label::new(&label::name_in_words(name), facts.unit()),
                 is_log: source.is_log_axis(name) && values.iter().all(|value| *value > 0.0),
                 influence: RankInfluence::new(&values, &quantity),
                 values,

@@ -90,7 +90,7 @@ impl AxisCollector {
         SweptAxis {
             name: column.name.clone(),
             words: label::name_in_words(&column.name),
-            unit: column.unit.clone(),
+            unit: column.unit().to_owned(),
             is_log,
             values,
             is_complete: !self.has_overflowed,

@@ -94,7 +94,7 @@ pub struct FigureColumn {
 impl FigureColumn {
     /// Returns the label of the column: its name in words and its unit.
     pub fn label(&self) -> Label {
-        Label::new(&label::name_in_words(&self.facts.name), &self.facts.unit)
+        Label::new(&label::name_in_words(&self.facts.name), self.facts.unit())
     }
 
     /// Returns the values if they are numbers.

@@ -85,13 +85,13 @@ fn columns_have_units_words_and_provenance() {
     assert_eq!((table.source.kind, table.rows), (FigureKind::MAP, 90));
     let column = |name: &str| table.column(name).unwrap();
     assert_eq!(
-        column("damping_n_s_per_m").facts.unit,
+        column("damping_n_s_per_m").facts.unit(),
         "N s/m",
         "by the name where the file does not say"
     );
-    assert_eq!(column("nonlinear_body_yaw").facts.unit, "rad");
-    assert_eq!(column("nonlinear_body_yaw").facts.description, "nonlinear_body_yaw, said");
-    assert_eq!(column("ratio_max").facts.unit, "", "1 is no unit to show");
+    assert_eq!(column("nonlinear_body_yaw").facts.unit(), "rad");
+    assert_eq!(column("nonlinear_body_yaw").facts.metadata.description, "nonlinear_body_yaw, said");
+    assert_eq!(column("ratio_max").facts.unit(), "", "1 is no unit to show");
     let words = |name: &str| column(name).words().unwrap();
     let rows_without_verdict =
         (0..table.rows).filter(|&row| words("reliable").get(row).is_none()).count();

@@ -267,7 +267,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     let mut shared: Vec<SharedRow> =
         pairs.iter().map(|&pair| files[0].shared_row(&files[1], pair)).collect();
     let columns = compare_columns(&files, &pairs, &mut shared);
-    let unit_of_key = |name: &String| first.column(name).map(|column| column.unit.clone());
+    let unit_of_key = |name: &String| first.column(name).map(|column| column.unit().to_owned());
     let key_units = keys.iter().map(|name| unit_of_key(name).unwrap_or_default()).collect();
     let boundary = if is_boundary {
         boundary::compare_boundaries(first, second)?
@@ -342,7 +342,7 @@ fn compare_columns(
         let Some(second) = files[1].position(&column.name) else { continue };
         let mut change = ColumnChange {
             name: column.name.clone(),
-            unit: column.unit.clone(),
+            unit: column.unit().to_owned(),
             rows: 0,
             greatest_difference: 0.0,
             worst: Vec::new(),

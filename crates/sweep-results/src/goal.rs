@@ -81,7 +81,7 @@ impl Goal {
             _ => false,
         };
         match self.columns.first() {
-            Some(column) if has_unit => &column.unit,
+            Some(column) if has_unit => column.unit(),
             _ => "",
         }
     }

@@ -76,7 +76,8 @@ pub fn check(
         aggregate_values: results.into_iter().map(|result| result.value).collect(),
         ..ConditionCheck::default()
     };
-    let ordered_column = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
+    let ordered_column =
+        |(k, name): (usize, &String)| Some((k, table.column(name)?.metadata.worse?));
     let order_column = condition.columns.iter().enumerate().find_map(ordered_column);
     let mut offenders = WorstRows::new(order_column.map(|(_, direction)| direction), max_offenders);
     let mut truth_of_file = None;

@@ -186,7 +186,7 @@ pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotErro
     let extreme_over_turn = |word: &str| {
         let mut columns = table.columns.iter().filter(|column| {
             column.facts.name.starts_with("frequency")
-                && column.facts.unit == "rpm"
+                && column.facts.unit() == "rpm"
                 && column.facts.name.split('_').any(|part| part == word)
         });
         columns.next().and_then(|column| column.numbers())

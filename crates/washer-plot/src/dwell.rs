@@ -68,7 +68,7 @@ pub(crate) fn chart(
     let last_speed = curves.speed.last().copied();
     let is_in_range = |speed: &f64| first_speed <= Some(*speed) && Some(*speed) <= last_speed;
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
-        let (_, factor) = label::display_unit(&facts.unit);
+        let (_, factor) = label::display_unit(facts.unit());
         let mut series = response_series("periodic response", &curves, k, factor);
         for (kind, (_, words, colour)) in ATTRACTOR_KINDS.iter().enumerate() {
             let points =

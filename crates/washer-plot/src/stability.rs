@@ -117,7 +117,7 @@ pub(crate) fn responses(
                 "nonlinear model",
                 &curves,
                 k,
-                label::display_unit(&channel.1.unit).1,
+                label::display_unit(channel.1.unit()).1,
             );
             ChartPanel { height: 170.0, ..channel_panel(*channel, is_channel_shown, series) }
         });
@@ -172,7 +172,7 @@ pub(crate) fn channel_panel(
     series: Vec<Series>,
 ) -> ChartPanel {
     let words = label::capitalise(&label::channel_in_words(name));
-    let label = Label::new(&words, label::display_unit(&facts.unit).0);
+    let label = Label::new(&words, label::display_unit(facts.unit()).0);
     ChartPanel { is_shown, ..ChartPanel::new(name, label, series) }
 }
 
@@ -292,12 +292,12 @@ pub(crate) fn read_unstable(table: &FigureTable, path: &Path) -> Result<Unstable
 }
 
 fn format_value(axis: &ColumnFacts, value: f64) -> String {
-    label::with_value(&label::name_in_words(&axis.name), value, &axis.unit)
+    label::with_value(&label::name_in_words(&axis.name), value, axis.unit())
 }
 
 /// Returns a value of an axis within a sentence: words in lower case, the unit unchanged.
 fn format_in_lower_case(axis: &ColumnFacts, value: f64) -> String {
-    label::with_value(&label::name_in_words(&axis.name).to_lowercase(), value, &axis.unit)
+    label::with_value(&label::name_in_words(&axis.name).to_lowercase(), value, axis.unit())
 }
 
 /// A row of a file over constant speeds. Missing values are NaN.

@@ -75,7 +75,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         .is_some_and(|compared_trace| table.bucket_rows.or(compared_trace.bucket_rows).is_none());
     let difference_of_runs = if is_comparable { largest_difference(&panels) } else { None };
     for (name, column) in table.with_prefix("residual_") {
-        let (unit, factor) = label::display_unit(&column.facts.unit);
+        let (unit, factor) = label::display_unit(column.facts.unit());
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
         let residual = Series::new("residual", INK, Rc::clone(&time), y, Style::Dots);
         let words = format!("residual, {}", label::name_in_words(name));
@@ -166,7 +166,7 @@ struct TraceQuantity<'a> {
 fn quantities<'a>(table: &'a FigureTable, model_prefixes: [&str; 2]) -> Vec<TraceQuantity<'a>> {
     let channels = table.with_prefix(&format!("{}_", model_prefixes[0])).into_iter();
     let channels = channels.map(|(name, column)| {
-        let file_unit = Some(column.facts.unit.as_str()).filter(|unit| !unit.is_empty());
+        let file_unit = Some(column.facts.unit()).filter(|unit| !unit.is_empty());
         let unit = file_unit.unwrap_or(label::unit_of_channel(name));
         TraceQuantity {
             name,
@@ -180,7 +180,7 @@ fn quantities<'a>(table: &'a FigureTable, model_prefixes: [&str; 2]) -> Vec<Trac
         let name_and_suffix = column.facts.name.split_once("_nonlinear_");
         let (name, unit_suffix) = name_and_suffix.filter(|(name, _)| *name != "gap")?;
         let columns = model_prefixes.map(|prefix| format!("{name}_{prefix}_{unit_suffix}"));
-        Some(TraceQuantity { name, unit: &column.facts.unit, is_channel: false, columns })
+        Some(TraceQuantity { name, unit: column.facts.unit(), is_channel: false, columns })
     });
     channels.chain(states_and_forces).collect()
 }

@@ -88,7 +88,7 @@ pub fn traceable_columns<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<
                 .as_ref()
                 .is_none_or(|channel_columns_only| channel_columns_only.contains(&column.name));
             let is_new = columns.iter().all(|(known, _)| known.name != column.name);
-            if is_number && column.worse.is_some() && is_wanted && is_new {
+            if is_number && column.metadata.worse.is_some() && is_wanted && is_new {
                 columns.push((column, plan.clone()));
             }
         }
@@ -262,14 +262,13 @@ pub fn find_quantity<M: Model>(
         return Err(Error::option("--quantity", name, expected));
     };
     let (column, mut plan) = candidates.swap_remove(index);
-    let own_limit = column.limit;
-    let Some(value) = limit.or(own_limit.map(|limit| limit.value)) else {
-        let unit = &column.unit;
+    let Some(value) = limit.or(column.metadata.limit) else {
+        let unit = &column.metadata.unit;
         let expected = format!("--limit with it, in {unit}: it has no limit of its own");
         return Err(Error::option("--quantity", name, expected));
     };
     let is_ratio = name.starts_with(RATIO);
-    let scale = own_limit.map_or(value.abs(), |limit| limit.scale);
+    let scale = column.limit_scale.unwrap_or(value.abs());
     if !value.is_finite() || (is_ratio && value <= 0.0) || scale == 0.0 {
         let expected = format!("a number greater than 0, as {name} is never below");
         return Err(Error::option("--limit", value, expected));
@@ -281,9 +280,9 @@ pub fn find_quantity<M: Model>(
     }
     let quantity = TracedQuantity {
         name: column.name,
-        unit: column.unit,
+        unit: column.metadata.unit,
         limit: value,
-        worse: column.worse.unwrap_or(Worse::Greater),
+        worse: column.metadata.worse.unwrap_or(Worse::Greater),
         scale: if is_ratio { Scale::Logarithm } else { Scale::Over(scale) },
     };
     Ok((quantity, plan))

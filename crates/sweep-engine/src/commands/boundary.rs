@@ -103,11 +103,11 @@ fn list_columns<M: Model>(plan: &Plan<M>) -> String {
     let columns = traceable_columns(plan);
     let width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
     let row = |(column, _): &(DeclaredColumn, Plan<M>)| {
-        let worse_side = column.worse.map_or("", Worse::name);
-        let limit =
-            column.limit.map_or_else(|| "--limit".to_owned(), |limit| format_number(limit.value));
-        let description = column.description.split(';').next().unwrap_or_default();
-        let DeclaredColumn { name, unit, .. } = column;
+        let DeclaredColumn { name, metadata, .. } = column;
+        let unit = &metadata.unit;
+        let worse_side = metadata.worse.map_or("", Worse::name);
+        let limit = metadata.limit.map_or_else(|| "--limit".to_owned(), format_number);
+        let description = metadata.description.split(';').next().unwrap_or_default();
         format!(
             "{name:width$}  {unit:>4}  worse the {worse_side:7}  limit {limit:7}  {description}\n"
         )

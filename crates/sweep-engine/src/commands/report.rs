@@ -14,7 +14,7 @@ use sweep_plot::{
     Figures, describe_as_html, escape, format_significant, html_table, name_in_words,
     printable_page, quantity_in_words,
 };
-use sweep_results::{Cell, ResultTable, check, ratio_limits, top};
+use sweep_results::{Cell, Column, ResultTable, check, ratio_limits, top};
 
 /// Arguments of `sweep report`.
 #[derive(Debug, clap::Args)]
@@ -175,16 +175,16 @@ fn worst_values(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
         let is_numbered =
             name.split('_').nth(1).is_some_and(|word| word.chars().all(|c| c.is_ascii_digit()));
         let is_shown = !is_numbered && name.split('_').all(|word| word != MODELS[1]);
-        let Some(worse) = column.worse.filter(|_| is_shown) else { continue };
+        let Some(worse) = column.metadata.worse.filter(|_| is_shown) else { continue };
         let columns: Vec<&str> = [name].into_iter().chain(axes.iter().copied()).collect();
         let rows = top(file, &columns, None, Some((name, worse)), 1)?;
         let Some([value, axis_cells @ ..]) = rows.first().map(Vec::as_slice) else { continue };
         let Cell::Number(number) = value else { continue };
-        let format_value = |value: f64| with_unit(format_significant(value, 4), &column.unit);
+        let format_value = |value: f64| with_unit(format_significant(value, 4), column.unit());
         table_rows.push(vec![
             quantity_in_words(name),
             format_value(*number),
-            column.limit.map_or_else(String::new, format_value),
+            column.metadata.limit.map_or_else(String::new, format_value),
             format_axis_values(file, axis_cells),
         ]);
     }
@@ -193,7 +193,7 @@ fn worst_values(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
 
 /// Formats the values of the axes.
 fn format_axis_values(file: &ResultTable, axis_cells: &[Cell]) -> String {
-    let unit_of = |name: &str| file.column(name).map_or("", |column| column.unit.as_str());
+    let unit_of = |name: &str| file.column(name).map_or("", Column::unit);
     let axes = file.axes().into_iter().zip(axis_cells);
     let values = axes.map(|(axis, cell)| {
         format!("{} {}", name_in_words(axis), with_unit(format_cell(cell), unit_of(axis)))

@@ -188,7 +188,7 @@ fn show_rows(args: &ShowArgs) -> Result<Exit, Error> {
     let order = |by| match (args.ascending, args.descending) {
         (true, _) => Worse::Less,
         (_, true) => Worse::Greater,
-        _ => file.column(by).and_then(|column| column.worse).unwrap_or(Worse::Greater),
+        _ => file.column(by).and_then(|column| column.metadata.worse).unwrap_or(Worse::Greater),
     };
     let by = args.by.as_deref().map(|by| (by, order(by)));
     let count = usize::from(args.top.unwrap_or(ROWS_SHOWN));
@@ -242,8 +242,8 @@ fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Val
         let counts = || column.names.iter().cloned().collect::<Value>();
         json!({
             "name": column.name,
-            "unit": column.unit,
-            "worse": column.worse.map(Worse::name),
+            "unit": Some(&column.metadata.unit).filter(|unit| !unit.is_empty()),
+            "worse": column.metadata.worse.map(Worse::name),
             "nulls": column.nulls,
             "least": column.range.map(|(least, _)| Cell::Number(least)),
             "greatest": column.range.map(|(_, greatest)| Cell::Number(greatest)),
@@ -370,9 +370,11 @@ fn add_columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str)
 fn describe_range(column: &ColumnRange) -> String {
     let mut parts = Vec::new();
     if let Some((least, greatest)) = column.range {
-        let unit = column.unit.as_deref().filter(|unit| *unit != "1");
-        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
-        parts.push(format_range([least, greatest], format_number) + &unit);
+        let range = format_range([least, greatest], format_number);
+        parts.push(match column.metadata.shown_unit() {
+            "" => range,
+            unit => format!("{range} {unit}"),
+        });
     }
     let names = column.names.iter();
     parts.extend(names.map(|(name, count)| format!("{count} {}", shorten(name))));

@@ -80,9 +80,10 @@ pub struct ColumnExtreme {
 impl ColumnExtreme {
     /// Creates the extreme of a column without rows; `None` for a column that is not in summaries.
     fn new(column: &Column) -> Option<Self> {
-        let worse = column.worse.filter(|_| column.is_in_summary)?;
+        let ColumnMetadata { worse, limit, is_in_summary, .. } = column.metadata;
+        let worse = worse.filter(|_| is_in_summary)?;
         let name = column.name.clone();
-        Some(Self { column: name, worse, limit: column.limit, rows_beyond_limit: 0, worst: None })
+        Some(Self { column: name, worse, limit, rows_beyond_limit: 0, worst: None })
     }
 
     /// Adds the value at a point.
@@ -257,10 +258,8 @@ pub fn read_methods(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreErro
 pub struct ColumnRange {
     /// The name.
     pub name: String,
-    /// The unit, if the field's metadata have one.
-    pub unit: Option<String>,
-    /// The direction in which values are worse, if the file gives it.
-    pub worse: Option<Worse>,
+    /// The metadata of the column's field.
+    pub metadata: ColumnMetadata,
     /// The number of rows without a value.
     pub nulls: u64,
     /// The least and the greatest value, if there are numbers.
@@ -290,16 +289,12 @@ pub struct Overview {
 /// # Errors
 /// [`StoreError::File`].
 pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
-    let empty_range = |field: &std::sync::Arc<arrow_schema::Field>| {
-        let ColumnMetadata { unit, worse, .. } = ColumnMetadata::from_field(field);
-        ColumnRange {
-            name: field.name().clone(),
-            unit: Some(unit).filter(|unit| !unit.is_empty()),
-            worse,
-            nulls: 0,
-            range: None,
-            names: Vec::new(),
-        }
+    let empty_range = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
+        name: field.name().clone(),
+        metadata: ColumnMetadata::from_field(field),
+        nulls: 0,
+        range: None,
+        names: Vec::new(),
     };
     let mut ranges: Vec<ColumnRange> = file.schema().fields().iter().map(empty_range).collect();
     // Columns of types that files of this program do not have are not read.

@@ -18,7 +18,6 @@ use serde_json::Value;
 
 use super::Job;
 use sweep_files::{CREATED_BY, ColumnMetadata, FileKind, key};
-use sweep_parameter::{Limit, Worse};
 
 /// The number of rows of a row group, which is fixed so that the file does not depend on chunks.
 /// Basis: a group of 25 columns takes about 30 MB of memory while it is written. Doubling it
@@ -55,23 +54,18 @@ pub enum CellType {
     Name(Vec<&'static str>),
 }
 
-/// A column of a file.
+/// A column of a file that is to be written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeclaredColumn {
     /// The name.
     pub name: String,
-    /// The unit.
-    pub unit: String,
-    /// The description, in one line.
-    pub description: String,
+    /// The metadata of the column's field.
+    pub metadata: ColumnMetadata,
     /// The type of the cells.
     pub kind: CellType,
-    /// The direction in which values are worse, if there is one.
-    pub worse: Option<Worse>,
-    /// The limit between good and bad values, if there is a natural one.
-    pub limit: Option<Limit>,
-    /// Whether summaries of a result report the column's worst value.
-    pub is_in_summary: bool,
+    /// The difference from the column's limit that is as important as a factor of e is for a ratio,
+    /// in the column's unit; `None` without a limit.
+    pub limit_scale: Option<f64>,
 }
 
 /// The columns and the kind of a result.
@@ -128,15 +122,10 @@ impl DeclaredColumn {
         description: impl Into<String>,
         kind: CellType,
     ) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-            description: description.into(),
-            kind,
-            worse: None,
-            limit: None,
-            is_in_summary: false,
-        }
+        let description = description.into();
+        let metadata =
+            ColumnMetadata { unit: unit.into(), description, ..ColumnMetadata::default() };
+        Self { name: name.into(), metadata, kind, limit_scale: None }
     }
 
     /// Returns the number in a cell; `None` for null, flags and names.
@@ -163,17 +152,9 @@ impl DeclaredColumn {
         self.arrow_field(data_type, nullable)
     }
 
-    /// Returns the Arrow field of the column, with its unit, description, worse side, limit and
-    /// mark for summaries as metadata.
+    /// Returns the Arrow field of the column with its metadata.
     pub(crate) fn arrow_field(&self, data_type: DataType, nullable: bool) -> Field {
-        let metadata = ColumnMetadata {
-            unit: self.unit.clone(),
-            description: self.description.clone(),
-            worse: self.worse,
-            limit: self.limit.map(|limit| limit.value),
-            is_in_summary: self.is_in_summary,
-        };
-        Field::new(&self.name, data_type, nullable).with_metadata(metadata.to_pairs())
+        Field::new(&self.name, data_type, nullable).with_metadata(self.metadata.to_pairs())
     }
 
     /// Returns the array of the column's cells. A missing count becomes 0, and a missing axis value

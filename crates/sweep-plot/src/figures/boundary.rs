@@ -214,7 +214,7 @@ pub(crate) fn overlay(table: &FigureTable, axes: [&str; 2]) -> Result<Overlay> {
 fn limit_in_words(table: &FigureTable) -> String {
     let settings = table.source.find_metadata(key::BOUNDARY);
     let limit_in_file = settings.and_then(|settings| settings.get(key::LIMIT)?.as_f64());
-    let unit = table.column("quantity_low").map_or("", |column| &column.facts.unit);
+    let unit = table.column("quantity_low").map_or("", |column| column.facts.unit());
     let (unit, factor) = label::display_unit(unit);
     let limit = limit_in_file.map_or(table.source.ratio_limit(), |limit| limit * factor);
     let limit = label::with_value("", limit, unit);
@@ -235,7 +235,7 @@ fn further_axes(table: &FigureTable, row: usize) -> String {
     let values = table.source.planned_axes().skip(2).filter_map(|name| {
         let column = table.column(name)?;
         let value = *column.numbers()?.get(row)?;
-        Some(label::with_value(&label::name_in_words(name), value, &column.facts.unit))
+        Some(label::with_value(&label::name_in_words(name), value, column.facts.unit()))
     });
     values.collect::<Vec<_>>().join(", ")
 }

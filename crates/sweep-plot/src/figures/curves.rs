@@ -69,13 +69,13 @@ pub(crate) fn chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
     // Each quantity has a panel with the columns of both models.
     let quantity_panel = |quantity: layer::QuantityColumns<'_>| {
         let columns = &quantity.columns;
-        let (unit, factor) = label::display_unit(&columns[0].1.unit);
+        let (unit, factor) = label::display_unit(columns[0].1.unit());
         let lines = columns.iter().filter_map(|(model, facts)| {
             let name = if model.is_empty() { String::new() } else { format!("{model} model") };
             let colour = if *model == "linear" { LINEAR } else { NONLINEAR };
             Some(column_series(&name, colour, table.column(&facts.name)?, factor))
         });
-        let limit = columns[0].1.limit.map(|limit| limit * factor);
+        let limit = columns[0].1.metadata.limit.map(|limit| limit * factor);
         let is_requested = |name: &String| requested.iter().any(|shown| shown.name() == name);
         let label = Label::new(&label::capitalise(&quantity.words), unit);
         let panel = ChartPanel::new(&quantity.name, label, lines.collect());

@@ -56,7 +56,7 @@ pub(crate) fn chart(source: &FigureFile) -> Result<Chart> {
     candidates.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
     let units: Vec<(&str, f64)> = std::iter::once(&x_column)
         .chain(&y_columns)
-        .map(|(column, _)| label::display_unit(&column.unit))
+        .map(|(column, _)| label::display_unit(column.unit()))
         .collect();
     let values = |kind: usize, k: usize| -> Vec<f64> {
         let candidates_of_kind = candidates.iter().filter(|(kind_of_candidate, values)| {

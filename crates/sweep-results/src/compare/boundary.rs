@@ -127,7 +127,7 @@ fn pair_crossings(
             });
         }
     }
-    let unit = first.column(axis).map(|column| column.unit.clone()).unwrap_or_default();
+    let unit = first.column(axis).map(|column| column.unit().to_owned()).unwrap_or_default();
     BoundaryShift { axis: axis.to_owned(), unit, keys, crossings, unmatched_lines }
 }
 

@@ -20,13 +20,13 @@ pub(super) fn write(
     let mut text = format!("{EXPORTED_CSV}{}\n", escape_comment(version));
     // Writing to a String cannot fail.
     for column in &table.columns {
-        let unit = if column.unit.is_empty() { "-" } else { &column.unit };
+        let unit = if column.unit().is_empty() { "-" } else { column.unit() };
         let _ = writeln!(
             text,
             "# {} [{}]: {}",
             escape_comment(&column.name),
             escape_comment(unit),
-            escape_comment(&column.description)
+            escape_comment(&column.metadata.description)
         );
     }
     if let Some(plan) = table.file().value(key::PLAN) {

@@ -124,7 +124,7 @@ fn write_rows(
     from_xlsx: impl Fn(XlsxError) -> ResultsError + Copy,
 ) -> Result<(), ResultsError> {
     let names = column_names(table);
-    let units = table.columns.iter().map(|column| text_cell(&column.unit));
+    let units = table.columns.iter().map(|column| text_cell(column.unit()));
     sheet.set_widths(names.iter().copied()).map_err(from_xlsx)?;
     sheet.write_row(names.iter().map(|name| text_cell(name))).map_err(from_xlsx)?;
     sheet.write_row(units).map_err(from_xlsx)?;
@@ -148,13 +148,13 @@ fn write_columns(workbook: &mut Workbook, table: &ResultTable) -> Result<(), Xls
     };
     let longest_texts = [
         longest_text(|column| &column.name),
-        longest_text(|column| &column.unit),
-        longest_text(|column| &column.description),
+        longest_text(Column::unit),
+        longest_text(|column| &column.metadata.description),
     ];
     sheet.set_widths(longest_texts.into_iter())?;
     sheet.write_row(["column", "unit", "description"].map(text_cell))?;
     for column in &table.columns {
-        let texts = [&column.name, &column.unit, &column.description];
+        let texts = [&column.name, column.unit(), &column.metadata.description];
         sheet.write_row(texts.map(|text| text_cell(text)))?;
     }
     Ok(())

@@ -142,7 +142,7 @@ fn find_worst(args: &TraceArgs, plan: &Plan, column: &str) -> Result<(u64, Worse
         let expected = format!("a result of this very grid, which {} is not", path.display());
         return Err(refused(expected));
     }
-    let worse = file.column(column).map_or(Some(Worse::Greater), |known| known.worse);
+    let worse = file.column(column).map_or(Some(Worse::Greater), |known| known.metadata.worse);
     let worse = worse.ok_or_else(|| {
         refused(format!(
             "a column that is bad one way, which {column} is not: --point takes the number of any \

@@ -21,8 +21,10 @@ pub(super) fn table(
     let rows = || comparison.shared.iter();
     table.counts("point", "row of A, from 0", rows().map(|row| row.rows[0]));
     for (k, (name, unit)) in comparison.keys.iter().zip(&comparison.key_units).enumerate() {
-        let description =
-            tables[0].column(name).map_or("", |column| column.description.as_str()).to_owned();
+        let description = tables[0]
+            .column(name)
+            .map_or("", |column| column.metadata.description.as_str())
+            .to_owned();
         let unit = if unit.is_empty() { "1" } else { unit };
         table.numbers(name, unit, &description, rows().map(|row| Some(row.key[k])));
     }

@@ -109,10 +109,10 @@ fn a_mark_without_a_worse_side_leaves_the_other_extremes() {
     let home = Home::new();
     let mut job = synthetic::job(POINTS);
     let without_side = job.layout.position("nonlinear_a").unwrap();
-    job.layout.columns[without_side].is_in_summary = true;
+    job.layout.columns[without_side].metadata.is_in_summary = true;
     let with_side = job.layout.position("linear_a").unwrap();
-    job.layout.columns[with_side].is_in_summary = true;
-    job.layout.columns[with_side].worse = Some(Worse::Greater);
+    job.layout.columns[with_side].metadata.is_in_summary = true;
+    job.layout.columns[with_side].metadata.worse = Some(Worse::Greater);
     let run = open(&home.output(), &job);
     write_missing(&run);
     let (tally, _) = finish(run, &job);
