@@ -344,15 +344,15 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eva
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         let columns = columns(self.plan);
         rayon::broadcast(|_| {
-            while !context.stopped() {
+            while !context.must_stop() {
                 let (points, axis_values): (Vec<u64>, Vec<Vec<f64>>) =
                     std::iter::from_fn(source).take(MAX_LANES).unzip();
                 if points.is_empty() {
                     break;
                 }
-                let rows = self.compared(&axis_values, Cancel::When(&|| context.stopped()));
+                let rows = self.compared(&axis_values, Cancel::When(&|| context.must_stop()));
                 // The rows may be incomplete if the engine was stopped.
-                if context.stopped() {
+                if context.must_stop() {
                     break;
                 }
                 for (&point, compared) in points.iter().zip(&rows) {

@@ -131,8 +131,8 @@ impl<'a> RunContext<'a> {
     }
 
     /// Returns whether the engine has to stop.
-    pub fn stopped(&self) -> bool {
-        self.interrupt.stopped()
+    pub fn must_stop(&self) -> bool {
+        self.interrupt.is_raised()
             || self.is_aborted.load(Ordering::Relaxed)
             || self.is_late.is_some_and(|is_late| is_late())
     }

@@ -98,7 +98,7 @@ impl<'a> CachedEvaluator<'a> {
         let queue = Mutex::new(missing.iter().flat_map(|&k| (0..rows).map(move |row| (k, row))));
         let context = RunContext::new(self.interrupt);
         let source = || {
-            let (k, row) = if context.stopped() { None } else { lock(&queue).next() }?;
+            let (k, row) = if context.must_stop() { None } else { lock(&queue).next() }?;
             Some((k as u64 * rows + row, axis_values(k, row)))
         };
         let mut responses = cached;

@@ -86,13 +86,13 @@ impl Interrupt {
     }
 
     /// Returns whether the flag is set.
-    pub fn stopped(&self) -> bool {
+    pub fn is_raised(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }
 
     /// Returns the signal that set the flag (1 for SIGHUP, 2 for SIGINT, 15 for SIGTERM).
     pub fn signal(&self) -> Option<u8> {
-        if self.stopped() { u8::try_from(self.signal.load(Ordering::Relaxed)).ok() } else { None }
+        if self.is_raised() { u8::try_from(self.signal.load(Ordering::Relaxed)).ok() } else { None }
     }
 }
 

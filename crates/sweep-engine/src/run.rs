@@ -170,15 +170,15 @@ struct Runner<'a> {
 impl Runner<'_> {
     /// Computes the missing chunks and joins all; `None` for a shard, or after a signal.
     fn compute_and_join(&self, run: &mut OpenRun) -> Result<Option<Tally>, StoreError> {
-        let stopped = || self.interrupt.stopped();
+        let is_interrupted = || self.interrupt.is_raised();
         let mut remaining_attempts = 2;
         loop {
             self.compute(run)?;
-            if stopped() || run.shard().is_some() {
+            if is_interrupted() || run.shard().is_some() {
                 return Ok(None);
             }
             self.progress.joining();
-            match run.join(self.job, &stopped) {
+            match run.join(self.job, &is_interrupted) {
                 // A chunk became unreadable after it was counted. It is computed again, at most
                 // twice.
                 Err(StoreError::Incomplete { .. }) if remaining_attempts > 0 => {
@@ -279,14 +279,14 @@ impl<'a> ChunkCollector<'a> {
     fn evaluate(&self) -> Result<(), StoreError> {
         let Runner { engine, job, .. } = self.runner;
         let source = || {
-            let point = if self.context.stopped() { None } else { lock(&self.queue).next() }?;
+            let point = if self.context.must_stop() { None } else { lock(&self.queue).next() }?;
             Some((point, (job.axis_values)(point)))
         };
         let sink = |row| self.collect(row);
         let evaluate = || engine.evaluator.evaluate(&source, &sink, self.context);
         let reason = match catch_unwind(AssertUnwindSafe(evaluate)) {
             Err(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
-            Ok(()) if self.context.stopped() => return Ok(()),
+            Ok(()) if self.context.must_stop() => return Ok(()),
             Ok(()) => "the engine put its work down unasked".to_owned(),
         };
         let incomplete = lock(&self.incomplete.0);

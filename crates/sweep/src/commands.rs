@@ -31,7 +31,7 @@ use sweep_engine::{Error, Exit, nearest};
 use washer_plot::WasherFigures;
 
 /// The headings of help, each with its subcommands.
-const GROUPS: [(&str, &[&str]); 5] = [
+const COMMAND_GROUPS: [(&str, &[&str]); 5] = [
     ("Run", &["run", "check"]),
     ("Ask", &["boundary", "trace", "modes", "stability", "dwell", "explain", "fit", "optimise"]),
     ("Look", &["show", "plot", "report", "require", "compare", "export"]),
@@ -83,11 +83,11 @@ pub enum Command {
     Modes(modes::ModesArgs),
     /// Find periodic responses at held speeds, and their stability
     #[command(after_long_help = held::STABILITY_LONG_HELP)]
-    #[command(mut_arg("out", |out| out.help(out_help("stability"))))]
+    #[command(mut_arg("out", |out| out.help(format_out_help("stability"))))]
     Stability(held::HeldSpeedArgs<held::ResponseOptions>),
     /// Find the motions in which the machine ends at held speeds
     #[command(after_long_help = held::DWELL_LONG_HELP)]
-    #[command(mut_arg("out", |out| out.help(out_help("dwell"))))]
+    #[command(mut_arg("out", |out| out.help(format_out_help("dwell"))))]
     Dwell(held::HeldSpeedArgs<AttractorSearch>),
     /// Explain why the linear model fails at one point
     Explain(explain::ExplainArgs),
@@ -104,51 +104,56 @@ pub enum Command {
 }
 
 /// Returns the help of `--out` for a command about held speeds, whose default is not that of a run.
-fn out_help(verb: &str) -> String {
+fn format_out_help(verb: &str) -> String {
     format!("Result file [default: results/NAME-{verb}.parquet]")
 }
 
 /// Returns the examples of a subcommand, or those of the program for the name `sweep`.
 fn find_examples(name: &str) -> Examples {
     let parts = EXAMPLES.split("\n\n");
-    let own = parts.filter_map(|part| part.strip_prefix(name)?.strip_prefix(":\n")).next();
-    let lines: Vec<&str> = own.unwrap_or_default().lines().map(str::trim).collect();
+    let lines_text = parts.filter_map(|part| part.strip_prefix(name)?.strip_prefix(":\n")).next();
+    let lines: Vec<&str> = lines_text.unwrap_or_default().lines().map(str::trim).collect();
     lines.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
 /// Returns the command line with the examples and the headings of its help.
 pub(crate) fn command() -> clap::Command {
-    let with = |command: clap::Command, lines: Examples| match examples::format_examples(&lines) {
-        Some(examples) => command.before_help(examples),
-        None => command,
-    };
-    let program = with(WasherCli::command(), find_examples("sweep"));
+    let add_examples =
+        |command: clap::Command, lines: Examples| match examples::format_examples(&lines) {
+            Some(examples) => command.before_help(examples),
+            None => command,
+        };
+    let program = add_examples(WasherCli::command(), find_examples("sweep"));
     let names: Vec<String> =
         program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
     let program = names.into_iter().fold(program, |program, name| {
-        program.mut_subcommand(&name, |command| with(command, find_examples(&name)))
+        program.mut_subcommand(&name, |command| add_examples(command, find_examples(&name)))
     });
-    let template = grouped_help(&program);
-    in_groups(program).help_template(template)
+    let template = format_help_template(&program);
+    sort_by_group(program).help_template(template)
 }
 
-/// Sorts the subcommands by the order of [`GROUPS`], which manual pages and documents follow.
-fn in_groups(mut program: clap::Command) -> clap::Command {
+/// Sorts the subcommands by the order of [`COMMAND_GROUPS`], which manual pages and documents
+/// follow.
+fn sort_by_group(mut program: clap::Command) -> clap::Command {
     let mut sorted: Vec<clap::Command> = program.get_subcommands().cloned().collect();
     sorted.sort_by_key(|command| {
-        GROUPS.iter().flat_map(|(_, names)| *names).position(|name| *name == command.get_name())
+        COMMAND_GROUPS
+            .iter()
+            .flat_map(|(_, names)| *names)
+            .position(|name| *name == command.get_name())
     });
-    program.get_subcommands_mut().zip(sorted).for_each(|(place, command)| *place = command);
+    program.get_subcommands_mut().zip(sorted).for_each(|(slot, command)| *slot = command);
     program
 }
 
 /// Returns the template of the program's help. clap has headings for arguments only, so the
 /// template has the subcommands.
-fn grouped_help(program: &clap::Command) -> String {
+fn format_help_template(program: &clap::Command) -> String {
     let header = program.get_styles().get_header();
     let name_style = program.get_styles().get_literal();
     let mut text = String::from("{before-help}{about-with-newline}\n{usage-heading} {usage}\n\n");
-    for (heading, names) in GROUPS {
+    for (heading, names) in COMMAND_GROUPS {
         text += &format!("{header}{heading}:{header:#}\n");
         for name in names {
             let command = program.find_subcommand(name);
@@ -161,7 +166,7 @@ fn grouped_help(program: &clap::Command) -> String {
 }
 
 /// Returns the command line without hidden subcommands, for lists of all subcommands.
-pub(crate) fn shown_command() -> clap::Command {
+pub(crate) fn visible_command() -> clap::Command {
     let whole = command();
     let shown = whole.get_subcommands().filter(|command| !command.is_hide_set()).cloned();
     clap::Command::new("sweep")
@@ -173,13 +178,13 @@ pub(crate) fn shown_command() -> clap::Command {
 }
 
 /// Adds a suggestion to the error of an unknown subcommand, if clap has none: two swapped letters
-/// leave too little of a short name for clap's measure of likeness.
-fn suggest(mut error: clap::Error) -> clap::Error {
+/// make a short name too different for clap's similarity measure.
+fn add_suggestion(mut error: clap::Error) -> clap::Error {
     let typed = match (error.kind(), error.get(ContextKind::InvalidSubcommand)) {
         (ErrorKind::InvalidSubcommand, Some(ContextValue::String(typed))) => typed.clone(),
         _ => return error,
     };
-    let shown = shown_command();
+    let shown = visible_command();
     let names = shown.get_subcommands().map(clap::Command::get_name);
     if let (None, Some(name)) =
         (error.get(ContextKind::SuggestedSubcommand), nearest(&typed, names))
@@ -194,7 +199,8 @@ impl WasherCli {
     /// Parses this process's command line. On a mistake or a request for help it prints a message
     /// and ends the process.
     pub fn read() -> Self {
-        let matches = command().try_get_matches().unwrap_or_else(|error| suggest(error).exit());
+        let matches =
+            command().try_get_matches().unwrap_or_else(|error| add_suggestion(error).exit());
         Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
     }
 }
@@ -215,7 +221,7 @@ impl Command {
             Self::Explain(args) => explain::run(args),
             Self::Fit(args) => fit::run(args),
             Self::Init(args) => init::run(args),
-            Self::Completions(args) => completions::run(args, shown_command()),
+            Self::Completions(args) => completions::run(args, visible_command()),
             Self::Man(args) => man::run(args, command(), &find_examples),
         }
     }
@@ -237,7 +243,7 @@ fn run_general(command: &GeneralCommand<WasherArguments>) -> Result<Exit, Error>
         GeneralCommand::Require(args) => require::run(args),
         GeneralCommand::Compare(args) => compare::run::<crate::Washer>(args),
         GeneralCommand::Export(args) => export::run(args),
-        GeneralCommand::Status(args) => args.status(),
+        GeneralCommand::Status(args) => args.show_status(),
         GeneralCommand::Merge(args) => args.merge(),
         GeneralCommand::Parameters(args) => parameters::run::<crate::Washer>(args),
         GeneralCommand::Schema(args) => schema::run(args),
@@ -255,12 +261,13 @@ mod tests {
 
     #[test]
     fn an_error_for_a_misspelt_short_subcommand_suggests_its_name() {
-        let refusal = |typed: &str| {
-            suggest(command().try_get_matches_from(["sweep", typed]).unwrap_err()).to_string()
+        let error_message = |typed: &str| {
+            add_suggestion(command().try_get_matches_from(["sweep", typed]).unwrap_err())
+                .to_string()
         };
-        assert!(refusal("rnu").contains("'run'"), "{}", refusal("rnu"));
-        assert!(refusal("boundry").contains("'boundary'"), "{}", refusal("boundry"));
-        assert!(!refusal("xyzzy").contains("similar"), "{}", refusal("xyzzy"));
+        assert!(error_message("rnu").contains("'run'"), "{}", error_message("rnu"));
+        assert!(error_message("boundry").contains("'boundary'"), "{}", error_message("boundry"));
+        assert!(!error_message("xyzzy").contains("similar"), "{}", error_message("xyzzy"));
     }
 
     #[test]
@@ -281,7 +288,7 @@ mod tests {
     }
 
     /// Returns the words of a line by a shell's rules: single quotes keep spaces.
-    fn words(line: &str) -> Vec<String> {
+    fn split_words(line: &str) -> Vec<String> {
         let mut words = Vec::new();
         for (index, part) in line.split('\'').enumerate() {
             match index % 2 {
@@ -303,7 +310,7 @@ mod tests {
             assert!(lines.first().is_some_and(|[line, _]| line.starts_with(&call)), "{name}");
             for [line, _] in lines {
                 let line = line.split(" 2>").next().unwrap_or_default();
-                let parsed = command().try_get_matches_from(words(line));
+                let parsed = command().try_get_matches_from(split_words(line));
                 assert!(parsed.is_ok(), "{line}: {parsed:?}");
             }
         }
@@ -326,7 +333,8 @@ mod tests {
         let whole = command();
         let shown = whole.get_subcommands().filter(|command| !command.is_hide_set());
         let shown: Vec<&str> = shown.map(clap::Command::get_name).collect();
-        let grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
+        let grouped: Vec<&str> =
+            COMMAND_GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
         assert_eq!(shown, grouped);
         let help = command().render_help().to_string();
         let list = help.split("Run:\n").nth(1).and_then(|rest| rest.split("Options:").next());
@@ -341,8 +349,9 @@ mod tests {
         let mut command = command();
         let run = command.find_subcommand_mut("run").unwrap();
         let help = run.render_help().to_string();
-        let place = |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
-        assert!(place("--shard 3/16") < place("Usage:"));
+        let position =
+            |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
+        assert!(position("--shard 3/16") < position("Usage:"));
     }
 
     #[test]
@@ -357,7 +366,11 @@ mod tests {
     #[test]
     fn help_shows_the_examples_before_the_usage_and_the_exit_codes_after() {
         let help = command().render_help().to_string();
-        let place = |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
-        assert!(place("Examples:") < place("Usage:") && place("Usage:") < place("Exit codes:"));
+        let position =
+            |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
+        assert!(
+            position("Examples:") < position("Usage:")
+                && position("Usage:") < position("Exit codes:")
+        );
     }
 }

@@ -215,7 +215,7 @@ impl AttractorEngine {
         sink: &dyn Fn(PointRows),
         context: &RunContext<'_>,
     ) {
-        let is_stopped = || context.stopped();
+        let is_stopped = || context.must_stop();
         let Some(carry) = self.search.carry else {
             let held_speeds: Vec<(HeldSpeed<'_>, Carried)> =
                 requested.iter().map(|(_, held_speed)| (*held_speed, None)).collect();

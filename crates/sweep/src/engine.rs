@@ -144,9 +144,9 @@ impl<'a> ModelEngine<'a> {
     fn levels_under(&self, context: &RunContext<'_>) -> Option<&[RefinementLevels; 2]> {
         // The standard library's cell has no `get_or_try_init` yet.
         let find = || {
-            let found = self.find_levels(Cancel::When(&|| context.stopped()));
+            let found = self.find_levels(Cancel::When(&|| context.must_stop()));
             // A search that was stopped may lack levels.
-            if context.stopped() { Err(()) } else { Ok(found) }
+            if context.must_stop() { Err(()) } else { Ok(found) }
         };
         self.levels.get_or_try_init(find).ok()
     }
@@ -256,7 +256,7 @@ impl<'a> ModelEngine<'a> {
         points: &[&Point],
         context: &RunContext<'_>,
     ) -> Vec<LevelRun> {
-        let is_stopped = || context.stopped();
+        let is_stopped = || context.must_stop();
         let cancel = Cancel::When(&is_stopped);
         let integrate_group = |points: &[&Point]| {
             let simd = self.simd_for(points.len());

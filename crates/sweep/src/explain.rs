@@ -381,7 +381,7 @@ fn find_crossings(
             is_backward: tongues[*k].is_backward,
         })
         .collect();
-    if finders.iter().any(|finder| finder.interrupt.stopped()) {
+    if finders.iter().any(|finder| finder.interrupt.is_raised()) {
         return (Vec::new(), None);
     }
     let step_s = reference_step_s(&StepSelector::new([(point, spin)], end_s));

@@ -68,9 +68,9 @@ pub use engine::ModelEngine;
 pub use fit::FitOptions;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
-    BoundaryOptions, EvaluationTask, Execution, Explained, MemoryTable, PlanEvaluator, PointTable,
-    RanToFile, TraceOptions, explain_point, find_boundary, find_modes, fit_tables, hold_speeds,
-    list_parameters, optimise_study, trace_point,
+    BoundaryOptions, CommandReport, EvaluationTask, Execution, FileRunEnd, MemoryTable,
+    PlanEvaluator, PointTable, TraceOptions, explain_point, find_boundary, find_modes, fit_tables,
+    held_speeds_task, list_parameters, optimise_study, trace_point,
 };
 pub use map_row::MapRow;
 pub use method::{Integrator, rk4, rk4_mass_scaled};

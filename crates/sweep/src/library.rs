@@ -1,4 +1,4 @@
-//! The work of the commands as functions with results in memory, for programs.
+//! The computations of the commands as functions that return results in memory, for programs.
 //!
 //! Functions that may take long have an [`Interrupt`](crate::Interrupt) as an argument. If another
 //! thread raises it, the work ends within a fraction of a second.
@@ -15,14 +15,14 @@ mod stability;
 mod trace;
 
 pub use evaluate::PlanEvaluator;
-pub use explain::{Explained, explain_point};
+pub use explain::{CommandReport, explain_point};
 pub use fit::fit_tables;
 pub use modes::find_modes;
 pub use points::PointTable;
 pub use result::MemoryTable;
-pub use run::{EvaluationTask, RanToFile};
+pub use run::{EvaluationTask, FileRunEnd};
 pub use search::{BoundaryOptions, find_boundary, optimise_study};
-pub use stability::hold_speeds;
+pub use stability::held_speeds_task;
 pub use trace::{TraceOptions, trace_point};
 
 use sweep_engine::Error;

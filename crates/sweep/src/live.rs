@@ -22,7 +22,7 @@ use sweep_engine::store::read::overview;
 use sweep_engine::{Error, Model as _};
 
 /// Parameters with sliders besides the axes, if the machine has them.
-const OFFERED: [&str; 6] = [
+const SLIDER_PARAMETERS: [&str; 6] = [
     "unbalance_mass_kg",
     "damping_n_s_per_m",
     "spring_stiffness_n_per_m",
@@ -67,8 +67,9 @@ pub(crate) fn parse_slider_range(text: &str) -> Result<SliderRange, String> {
     let expected = "expected NAME=FROM:TO, as in tub_mass_kg=20:30";
     let (name, range) = text.split_once('=').ok_or(expected)?;
     let (from, to) = range.split_once(':').ok_or(expected)?;
-    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
-    match (number(from), number(to)) {
+    let parse_number =
+        |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    match (parse_number(from), parse_number(to)) {
         (Some(from), Some(to)) if from < to => {
             Ok(SliderRange { name: name.trim().to_owned(), from, to })
         }
@@ -83,7 +84,7 @@ pub(crate) fn parse_slider_range(text: &str) -> Result<SliderRange, String> {
 /// # Errors
 /// Returns an error if the file is no map of a grid with its plan, or if no machine can have the
 /// ranges.
-pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
+pub(crate) fn build_live_part(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let mut plan = plan_from_map(file)?;
     let has_slow_growth = corners_of_forces(&plan).is_some();
     let (held_speeds_rpm, held_metrics) = take_held_metrics(&mut plan);
@@ -91,9 +92,9 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         [] => usual_sliders(&plan),
         _ => requested_sliders(&plan, ranges)?,
     };
-    let (setup, words) = setup(&plan, &sliders)?;
-    let axes = plan.axes.iter().map(|axis| slider(axis, None));
-    let further = sliders.iter().map(|axis| slider(axis, axis.parameter.value));
+    let (setup, level_descriptions) = build_setup(&plan, &sliders)?;
+    let axes = plan.axes.iter().map(|axis| to_slider(axis, None));
+    let further = sliders.iter().map(|axis| to_slider(axis, axis.parameter.value));
     let columns = |number: MetricColumn| ModelKind::ALL.map(|model| number.column(model.name()));
     let criterion = plan.model.measures.criterion;
     // The rest of the description is about rows without a ratio, which a page does not have.
@@ -118,7 +119,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         accuracy: setup.rule.accuracy,
         ratio_limit: setup.rule.limits.upper,
         ratio_min: setup.rule.limits.lower,
-        level_words: words,
+        level_words: level_descriptions,
         version: crate::VERSION.to_owned(),
         resonances: resonance_rows(&plan),
     })
@@ -146,7 +147,7 @@ pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
     modes.into_iter().flat_map(rows).collect()
 }
 
-fn slider(Axis { parameter, values, .. }: &Axis, value: Option<f64>) -> Slider {
+fn to_slider(Axis { parameter, values, .. }: &Axis, value: Option<f64>) -> Slider {
     let [from, to] = values.extremes();
     Slider {
         name: parameter.name.to_string(),
@@ -159,26 +160,26 @@ fn slider(Axis { parameter, values, .. }: &Axis, value: Option<f64>) -> Slider {
 
 /// Returns the plan of a map.
 fn plan_from_map(file: &Path) -> Result<Plan, Error> {
-    let refused = |expected: &str| Error::option("--live", file.display(), expected);
-    let opened = ParquetFile::open(file)?;
-    let json = opened.json(key::PLAN);
-    let mut json = json.ok_or_else(|| refused("a map by `sweep run`, which carries its plan"))?;
+    let refuse = |expected: &str| Error::option("--live", file.display(), expected);
+    let map = ParquetFile::open(file)?;
+    let json = map.json(key::PLAN);
+    let mut json = json.ok_or_else(|| refuse("a map by `sweep run`, which carries its plan"))?;
     let name = file.display().to_string();
     if json.get("design").is_none() {
         let plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
-        return if plan.axes.is_empty() { Err(refused("a map with an axis")) } else { Ok(plan) };
+        return if plan.axes.is_empty() { Err(refuse("a map with an axis")) } else { Ok(plan) };
     }
     // The axes of a design with ranges have these; those of a list and of distributions have the
     // ranges of the file's columns.
     let axes = json["axis"].take();
     let mut plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
-    let columns = overview(&opened)?.columns;
+    let columns = overview(&map)?.columns;
     for axis in axes.as_array().into_iter().flatten() {
         let name = axis["parameter"].as_str().unwrap_or_default();
         let parameter = plan.model.find(name);
         let [from, to] = ["from", "to"].map(|end| axis["range"][end].as_f64());
-        let in_file = || columns.iter().find(|column| column.name == name)?.range;
-        if let (Ok(parameter), Some((from, to))) = (parameter, from.zip(to).or_else(in_file)) {
+        let column_range = || columns.iter().find(|column| column.name == name)?.range;
+        if let (Ok(parameter), Some((from, to))) = (parameter, from.zip(to).or_else(column_range)) {
             plan.axes.push(axis_between(parameter, from, to));
         }
     }
@@ -197,48 +198,50 @@ fn take_held_metrics(plan: &mut Plan) -> (Vec<f64>, Vec<Metric>) {
 /// Returns sliders about the plan's values, for the ranges that machines can have.
 fn usual_sliders(plan: &Plan) -> Vec<Axis> {
     let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name == name);
-    let offered = OFFERED.into_iter().filter(|name| !is_axis(name));
+    let names = SLIDER_PARAMETERS.into_iter().filter(|name| !is_axis(name));
     let range = |name| {
         let parameter = plan.model.find(name).ok()?;
         let value = parameter.value.filter(|value| *value != 0.0)?;
         let ends = [(1.0 - SLIDER_SPREAD) * value, (1.0 + SLIDER_SPREAD) * value];
         let [from, to] = if value > 0.0 { ends } else { [ends[1], ends[0]] };
         let range = axis_between(parameter, from, to);
-        is_sound(plan, std::slice::from_ref(&range)).then_some(range)
+        is_possible(plan, std::slice::from_ref(&range)).then_some(range)
     };
-    offered.filter_map(range).collect()
+    names.filter_map(range).collect()
 }
 
 /// Returns the sliders of `--slider`.
 fn requested_sliders(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, Error> {
     let mut found: Vec<Axis> = Vec::new();
     for SliderRange { name, from, to } in ranges {
-        let refused =
+        let refuse =
             |expected: String| Error::option("--slider", format!("{name}={from}:{to}"), expected);
         let parameter = plan
             .model
             .find(name)
-            .map_err(|why| refused(format!("a name of `sweep parameters`: {why}")))?;
+            .map_err(|why| refuse(format!("a name of `sweep parameters`: {why}")))?;
         let has_slider = plan.axes.iter().chain(&found).any(|axis| axis.parameter == parameter);
-        let is_spread = parameter.value.is_none();
+        let has_several_values = parameter.value.is_none();
         let range = parameter.range;
         let beyond = [*from, *to].into_iter().find(|end| !range.contains(*end));
         found.push(axis_between(parameter, *from, *to));
         let expected = match beyond {
             _ if has_slider => "a parameter that has no slider yet".to_owned(),
-            _ if is_spread => "a parameter that has one value in this map".to_owned(),
+            _ if has_several_values => "a parameter that has one value in this map".to_owned(),
             Some(end) => format!("{} at both ends", range.describe_for(end)),
             None if found.len() > MAX_SLIDERS => format!("at most {MAX_SLIDERS} sliders"),
-            None if !is_sound(plan, &found) => "values that a machine can have together".to_owned(),
+            None if !is_possible(plan, &found) => {
+                "values that a machine can have together".to_owned()
+            }
             None => continue,
         };
-        return Err(refused(expected));
+        return Err(refuse(expected));
     }
     Ok(found)
 }
 
 /// Whether all corners of these ranges have a possible machine and spin.
-fn is_sound(plan: &Plan, sliders: &[Axis]) -> bool {
+fn is_possible(plan: &Plan, sliders: &[Axis]) -> bool {
     let plan = with_sliders(plan, sliders);
     plan.some_corners().iter().all(|corner| {
         let scenario = plan.scenario_at(corner);
@@ -253,18 +256,18 @@ fn with_sliders(plan: &Plan, sliders: &[Axis]) -> Plan {
 }
 
 /// Returns the setup, and a description of each model's refinement levels.
-fn setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Error> {
+fn build_setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Error> {
     // A page uses the fast method, with the accuracy of the map's method if it has one.
     let map_accuracy = rule(plan).accuracy;
     let accuracy = if map_accuracy.is_finite() { map_accuracy } else { ACCURACY.default };
     let plan = &Plan { integrator: rk4_mass_scaled(accuracy), ..plan.clone() };
     let levels = ModelEngine::new(plan)?.levels().clone();
-    let wide = with_sliders(plan, sliders);
-    let wide_levels = ModelEngine::new(&wide)?.levels().clone();
-    let words = ModelKind::ALL.map(|model| {
+    let wide_plan = with_sliders(plan, sliders);
+    let wide_levels = ModelEngine::new(&wide_plan)?.levels().clone();
+    let level_descriptions = ModelKind::ALL.map(|model| {
         levels[model as usize].levels.iter().map(|level| level.describe(model)).collect()
     });
-    let parameters = wide.axes.iter().map(|axis| axis.parameter.handle.clone()).collect();
+    let parameters = wide_plan.axes.iter().map(|axis| axis.parameter.handle.clone()).collect();
     let setup = Setup {
         machine: plan.model.machine.clone(),
         spin: plan.model.spin.clone(),
@@ -274,7 +277,7 @@ fn setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Err
         levels,
         wide_levels,
     };
-    Ok((setup, words))
+    Ok((setup, level_descriptions))
 }
 
 #[cfg(test)]

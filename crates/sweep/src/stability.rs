@@ -40,7 +40,7 @@ const ROWS_PER_BATCH: [u64; 2] = [32, 2048];
 /// # Errors
 ///
 /// Returns [`Error::Refused`] for such an axis.
-pub(crate) fn check(plan: &Plan, option: &'static str, text: &str) -> Result<(), Error> {
+pub(crate) fn check_axes(plan: &Plan, option: &'static str, text: &str) -> Result<(), Error> {
     let refuse = |expected: String| Err(Error::option(option, text, expected));
     for axis in &plan.axes {
         let name = &axis.parameter.name;
@@ -155,7 +155,7 @@ impl<'a> HeldPlan<'a> {
             HeldAnalysis::Responses(_) => Simd::best().name(),
             HeldAnalysis::Attractors(_) => simd.name(),
         };
-        let evaluator = HeldSpeedEvaluator { held: *self, simd, analysis };
+        let evaluator = HeldSpeedEvaluator { held_plan: *self, simd, analysis };
         // The rows of a point share its curve of responses.
         let plan = self.plan;
         Ok(Engine {
@@ -176,7 +176,7 @@ enum HeldAnalysis {
 
 /// An evaluator of rows at held speeds. Row r is the point r / speeds at the speed r % speeds.
 pub(crate) struct HeldSpeedEvaluator<'a> {
-    held: HeldPlan<'a>,
+    held_plan: HeldPlan<'a>,
     simd: Simd,
     analysis: HeldAnalysis,
 }
@@ -185,20 +185,20 @@ impl HeldSpeedEvaluator<'_> {
     /// Computes rows, which share the lanes, and passes them to `sink`.
     fn evaluate_rows(&self, rows: &[u64], sink: &RowSink<'_>, context: &RunContext<'_>) {
         // Rows of a stopped search are meaningless.
-        let is_stopped = || context.stopped();
-        let store = |done| {
+        let is_stopped = || context.must_stop();
+        let store = |rows| {
             if !is_stopped() {
-                sink(done)
+                sink(rows)
             }
         };
-        let speeds = self.held.speeds_rpm.len() as u64;
+        let speeds = self.held_plan.speeds_rpm.len() as u64;
         let mut point_indices: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
         point_indices.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
             point_indices.iter().copied().zip(self.prepare(&point_indices)).collect();
         let mut requests = Vec::new();
         for &row in rows {
-            let speed_rpm = self.held.speeds_rpm[(row % speeds) as usize];
+            let speed_rpm = self.held_plan.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
                 Ok(point) => requests.push((row, HeldSpeed { point, speed_rpm })),
                 Err(status) => store(match &self.analysis {
@@ -221,18 +221,18 @@ impl HeldSpeedEvaluator<'_> {
                 }
             }
             HeldAnalysis::Attractors(engine) => {
-                engine.evaluate(self.simd, self.held.speeds_rpm, &requests, &store, context);
+                engine.evaluate(self.simd, self.held_plan.speeds_rpm, &requests, &store, context);
             }
         }
     }
 
     /// Prepares points for integration, each for all rows at its speeds.
     fn prepare(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
-        let scenarios = points.iter().map(|&point| self.held.plan.scenario(point));
+        let scenarios = points.iter().map(|&point| self.held_plan.plan.scenario(point));
         let machines: Vec<(Machine, Spin)> =
             scenarios.map(|scenario| (scenario.model.machine, scenario.model.spin)).collect();
         let prepare_group = |machines: &[(Machine, Spin)]| {
-            let points = prepare(self.simd, machines, &timing(self.held.plan)).into_iter();
+            let points = prepare(self.simd, machines, &timing(self.held_plan.plan)).into_iter();
             points.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
         };
         map_isolating_panics(&machines, prepare_group, || Err(Status::Panicked))
@@ -247,7 +247,7 @@ impl HeldSpeedEvaluator<'_> {
     }
 
     fn response_outcome(&self, row: u64, response: &Response) -> Outcome {
-        let channels = compared_channels(self.held.plan);
+        let channels = compared_channels(self.held_plan.plan);
         let trajectory = |amplitudes: &[f64]| Trajectory {
             amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
             ..Trajectory::default()
@@ -255,17 +255,17 @@ impl HeldSpeedEvaluator<'_> {
         let nonlinear = trajectory(&response.nonlinear_peaks);
         let linear = trajectory(&response.linear_peaks);
         let mut outcome = Outcome::new(row, nonlinear, linear);
-        outcome.compare(&channels, self.held.plan.reliability.limits);
+        outcome.compare(&channels, self.held_plan.plan.reliability.limits);
         Outcome { growth: Some(Growth::from(response)), ..outcome }
     }
 }
 
 impl Evaluator for HeldSpeedEvaluator<'_> {
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
-        let speeds = self.held.speeds_rpm.len() as u64;
+        let speeds = self.held_plan.speeds_rpm.len() as u64;
         // A small job is divided between all threads.
-        let rows_per_thread =
-            self.held.plan.points().saturating_mul(speeds) / rayon::current_num_threads() as u64;
+        let rows_per_thread = self.held_plan.plan.points().saturating_mul(speeds)
+            / rayon::current_num_threads() as u64;
         let row_count = match &self.analysis {
             HeldAnalysis::Responses(_) => rows_per_thread
                 .min(POINTS_PER_BATCH * speeds)
@@ -273,7 +273,7 @@ impl Evaluator for HeldSpeedEvaluator<'_> {
             HeldAnalysis::Attractors(engine) => engine.rows_per_batch(rows_per_thread, speeds),
         };
         rayon::broadcast(|_| {
-            while !context.stopped() {
+            while !context.must_stop() {
                 let rows = std::iter::from_fn(source).map(|(row, _)| row);
                 let rows: Vec<u64> = rows.take(row_count as usize).collect();
                 if rows.is_empty() {

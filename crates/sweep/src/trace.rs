@@ -54,7 +54,7 @@ pub(crate) struct StartValue {
 
 /// Maximum initial distance from equilibrium of a coordinate (m or rad). Basis: a right angle, and
 /// the size of a machine. Doubling it admits starts that no washing machine can have.
-const MAX_START: f64 = 1.5;
+const MAX_START_DEVIATION: f64 = 1.5;
 
 /// Parses an initial value such as `q5=0.1`.
 ///
@@ -73,8 +73,8 @@ pub(crate) fn parse_start_value(text: &str) -> Result<StartValue, String> {
     let index = number.ok_or(expected)? - 1;
     let value = value.trim().parse().ok().filter(|value: &f64| value.is_finite());
     let value = value.ok_or(expected)?;
-    if !is_speed && value.abs() > MAX_START {
-        return Err(format!("expected at most {MAX_START} m or rad from equilibrium"));
+    if !is_speed && value.abs() > MAX_START_DEVIATION {
+        return Err(format!("expected at most {MAX_START_DEVIATION} m or rad from equilibrium"));
     }
     Ok(StartValue { is_speed, index, value })
 }
@@ -126,7 +126,8 @@ pub(crate) struct TraceSettings {
     /// The initial state of both models.
     pub(crate) start: InitialDeviation,
     pub(crate) extras: TraceExtras,
-    /// The method by which the point's row was computed with capped modes, for a trace by the same.
+    /// The method of the point's row with its capped modes, for a trace that repeats the row's
+    /// trajectory; `None` for a trace by the plan's or the reference method.
     pub(crate) capped: Option<CappedRun>,
 }
 
@@ -140,7 +141,7 @@ pub(crate) enum Models {
 }
 
 impl Models {
-    fn kinds(self) -> &'static [ModelKind] {
+    fn model_kinds(self) -> &'static [ModelKind] {
         match self {
             Self::Both => &ModelKind::ALL,
             Self::Nonlinear => &[ModelKind::Nonlinear],
@@ -174,13 +175,13 @@ pub(crate) fn trace_in_pool(
 ) -> Result<TraceTable, NoEquilibrium> {
     // A single point has at most two integrations, one of each model.
     let thread_count = if parameters.is_some() { 2 } else { threads::cores() };
-    let work = || match parameters {
+    let compute_table = || match parameters {
         Some(parameters) => trace_scenario(plan, plan.scenario(0), parameters, settings, cancel),
         None => Ok(trace_all_points(plan, settings, cancel)),
     };
     match threads::pool(thread_count) {
-        Ok(pool) => pool.install(work),
-        Err(_) => work(),
+        Ok(pool) => pool.install(compute_table),
+        Err(_) => compute_table(),
     }
 }
 
@@ -204,14 +205,14 @@ pub(crate) fn trace_scenario(
     let mut table = Table::new(crate::identity::BUILD);
     let failures = add_columns(&mut table, &runs, &models, settings.extras);
     let failure = |kind: ModelKind| {
-        let model = settings.models.kinds().iter().position(|known| *known == kind);
+        let model = settings.models.model_kinds().iter().position(|known| *known == kind);
         model.and_then(|model| failures[model][0].clone())
     };
     table.metadata(key::PLAN, &plan.to_json());
     let mut facts = json!({
         "at": parameters.into_iter().collect::<BTreeMap<_, _>>(),
         "every_s": settings.every_s,
-        "equilibrium": numbered('q', run.point.equilibrium()),
+        "equilibrium": numbered_values('q', run.point.equilibrium()),
         "start": start_json(&settings.start),
         "integrator": run.method_json,
         "nonlinear_failure": failure(ModelKind::Nonlinear),
@@ -231,9 +232,10 @@ pub(crate) fn trace_scenario(
     })
 }
 
-/// Computes the traces of all points of a plan, in one table with the points' numbers and axes. As
-/// many points as there are lanes are integrated together, with the bits that each has alone. A
-/// point without equilibrium has no rows, and a message among the failures.
+/// Computes the traces of all points of a plan, in one table with the points' numbers and axes.
+/// Points are integrated together in groups that fill the lanes; the bits of each are those of a
+/// trace of the point alone. A point without equilibrium has no rows, and a message among the
+/// failures.
 pub(crate) fn trace_all_points(
     plan: &Plan,
     settings: &TraceSettings,
@@ -291,7 +293,7 @@ impl TraceRun {
         let checkpoints = settings.capped.map_or(0, |capped| capped.checkpoints);
         let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
         let point = prepare_point(machine, spin.clone(), &timing)?;
-        let (methods, method_json) = methods(plan, &point, &spin, settings.capped);
+        let (methods, method_json) = choose_methods(plan, &point, &spin, settings.capped);
         let times_s = match settings.every_s {
             Some(every_s) => {
                 (0..instant_count(plan.end_s, every_s)).map(|k| k as f64 * every_s).collect()
@@ -309,8 +311,8 @@ fn integrate<'a>(
     models: Models,
     cancel: Cancel<'_>,
 ) -> Vec<(ModelKind, Vec<History<'a>>)> {
-    let kinds = models.kinds();
-    let groups: Vec<(ModelKind, &[&'a TraceRun])> = kinds
+    let model_kinds = models.model_kinds();
+    let groups: Vec<(ModelKind, &[&'a TraceRun])> = model_kinds
         .iter()
         .flat_map(|&kind| runs.chunks(histories_per_batch()).map(move |runs| (kind, runs)))
         .collect();
@@ -323,32 +325,32 @@ fn integrate<'a>(
         });
         histories(kind, requests.collect(), cancel)
     };
-    let by_group: Vec<Vec<History<'a>>> = match rayon::current_thread_index() {
+    let grouped_histories: Vec<Vec<History<'a>>> = match rayon::current_thread_index() {
         Some(_) => groups.par_iter().map(integrate_group).collect(),
         // Outside of a pool rayon would start its global one, and panic if the system has no
         // threads.
         None => groups.iter().map(integrate_group).collect(),
     };
-    let mut all = by_group.into_iter().flatten();
-    kinds.iter().map(|&kind| (kind, all.by_ref().take(runs.len()).collect())).collect()
+    let mut all = grouped_histories.into_iter().flatten();
+    model_kinds.iter().map(|&kind| (kind, all.by_ref().take(runs.len()).collect())).collect()
 }
 
 fn start_json(start: &InitialDeviation) -> Value {
     json!({
-        "deviations": numbered('q', &start.deviations),
-        "speeds": numbered('u', &start.speeds),
+        "deviations": numbered_values('q', &start.deviations),
+        "speeds": numbered_values('u', &start.speeds),
     })
 }
 
 /// Returns ten numbers with the names q1 to q10, or u1 to u10, by the letter.
-fn numbered(letter: char, values: &[f64; COORDINATES]) -> Value {
+fn numbered_values(letter: char, values: &[f64; COORDINATES]) -> Value {
     (1..).zip(values).map(|(i, value)| (format!("{letter}{i}"), *value)).collect()
 }
 
 /// Returns the methods of the nonlinear and the linear model, and a description of the former. With
 /// `capped` they are those of a map's row, which caps fast modes. Otherwise a plan that chooses
 /// levels by error gets the reference method, without capped modes.
-fn methods(
+fn choose_methods(
     plan: &Plan,
     point: &Point,
     spin: &Spin,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sweep::{Error, EvaluationTask, MemoryTable, RanToFile, counted};
+use sweep::{Error, EvaluationTask, FileRunEnd, MemoryTable, counted};
 
 use crate::errors;
 use crate::result::PyResultTable;
@@ -37,17 +37,21 @@ pub(crate) fn rows_or_file(
 ) -> PyResult<PyResultTable> {
     let task = &task.map_err(|error| errors::error(py, &error))?;
     let Some(out) = out else {
-        return rows_or_raise(py, supervise(py, options, |execution| task.in_memory(execution))?);
+        return rows_or_raise(
+            py,
+            supervise(py, options, |execution| task.compute_in_memory(execution))?,
+        );
     };
     let tell: fn(&str) = if options.progress { sweep::tell } else { |_| () };
-    let result = supervise(py, options, |execution| task.to_file(&out, fresh, &tell, execution))?;
+    let result =
+        supervise(py, options, |execution| task.compute_to_file(&out, fresh, &tell, execution))?;
     let result = result.value_or_raise(py, |result| match result {
         Err(error) => errors::error(py, &error),
-        Ok(RanToFile::Complete(table)) => {
+        Ok(FileRunEnd::Complete(table)) => {
             let text = format!("interrupted after {} was complete", out.display());
             interruption(py, text, Some(table))
         }
-        Ok(RanToFile::Interrupted { stored, points }) => {
+        Ok(FileRunEnd::Interrupted { stored, points }) => {
             let text = format!(
                 "interrupted with {stored} of {points} points kept beside {}; the same call \
                  continues with the others",
@@ -57,8 +61,8 @@ pub(crate) fn rows_or_file(
         }
     })?;
     match result {
-        RanToFile::Complete(table) => Ok(PyResultTable::new(table)),
-        RanToFile::Interrupted { stored, points } => Err(PyValueError::new_err(format!(
+        FileRunEnd::Complete(table) => Ok(PyResultTable::new(table)),
+        FileRunEnd::Interrupted { stored, points } => Err(PyValueError::new_err(format!(
             "stopped with {stored} of {points} points without an interruption"
         ))),
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyMapping};
-use sweep::{AttractorSearch, Explained, FitOptions};
+use sweep::{AttractorSearch, CommandReport, FitOptions};
 
 use crate::columns::{numbers, points};
 use crate::errors;
@@ -107,7 +107,7 @@ fn held_speeds(
 ) -> PyResult<PyResultTable> {
     let py = plan.py();
     let speeds_rpm = &numbers(speeds_rpm)?;
-    let task = sweep::hold_speeds(plan.get().evaluator.plan(), speeds_rpm, search);
+    let task = sweep::held_speeds_task(plan.get().evaluator.plan(), speeds_rpm, search);
     finish::rows_or_file(py, task, output, options)
 }
 
@@ -215,9 +215,9 @@ pub(crate) fn fit<'py>(
 }
 
 /// Creates the package's `Explanation` from data and text.
-fn explanation(py: Python<'_>, explained: Explained) -> PyResult<Bound<'_, PyAny>> {
-    let data = py.import("json")?.call_method1("loads", (explained.found.to_string(),))?;
-    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, explained.text))
+fn explanation(py: Python<'_>, report: CommandReport) -> PyResult<Bound<'_, PyAny>> {
+    let data = py.import("json")?.call_method1("loads", (report.data.to_string(),))?;
+    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, report.text))
 }
 
 /// Lists all numbers that can be set or swept, with their values in the plan or the built-in

@@ -158,7 +158,7 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         finish::rows_or_file(
             py,
-            self.evaluator.all_points(),
+            self.evaluator.task_for_all_points(),
             (out, fresh),
             WorkOptions { threads, progress },
         )

@@ -51,7 +51,7 @@ pub fn merge_job(
         }
     };
     run.take_notes().iter().for_each(|note| tell(note));
-    let Some(tally) = run.join(job, &|| interrupt.stopped())? else {
+    let Some(tally) = run.join(job, &|| interrupt.is_raised())? else {
         tell("interrupted; the chunks are kept");
         return Ok(Exit::interrupted(interrupt.signal()));
     };

@@ -28,7 +28,7 @@ impl<F: Fn(u64) + Sync> Evaluator for &FormulaEngine<F> {
         rayon::broadcast(|_| {
             while let Some((point, _)) = source() {
                 (self.before_point)(point);
-                if context.stopped() {
+                if context.must_stop() {
                     return;
                 }
                 self.evaluated.fetch_add(1, Ordering::Relaxed);

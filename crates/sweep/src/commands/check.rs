@@ -42,34 +42,34 @@ pub(crate) fn run(args: &WasherCheckArgs) -> Result<Exit, Error> {
         return engine_check::run::<Washer>(&args.check);
     }
     let plan: Plan = args.check.grid.load()?;
-    let assumed = Assumed::all(&plan);
+    let assumed = AssumedNumber::find_all(&plan);
     if assumed.is_empty() {
         return show("the machine file leaves out no number: nothing is assumed\n");
     }
     let trial = Trial::new(&plan, assumed);
     let estimate = estimate(&trial.plan, threads::count(None, &threads::process)?)?;
-    tell(&trial.announcement(&estimate));
+    tell(&trial.describe_work(&estimate));
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let execution =
         Execution { threads: None, progress: ProgressMode::default(), interrupt: &interrupt };
-    let Some(outcomes) = trial.outcomes(execution)? else {
+    let Some(outcomes) = trial.compute_outcomes(execution)? else {
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    show(&trial.table(&outcomes))
+    show(&trial.format_table(&outcomes))
 }
 
 /// A number that the machine file leaves out.
-struct Assumed {
+struct AssumedNumber {
     parameter: MachineParameter,
     value: f64,
-    /// The ends of its expected range, without those at which no machine exists, such as moments of
-    /// inertia of no rigid body.
-    ends: Vec<f64>,
+    /// The ends of the number's expected range, without those at which no machine exists, such as
+    /// moments of inertia of no rigid body.
+    range_ends: Vec<f64>,
 }
 
-impl Assumed {
+impl AssumedNumber {
     /// Returns every assumed number of a plan's machine that no axis sweeps.
-    fn all(plan: &Plan) -> Vec<Self> {
+    fn find_all(plan: &Plan) -> Vec<Self> {
         let Washer { machine, spin, .. } = &plan.model;
         let mut all = Vec::new();
         for parameter in MachineParameter::all(machine, spin) {
@@ -90,12 +90,12 @@ impl Assumed {
                 parameter.set(&mut other, &mut spin.clone(), *end);
                 parameter.range().contains(*end) && other.violations().is_empty()
             };
-            let ends = assumption
+            let range_ends = assumption
                 .expected_bounds(value, machine)
                 .into_iter()
                 .filter(is_possible)
                 .collect();
-            all.push(Self { parameter, value, ends });
+            all.push(Self { parameter, value, range_ends });
         }
         all
     }
@@ -106,9 +106,9 @@ struct Trial {
     /// The plan as a list of rows: for each point the machine with all assumed values, then the
     /// machines with one number at an end of its range.
     plan: Plan,
-    assumed: Vec<Assumed>,
+    numbers: Vec<AssumedNumber>,
     /// The number of rows of a point.
-    stride: usize,
+    rows_per_point: usize,
     /// The speed at which growth is computed (rpm): the greatest of the spin.
     plateau_rpm: f64,
 }
@@ -116,10 +116,9 @@ struct Trial {
 /// The results of a row that are compared.
 #[derive(Clone, Copy, Debug, Default)]
 struct TrialOutcome {
-    /// Whether the row is reliable.
-    verdict: Option<bool>,
-    /// The greatest ratio.
-    ratio: Option<f64>,
+    /// Whether the row is reliable; `None` if its verdict is undefined.
+    is_reliable: Option<bool>,
+    greatest_ratio: Option<f64>,
     growth_per_s: Option<f64>,
 }
 
@@ -127,19 +126,21 @@ struct TrialOutcome {
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 struct Effect {
     /// The number of points whose verdict changes or becomes undefined.
-    verdicts: usize,
+    changed_verdicts: usize,
     /// The relative change of the greatest ratio.
-    ratio: f64,
+    ratio_change: f64,
     /// The change of the growth (1/s); `None` if it is not known at any point.
-    growth_per_s: Option<f64>,
+    growth_change_per_s: Option<f64>,
 }
 
 impl Trial {
-    fn new(plan: &Plan, assumed: Vec<Assumed>) -> Self {
+    fn new(plan: &Plan, numbers: Vec<AssumedNumber>) -> Self {
         let count = plan.points().min(MAX_TRIAL_POINTS);
-        let step = |k: u64| if count > 1 { k * (plan.points() - 1) / (count - 1) } else { 0 };
-        let points: Vec<Vec<f64>> = (0..count).map(|k| plan.axis_values(step(k))).collect();
-        let stride = 1 + assumed.iter().map(|number| number.ends.len()).sum::<usize>();
+        let point_index =
+            |k: u64| if count > 1 { k * (plan.points() - 1) / (count - 1) } else { 0 };
+        let points: Vec<Vec<f64>> = (0..count).map(|k| plan.axis_values(point_index(k))).collect();
+        let rows_per_point =
+            1 + numbers.iter().map(|number| number.range_ends.len()).sum::<usize>();
         let mut trial = plan.clone();
         let plateau_rpm =
             plan.model.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / std::f64::consts::TAU;
@@ -151,16 +152,17 @@ impl Trial {
             trial.model.measures.metrics.retain(|metric| !metric.is_at_held_speeds());
         }
         for (k, axis) in trial.axes.iter_mut().enumerate() {
-            let values = points.iter().flat_map(|point| std::iter::repeat_n(point[k], stride));
+            let values =
+                points.iter().flat_map(|point| std::iter::repeat_n(point[k], rows_per_point));
             axis.values = AxisValues::List(values.collect());
         }
         let mut first = 1;
-        for number in &assumed {
-            let mut row = vec![number.value; stride];
-            for (k, end) in number.ends.iter().enumerate() {
+        for number in &numbers {
+            let mut row = vec![number.value; rows_per_point];
+            for (k, end) in number.range_ends.iter().enumerate() {
                 row[first + k] = *end;
             }
-            first += number.ends.len();
+            first += number.range_ends.len();
             let values = AxisValues::List(row.repeat(points.len()));
             trial.axes.push(sweep_engine::Axis {
                 parameter: plan.model.parameter(number.parameter.clone()),
@@ -168,25 +170,26 @@ impl Trial {
                 tolerance: None,
             });
         }
-        let rows = (stride * points.len()) as u64;
+        let rows = (rows_per_point * points.len()) as u64;
         let file = "assumed numbers".to_owned();
         trial.design = Some(Design::List { file, points: rows, hash: String::new() });
-        Self { plan: trial, assumed, stride, plateau_rpm }
+        Self { plan: trial, numbers, rows_per_point, plateau_rpm }
     }
 
     fn rows(&self) -> u64 {
         self.plan.points()
     }
 
-    /// Returns the number of rows and the time that they take, and what makes a long time shorter.
-    fn announcement(&self, estimate: &Estimate) -> String {
-        let points = counted(self.rows() as usize / self.stride, "point");
+    /// Describes the number of rows and the time that they take, with advice that shortens a long
+    /// time.
+    fn describe_work(&self, estimate: &Estimate) -> String {
+        let points = counted(self.rows() as usize / self.rows_per_point, "point");
         let threads = counted(estimate.threads, "thread");
         let time = duration(estimate.wall_s);
         let rows = self.rows();
         let mut text = format!(
             "{rows} rows, {} for each of {points}, take about {time} on {threads}",
-            self.stride
+            self.rows_per_point
         );
         if estimate.wall_s > LONG_WORK_S {
             text += "\nit is shorter with fewer points (--at NAME=VALUE fixes an axis), with an \
@@ -196,11 +199,14 @@ impl Trial {
     }
 
     /// Computes every row. Returns `None` if the work was interrupted.
-    fn outcomes(&self, execution: Execution<'_>) -> Result<Option<Vec<TrialOutcome>>, Error> {
+    fn compute_outcomes(
+        &self,
+        execution: Execution<'_>,
+    ) -> Result<Option<Vec<TrialOutcome>>, Error> {
         let evaluator = PlanEvaluator::new(self.plan.clone());
-        let found = evaluator.all_points()?.in_memory(execution)?;
+        let result = evaluator.task_for_all_points()?.compute_in_memory(execution)?;
         let mut outcomes: Vec<TrialOutcome> = Vec::new();
-        for batch in found.batches() {
+        for batch in result.batches() {
             let numbers = |name: &str| {
                 let column = batch.column_by_name(name);
                 let numbers = column.and_then(|column| cells::numbers(column).ok());
@@ -210,10 +216,10 @@ impl Trial {
             let verdicts = batch.column_by_name("reliable");
             let verdicts = verdicts.and_then(|column| cells::flags(column).ok());
             for row in 0..batch.num_rows() {
-                let known = verdicts.filter(|column| !column.is_null(row));
+                let reliable_column = verdicts.filter(|column| !column.is_null(row));
                 outcomes.push(TrialOutcome {
-                    verdict: known.map(|column| column.value(row)),
-                    ratio: ratios[row],
+                    is_reliable: reliable_column.map(|column| column.value(row)),
+                    greatest_ratio: ratios[row],
                     growth_per_s: growths[row],
                 });
             }
@@ -222,16 +228,16 @@ impl Trial {
     }
 
     /// Returns the assumed numbers with their effects, the greatest effect first.
-    fn ranked(&self, outcomes: &[TrialOutcome]) -> Vec<(&Assumed, Effect)> {
+    fn rank_numbers(&self, outcomes: &[TrialOutcome]) -> Vec<(&AssumedNumber, Effect)> {
         let mut first = 1;
         let mut ranked = Vec::new();
-        for number in &self.assumed {
+        for number in &self.numbers {
             let mut effect = Effect::default();
-            for rows in outcomes.chunks(self.stride) {
-                let ends = &rows[first..first + number.ends.len()];
-                effect.add(rows[0], ends);
+            for rows in outcomes.chunks(self.rows_per_point) {
+                let range_ends = &rows[first..first + number.range_ends.len()];
+                effect.add(rows[0], range_ends);
             }
-            first += number.ends.len();
+            first += number.range_ends.len();
             ranked.push((number, effect));
         }
         ranked.sort_by(|(_, a), (_, b)| b.partial_cmp(a).unwrap_or(std::cmp::Ordering::Equal));
@@ -239,26 +245,26 @@ impl Trial {
     }
 
     /// Returns the table of effects as text.
-    fn table(&self, outcomes: &[TrialOutcome]) -> String {
-        let ranked = self.ranked(outcomes);
-        let name = |number: &Assumed| number.parameter.name().to_owned();
+    fn format_table(&self, outcomes: &[TrialOutcome]) -> String {
+        let ranked = self.rank_numbers(outcomes);
+        let name = |number: &AssumedNumber| number.parameter.name().to_owned();
         let width = ranked.iter().map(|(number, _)| name(number).len()).max().unwrap_or(0);
-        let points = outcomes.len() / self.stride;
-        let growth = format!("growth at {} rpm", decimal(rounded(self.plateau_rpm)));
+        let points = outcomes.len() / self.rows_per_point;
+        let growth = format!("growth at {} rpm", decimal(round_to_4_digits(self.plateau_rpm)));
         let mut text = format!(
             "{:width$}  {:>10}  {:>22}  {:>12}  {:>9}  {growth}\n",
             "assumed", "value", "expected", "verdicts", "ratio"
         );
         for (number, effect) in &ranked {
             let expected: Vec<String> =
-                number.ends.iter().map(|end| decimal(rounded(*end))).collect();
+                number.range_ends.iter().map(|end| decimal(round_to_4_digits(*end))).collect();
             let expected = match expected.as_slice() {
                 [] => "kept".to_owned(),
-                ends => ends.join(" to "),
+                range_ends => range_ends.join(" to "),
             };
-            let verdicts = format!("{} of {points}", effect.verdicts);
-            let ratio = format!("{:.1} %", 100.0 * effect.ratio);
-            let growth = match effect.growth_per_s {
+            let verdicts = format!("{} of {points}", effect.changed_verdicts);
+            let ratio = format!("{:.1} %", 100.0 * effect.ratio_change);
+            let growth = match effect.growth_change_per_s {
                 None => "unknown".to_owned(),
                 Some(0.0) => "0 /s".to_owned(),
                 Some(change) => format!("{change:.2e} /s"),
@@ -266,12 +272,12 @@ impl Trial {
             text += &format!(
                 "{:width$}  {:>10}  {expected:>22}  {verdicts:>12}  {ratio:>9}  {growth}\n",
                 name(number),
-                decimal(rounded(number.value)),
+                decimal(round_to_4_digits(number.value)),
             );
         }
         let decisive: Vec<String> = ranked
             .iter()
-            .filter(|(_, effect)| effect.verdicts > 0)
+            .filter(|(_, effect)| effect.changed_verdicts > 0)
             .map(|(number, _)| name(number))
             .collect();
         text + &match decisive.as_slice() {
@@ -287,23 +293,24 @@ impl Trial {
 
 impl Effect {
     /// Adds a point, with its outcomes for the assumed value and for the ends of the range.
-    fn add(&mut self, assumed: TrialOutcome, ends: &[TrialOutcome]) {
-        let changes = ends.iter().any(|end| end.verdict != assumed.verdict);
-        self.verdicts += usize::from(changes);
-        for end in ends {
-            if let (Some(assumed), Some(end)) = (assumed.ratio, end.ratio) {
-                self.ratio = self.ratio.max((end / assumed - 1.0).abs());
+    fn add(&mut self, assumed: TrialOutcome, range_ends: &[TrialOutcome]) {
+        let changes = range_ends.iter().any(|end| end.is_reliable != assumed.is_reliable);
+        self.changed_verdicts += usize::from(changes);
+        for end in range_ends {
+            if let (Some(assumed), Some(end)) = (assumed.greatest_ratio, end.greatest_ratio) {
+                self.ratio_change = self.ratio_change.max((end / assumed - 1.0).abs());
             }
             if let (Some(assumed), Some(end)) = (assumed.growth_per_s, end.growth_per_s) {
                 let change = (end - assumed).abs();
-                self.growth_per_s = Some(self.growth_per_s.map_or(change, |most| most.max(change)));
+                let greatest = self.growth_change_per_s.unwrap_or(change);
+                self.growth_change_per_s = Some(greatest.max(change));
             }
         }
     }
 }
 
 /// Returns a number rounded to four digits, for a table.
-fn rounded(value: f64) -> f64 {
+fn round_to_4_digits(value: f64) -> f64 {
     let text = format!("{value:.3e}");
     let number = text.parse().unwrap_or(value);
     if Range::Any.contains(number) { number } else { value }
@@ -314,12 +321,12 @@ mod tests {
     use super::*;
     use crate::config::WasherGridInput;
 
-    const SHEET: &str = include_str!("starter_machine.toml");
+    const SHEET_MACHINE: &str = include_str!("starter_machine.toml");
 
     /// Returns a plan of a machine from a data sheet, with further lines of the grid file.
     fn plan(more: &str) -> Plan {
         let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(folder.path().join("m.toml"), SHEET).expect("it is written");
+        std::fs::write(folder.path().join("m.toml"), SHEET_MACHINE).expect("it is written");
         let grid = format!(
             "machine = \"m.toml\"\n[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 1\n\
              [time]\nend_s = 1.5\n{more}"
@@ -334,42 +341,48 @@ mod tests {
     #[test]
     fn every_left_out_number_is_varied_and_ranked() {
         let plan = plan("[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.3]\n");
-        let trial = Trial::new(&plan, Assumed::all(&plan));
-        assert!(trial.assumed.len() > 10, "{}", trial.assumed.len());
+        let trial = Trial::new(&plan, AssumedNumber::find_all(&plan));
+        assert!(trial.numbers.len() > 10, "{}", trial.numbers.len());
         let interrupt = Interrupt::new();
         let execution =
             || Execution { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
-        let outcomes = trial.outcomes(execution()).unwrap().expect("nobody interrupts");
-        assert_eq!(outcomes.len(), 2 * trial.stride);
+        let outcomes = trial.compute_outcomes(execution()).unwrap().expect("nobody interrupts");
+        assert_eq!(outcomes.len(), 2 * trial.rows_per_point);
         // The rows with all assumed values are those of the plan itself, except for their steps.
         let evaluator = PlanEvaluator::new(plan.clone());
-        let plan_rows = evaluator.all_points().unwrap().in_memory(execution()).unwrap();
+        let plan_rows =
+            evaluator.task_for_all_points().unwrap().compute_in_memory(execution()).unwrap();
         let column = plan_rows.batches()[0].column_by_name("ratio_max").expect("it is there");
         let ratios = cells::numbers(column).unwrap();
         for (point, ratio) in ratios.into_iter().enumerate() {
             let [plan_ratio, trial_ratio] =
-                [ratio, outcomes[point * trial.stride].ratio].map(Option::unwrap);
+                [ratio, outcomes[point * trial.rows_per_point].greatest_ratio].map(Option::unwrap);
             assert!((trial_ratio / plan_ratio - 1.0).abs() < 0.01, "{plan_ratio} {trial_ratio}");
         }
-        let ranked = trial.ranked(&outcomes);
+        let ranked = trial.rank_numbers(&outcomes);
         assert!(ranked.windows(2).all(|pair| pair[0].1 >= pair[1].1));
-        assert!(ranked[0].1.ratio > ranked[ranked.len() - 1].1.ratio, "{:?}", ranked[0].1);
-        let text = trial.table(&outcomes);
+        assert!(
+            ranked[0].1.ratio_change > ranked[ranked.len() - 1].1.ratio_change,
+            "{:?}",
+            ranked[0].1
+        );
+        let text = trial.format_table(&outcomes);
         assert!(text.contains("tub_inertia_11_kg_m2") && text.contains("300 rpm"), "{text}");
     }
 
     #[test]
     fn long_work_is_announced_with_what_makes_it_shorter() {
         let plan = plan("[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.3]\n");
-        let trial = Trial::new(&plan, Assumed::all(&plan));
+        let trial = Trial::new(&plan, AssumedNumber::find_all(&plan));
         let estimate = estimate(&trial.plan, 2).unwrap();
         assert!(estimate.wall_s > 0.0 && estimate.sampled.values().sum::<u64>() > 0);
         let announced = |wall_s: f64| {
             let estimate = Estimate { wall_s, ..estimate.clone() };
-            trial.announcement(&estimate)
+            trial.describe_work(&estimate)
         };
         let rows = trial.rows();
-        let line = format!("{rows} rows, {} for each of 2 points, take about ", trial.stride);
+        let line =
+            format!("{rows} rows, {} for each of 2 points, take about ", trial.rows_per_point);
         assert_eq!(announced(90.0), format!("{line}1 min 30 s on 2 threads"));
         let text = announced(7200.0);
         assert!(text.starts_with(&format!("{line}2 h 00 min on 2 threads\n")), "{text}");
@@ -378,26 +391,27 @@ mod tests {
 
     #[test]
     fn numbers_that_change_a_verdict_come_first() {
-        let outcome = |verdict, ratio| TrialOutcome {
-            verdict: Some(verdict),
-            ratio: Some(ratio),
+        let outcome = |is_reliable, ratio| TrialOutcome {
+            is_reliable: Some(is_reliable),
+            greatest_ratio: Some(ratio),
             growth_per_s: Some(-1.0),
         };
         let mut changing = Effect::default();
         changing.add(outcome(true, 1.9), &[outcome(true, 1.8), outcome(false, 2.1)]);
         let mut unchanging = Effect::default();
         unchanging.add(outcome(true, 1.0), &[outcome(true, 1.9)]);
-        assert_eq!((changing.verdicts, unchanging.verdicts), (1, 0));
-        assert!(changing > unchanging && unchanging.ratio > changing.ratio);
+        assert_eq!((changing.changed_verdicts, unchanging.changed_verdicts), (1, 0));
+        assert!(changing > unchanging && unchanging.ratio_change > changing.ratio_change);
     }
 
     #[test]
     fn a_number_without_effect_has_an_effect_of_0() {
         let plan = plan("[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1]\n");
-        let trial = Trial::new(&plan, Assumed::all(&plan));
+        let trial = Trial::new(&plan, AssumedNumber::find_all(&plan));
         let outcome = |growth_per_s| TrialOutcome { growth_per_s, ..TrialOutcome::default() };
-        let table = |growth| trial.table(&vec![outcome(growth); trial.stride]);
-        let [known, unknown] = [table(Some(-1.0)), table(None)];
+        let format_table =
+            |growth| trial.format_table(&vec![outcome(growth); trial.rows_per_point]);
+        let [known, unknown] = [format_table(Some(-1.0)), format_table(None)];
         let row = |table: &str| table.lines().nth(1).expect("a number is assumed").to_owned();
         assert!(row(&known).ends_with("  0 /s"), "{known}");
         assert!(row(&unknown).ends_with("  unknown"), "{unknown}");

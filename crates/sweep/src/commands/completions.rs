@@ -1,4 +1,4 @@
-//! `sweep completions SHELL`.
+//! `sweep completions SHELL` prints the completion script of a shell.
 
 use clap_complete::Shell;
 
@@ -16,10 +16,10 @@ pub struct CompletionsArgs {
 /// # Errors
 /// Returns an error if standard output cannot be written.
 pub(crate) fn run(args: &CompletionsArgs, program: clap::Command) -> Result<Exit, Error> {
-    print(&script(args.shell, program))
+    print(&generate_script(args.shell, program))
 }
 
-fn script(shell: Shell, mut program: clap::Command) -> String {
+fn generate_script(shell: Shell, mut program: clap::Command) -> String {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut program, "sweep", &mut script);
     String::from_utf8_lossy(&script).into_owned()
@@ -30,12 +30,12 @@ mod tests {
     use clap::ValueEnum as _;
 
     use super::*;
-    use crate::commands::shown_command;
+    use crate::commands::visible_command;
 
     #[test]
     fn every_shell_completes_visible_commands_and_no_hidden_ones() {
         for shell in Shell::value_variants() {
-            let script = script(*shell, shown_command());
+            let script = generate_script(*shell, visible_command());
             for name in ["boundary", "completions", "--keep-traces", "--version"] {
                 assert!(script.contains(name.trim_start_matches('-')), "{shell}: no {name}");
             }

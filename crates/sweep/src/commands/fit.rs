@@ -1,5 +1,5 @@
-//! `sweep fit GRID.toml MEASURED.csv --free NAME,...`: the numbers that make the model follow a
-//! measurement.
+//! `sweep fit GRID.toml MEASURED.csv --free NAME,...` estimates the parameters with which the model
+//! follows a measurement.
 
 use std::path::{Path, PathBuf};
 
@@ -12,25 +12,25 @@ use sweep_files::{FileKind, OWN_FILE, Output};
 
 /// Arguments of `sweep fit`.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LONG)]
+#[command(after_long_help = LONG_HELP)]
 pub struct FitArgs {
     #[command(flatten)]
     grid: GridArgs,
-    /// Measured run: a CSV or Parquet file of time_s, perhaps speed_rpm, and channels with their
-    /// units; after @ constants of its own
+    /// Measured run: a CSV or Parquet file with columns time_s, optionally speed_rpm, and channels
+    /// with their units; constants of this run alone follow after @
     #[arg(value_name = "FILE[@NAME=VALUE,...]", required = true)]
     measurement: Vec<String>,
-    /// A column of the files and what it holds, as 'Acc front [g]=tub_front_y_m_per_s2'; over
-    /// [columns] of the grid file; may be repeated
-    #[arg(long = "column", value_name = "HEADER=NAME", value_parser = header_and_name)]
+    /// Quantity of a column of the files, as 'Acc front [g]=tub_front_y_m_per_s2', in place of that
+    /// in [columns] of the grid file; may be repeated
+    #[arg(long = "column", value_name = "HEADER=NAME", value_parser = parse_column)]
     columns: Vec<(String, String)>,
     #[command(flatten)]
     options: FitOptions,
     /// Machine file to write
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// File of curves to write, for `sweep plot`: measured, model and residual, and profiles; of
-    /// further files under -2 and so on
+    /// File of curves to write, for `sweep plot`: measured and computed values, residuals and
+    /// profiles; the curves of further measurements go to files with -2, -3, ... after the name
     #[arg(long, value_name = "FILE")]
     curves: Option<PathBuf>,
     /// Print everything as JSON
@@ -44,7 +44,7 @@ pub struct FitArgs {
 }
 
 /// The end of `sweep fit --help`.
-const LONG: &str = "\
+const LONG_HELP: &str = "\
 Columns are channels of `sweep trace` with their units: tub_front_y_m, tub_yaw_rad, rates \
 (tub_yaw_rad_per_s), accelerations (tub_front_y_m_per_s2), cabinet_force_y_n. Other units are \
 converted: 'Tub yaw [deg]', time_ms. Further columns are left out. A missing sample is empty. The \
@@ -52,77 +52,81 @@ run begins at time 0, at rest; with speed_rpm, or pulses of a tachometer (tacho_
 tacho_60_pulses for 60 a turn) or their number (tacho_60_count, tacho_60_count_per_row), the spin \
 is the measured one, else the grid's. An offset of every column is fitted beside the parameters.
 
-With --out, what an interrupted fit has found out stays in FILE.partial, and the same command goes \
-on from there. docs/fit.md explains every line.";
+With --out, the evaluations of an interrupted fit are stored in FILE.partial, and the same command \
+continues from there. docs/fit.md explains every line.";
 
-/// Fits, and prints.
+/// Fits the parameters, and prints the report.
 ///
 /// # Errors
-/// Mistakes in the grid file, the measurements or the options; data that cannot tell; and a machine
-/// file that cannot be written.
+/// Returns an error for mistakes in the grid file, the measurements or the options, for data that
+/// do not determine the parameters, and if a file cannot be written.
 pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let grid: WasherGridInput = args.grid.input().with_fixed(&args.grid.at);
     let mut cases = Vec::new();
     let columns = [args.columns.clone(), grid.load()?.reading_notes.columns].concat();
     for text in &args.measurement {
-        let (path, constants) = parted(text);
+        let (path, constants) = split_constants(text);
         let measurement = Measurement::read(path, &columns)?;
         measurement.notes.iter().for_each(|note| tell(&format!("{}: {note}", measurement.name)));
         cases.push(fit::case(&grid, &constants, measurement)?);
     }
     for (header, _) in &args.columns {
-        let has = |case: &fit::FitCase| {
+        let has_header = |case: &fit::FitCase| {
             case.measurement.headers.iter().any(|own| own.starts_with(header))
         };
-        if !cases.iter().any(has) {
-            let all: Vec<&String> =
+        if !cases.iter().any(has_header) {
+            let known_headers: Vec<&String> =
                 cases.iter().flat_map(|case| &case.measurement.headers).take(20).collect();
-            let expected = format!("one of the files' columns, as in {all:?}");
+            let expected = format!("one of the files' columns, as in {known_headers:?}");
             return Err(Error::option("--column", header, expected));
         }
     }
     let out = args.out.as_deref().map(|path| Output::begin(path, FileKind::Own)).transpose()?;
-    let count = cases.len();
-    let paths = |path: &PathBuf| (0..count).map(|k| numbered(path, k)).collect::<Vec<_>>();
+    let case_count = cases.len();
+    let paths =
+        |path: &PathBuf| (0..case_count).map(|k| add_case_number(path, k)).collect::<Vec<_>>();
     let curves: Vec<PathBuf> = args.curves.iter().flat_map(paths).collect();
-    let begun = curves.iter().map(|path| Output::begin(path, FileKind::Fit));
-    let begun = begun.collect::<Result<Vec<_>, _>>()?;
+    let curve_outputs = curves.iter().map(|path| Output::begin(path, FileKind::Fit));
+    let curve_outputs = curve_outputs.collect::<Result<Vec<_>, _>>()?;
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let progress = Progress::for_search(args.execution.progress, 0, "", 0);
-    let report_progress = |made: usize| progress.show_search(0, made as u64);
+    let report_progress =
+        |evaluation_count: usize| progress.show_search(0, evaluation_count as u64);
     let cancel = Cancel::Flag(interrupt.flag());
     let output = args.out.as_deref();
     let context =
         FitContext { cancel, count_evaluations: &report_progress, output, fresh: args.fresh };
     let threads = threads::count(args.execution.threads, &threads::process)?;
-    let fitted = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &context))?;
+    let fit_result =
+        threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &context))?;
     progress.finish();
-    let Some(mut fitted) = fitted else {
-        let kept = "with --out, what was found out is kept";
+    let Some(mut fit_result) = fit_result else {
+        let kept = "with --out, its evaluations are kept";
         tell(&format!("interrupted: {kept}\n     go on  {}", resume_command()));
         return Ok(Exit::interrupted(interrupt.signal()));
     };
     if let (Some(path), Some(out)) = (&args.out, out) {
-        let (machine, _) = fitted.problem.machine(0, &fitted.x);
-        let text = config::machine_file(&machine, &fitted.problem.written());
+        let (machine, _) = fit_result.problem.machine(0, &fit_result.x);
+        let text = config::machine_file(&machine, &fit_result.problem.written());
         out.finish(
             format!("{OWN_FILE}fitted to {:?}\n{text}", args.measurement.join(" ")).as_bytes(),
         )?;
         tell(&format!("wrote {}", path.display()));
-        if let Some(note) = fitted.evaluations.take().and_then(Evaluations::complete) {
+        if let Some(note) = fit_result.evaluations.take().and_then(Evaluations::complete) {
             tell(&note);
         }
     }
-    for (case, (path, file)) in curves.iter().zip(begun).enumerate() {
-        file.finish(&fitted.curves(case).into_bytes(path)?)?;
+    for (case, (path, file)) in curves.iter().zip(curve_outputs).enumerate() {
+        file.finish(&fit_result.curves(case).into_bytes(path)?)?;
         tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));
     }
-    let report = &fitted.report;
+    let report = &fit_result.report;
     show(&if args.json { format!("{:#}\n", serde_json::json!(report)) } else { report.text() })
 }
 
-/// Returns a header and the name of what its column holds. Headers may have an equals sign.
-fn header_and_name(text: &str) -> Result<(String, String), String> {
+/// Parses `HEADER=NAME`, a column's header and the name of its quantity. The header may contain an
+/// equals sign.
+fn parse_column(text: &str) -> Result<(String, String), String> {
     match text.rsplit_once('=') {
         Some((header, name)) if Measurement::is_name(name) => {
             Ok((header.to_owned(), name.to_owned()))
@@ -137,7 +141,7 @@ fn header_and_name(text: &str) -> Result<(String, String), String> {
 
 /// Returns the path of a case's file of curves: the given path for the first case, and one with a
 /// number for each further case.
-fn numbered(path: &Path, case: usize) -> PathBuf {
+fn add_case_number(path: &Path, case: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     match case {
@@ -148,7 +152,7 @@ fn numbered(path: &Path, case: usize) -> PathBuf {
 
 /// Splits an argument into a path and the constants after `@`. The name of an existing file may
 /// have an `@` itself.
-fn parted(text: &str) -> (&Path, Vec<String>) {
+fn split_constants(text: &str) -> (&Path, Vec<String>) {
     match text.rsplit_once('@') {
         Some((path, constants)) if !Path::new(text).exists() => {
             (Path::new(path), constants.split(',').map(str::to_owned).collect())

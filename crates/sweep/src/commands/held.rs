@@ -7,7 +7,7 @@ use super::show::MODEL_SUMMARY;
 use crate::dwell::AttractorSearch;
 use crate::plan::Plan;
 use crate::speeds::SpeedList;
-use crate::stability::{HeldPlan, check};
+use crate::stability::{HeldPlan, check_axes};
 use sweep_engine::commands::cells::Lines as _;
 use sweep_engine::commands::grid::ResultArgs;
 use sweep_engine::commands::run::{
@@ -77,49 +77,50 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<O
         let Self { target, speed, options, work } = self;
         let search: Option<AttractorSearch> = (*options).into();
         let plan: Plan = target.grid.load()?;
-        check(&plan, "--speed", &speed.to_string())?;
-        let held = HeldPlan { plan: &plan, speeds_rpm: speed.values(), search };
-        let job = held.job();
-        let output = held.output(target.out.as_deref());
-        let [own_options, merge_options] = command_options(speed, search);
+        check_axes(&plan, "--speed", &speed.to_string())?;
+        let held_plan = HeldPlan { plan: &plan, speeds_rpm: speed.values(), search };
+        let job = held_plan.job();
+        let output = held_plan.output(target.out.as_deref());
+        let [speed_options, merge_options] = format_options(speed, search);
         let command = RunCommand {
             name: &plan.name,
-            verb: held.command_name(),
+            verb: held_plan.command_name(),
             rows: "rows",
             target,
             work,
-            options: [&own_options, &merge_options],
+            options: [&speed_options, &merge_options],
         };
-        let engine = held.engine()?;
-        let finished = |text: &mut String, tally: &Tally| {
-            text.push_str(&content(&output)?);
+        let engine = held_plan.engine()?;
+        let add_summary = |text: &mut String, tally: &Tally| {
+            text.push_str(&describe_content(&output)?);
             text.push_str(&failure_reasons(&engine, tally, &job));
             text.line("file", output.display());
             text.suggest_command("show", &output);
             Ok(())
         };
-        let report = command.execute(&engine, &job, &output, &install_interrupt()?, &finished)?;
+        let report =
+            command.execute(&engine, &job, &output, &install_interrupt()?, &add_summary)?;
         Ok(exit(work, &report))
     }
 }
 
 /// Describes the content of a finished file about held speeds.
-fn content(output: &Path) -> Result<String, Error> {
+fn describe_content(output: &Path) -> Result<String, Error> {
     let mut text = String::new();
-    for (name, words) in MODEL_SUMMARY.shortened_lines(&ParquetFile::open(output)?)? {
-        text.line(name, words);
+    for (name, description) in MODEL_SUMMARY.shortened_lines(&ParquetFile::open(output)?)? {
+        text.line(name, description);
     }
     Ok(text)
 }
 
 /// Returns the options that repeat a command about held speeds, and those by which `merge` refers
 /// to its job.
-fn command_options(speed: &SpeedList, search: Option<AttractorSearch>) -> [String; 2] {
+fn format_options(speed: &SpeedList, search: Option<AttractorSearch>) -> [String; 2] {
     let search_options = search.map(|search| search.to_string()).unwrap_or_default();
-    let own_options = format!(" --speed {speed}{search_options}");
+    let speed_options = format!(" --speed {speed}{search_options}");
     let dwell_option = if search.is_some() { " --dwell" } else { "" };
-    let merge_options = format!("{dwell_option}{own_options}");
-    [own_options, merge_options]
+    let merge_options = format!("{dwell_option}{speed_options}");
+    [speed_options, merge_options]
 }
 
 /// Arguments of `sweep status` or `sweep merge` (`CommandArgs`), for a run or for held speeds.
@@ -128,7 +129,7 @@ pub struct JobArgs<CommandArgs: clap::Args> {
     #[command(flatten)]
     command: CommandArgs,
     #[command(flatten)]
-    held: HeldArgs,
+    options: HeldArgs,
 }
 
 impl JobArgs<status::StatusArgs> {
@@ -137,11 +138,11 @@ impl JobArgs<status::StatusArgs> {
     /// # Errors
     /// Returns an error for mistakes in the grid file, for a folder or file of another plan, and
     /// for a file that cannot be read.
-    pub(super) fn status(&self) -> Result<Exit, Error> {
+    pub(super) fn show_status(&self) -> Result<Exit, Error> {
         let target = &self.command.target;
         let plan: Plan = target.grid.load()?;
-        let (job, output, again) = self.held.job(&plan, target);
-        status::show_job(&self.command, &job, &output, again.each_ref().map(String::as_str))
+        let (job, output, resume_texts) = self.options.job(&plan, target);
+        status::show_job(&self.command, &job, &output, resume_texts.each_ref().map(String::as_str))
     }
 }
 
@@ -153,9 +154,9 @@ impl JobArgs<merge::MergeArgs> {
     pub(super) fn merge(&self) -> Result<Exit, Error> {
         let target = &self.command.target;
         let plan: Plan = target.grid.load()?;
-        let (job, output, _) = self.held.job(&plan, target);
-        let content = |tally: &Tally| match self.held.speed {
-            Some(_) => content(&output),
+        let (job, output, _) = self.options.job(&plan, target);
+        let content = |tally: &Tally| match self.options.speed {
+            Some(_) => describe_content(&output),
             None => Ok(count_lines(tally, &job)),
         };
         merge::merge_job(&self.command, &plan.name, &job, &output, &content)
@@ -184,9 +185,9 @@ impl HeldArgs {
             return (Job::new(plan), target.output(plan), ["run", "", ""].map(str::to_owned));
         };
         let search = self.dwell.then_some(self.search);
-        let held = HeldPlan { plan, speeds_rpm: speed.values(), search };
-        let [own_options, merge_options] = command_options(speed, search);
-        let again = [held.command_name().to_owned(), own_options, merge_options];
-        (held.job(), held.output(target.out.as_deref()), again)
+        let held_plan = HeldPlan { plan, speeds_rpm: speed.values(), search };
+        let [speed_options, merge_options] = format_options(speed, search);
+        let resume_texts = [held_plan.command_name().to_owned(), speed_options, merge_options];
+        (held_plan.job(), held_plan.output(target.out.as_deref()), resume_texts)
     }
 }

@@ -10,10 +10,10 @@ use sweep_engine::{Error, Exit, print, tell};
 use sweep_files::{FileError, atomic};
 
 /// The commented grid file that `sweep init` writes.
-const GRID: &str = include_str!("starter.toml");
+const STARTER_GRID: &str = include_str!("starter.toml");
 
 /// The commented machine file that `sweep init --machine --short` writes.
-const SHORT_MACHINE: &str = include_str!("starter_machine.toml");
+const SHORT_MACHINE_FILE: &str = include_str!("starter_machine.toml");
 
 /// Arguments of `sweep init`.
 #[derive(Debug, clap::Args)]
@@ -34,13 +34,13 @@ pub struct InitArgs {
 /// Returns an error if the file exists or cannot be written.
 pub(crate) fn run(args: &InitArgs) -> Result<Exit, Error> {
     let text = match (args.machine, args.short) {
-        (true, true) => SHORT_MACHINE.to_owned(),
+        (true, true) => SHORT_MACHINE_FILE.to_owned(),
         // Scripts read the complete file, in which no number is left to the rules of assumption.
         (true, false) => config::machine_file(&Machine::paper(), &NumberSources::default()),
-        (false, _) => GRID.to_owned(),
+        (false, _) => STARTER_GRID.to_owned(),
     };
-    let default = if args.machine { "machine.toml" } else { "grid.toml" };
-    let path = args.file.as_deref().unwrap_or(Path::new(default));
+    let default_name = if args.machine { "machine.toml" } else { "grid.toml" };
+    let path = args.file.as_deref().unwrap_or(Path::new(default_name));
     if path == Path::new("-") {
         return print(&text);
     }
@@ -49,14 +49,14 @@ pub(crate) fn run(args: &InitArgs) -> Result<Exit, Error> {
         let help = "give another name, or remove that file first";
         return Err(FileError::Refused { path: path.to_owned(), reason, help }.into());
     }
-    let shown = path.display();
+    let shown_path = path.display();
     tell(&if args.machine {
         format!(
-            "wrote {shown}; a grid file beside it names it: machine = \"{}\"",
+            "wrote {shown_path}; a grid file beside it names it: machine = \"{}\"",
             path.file_name().unwrap_or_default().display()
         )
     } else {
-        format!("wrote {shown}; next: sweep check {shown}")
+        format!("wrote {shown_path}; next: sweep check {shown_path}")
     });
     Ok(Exit::Done)
 }
@@ -68,11 +68,11 @@ mod tests {
 
     #[test]
     fn the_starter_shows_every_method_and_setting() {
-        for entry in &METHODS {
-            assert!(GRID.contains(&format!("\"{}\"", entry.name)), "no {}", entry.name);
-            for setting in entry.settings {
+        for method in &METHODS {
+            assert!(STARTER_GRID.contains(&format!("\"{}\"", method.name)), "no {}", method.name);
+            for setting in method.settings {
                 let line = format!("{} = {:e}", setting.key, setting.default);
-                assert!(GRID.contains(&line), "no {line}");
+                assert!(STARTER_GRID.contains(&line), "no {line}");
             }
         }
     }

@@ -13,7 +13,7 @@ use sweep_files::{self as files, FileKind};
 /// Arguments of `sweep man`.
 #[derive(Debug, clap::Args)]
 pub struct ManArgs {
-    /// Folder to write them to; made if it is not there
+    /// Folder for the pages; created if it does not exist
     folder: PathBuf,
 }
 
@@ -26,23 +26,26 @@ pub(crate) fn run(
     mut program: clap::Command,
     examples: &dyn Fn(&str) -> Examples,
 ) -> Result<Exit, Error> {
-    let failed =
+    let write_error =
         |source| Error::File { action: "write manual pages to", path: args.folder.clone(), source };
     files::ready(&args.folder)?;
     let write =
         |name: &str, page: &[u8]| files::write(&args.folder.join(name), FileKind::ManPage, page);
-    // Each command gets its full name.
+    // Gives each command its full name, such as `sweep run`.
     program.build();
     for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
         let name = command.get_name();
-        write(&format!("sweep-{name}.1"), &page(command, name, examples(name)).map_err(failed)?)?;
+        write(
+            &format!("sweep-{name}.1"),
+            &render_page(command, name, examples(name)).map_err(write_error)?,
+        )?;
     }
-    write("sweep.1", &page(&program, "", examples("sweep")).map_err(failed)?)?;
+    write("sweep.1", &render_page(&program, "", examples("sweep")).map_err(write_error)?)?;
     Ok(Exit::Done)
 }
 
 /// Returns a manual page. Unlike help, a manual page ends with the examples.
-fn page(command: &clap::Command, name: &str, examples: Examples) -> io::Result<Vec<u8>> {
+fn render_page(command: &clap::Command, name: &str, examples: Examples) -> io::Result<Vec<u8>> {
     let title = if name.is_empty() { "sweep".to_owned() } else { format!("sweep-{name}") };
     let man =
         Man::new(command.clone()).title(title).source(concat!("sweep ", env!("CARGO_PKG_VERSION")));
@@ -55,16 +58,19 @@ fn page(command: &clap::Command, name: &str, examples: Examples) -> io::Result<V
     if name.is_empty() {
         man.render_subcommands_section(&mut text)?;
     }
-    let mut rest = Roff::new();
-    rest.control("SH", ["EXIT STATUS"]);
+    let mut last_sections = Roff::new();
+    last_sections.control("SH", ["EXIT STATUS"]);
     for (exit, meaning) in Exit::ALL {
-        rest.control("TP", []).text([bold((exit as u8).to_string())]).text([roman(meaning)]);
+        last_sections
+            .control("TP", [])
+            .text([bold((exit as u8).to_string())])
+            .text([roman(meaning)]);
     }
-    rest.control("SH", ["EXAMPLES"]);
-    for [line, does] in examples {
-        rest.control("TP", []).text([bold(line)]).text([roman(does)]);
+    last_sections.control("SH", ["EXAMPLES"]);
+    for [line, purpose] in examples {
+        last_sections.control("TP", []).text([bold(line)]).text([roman(purpose)]);
     }
-    rest.to_writer(&mut text)?;
+    last_sections.to_writer(&mut text)?;
     Ok(text)
 }
 
@@ -78,7 +84,8 @@ mod tests {
         let mut program = command();
         program.build();
         let run = program.find_subcommand("run").unwrap();
-        let text = String::from_utf8(page(run, "run", find_examples("run")).unwrap()).unwrap();
+        let text =
+            String::from_utf8(render_page(run, "run", find_examples("run")).unwrap()).unwrap();
         for part in [
             ".TH sweep-run 1",
             "sweep run",

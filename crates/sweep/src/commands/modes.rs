@@ -55,20 +55,20 @@ pub(crate) fn run(args: &ModesArgs) -> Result<Exit, Error> {
     let input = ModesInput::new(grid.as_ref(), &args.at, args.speed.to)?;
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
-    let speeds = args.speed.values();
+    let speeds_rpm = args.speed.values();
     // A signal ends the process, because there are no partial results to keep.
-    let found = ModeAnalysis::new(&input, &speeds, args.exact, Cancel::Never)?;
-    let Some(analysis) = found else { return Ok(Exit::Interrupted) };
+    let analysis = ModeAnalysis::new(&input, &speeds_rpm, args.exact, Cancel::Never)?;
+    let Some(analysis) = analysis else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
         output.finish(&analysis.table(&input).into_bytes(path)?)?;
         let modes = analysis.modes.len();
-        tell(&format!("wrote {}: {modes} modes at {} speeds", path.display(), speeds.len()));
+        tell(&format!("wrote {}: {modes} modes at {} speeds", path.display(), speeds_rpm.len()));
     }
     if args.json {
         return show(&format!("{:#}\n", analysis.to_json(&input.name)));
     }
-    let mut text = mode_table(&speeds, &analysis.modes);
-    text.push_str(&difference_lines(&analysis));
+    let mut text = mode_table(&speeds_rpm, &analysis.modes);
+    text.push_str(&describe_differences(&analysis));
     if !analysis.friction_speeds.is_empty() {
         let dampers = analysis.friction_speeds.iter().map(|(damper, speed)| {
             let speed = speed.as_f64().unwrap_or_default();
@@ -82,9 +82,9 @@ pub(crate) fn run(args: &ModesArgs) -> Result<Exit, Error> {
 
 /// Returns lines on the differences between the suspension's modes at a frozen angle of the drum
 /// and its exact motions. They are empty without exact motions.
-fn difference_lines(analysis: &ModeAnalysis) -> String {
-    let Some(exact) = &analysis.exact else { return String::new() };
-    let speeds = &analysis.speeds_rpm;
+fn describe_differences(analysis: &ModeAnalysis) -> String {
+    let Some(exact) = &analysis.exact_modes else { return String::new() };
+    let speeds_rpm = &analysis.speeds_rpm;
     let modes = &analysis.modes;
     let mut text =
         "The table freezes theta, as the paper does (Eqs. 43 to 45). Over whole turns the \
@@ -92,25 +92,28 @@ fn difference_lines(analysis: &ModeAnalysis) -> String {
             .to_owned();
     for mode in 0..modes.len().min(COMPARED_MODES) {
         // The greatest difference (%) over all speeds, with its speed.
-        let greatest = |difference: fn(&ModeAtSpeed, &FloquetMode) -> f64| {
+        let greatest = |relative_difference: fn(&ModeAtSpeed, &FloquetMode) -> f64| {
             let at_speed = |k: usize| {
-                let share = difference(&modes[mode].at_speed[k], exact[k][mode].as_ref()?);
-                share.is_finite().then_some((100.0 * share, speeds[k]))
+                let difference =
+                    relative_difference(&modes[mode].at_speed[k], exact[k][mode].as_ref()?);
+                difference.is_finite().then_some((100.0 * difference, speeds_rpm[k]))
             };
-            let all = (0..speeds.len()).filter_map(at_speed);
+            let all = (0..speeds_rpm.len()).filter_map(at_speed);
             all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
         };
         let frequency =
             greatest(|frozen, exact| exact.frequency_rpm() / frozen.frequency_rpm - 1.0);
         let damping = greatest(|frozen, exact| exact.damping_ratio() / frozen.damping_ratio - 1.0);
-        if let (Some((frequency, at)), Some((damping, damping_at))) = (frequency, damping) {
+        if let (Some((frequency, frequency_rpm)), Some((damping, damping_rpm))) =
+            (frequency, damping)
+        {
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
                 "{:>4}  frequency {frequency:+.2} % at {} rpm, damping {damping:+.1} % at {} rpm",
                 mode + 1,
-                decimal(at),
-                decimal(damping_at)
+                decimal(frequency_rpm),
+                decimal(damping_rpm)
             );
         }
     }
@@ -119,33 +122,33 @@ fn difference_lines(analysis: &ModeAnalysis) -> String {
 
 /// Returns the printed table of modes: a line for each resonance of a mode, and one for a mode
 /// without any.
-fn mode_table(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
-    let lowest = format!("at {} rpm", decimal(speeds[0]));
+fn mode_table(speeds_rpm: &[f64], modes: &[ModeOverSpeed]) -> String {
+    let lowest_speed = format!("at {} rpm", decimal(speeds_rpm[0]));
     let mut text = format!(
         "mode   resonance   over a turn   damping   frequency   motion\n             \
-         rpm        +- rpm     ratio{lowest:>12}\n"
+         rpm        +- rpm     ratio{lowest_speed:>12}\n"
     );
     for (k, mode) in modes.iter().enumerate() {
-        let start = mode.at_speed[0].frequency_rpm;
+        let start_rpm = mode.at_speed[0].frequency_rpm;
         let rows = mode.resonances.iter().map(|resonance| {
-            let swing = 0.5 * (resonance.mode.greatest_rpm - resonance.mode.least_rpm);
-            (format!("{:.2}", resonance.speed_rpm), format!("{swing:.3}"), &resonance.mode)
+            let swing_rpm = 0.5 * (resonance.mode.greatest_rpm - resonance.mode.least_rpm);
+            (format!("{:.2}", resonance.speed_rpm), format!("{swing_rpm:.3}"), &resonance.mode)
         });
         let none = ("none".to_owned(), "-".to_owned(), &mode.at_speed[0]);
         let none = Some(none).filter(|_| mode.resonances.is_empty());
-        for (resonance, turn, at) in none.into_iter().chain(rows) {
+        for (resonance, swing, at) in none.into_iter().chain(rows) {
             let number = k + 1;
             let damping = at.damping_ratio;
             let motion = mode.motion.to_string();
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
-                "{number:>4}{resonance:>12}{turn:>14}{damping:>10.4}{start:>12.2}   {motion}"
+                "{number:>4}{resonance:>12}{swing:>14}{damping:>10.4}{start_rpm:>12.2}   {motion}"
             );
         }
     }
-    if let Some((swing, mode, speed)) = widest_swing(speeds, modes) {
-        let percent = 100.0 * swing;
+    if let Some((variation, mode, speed)) = greatest_variation(speeds_rpm, modes) {
+        let percent = 100.0 * variation;
         let _ = writeln!(
             text,
             "Over a turn, resonant modes vary by up to +-{percent:.3} % of their mean frequency \
@@ -158,14 +161,14 @@ fn mode_table(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
 
 /// Returns the greatest variation of a resonant mode's frequency over a turn (half the distance
 /// from least to greatest as a share of the mean), the mode's number, and the speed (rpm).
-fn widest_swing(speeds: &[f64], modes: &[ModeOverSpeed]) -> Option<(f64, usize, f64)> {
+fn greatest_variation(speeds_rpm: &[f64], modes: &[ModeOverSpeed]) -> Option<(f64, usize, f64)> {
     let resonant = modes.iter().enumerate().filter(|(_, mode)| !mode.resonances.is_empty());
     resonant
         .flat_map(|(k, mode)| {
-            mode.at_speed.iter().zip(speeds).map(move |(at, &speed)| {
+            mode.at_speed.iter().zip(speeds_rpm).map(move |(at, &speed)| {
                 (0.5 * (at.greatest_rpm - at.least_rpm) / at.frequency_rpm, k + 1, speed)
             })
         })
-        .filter(|(swing, ..)| swing.is_finite())
+        .filter(|(variation, ..)| variation.is_finite())
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::live::{SliderRange, live, parse_slider_range};
+use crate::live::{SliderRange, build_live_part, parse_slider_range};
 use sweep_engine::commands::plot;
 use sweep_engine::config::written::finite;
 use sweep_engine::{Error, Exit};
@@ -21,7 +21,7 @@ pub struct WasherPlotArgs {
     pub channels: Vec<String>,
 
     /// Trace: mark where these speeds are passed, in rpm, separated by commas
-    #[arg(long, value_name = "RPM,...", value_delimiter = ',', value_parser = speed)]
+    #[arg(long, value_name = "RPM,...", value_delimiter = ',', value_parser = parse_speed)]
     #[arg(allow_negative_numbers = true)]
     pub resonances: Vec<f64>,
 
@@ -58,7 +58,7 @@ pub struct WasherPlotArgs {
 /// # Errors
 /// Returns the errors of the engine's command, and an error for a map that no page can compute.
 pub(crate) fn run(args: &WasherPlotArgs) -> Result<Exit, Error> {
-    let live = args.live.then(|| live(&args.plot.file, &args.sliders)).transpose()?;
+    let live = args.live.then(|| build_live_part(&args.plot.file, &args.sliders)).transpose()?;
     let figures = WasherFigures {
         view: args.plot.view,
         channels: args.channels.clone(),
@@ -76,7 +76,7 @@ pub(crate) fn run(args: &WasherPlotArgs) -> Result<Exit, Error> {
     plot::draw(&args.plot, options, &figures)
 }
 
-fn speed(text: &str) -> Result<f64, String> {
+fn parse_speed(text: &str) -> Result<f64, String> {
     let speed = finite(text)?;
     if speed > 0.0 { Ok(speed) } else { Err("expected a speed above 0 rpm".to_owned()) }
 }

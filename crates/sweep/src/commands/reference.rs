@@ -20,7 +20,7 @@ use sweep_engine::store::{CellType, DeclaredColumn, Layout};
 use sweep_files::key;
 
 /// Returns the head of a page, with a comment that it is generated.
-fn head(title: &str) -> String {
+fn page_head(title: &str) -> String {
     format!("# {title}\n\n<!-- Made by crates/sweep/src/commands/reference.rs. -->\n\n")
 }
 
@@ -31,8 +31,8 @@ fn push_row(text: &mut String, cells: &[&str]) {
     let _ = writeln!(text, "| {} |", cells.join(" | "));
 }
 
-fn parameters() -> String {
-    let mut text = head("Parameters");
+fn parameters_page() -> String {
+    let mut text = page_head("Parameters");
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
     let all = MachineParameter::all(&with_one_of_each(), &spin);
     // The common source of derived parameters stands once, before the table.
@@ -57,7 +57,7 @@ fn parameters() -> String {
             continue;
         }
         let is_in_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
-        let none = if is_in_grid { "as the grid file says" } else { "none" };
+        let missing_text = if is_in_grid { "as the grid file says" } else { "none" };
         let has_source = value_of(name).is_some() || is_in_grid;
         let source = match parameter.source() {
             _ if !has_source => String::new(),
@@ -66,8 +66,9 @@ fn parameters() -> String {
         };
         let coordinate = description.strip_suffix("towards the door");
         let axes: &[&str] = if coordinate.is_some() { &["_x", "_y", "_z"] } else { &["_x"] };
-        let value =
-            |axis: &&str| value_of(&name.replacen("_x", axis, 1)).unwrap_or_else(|| none.into());
+        let value = |axis: &&str| {
+            value_of(&name.replacen("_x", axis, 1)).unwrap_or_else(|| missing_text.into())
+        };
         let mut values: Vec<String> = axes.iter().map(value).collect();
         if values.iter().all(|value| *value == values[0]) {
             values.truncate(1);
@@ -99,8 +100,8 @@ fn range_text(range: Range) -> String {
     }
 }
 
-fn methods() -> String {
-    let mut text = head("Methods of integration");
+fn methods_page() -> String {
+    let mut text = page_head("Methods of integration");
     text.push_str(
         "The `method` of `[integrator]`, with its keys. [Method and \
          accuracy](../method.md)\nsays which one to take.\n\n",
@@ -111,8 +112,9 @@ fn methods() -> String {
         let is_default = entry.name == crate::Washer::ABOUT.default_method().name;
         let name = format!("`{}`{}", entry.name, if is_default { ", the default" } else { "" });
         // Only the first key's row has the name and the description.
-        let heads = [[name.as_str(), entry.description]].into_iter().chain(iter::repeat([""; 2]));
-        for ([name, description], setting) in heads.zip(entry.settings) {
+        let first_cells =
+            [[name.as_str(), entry.description]].into_iter().chain(iter::repeat([""; 2]));
+        for ([name, description], setting) in first_cells.zip(entry.settings) {
             let key = format!("`{}`", setting.key);
             let default = format!("{:e}", setting.default);
             let values = range_text(setting.range);
@@ -122,8 +124,8 @@ fn methods() -> String {
     text
 }
 
-fn columns() -> String {
-    let mut text = head("Columns of a result file");
+fn columns_page() -> String {
+    let mut text = page_head("Columns of a result file");
     text.push_str(include_str!("reference/columns.txt"));
     let machine = Machine::paper();
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
@@ -163,13 +165,13 @@ fn columns() -> String {
             &[&name, criterion.amplitude_description(), criterion.ratio_description()],
         );
     }
-    let listed = |names: &mut dyn Iterator<Item = &'static str>| {
+    let join_names = |names: &mut dyn Iterator<Item = &'static str>| {
         names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
     };
     text.push_str(&format!(
         include_str!("reference/metrics.txt"),
-        metrics = listed(&mut Metric::ALL.iter().map(|metric| metric.name())),
-        statuses = listed(&mut ROW_STATUSES.into_iter()),
+        metrics = join_names(&mut Metric::ALL.iter().map(|metric| metric.name())),
+        statuses = join_names(&mut ROW_STATUSES.into_iter()),
     ));
     let columns = declared(dwell_columns::columns(&Channel::ALL, &Measures::default(), false));
     list_columns(&mut text, &Layout::map(Vec::new(), columns).schema());
@@ -184,13 +186,13 @@ fn list_columns(text: &mut String, columns: &Schema) {
         if !names.insert(name.clone()) {
             continue;
         }
-        let entry = |key: &str| field.metadata().get(key).map_or("", String::as_str);
-        let unit = match entry("unit") {
+        let metadata = |key: &str| field.metadata().get(key).map_or("", String::as_str);
+        let unit = match metadata("unit") {
             "1" => "",
             _ if name.ends_with("CHANNEL") => "the channel's unit",
             unit => unit,
         };
-        let [worse, limit] = [key::WORSE, key::LIMIT].map(entry);
+        let [worse, limit] = [key::WORSE, key::LIMIT].map(metadata);
         let facts = [("", unit), ("worse: ", worse), ("limit: ", limit)];
         let facts = facts.iter().filter(|(_, fact)| !fact.is_empty());
         let facts: Vec<String> = facts.map(|(label, fact)| format!("{label}{fact}")).collect();
@@ -198,7 +200,7 @@ fn list_columns(text: &mut String, columns: &Schema) {
             [] => String::new(),
             facts => format!(" ({})", facts.join(", ")),
         };
-        let description = generic_description(entry("description"));
+        let description = generic_description(metadata("description"));
         // Writing to a String cannot fail.
         let _ = writeln!(text, "- `{name}`{facts}: {description}");
     }
@@ -207,8 +209,8 @@ fn list_columns(text: &mut String, columns: &Schema) {
 /// Returns a column's name with CHANNEL and MODEL in place of the names of a channel and a model.
 fn generic_name(name: &str) -> String {
     let with_channel = Channel::ALL.iter().find_map(|channel| {
-        ["nonlinear_", "linear_", "ratio_", "dwell_", "periodic_"].into_iter().find_map(|before| {
-            (name.strip_prefix(before)? == channel.name()).then(|| format!("{before}CHANNEL"))
+        ["nonlinear_", "linear_", "ratio_", "dwell_", "periodic_"].into_iter().find_map(|prefix| {
+            (name.strip_prefix(prefix)? == channel.name()).then(|| format!("{prefix}CHANNEL"))
         })
     });
     with_channel
@@ -226,13 +228,13 @@ fn generic_description(description: &str) -> String {
     generic.replace("; null if it failed", "")
 }
 
-fn commands(program: clap::Command) -> String {
-    let mut text = head("Commands");
+fn commands_page(program: clap::Command) -> String {
+    let mut text = page_head("Commands");
     text.push_str("`sweep COMMAND --help` begins with examples of the command.\n\n");
     // The width of a terminal must not show in a file.
     let mut program = program.term_width(100);
     program.build();
-    let mut part = |title: &str, help: String, more: &str| {
+    let mut add_part = |title: &str, help: String, more: &str| {
         // The usage names the argument already.
         let help = help.replace("Arguments:\n  <GRID.toml>  Grid file\n\n", "");
         let help: Vec<&str> = help.lines().map(str::trim_end).collect();
@@ -242,27 +244,31 @@ fn commands(program: clap::Command) -> String {
     };
     // Examples are for a terminal.
     let program_help = program.clone().before_help(None::<&'static str>).render_help();
-    part("sweep", program_help.to_string().trim_start().into(), "");
+    add_part("sweep", program_help.to_string().trim_start().into(), "");
     let shared = shared_options(&program);
     let mut options = clap::Command::new("options").disable_help_flag(true).term_width(100);
     options = options.help_template("{options}").args(shared.clone());
-    part("Options of several commands", options.render_help().to_string(), "");
+    add_part("Options of several commands", options.render_help().to_string(), "");
     for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
-        let is_shared = |arg: &clap::Arg| shared.iter().any(|option| is_same(option, arg));
-        let longs = command
+        let is_shared = |arg: &clap::Arg| shared.iter().any(|option| is_same_option(option, arg));
+        let long_options = command
             .get_arguments()
             .filter(|arg| is_shared(arg))
             .filter_map(|arg| arg.get_long().map(|long| format!("`--{long}`")));
-        let longs: Vec<String> = longs.collect();
-        let more = if longs.is_empty() {
+        let long_options: Vec<String> = long_options.collect();
+        let more = if long_options.is_empty() {
             String::new()
         } else {
-            format!("\nAlso {}: [above](#options-of-several-commands).\n", longs.join(", "))
+            format!("\nAlso {}: [above](#options-of-several-commands).\n", long_options.join(", "))
         };
         let is_hidden = |arg: &clap::Arg| is_shared(arg) || arg.get_long() == Some("help");
-        let mut alone = command.clone().before_help(None::<&'static str>);
-        alone = alone.mut_args(|arg| if is_hidden(&arg) { arg.hide(true) } else { arg });
-        part(&format!("sweep {}", command.get_name()), alone.render_help().to_string(), &more);
+        let mut own_help = command.clone().before_help(None::<&'static str>);
+        own_help = own_help.mut_args(|arg| if is_hidden(&arg) { arg.hide(true) } else { arg });
+        add_part(
+            &format!("sweep {}", command.get_name()),
+            own_help.render_help().to_string(),
+            &more,
+        );
     }
     text.truncate(text.trim_end().len());
     text.push('\n');
@@ -270,7 +276,7 @@ fn commands(program: clap::Command) -> String {
 }
 
 /// Whether two arguments are the same option with the same help.
-fn is_same(a: &clap::Arg, b: &clap::Arg) -> bool {
+fn is_same_option(a: &clap::Arg, b: &clap::Arg) -> bool {
     let help = |arg: &clap::Arg| arg.get_help().map(ToString::to_string);
     a.get_long().is_some() && a.get_long() == b.get_long() && help(a) == help(b)
 }
@@ -280,8 +286,9 @@ fn shared_options(program: &clap::Command) -> Vec<clap::Arg> {
     let visible = || program.get_subcommands().filter(|command| !command.is_hide_set());
     let mut shared: Vec<clap::Arg> = Vec::new();
     for arg in visible().flat_map(clap::Command::get_arguments) {
-        let times = visible().flat_map(clap::Command::get_arguments).filter(|a| is_same(a, arg));
-        let is_known = shared.iter().any(|known| is_same(known, arg));
+        let times =
+            visible().flat_map(clap::Command::get_arguments).filter(|a| is_same_option(a, arg));
+        let is_known = shared.iter().any(|known| is_same_option(known, arg));
         if arg.get_long() != Some("help") && !is_known && times.count() > 2 {
             shared.push(arg.clone());
         }
@@ -293,10 +300,10 @@ fn shared_options(program: &clap::Command) -> Vec<clap::Arg> {
 #[test]
 fn the_guide_has_these_pages() {
     let pages = [
-        ("parameters", parameters()),
-        ("methods", methods()),
-        ("columns", columns()),
-        ("commands", commands(command())),
+        ("parameters", parameters_page()),
+        ("methods", methods_page()),
+        ("columns", columns_page()),
+        ("commands", commands_page(command())),
     ];
     for (page, generated) in pages {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference");

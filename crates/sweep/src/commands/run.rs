@@ -38,22 +38,27 @@ pub(crate) fn run(args: &WasherRunArgs) -> Result<Exit, Error> {
         return Err(Error::option("--keep-traces", given, expected));
     }
     let interrupt = install_interrupt()?;
-    let options = if args.keep_traces { " --keep-traces" } else { "" };
-    let report =
-        execute(&args.run, &plan, &engine.for_plan(&plan).into_engine(), &interrupt, options)?;
+    let further_options = if args.keep_traces { " --keep-traces" } else { "" };
+    let report = execute(
+        &args.run,
+        &plan,
+        &engine.for_plan(&plan).into_engine(),
+        &interrupt,
+        further_options,
+    )?;
     let output = args.run.target.output(&plan);
     if args.keep_traces && matches!(report.end, RunEnd::Already(..) | RunEnd::Finished(_)) {
         let threads = threads::count(args.run.work.execution.threads, &threads::process)?;
         let folder = files::beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
         let progress = Progress::new(args.run.work.execution.progress, plan.points(), 0);
-        let kept = AtomicU64::new(0);
-        let done = || progress.show(kept.fetch_add(1, Ordering::Relaxed) + 1);
+        let traced_points = AtomicU64::new(0);
+        let count_point = || progress.show(traced_points.fetch_add(1, Ordering::Relaxed) + 1);
         let map = ParquetFile::open(&output)?;
         let cancel = Cancel::Flag(interrupt.flag());
-        let ended = write_point_traces(&engine, &map, &folder, threads, cancel, &done);
+        let result = write_point_traces(&engine, &map, &folder, threads, cancel, &count_point);
         progress.finish();
-        ended?;
+        result?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");
             return Ok(Exit::interrupted(Some(signal)));

@@ -9,10 +9,10 @@ use washer_row::Metric;
 
 /// The additions of this model to the engine's `sweep show`.
 pub(super) const MODEL_SUMMARY: ModelSummary<'static> =
-    ModelSummary { lines: &lines, is_metric_column };
+    ModelSummary { lines: &summary_lines, is_metric_column };
 
 /// Returns the lines of the summary of a file about held speeds, each with its name.
-fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
+fn summary_lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     Ok(match file.kind() {
         Some(FileKind::Stability) => tongues::summarise(file)?.lines(),
         Some(FileKind::Dwell) => dwell::summary::lines(file)?,

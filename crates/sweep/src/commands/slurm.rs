@@ -63,11 +63,11 @@ fn parse_word(text: &str) -> Result<String, String> {
 /// path, and if standard output cannot be written.
 pub(crate) fn run(args: &SlurmArgs) -> Result<Exit, Error> {
     let plan: Plan = args.target.grid.load()?;
-    let no_path = |what: &'static str| {
-        move |source| Error::File { action: "find the path of", path: what.into(), source }
+    let path_error = |description: &'static str| {
+        move |source| Error::File { action: "find the path of", path: description.into(), source }
     };
-    let folder = std::env::current_dir().map_err(no_path("the working folder"))?;
-    let program = std::env::current_exe().map_err(no_path("this program"))?;
+    let folder = std::env::current_dir().map_err(path_error("the working folder"))?;
+    let program = std::env::current_exe().map_err(path_error("this program"))?;
     check_names(args, &folder, &program)?;
     idle_shards(plan.points(), args.shards).iter().for_each(|note| tell(note));
     if args.shards > MAX_ARRAY_TASKS {
@@ -76,7 +76,7 @@ pub(crate) fn run(args: &SlurmArgs) -> Result<Exit, Error> {
              MaxArraySize); more --cpus-per-task need fewer shards",
         );
     }
-    print(&script(args, &plan, &folder, &program))
+    print(&format_script(args, &plan, &folder, &program))
 }
 
 /// Checks that a script can hold all names. A line break in one would end a here-document early,
@@ -92,7 +92,7 @@ fn check_names(args: &SlurmArgs, folder: &Path, program: &Path) -> Result<(), Er
         ("the working folder", Some(folder)),
         ("the path of this program", Some(program)),
     ];
-    let paths = paths.into_iter().filter_map(|(what, path)| Some((what, path?.as_os_str())));
+    let paths = paths.into_iter().filter_map(|(name, path)| Some((name, path?.as_os_str())));
     let sets = grid.sets.iter().map(|set| ("--set", OsStr::new(set)));
     let at = grid.at.iter().map(|at| ("--at", OsStr::new(at)));
     for (option, name) in paths.chain(sets).chain(at) {
@@ -105,14 +105,14 @@ fn check_names(args: &SlurmArgs, folder: &Path, program: &Path) -> Result<(), Er
 }
 
 /// Returns the script, which submits the array and the merge that waits for it.
-fn script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -> String {
+fn format_script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -> String {
     let output = args.target.output(plan);
     let results = match output.parent() {
         Some(parent) if parent != Path::new("") => parent.to_path_buf(),
         _ => PathBuf::from("."),
     };
     // sbatch reads % as the start of a field.
-    let log = |field: &str| {
+    let log_pattern = |field: &str| {
         let stem = results.join(&plan.name).display().to_string().replace('%', "%%");
         quoted_pattern(&format!("{stem}.slurm-{field}.log"))
     };
@@ -120,11 +120,14 @@ fn script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -> Strin
     let program = quoted(&program.display().to_string());
     let command = |verb: &str| args.target.command(verb).replacen("sweep", &program, 1);
     let SlurmArgs { time, partition, account, mem, .. } = args;
-    let named = [("time", time), ("partition", partition), ("account", account), ("mem", mem)];
-    let named = named.into_iter().filter_map(|(option, value)| Some((option, value.as_ref()?)));
-    let named = named.map(|(option, value)| format!(" --{option}={}", quoted(value)));
-    let others = args.sbatch.iter().map(|option| format!(" {}", quoted(option)));
-    let common: String = named.chain(others).collect();
+    let named_options =
+        [("time", time), ("partition", partition), ("account", account), ("mem", mem)];
+    let named_options =
+        named_options.into_iter().filter_map(|(option, value)| Some((option, value.as_ref()?)));
+    let named_options =
+        named_options.map(|(option, value)| format!(" --{option}={}", quoted(value)));
+    let further_options = args.sbatch.iter().map(|option| format!(" {}", quoted(option)));
+    let common: String = named_options.chain(further_options).collect();
     format!(
         include_str!("slurm.sh"),
         name = quoted(&plan.name),
@@ -132,8 +135,8 @@ fn script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -> Strin
         results = quoted(&results.display().to_string()),
         shards = args.shards,
         cpus = args.cpus_per_task,
-        array_log = log("%A_%a"),
-        merge_log = log("merge-%j"),
+        array_log = log_pattern("%A_%a"),
+        merge_log = log_pattern("merge-%j"),
         run = command("run"),
         merge = command("merge"),
         common = common,
@@ -155,13 +158,13 @@ mod tests {
     use super::*;
 
     #[derive(clap::Parser)]
-    struct Line {
+    struct SlurmCli {
         #[command(flatten)]
         args: SlurmArgs,
     }
 
     fn parse(words: &[&str]) -> Result<SlurmArgs, clap::Error> {
-        Line::try_parse_from([&["slurm"], words].concat()).map(|line| line.args)
+        SlurmCli::try_parse_from([&["slurm"], words].concat()).map(|line| line.args)
     }
 
     /// Runs a script, with a program in place of sbatch that records its calls. Returns the lines
@@ -171,11 +174,11 @@ mod tests {
         let bin = home.join("bin");
         std::fs::create_dir_all(&bin).unwrap();
         let calls = home.join("calls");
-        let fake = format!(
+        let fake_sbatch = format!(
             "#!/bin/sh\nprintf '%s\\n' \"$@\" >> {0}\ncat >> {0}\necho '17;cluster'\n",
             calls.display()
         );
-        std::fs::write(bin.join("sbatch"), fake).unwrap();
+        std::fs::write(bin.join("sbatch"), fake_sbatch).unwrap();
         std::fs::set_permissions(
             bin.join("sbatch"),
             std::os::unix::fs::PermissionsExt::from_mode(0o755),
@@ -221,7 +224,7 @@ mod tests {
         ])
         .unwrap();
         let plan = args.target.grid.load().unwrap();
-        let script = script(&args, &plan, home.path(), Path::new("/opt/my sweep"));
+        let script = format_script(&args, &plan, home.path(), Path::new("/opt/my sweep"));
         let (calls, output) = run_script(&script, &["--array=3,7"], home.path());
         assert_eq!(output, "array 17, merge 17\n");
         let position = |expected: &str| {
@@ -255,19 +258,19 @@ mod tests {
     #[test]
     fn names_with_line_breaks_are_refused() {
         use std::os::unix::ffi::OsStrExt;
-        let fits = |words: &[&str], folder: &[u8], program: &str| {
+        let is_accepted = |words: &[&str], folder: &[u8], program: &str| {
             let args = parse(&[words, &["--shards", "2"]].concat()).unwrap();
             check_names(&args, Path::new(OsStr::from_bytes(folder)), Path::new(program)).is_ok()
         };
-        assert!(fits(&["it's $(a) `grid`.toml", "--out", "ü x.parquet"], b"/a b", "/sweep"));
+        assert!(is_accepted(&["it's $(a) `grid`.toml", "--out", "ü x.parquet"], b"/a b", "/sweep"));
         let out = "x\nEND\ntouch /tmp/out\n.toml";
-        assert!(!fits(&[out], b"/", "/sweep"));
-        assert!(!fits(&["g.toml", "--out", out], b"/", "/sweep"));
-        assert!(!fits(&["g.toml", "--set", out], b"/", "/sweep"));
-        assert!(!fits(&["g.toml"], out.as_bytes(), "/sweep"));
-        assert!(!fits(&["g.toml"], b"/", out));
-        assert!(!fits(&["g.toml"], b"/\xff", "/sweep"), "a lossy name is another one");
-        assert!(!fits(&["g.toml", "--out", "a\r.parquet"], b"/", "/sweep"));
+        assert!(!is_accepted(&[out], b"/", "/sweep"));
+        assert!(!is_accepted(&["g.toml", "--out", out], b"/", "/sweep"));
+        assert!(!is_accepted(&["g.toml", "--set", out], b"/", "/sweep"));
+        assert!(!is_accepted(&["g.toml"], out.as_bytes(), "/sweep"));
+        assert!(!is_accepted(&["g.toml"], b"/", out));
+        assert!(!is_accepted(&["g.toml"], b"/\xff", "/sweep"), "a lossy name is another one");
+        assert!(!is_accepted(&["g.toml", "--out", "a\r.parquet"], b"/", "/sweep"));
     }
 
     #[test]

@@ -75,11 +75,11 @@ pub struct TraceArgs {
 /// Returns an error for mistakes in the grid file or the options, for a machine without
 /// equilibrium, and if the file cannot be written.
 pub(crate) fn run(args: &TraceArgs) -> Result<Exit, Error> {
-    let chosen = if args.all { Vec::new() } else { choose_point(args)? };
+    let point_values = if args.all { Vec::new() } else { choose_point(args)? };
     let (plan, parameters) = match args.all {
         true => (args.grid.load()?, None),
         false => {
-            let (plan, parameters) = args.grid.load_point(&chosen)?;
+            let (plan, parameters) = args.grid.load_point(&point_values)?;
             (plan, Some(parameters))
         }
     };
@@ -90,17 +90,17 @@ pub(crate) fn run(args: &TraceArgs) -> Result<Exit, Error> {
     let output = Output::begin(&args.out, FileKind::Trace)?;
     let settings = TraceSettings { every_s, models, start, extras, capped: None };
     // A signal ends the process, because there are no partial results to keep.
-    let traced =
+    let trace_table =
         trace_in_pool(&plan, parameters, &settings, Cancel::Never).map_err(Error::model)?;
-    let TraceTable { table, instants, failures, method } = traced;
+    let TraceTable { table, instants, failures, method } = trace_table;
     failures.iter().for_each(|failure| tell(failure));
     output.finish(&table.into_bytes(&args.out)?)?;
     let points = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
     let out = args.out.display();
     tell(&format!("wrote {out}: {instants} instants{points} from 0 to {} s", plan.end_s));
-    // The row of a map has both models, which start at equilibrium.
+    // A row is comparable only with a trace of both models that start at equilibrium.
     if args.start.is_empty() && !args.all && models == Models::Both {
-        tell(summarise_row(&plan, &chosen, method)?.trim_end());
+        tell(summarise_row(&plan, &point_values, method)?.trim_end());
     }
     Ok(Exit::Done)
 }
@@ -128,23 +128,23 @@ fn choose_point(args: &TraceArgs) -> Result<Vec<String>, Error> {
 /// Returns the point of the grid's result at which a column is worst, and the bad direction of that
 /// column.
 fn find_worst(args: &TraceArgs, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> {
-    let default = || PathBuf::from(format!("results/{}.parquet", plan.name));
-    let path = args.result.clone().unwrap_or_else(default);
-    let refused = |expected: String| Error::option("--worst", column, expected);
+    let default_path = || PathBuf::from(format!("results/{}.parquet", plan.name));
+    let path = args.result.clone().unwrap_or_else(default_path);
+    let refuse = |expected: String| Error::option("--worst", column, expected);
     if !path.exists() {
-        let run = format!("`sweep run {}`", quoted(&args.grid.grid.display().to_string()));
-        let expected = format!("a result at {} (--result); {run} makes it", path.display());
-        return Err(refused(expected));
+        let run_command = format!("`sweep run {}`", quoted(&args.grid.grid.display().to_string()));
+        let expected = format!("a result at {} (--result); {run_command} makes it", path.display());
+        return Err(refuse(expected));
     }
     let file = ResultTable::open(&path)?;
     let hash = Job::new(plan).hash().to_hex().to_string();
     if file.file().value(key::PLAN_HASH) != Some(hash.as_str()) {
         let expected = format!("a result of this very grid, which {} is not", path.display());
-        return Err(refused(expected));
+        return Err(refuse(expected));
     }
-    let worse = file.column(column).map_or(Some(Worse::Greater), |known| known.metadata.worse);
+    let worse = file.column(column).map_or(Some(Worse::Greater), |info| info.metadata.worse);
     let worse = worse.ok_or_else(|| {
-        refused(format!(
+        refuse(format!(
             "a column that is bad one way, which {column} is not: --point takes the number of any \
              row"
         ))
@@ -152,7 +152,7 @@ fn find_worst(args: &TraceArgs, plan: &Plan, column: &str) -> Result<(u64, Worse
     let rows = top(&file, &["point", column], None, Some((column, worse)), 1)?;
     match rows.first().map(Vec::as_slice) {
         Some([Cell::Number(point), Cell::Number(_)]) => Ok((*point as u64, worse)),
-        _ => Err(refused(format!("a column that has values in {}", path.display()))),
+        _ => Err(refuse(format!("a column that has values in {}", path.display()))),
     }
 }
 
@@ -172,14 +172,15 @@ fn summarise_row(
     let channels = &compared_channels(&plan);
     let limits = plan.reliability.limits;
     let verdict = row.verdict();
-    let number = |column: &str| row.number(column).map_or_else(|| "none".to_owned(), format_number);
-    let line = |channel: &Channel| {
+    let format_column =
+        |column: &str| row.number(column).map_or_else(|| "none".to_owned(), format_number);
+    let channel_line = |channel: &Channel| {
         let name = channel.name();
-        let numbers =
-            ["nonlinear", "linear", "ratio"].map(|prefix| number(&format!("{prefix}_{name}")));
+        let numbers = ["nonlinear", "linear", "ratio"]
+            .map(|prefix| format_column(&format!("{prefix}_{name}")));
         [vec![name.to_owned(), channel.unit().to_owned()], numbers.to_vec()].concat()
     };
-    let lines: Vec<Vec<String>> = channels.iter().map(line).collect();
+    let lines: Vec<Vec<String>> = channels.iter().map(channel_line).collect();
     let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
     let window = format_range(plan.window_s, format_number);
     let amplitude = plan.model.measures.criterion.amplitude_description();
@@ -187,35 +188,37 @@ fn summarise_row(
     let mut text =
         format!("{amplitude}, {window} s{point}:\n{}", format_table(&headings, &lines, ""));
     // The decisive ratio is one that is beyond its limit, or else the greatest.
-    let too_low = limits.lower.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
-    let decisive = match (verdict.greatest, too_low) {
+    let least_below_limit =
+        limits.lower.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
+    let decisive = match (verdict.greatest, least_below_limit) {
         (Some((_, ratio)), Some((limit, least))) if ratio < limits.upper => {
             Some((least, "least", limit))
         }
         (greatest, _) => greatest.map(|greatest| (greatest, "greatest", limits.upper)),
     };
     let verdict_text = match (verdict.reliable, decisive) {
-        (Some(reliable), Some(((channel, ratio), which, limit))) => {
+        (Some(reliable), Some(((channel, ratio), extreme_name, limit))) => {
             let word = if reliable { "reliable" } else { "not reliable" };
             let channel = channels[channel].name();
             let ratio = format_number(ratio);
             let limit = format_number(limit);
-            format!("{word}: the {which} ratio is {ratio} ({channel}), the limit {limit}")
+            format!("{word}: the {extreme_name} ratio is {ratio} ({channel}), the limit {limit}")
         }
         _ => "undefined: no ratio is defined".to_owned(),
     };
     text.line("verdict", &verdict_text);
     if let Some(trace_method) = trace_method.filter(|_| direct(&plan.integrator).is_none()) {
         let method = row.name("method").unwrap_or_default();
-        let trace = trace_method.name();
-        let methods = format!("{method}, as in the point's row of a map; the file: {trace}");
+        let trace_name = trace_method.name();
+        let methods = format!("{method}, as in the point's row of a map; the file: {trace_name}");
         text.line("method", methods);
     }
     if row.flag("sensitive") == Some(true) {
         text.line("sensitive", "chaotic: the digits are those of one trajectory");
     }
-    let gaps = MODELS.map(|model| number(&format!("min_gap_{model}_m")));
-    let gap_text = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
+    let least_gaps = MODELS.map(|model| format_column(&format!("min_gap_{model}_m")));
+    let gap_text =
+        format!("{} m nonlinear, {} m linear, over the whole run", least_gaps[0], least_gaps[1]);
     text.line("least gap", &gap_text);
     Ok(text)
 }

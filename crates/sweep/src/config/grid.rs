@@ -24,7 +24,7 @@ pub(super) const DEFAULT_MACHINE: &str = "paper";
 const MAX_PATH_CHARS: usize = 1000;
 
 /// Names of machines that need no file.
-const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
+const BUILT_IN_MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 
 /// Reads or describes the key `machine`. The machine may also be given with the input instead of in
 /// a file.
@@ -62,7 +62,7 @@ fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
             let expected =
                 format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
             let refusal = Diagnostic::new(title).at_location(&name.location, expected);
-            report.push(refusal.nearest(name.value, MACHINES));
+            report.push(refusal.nearest(name.value, BUILT_IN_MACHINES));
             Machine::paper()
         }
     }

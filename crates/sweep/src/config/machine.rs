@@ -31,7 +31,7 @@ struct MachineSection {
     occurrence: Occurrence,
     /// A function that returns the number of the machine's elements in the section.
     count: fn(&Machine) -> usize,
-    /// A function that gives a machine this number of elements, whose optional numbers are omitted.
+    /// A function that gives a machine a number of elements, whose optional numbers are omitted.
     fill: fn(&mut Machine, usize),
 }
 
@@ -86,11 +86,11 @@ static KEYS: LazyLock<Vec<Vec<MachineKey>>> = LazyLock::new(|| {
             .into_iter()
             .for_each(|(rest, k)| names[k].push((rest.to_owned(), parameter.default_value())));
     }
-    SECTIONS.iter().zip(names).map(|(section, names)| section.keys(&names)).collect()
+    SECTIONS.iter().zip(names).map(|(section, names)| section.build_keys(&names)).collect()
 });
 
 /// Returns the name of a parameter without its component.
-fn stem(name: &str) -> String {
+fn without_component(name: &str) -> String {
     let is_component = |word: &&str| ["x", "y", "z", "11", "22", "33"].contains(word);
     name.split('_').filter(|word| !is_component(word)).collect::<Vec<_>>().join("_")
 }
@@ -99,24 +99,26 @@ impl MachineSection {
     /// Returns the keys of the section's parameters in the order in which they are written:
     /// numbers, arrays, and optional ones. `names` has the names without the prefix, with their
     /// defaults.
-    fn keys(&self, names: &[(String, Option<f64>)]) -> Vec<MachineKey> {
+    fn build_keys(&self, names: &[(String, Option<f64>)]) -> Vec<MachineKey> {
         let key = |names: &[(String, Option<f64>)]| {
             let (first, value) = &names[0];
-            let stem = stem(first);
+            let name_without_component = without_component(first);
             let name = match names.len() {
                 1 => first.clone(),
                 // The position of a foot has the element's name, unlike that of other elements.
-                _ if first.starts_with("x_") => format!("{}{stem}", self.prefix),
-                _ => stem,
+                _ if first.starts_with("x_") => format!("{}{name_without_component}", self.prefix),
+                _ => name_without_component,
             };
             let optional = OPTIONAL.iter().find(|(known, _)| *known == name);
-            let by_table = value.map_or(IfOmitted::Refused, IfOmitted::Default);
-            let if_omitted = optional.map_or(by_table, |(_, if_omitted)| *if_omitted);
+            let table_default = value.map_or(IfOmitted::Refused, IfOmitted::Default);
+            let if_omitted = optional.map_or(table_default, |(_, if_omitted)| *if_omitted);
             let parameters = names.iter().map(|(name, _)| name.clone()).collect();
             MachineKey { name, parameters, if_omitted }
         };
-        let mut keys: Vec<MachineKey> =
-            names.chunk_by(|(a, _), (b, _)| stem(a) == stem(b)).map(key).collect();
+        let mut keys: Vec<MachineKey> = names
+            .chunk_by(|(a, _), (b, _)| without_component(a) == without_component(b))
+            .map(key)
+            .collect();
         keys.sort_by_key(|key| (key.if_omitted != IfOmitted::Refused, key.is_vector()));
         keys
     }
@@ -192,7 +194,7 @@ impl MachineKey {
 }
 
 /// Returns a section that every file has once.
-fn once(name: &'static str) -> MachineSection {
+fn single_section(name: &'static str) -> MachineSection {
     let prefix = match name {
         "" => String::new(),
         _ => format!("{}_", name.trim_end_matches('s')),
@@ -220,8 +222,9 @@ static SECTIONS: LazyLock<Vec<MachineSection>> = LazyLock::new(|| {
         let occurrence = Occurrence::Many(first);
         MachineSection { name, prefix: format!("{element}_"), occurrence, count, fill }
     };
-    let once = ["", "tub", "shaft", "drum", "unbalance", "flexure", "bearings"].map(once);
-    once.into_iter().chain([cabinet]).chain(ElementList::all().map(to_section)).collect()
+    let single_sections =
+        ["", "tub", "shaft", "drum", "unbalance", "flexure", "bearings"].map(single_section);
+    single_sections.into_iter().chain([cabinet]).chain(ElementList::all().map(to_section)).collect()
 });
 
 /// Maximum number of elements in a list. Basis: far above real machines, and a run stays fast with
@@ -312,7 +315,9 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                     .table(table, |keys| section.walk(section_keys, 0, machine, &mut sheet, keys));
                 if !is_needed && matches!(field, Field::Absent) && keys.section().is_some() {
                     let names = section_keys.iter().flat_map(|key| key.names(&section.prefix));
-                    sheet.omitted.extend(names.filter_map(|name| find_parameter(&name, machine)));
+                    sheet
+                        .omitted_parameters
+                        .extend(names.filter_map(|name| find_parameter(&name, machine)));
                     continue;
                 }
                 if let (None, Some(report)) =
@@ -355,7 +360,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
         // With the built-in machine's springs later checks do not report this mistake again.
         machine.springs = Machine::paper().springs;
     }
-    let planes = std::mem::take(&mut sheet.planes);
+    let planes = std::mem::take(&mut sheet.plane_positions);
     if sheet.is_given {
         sheet.fill_omitted(machine, root);
     }
@@ -429,7 +434,7 @@ impl MachineKey {
         let key = keys::Key::new(&self.name, &description);
         let key = if is_needed { key.required(&expected) } else { key };
         let mut value = match self.if_omitted {
-            _ if !keys.is_schema() => self.json(section, k, machine),
+            _ if !keys.is_schema() => self.file_value(section, k, machine),
             IfOmitted::Auto => AUTO.into(),
             IfOmitted::Default(default) if !self.is_vector() => default.into(),
             _ => Value::Null,
@@ -448,14 +453,14 @@ impl MachineKey {
                 }
             }
             Field::Absent if has_plane => {}
-            Field::Absent if is_assumed => sheet.omitted.extend(parameters),
+            Field::Absent if is_assumed => sheet.omitted_parameters.extend(parameters),
             Field::Absent if !is_needed => {}
             Field::Absent | Field::Rejected => mark_doubtful(names, report),
         }
     }
 
     /// Returns the value of the key in a file of the machine; null if the file omits it.
-    fn json(&self, section: &MachineSection, k: usize, machine: &Machine) -> Value {
+    fn file_value(&self, section: &MachineSection, k: usize, machine: &Machine) -> Value {
         match self.written_values(section, k, machine) {
             Some(values) if self.is_vector() => values.into(),
             Some(values) => values[0].into(),
@@ -485,7 +490,7 @@ fn parameter_value(name: &str, machine: &Machine) -> Option<f64> {
 /// Returns the text of a machine file, in which each number has its description and source. A
 /// number that no file gave has the source of the built-in machine's number. The text reads back to
 /// the same machine, bit for bit.
-pub(crate) fn to_toml(machine: &Machine, written: &NumberSources) -> String {
+pub(crate) fn to_toml(machine: &Machine, sources: &NumberSources) -> String {
     let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the \
                     bearings before loading: x along the\n\
          # drum axis towards the door, y up, z sideways. Inertia about each body's own mass \
@@ -505,7 +510,7 @@ pub(crate) fn to_toml(machine: &Machine, written: &NumberSources) -> String {
                 false => format!("{} = {:?}", key.name, values[0]),
             };
             let names = key.names(&section.prefix(k));
-            let user_source = written.source(&names);
+            let user_source = sources.source(&names);
             let has_comment = user_source.is_some() || key.if_omitted == IfOmitted::Refused;
             match find_parameter(&names[0], machine).filter(|_| has_comment) {
                 Some(first) => {

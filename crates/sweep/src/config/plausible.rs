@@ -29,12 +29,14 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
         let is_written_once =
             written.contains_key(parameter.name()) && !parameter.target().has_several_numbers();
         if let Some(value) = parameter.get(machine, spin).filter(|_| is_written_once) {
-            notes.extend(unusual_note(&parameter, value));
+            notes.extend(find_unusual_note(&parameter, value));
         }
     }
     for axis in &plan.axes {
         let ends = axis.values.extremes();
-        notes.extend(ends.into_iter().find_map(|end| unusual_note(&axis.parameter.handle, end)));
+        notes.extend(
+            ends.into_iter().find_map(|end| find_unusual_note(&axis.parameter.handle, end)),
+        );
     }
     let unbalance_kg = machine.unbalance.mass_kg;
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
@@ -45,16 +47,16 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
             decimal(moving_kg)
         ));
     }
-    let further = notes.len().saturating_sub(MAX_NOTES);
+    let omitted_count = notes.len().saturating_sub(MAX_NOTES);
     notes.into_iter().take(MAX_NOTES).for_each(|note| draft.report.add_note(note));
-    if further > 0 {
-        draft.report.add_note(format!("{further} more numbers are as unusual"));
+    if omitted_count > 0 {
+        draft.report.add_note(format!("{omitted_count} more numbers are as unusual"));
     }
 }
 
 /// Returns a note if a parameter's value is unusual.
-fn unusual_note(parameter: &MachineParameter, value: f64) -> Option<String> {
-    let usual = usual_range(parameter)?;
+fn find_unusual_note(parameter: &MachineParameter, value: f64) -> Option<String> {
+    let usual = find_usual_range(parameter)?;
     let [least, greatest] = usual.bounds;
     let is_usual = |value: f64| value == 0.0 || (least..=greatest).contains(&value.abs());
     if is_usual(value) {
@@ -65,55 +67,55 @@ fn unusual_note(parameter: &MachineParameter, value: f64) -> Option<String> {
     let shown = decimal(value);
     let range = format!("machines have {} to {}", decimal(least), decimal(greatest));
     // In the unit that was meant the number is usual, such as 10 mm for a clearance of "10" m.
-    let unit_meant = usual.mistaken_units.iter().find(|(_, size)| is_usual(value * size));
-    let conversion = unit_meant.map(|(other, size)| {
-        format!(": {shown} {other} would be {} {unit}", decimal(rounded(value * size)))
+    let intended_unit = usual.mistaken_units.iter().find(|(_, size)| is_usual(value * size));
+    let conversion = intended_unit.map(|(other, size)| {
+        format!(": {shown} {other} would be {} {unit}", decimal(round_to_6_digits(value * size)))
     });
     let conversion = conversion.unwrap_or_default();
     Some(format!("unusual: {name} = {shown} {unit}, {range}{conversion}"))
 }
 
 /// Returns a number of at most six digits, for a message.
-fn rounded(value: f64) -> f64 {
+fn round_to_6_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 /// Units of mass in place of kg.
-const MASSES: &[(&str, f64)] = &[("g", 1e-3)];
+const MASS_UNITS: &[(&str, f64)] = &[("g", 1e-3)];
 /// Units of length in place of m.
-const LENGTHS: &[(&str, f64)] = &[("mm", 1e-3), ("cm", 1e-2)];
+const LENGTH_UNITS: &[(&str, f64)] = &[("mm", 1e-3), ("cm", 1e-2)];
 /// Units of stiffness in place of N/m.
-const STIFFNESSES: &[(&str, f64)] = &[("N/mm", 1e3), ("kN/m", 1e3)];
+const STIFFNESS_UNITS: &[(&str, f64)] = &[("N/mm", 1e3), ("kN/m", 1e3)];
 /// Units of damping in place of N s/m.
-const DAMPINGS: &[(&str, f64)] = &[("N s/mm", 1e3)];
+const DAMPING_UNITS: &[(&str, f64)] = &[("N s/mm", 1e3)];
 /// Units of moments of inertia in place of kg m^2.
-const INERTIAS: &[(&str, f64)] = &[("kg mm^2", 1e-6), ("g m^2", 1e-3)];
+const INERTIA_UNITS: &[(&str, f64)] = &[("kg mm^2", 1e-6), ("g m^2", 1e-3)];
 /// Units of time in place of s.
-const TIMES: &[(&str, f64)] = &[("ms", 1e-3)];
+const TIME_UNITS: &[(&str, f64)] = &[("ms", 1e-3)];
 
 /// Returns the usual range of a parameter, if it has one: from the smallest toy to the largest
 /// washer-extractor (about 400 kg of laundry), widened by a factor of about three on both sides.
 /// With a greater factor grams would be accepted as kilograms.
-fn usual_range(parameter: &MachineParameter) -> Option<UsualRange> {
+fn find_usual_range(parameter: &MachineParameter) -> Option<UsualRange> {
     let name = parameter.name();
     let name_contains = |word: &str| name.contains(word);
     let (bounds, mistaken_units) = match parameter.unit() {
-        "kg" if name_contains("unbalance") => ([1e-6, 100.0], MASSES),
-        "kg" if name_contains("tub") => ([0.3, 1e4], MASSES),
-        "kg" if name_contains("cabinet") => ([1.0, 1e5], MASSES),
-        "kg" => ([0.1, 3e3], MASSES),
-        "m" if name_contains("clearance") => ([1e-4, 0.3], LENGTHS),
-        "m" if name_contains("softness") => ([1e-7, 0.03], LENGTHS),
-        "m" => ([0.0, 5.0], LENGTHS),
-        "N/m" if name_contains("bearing") => ([1e5, 1e12], STIFFNESSES),
-        "N/m" => ([30.0, 1e9], STIFFNESSES),
-        "N s/m" => ([1.0, 1e6], DAMPINGS),
+        "kg" if name_contains("unbalance") => ([1e-6, 100.0], MASS_UNITS),
+        "kg" if name_contains("tub") => ([0.3, 1e4], MASS_UNITS),
+        "kg" if name_contains("cabinet") => ([1.0, 1e5], MASS_UNITS),
+        "kg" => ([0.1, 3e3], MASS_UNITS),
+        "m" if name_contains("clearance") => ([1e-4, 0.3], LENGTH_UNITS),
+        "m" if name_contains("softness") => ([1e-7, 0.03], LENGTH_UNITS),
+        "m" => ([0.0, 5.0], LENGTH_UNITS),
+        "N/m" if name_contains("bearing") => ([1e5, 1e12], STIFFNESS_UNITS),
+        "N/m" => ([30.0, 1e9], STIFFNESS_UNITS),
+        "N s/m" => ([1.0, 1e6], DAMPING_UNITS),
         "N" => ([0.1, 2e4], &[][..]),
-        "kg m^2" => ([1e-5, 1e4], INERTIAS),
+        "kg m^2" => ([1e-5, 1e4], INERTIA_UNITS),
         "N m/rad" => ([10.0, 1e11], &[][..]),
         "rpm" => ([0.0, 5e3], &[][..]),
         "s" if parameter.target() == Target::Spin && !name_contains("table") => {
-            ([0.05, 7200.0], TIMES)
+            ([0.05, 7200.0], TIME_UNITS)
         }
         _ => return None,
     };

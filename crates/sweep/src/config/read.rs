@@ -1,4 +1,4 @@
-//! The washing machine in grid files.
+//! The keys of the washing machine in grid files.
 
 use std::path::Path;
 
@@ -31,8 +31,8 @@ pub(crate) fn walk_top(washer: &mut Washer, keys: &mut Keys<'_>, input: Option<&
 
 /// Walks over the criterion in `[reliability]`.
 pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
-    let misplaced = "it belongs at the top of the file, before the first [section]";
-    keys.misplace(&["metrics"], misplaced);
+    let reason = "it belongs at the top of the file, before the first [section]";
+    keys.misplace(&["metrics"], reason);
     let description = "amplitudes by which the models are compared: largest deviations, the same \
                  turn by turn of the drum, or root mean squares";
     let criterion = &mut measures.criterion;

@@ -11,11 +11,11 @@ use sweep_engine::config::source::beside;
 use sweep_engine::config::{Field, Form, Key, Keys};
 use washer_model::{Machine, MachineParameter, Profile, Range, Spin};
 
-use cycle::Joints;
+use cycle::JointKind;
 
 /// Maximum number of rows of a table. Basis: each row is a segment of every trajectory, kept in
 /// memory for all points that are prepared together. Doubling it doubles that memory.
-pub(super) const MAX_ROWS: usize = 20_000;
+pub(super) const MAX_TABLE_ROWS: usize = 20_000;
 
 /// The spin that replaces an invalid one, so that axes of its parameters are still checked.
 pub(crate) const PLACEHOLDER: Spin =
@@ -43,23 +43,24 @@ const NEEDS_FILE_PROFILE: &str = "only the profile \"file\" has it, which needs 
 pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     keys.table(Key::new("spin", "").required("a section [spin]"), |keys| {
         keys.location_prefix = "spin_".to_owned();
-        let from_table = (
+        let table_variant = (
             TABLE_PROFILE,
             "linear between given points, constant after the last; a first speed other than 0 is \
              there at once",
         );
-        let from_file = (
+        let file_variant = (
             FILE_PROFILE,
             "a cycle from a file with columns of time and speed; constant after its last row",
         );
-        let all = Profile::ALL.map(|profile| (profile.name(), profile_description(profile)));
-        let table_index = all.len();
+        let profile_variants =
+            Profile::ALL.map(|profile| (profile.name(), profile_description(profile)));
+        let table_index = profile_variants.len();
         // The key `file` implies its profile.
         let has_file =
             keys.section().is_some_and(|section| section.key_location(FILE_PROFILE).is_some());
         let is_default = has_file || keys.is_schema();
         let variants = Variants {
-            words: all.into_iter().chain([from_table, from_file]).collect(),
+            words: profile_variants.into_iter().chain([table_variant, file_variant]).collect(),
             default: is_default.then_some(table_index + 1),
             settable_count: table_index,
         };
@@ -68,13 +69,13 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
             Spin::Table { .. } => table_index,
         };
         let key = Key::new("profile", "").settable();
-        let chosen =
+        let chosen_variant =
             keys.variants(key, &variants, Some(current), |keys, k| match Profile::ALL.get(k) {
                 Some(&profile) => walk_ramp(profile, spin, keys),
                 None if k == table_index => walk_table(spin, keys),
                 None => walk_file(spin, path, keys),
             });
-        if chosen.is_none() && keys.section().is_some() {
+        if chosen_variant.is_none() && keys.section().is_some() {
             *spin = PLACEHOLDER;
         }
     });
@@ -92,7 +93,7 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
         Key::new(FILE_PROFILE, description).required("a CSV or Parquet file of times and speeds");
     let file_field = keys.key(key, &Form::Text, &mut file_name);
     let description = "straight lines between the rows, or monotone cubics";
-    let names = Joints::ALL.map(|(_, name)| name);
+    let names = JointKind::ALL.map(|(_, name)| name);
     let mut word = names[0].to_owned();
     keys.key(Key::new("joints", description), &Form::Word(&names), &mut word);
     let (Field::Present(location), Some(report)) = (file_field, keys.report()) else {
@@ -101,8 +102,8 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
         }
         return;
     };
-    let joints = Joints::ALL.into_iter().find(|(_, name)| *name == word);
-    let joints = joints.map_or(Joints::Straight, |(joints, _)| joints);
+    let joints = JointKind::ALL.into_iter().find(|(_, name)| *name == word);
+    let joints = joints.map_or(JointKind::Straight, |(joints, _)| joints);
     *spin = match cycle::read(&beside(path, &file_name), joints, &location.location, report) {
         Some((time_s, speed_rpm)) => {
             for (column, values) in [("time_s", &time_s), ("speed_rpm", &speed_rpm)] {
@@ -157,7 +158,11 @@ fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
     };
     let times = Numbers {
         help: Some("leave out rows between which the speed is linear"),
-        ..Numbers::new(Range::NonNegative, 0..=MAX_ROWS, format!("expected at most {MAX_ROWS}"))
+        ..Numbers::new(
+            Range::NonNegative,
+            0..=MAX_TABLE_ROWS,
+            format!("expected at most {MAX_TABLE_ROWS}"),
+        )
     };
     // The range of the speeds is checked with the whole table.
     let speeds =

@@ -27,7 +27,7 @@ const MAX_COMPARED_TURNS: f64 = 20_000.0;
 /// machine's highest frequency, at which a message recommends that method. Basis: at a lower ratio,
 /// stiff bearings or a stiff hinge cause the highest frequency. Doubling it recommends the method
 /// always.
-const ADDITIVE_HINT_SHARE: f64 = 0.9;
+const MAX_HINT_FREQUENCY_RATIO: f64 = 0.9;
 
 /// Maximum number of elements and of rows of a spin's table that are checked before a run, over all
 /// points. Basis: their check takes some seconds. Doubling it doubles that time.
@@ -50,7 +50,7 @@ pub(crate) fn check_scenarios(draft: &Draft<'_, Washer>) {
     if varying.refuse_too_many_points(draft, &scenario) {
         return;
     }
-    let mut check = CornerCheck { draft, reported: BTreeSet::new(), spin_is_sound: true };
+    let mut check = CornerCheck { draft, reported: BTreeSet::new(), is_spin_valid: true };
     check.check_corner(&scenario, VaryingParts::ALL);
     for corner in 1..plan.corners() {
         if draft.report.is_full() {
@@ -75,13 +75,13 @@ impl VaryingParts {
     const ALL: Self = Self { machine: true, spin: true, window: true };
 
     fn new(plan: &Plan) -> Self {
-        let any = |is_part: fn(Target) -> bool| {
+        let has_axis = |is_part: fn(Target) -> bool| {
             plan.axes.iter().any(|axis| is_part(axis.parameter.handle.target()))
         };
         Self {
-            machine: any(|target| !matches!(target, Target::Spin | Target::Window(_))),
-            spin: any(|target| target == Target::Spin),
-            window: any(|target| matches!(target, Target::Window(_))),
+            machine: has_axis(|target| !matches!(target, Target::Spin | Target::Window(_))),
+            spin: has_axis(|target| target == Target::Spin),
+            window: has_axis(|target| matches!(target, Target::Window(_))),
         }
     }
 
@@ -123,25 +123,25 @@ impl VaryingParts {
 struct CornerCheck<'a> {
     draft: &'a Draft<'a, Washer>,
     reported: BTreeSet<Vec<String>>,
-    spin_is_sound: bool,
+    is_spin_valid: bool,
 }
 
 impl CornerCheck<'_> {
-    /// Checks the parts that are new at a corner. Single numbers were checked as they were read;
-    /// this function checks their combinations.
-    fn check_corner(&mut self, scenario: &Scenario, new: VaryingParts) {
-        if new.machine {
+    /// Checks the parts that differ from those of the corners before. Single numbers were checked
+    /// as they were read; this function checks their combinations.
+    fn check_corner(&mut self, scenario: &Scenario, changed: VaryingParts) {
+        if changed.machine {
             self.report_violations(scenario.model.machine.joint_violations());
         }
-        if new.spin {
+        if changed.spin {
             let violations = scenario.model.spin.joint_violations();
-            self.spin_is_sound = violations.is_empty();
+            self.is_spin_valid = violations.is_empty();
             self.report_violations(violations);
         }
-        if new.window {
+        if changed.window {
             window(self.draft, scenario, &mut self.reported);
         }
-        if (new.spin || new.window) && self.spin_is_sound {
+        if (changed.spin || changed.window) && self.is_spin_valid {
             check_turns(self.draft, scenario, &mut self.reported);
         }
     }
@@ -210,12 +210,12 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         let name = draft.plan.integrator.name();
         let needs = format!("\"{name}\" needs {steps:.1e} steps to {end_s} s");
         let title = format!("the machine is too stiff: {needs}");
-        let place =
+        let location =
             ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.location(key));
-        let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
+        let refusal = location.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
             diagnostic.at_location(&location, format!("expected at most {MAX_STEPS:e} steps"))
         });
-        let way_out = if is_too_fast(highest_additive_rad_per_s(draft)) {
+        let hint = if is_too_fast(highest_additive_rad_per_s(draft)) {
             ""
         } else {
             ", or use method = \"additive\", which takes stiff bearings in long steps"
@@ -223,7 +223,7 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         draft.report.push(refusal.help(format!(
             "its highest natural frequency is {frequency:.1e} rad/s{at_corner}: look for a \
              mistaken mass, \
-             moment of inertia or stiffness{way_out}"
+             moment of inertia or stiffness{hint}"
         )));
     } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
         let title = format!(
@@ -231,14 +231,14 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
             decimal(step_s)
         );
         let expected = format!("expected a step of at most {limit_s:.2e} s");
-        let way_out = if highest_additive_rad_per_s(draft) > ADDITIVE_HINT_SHARE * frequency {
+        let hint = if highest_additive_rad_per_s(draft) > MAX_HINT_FREQUENCY_RATIO * frequency {
             ""
         } else {
             "; method = \"additive\" takes stiff bearings in longer steps"
         };
         draft.report.push(refuse_step(draft, title, &expected).help(format!(
             "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural \
-             frequency{at_corner}{way_out}"
+             frequency{at_corner}{hint}"
         )));
     }
 }

@@ -124,7 +124,7 @@ pub(super) struct Pool<'a> {
 impl Pool<'_> {
     /// Works on one thread until nothing is left or the context is stopped.
     pub(super) fn work(&self) {
-        while !self.context.stopped() {
+        while !self.context.must_stop() {
             let mut state = self.lock();
             match state.choose(&|(level, model)| {
                 let size = |rule: RefinementRule<'_>| batch_size(rule.levels[model].method(level));
@@ -165,7 +165,7 @@ impl Pool<'_> {
                         self.context,
                     );
                     // Runs of a stopped context may have ended early.
-                    if self.context.stopped() {
+                    if self.context.must_stop() {
                         break;
                     }
                     let mut state = self.lock();
@@ -243,7 +243,7 @@ impl Pool<'_> {
         self.changed.notify_all();
         let model = &self.engine.plan.model;
         if let Some(speeds) = &model.held_speeds {
-            let is_stopped = || self.context.stopped();
+            let is_stopped = || self.context.must_stop();
             let metrics = (speeds.values(), model.measures.metrics.as_slice());
             let mut rows: Vec<_> = done
                 .iter_mut()

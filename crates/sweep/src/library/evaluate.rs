@@ -1,4 +1,4 @@
-//! Evaluation of points with results in memory.
+//! Evaluation of points, whose rows are returned in memory.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -60,14 +60,14 @@ impl PlanEvaluator {
             "method": "table", "points": job.points, "hash": points.hash(),
         });
         job.axis_values = Box::new(|point| points.axis_values(point));
-        self.run_task(job)?.in_memory(execution)
+        self.run_task(job)?.compute_in_memory(execution)
     }
 
     /// Returns the task to compute all points of the plan.
     ///
     /// # Errors
     /// Returns an error if `SWEEP_SIMD` names no instruction set of this processor.
-    pub fn all_points(&self) -> Result<EvaluationTask<'_>, Error> {
+    pub fn task_for_all_points(&self) -> Result<EvaluationTask<'_>, Error> {
         self.run_task(Job::new(&self.plan))
     }
 
@@ -83,13 +83,13 @@ impl EvaluationTask<'_> {
     ///
     /// # Errors
     /// Returns an error if no threads can be started, and if the engine panics.
-    pub fn in_memory(&self, execution: Execution<'_>) -> Result<MemoryTable, Error> {
+    pub fn compute_in_memory(&self, execution: Execution<'_>) -> Result<MemoryTable, Error> {
         let Self { job, engine } = self;
         let pool = threads::pool(execution.threads()?)?;
         let context = RunContext::new(execution.interrupt);
         let rows = Mutex::new(0..job.points);
         let source = || {
-            let row = if context.stopped() { None } else { lock(&rows).next() }?;
+            let row = if context.must_stop() { None } else { lock(&rows).next() }?;
             Some((row, (job.axis_values)(row)))
         };
         let last = job.points.saturating_sub(1);
@@ -102,9 +102,9 @@ impl EvaluationTask<'_> {
             progress.show(context.points_done());
         };
         let evaluate = || pool.install(|| engine.evaluator.evaluate(&source, &sink, &context));
-        let evaluated = catch_unwind(AssertUnwindSafe(evaluate));
+        let evaluation_result = catch_unwind(AssertUnwindSafe(evaluate));
         progress.finish();
-        evaluated.map_err(|panic| {
+        evaluation_result.map_err(|panic| {
             engine_error(format!("the engine panicked: {}", panics::text(panic.as_ref())))
         })?;
         let is_complete = context.points_done() == job.points;
@@ -118,14 +118,19 @@ struct BatchCollector<'a> {
     job: &'a Job<'a>,
     /// The schema of every batch.
     schema: SchemaRef,
-    incomplete: IncompleteGroups,
+    incomplete_batches: IncompleteGroups,
     batches: Mutex<BTreeMap<u64, Result<RecordBatch, ArrowError>>>,
 }
 
 impl<'a> BatchCollector<'a> {
     fn new(job: &'a Job<'a>) -> Self {
         let schema = job.layout.schema();
-        Self { job, schema, incomplete: IncompleteGroups::default(), batches: Mutex::default() }
+        Self {
+            job,
+            schema,
+            incomplete_batches: IncompleteGroups::default(),
+            batches: Mutex::default(),
+        }
     }
 
     /// Adds a row, and completes its batch if the row is the last one.
@@ -133,20 +138,20 @@ impl<'a> BatchCollector<'a> {
         let rows = BATCH_ROWS as u64;
         let batch_index = outcome.point / rows;
         let size = rows.min(self.job.points - batch_index * rows);
-        if let Some(outcomes) = self.incomplete.add(batch_index, size, outcome) {
-            let batch = self.batch(outcomes);
+        if let Some(outcomes) = self.incomplete_batches.add(batch_index, size, outcome) {
+            let batch = self.build_batch(outcomes);
             lock(&self.batches).insert(batch_index, batch);
         }
         context.add_points(1);
     }
 
-    fn batch(&self, mut outcomes: Vec<PointRows>) -> Result<RecordBatch, ArrowError> {
+    fn build_batch(&self, mut outcomes: Vec<PointRows>) -> Result<RecordBatch, ArrowError> {
         outcomes.sort_by_key(|outcome| outcome.point);
         let layout: &Layout = &self.job.layout;
         let mut rows = ResultRows::with_schema(layout, SchemaRef::clone(&self.schema));
-        for done in outcomes {
-            for row in done.rows {
-                rows.push(done.point, (self.job.axis_values)(done.point), row);
+        for outcome in outcomes {
+            for row in outcome.rows {
+                rows.push(outcome.point, (self.job.axis_values)(outcome.point), row);
             }
         }
         rows.take()
@@ -154,10 +159,10 @@ impl<'a> BatchCollector<'a> {
 
     /// Returns all batches in order, including incomplete ones.
     fn into_batches(self) -> Result<Vec<RecordBatch>, ArrowError> {
-        let incomplete = std::mem::take(&mut *lock(&self.incomplete.0));
+        let incomplete_batches = std::mem::take(&mut *lock(&self.incomplete_batches.0));
         let mut batches = std::mem::take(&mut *lock(&self.batches));
-        for (batch_index, outcomes) in incomplete {
-            batches.insert(batch_index, self.batch(outcomes));
+        for (batch_index, outcomes) in incomplete_batches {
+            batches.insert(batch_index, self.build_batch(outcomes));
         }
         batches.into_values().collect()
     }
@@ -181,7 +186,7 @@ mod tests {
         let interrupt = Interrupt::new();
         let execution =
             Execution { threads: Some(2), progress: ProgressMode::None, interrupt: &interrupt };
-        let table = evaluator.all_points().unwrap().in_memory(execution).unwrap();
+        let table = evaluator.task_for_all_points().unwrap().compute_in_memory(execution).unwrap();
         let [first, second] = table.batches() else { panic!("{table:?}") };
         assert_eq!([first.num_rows(), second.num_rows()], [BATCH_ROWS, 1]);
         assert!(Arc::ptr_eq(&first.schema(), &second.schema()));

@@ -10,18 +10,18 @@ use sweep_engine::Error;
 
 /// The result of a command as data and as text.
 #[derive(Debug)]
-pub struct Explained {
+pub struct CommandReport {
     /// The data, which the command prints with `--json`.
-    pub found: Value,
+    pub data: Value,
     /// The text that the command prints.
     pub text: String,
 }
 
 /// Explains the verdict of a point of a grid; `None` if it was interrupted.
 ///
-/// `at` has texts `NAME=VALUE`, which give every axis its value and may set other parameters.
-/// `speeds_rpm` are equally spaced; by default they go from half of the slowest mode's frequency to
-/// the profile's greatest speed.
+/// `point_values` has texts `NAME=VALUE`, which give every axis its value and may set other
+/// parameters. `speeds_rpm` are equally spaced; by default they go from half of the slowest mode's
+/// frequency to the profile's greatest speed.
 ///
 /// # Errors
 ///
@@ -32,7 +32,7 @@ pub fn explain_point(
     point_values: &[String],
     speeds_rpm: Option<&[f64]>,
     execution: Execution<'_>,
-) -> Result<Option<Explained>, Error> {
+) -> Result<Option<CommandReport>, Error> {
     let (plan, parameters) = grid.load_point(point_values)?;
     let parse = |speeds: &[f64]| {
         Speeds::from_values(speeds).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
@@ -43,10 +43,13 @@ pub fn explain_point(
     };
     let speeds = speeds_rpm.map(parse).transpose()?;
     let explanation = explain(&plan, parameters, speeds, execution)?;
-    if execution.interrupt.stopped() {
+    if execution.interrupt.is_raised() {
         return Ok(None);
     }
-    Ok(Some(Explained { found: json::to_json(&explanation), text: format::to_text(&explanation) }))
+    Ok(Some(CommandReport {
+        data: json::to_json(&explanation),
+        text: format::to_text(&explanation),
+    }))
 }
 
 #[cfg(test)]
@@ -68,13 +71,14 @@ mod tests {
         let execution =
             Execution { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
         let explanation = std::thread::scope(|scope| {
-            let work = scope.spawn(|| explain_point(&grid, &[], Some(&speeds), execution));
+            let explaining_thread =
+                scope.spawn(|| explain_point(&grid, &[], Some(&speeds), execution));
             std::thread::sleep(Duration::from_millis(500));
-            assert!(!work.is_finished(), "it is too short");
-            let raised = Instant::now();
+            assert!(!explaining_thread.is_finished(), "it is too short");
+            let start = Instant::now();
             interrupt.raise(2);
-            let explanation = work.join().unwrap();
-            assert!(raised.elapsed() < Duration::from_secs(5), "{:?}", raised.elapsed());
+            let explanation = explaining_thread.join().unwrap();
+            assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
             explanation
         });
         assert!(explanation.unwrap().is_none());

@@ -3,7 +3,7 @@
 use lane_ode::Cancel;
 use serde_json::json;
 
-use super::{Execution, Explained, PointTable};
+use super::{CommandReport, Execution, PointTable};
 use crate::config::WasherGridInput;
 use crate::fit::{self, FitContext, FitOptions, Measurement};
 use sweep_engine::{Error, threads};
@@ -19,7 +19,7 @@ pub fn fit_tables(
     tables: Vec<(PointTable, Vec<String>)>,
     options: &FitOptions,
     execution: Execution<'_>,
-) -> Result<Option<Explained>, Error> {
+) -> Result<Option<CommandReport>, Error> {
     if tables.is_empty() {
         return Err(Error::option("table", "[]", "a table or more"));
     }
@@ -35,9 +35,9 @@ pub fn fit_tables(
     }
     let cancel = Cancel::Flag(execution.interrupt.flag());
     let context = FitContext { cancel, count_evaluations: &|_| {}, output: None, fresh: false };
-    let fitted =
+    let fit_result =
         threads::pool(execution.threads()?)?.install(|| fit::fit(cases, options, &context))?;
-    Ok(fitted.map(|fit| Explained { found: json!(fit.report), text: fit.report.text() }))
+    Ok(fit_result.map(|fit| CommandReport { data: json!(fit.report), text: fit.report.text() }))
 }
 
 #[cfg(test)]

@@ -16,8 +16,8 @@ use sweep_engine::{Error, Interrupt, Table};
 use sweep_files::{FileKind, key};
 
 /// Computes the modes of a grid's machine at increasing spin speeds (rpm); `None` if it was
-/// interrupted. `at` has texts `NAME=VALUE` of the point, if the grid has axes. Without a grid the
-/// machine is the built-in one.
+/// interrupted. `point_values` has texts `NAME=VALUE` of the point, if the grid has axes. Without a
+/// grid the machine is the built-in one.
 ///
 /// # Errors
 ///
@@ -25,12 +25,12 @@ use sweep_files::{FileKind, key};
 /// without equilibrium or modes.
 pub fn find_modes(
     grid: Option<&WasherGridInput>,
-    at: &[String],
+    point_values: &[String],
     speeds_rpm: &[f64],
     interrupt: &Interrupt,
 ) -> Result<Option<MemoryTable>, Error> {
     check_speeds(speeds_rpm, 2, |speed| speed >= 0.0, ", 0 or greater")?;
-    let input = ModesInput::new(grid, at, speeds_rpm[speeds_rpm.len() - 1])?;
+    let input = ModesInput::new(grid, point_values, speeds_rpm[speeds_rpm.len() - 1])?;
     let analysis = ModeAnalysis::new(&input, speeds_rpm, false, Cancel::Flag(interrupt.flag()))?;
     let table =
         |analysis: ModeAnalysis| MemoryTable::from_table(FileKind::Modes, analysis.table(&input));
@@ -41,40 +41,43 @@ pub fn find_modes(
 pub(crate) struct ModesInput {
     pub(crate) name: String,
     /// The constants that were set and the values of the axes, by name.
-    set: Map<String, Value>,
+    constants: Map<String, Value>,
     machine: Machine,
     spin: Spin,
     timing: Timing,
 }
 
 impl ModesInput {
-    /// Returns the machine of a grid, at the point of `at` if that is not empty; without a grid the
-    /// built-in machine in a run-up to a speed (rpm).
+    /// Returns the machine of a grid, at the point of `point_values` if that is not empty; without
+    /// a grid the built-in machine in a run-up to a speed (rpm).
     ///
     /// # Errors
     ///
     /// Returns the mistakes in the grid.
     pub(crate) fn new(
         grid: Option<&WasherGridInput>,
-        at: &[String],
+        point_values: &[String],
         greatest_rpm: f64,
     ) -> Result<Self, Diagnostics> {
         let Some(grid) = grid else {
             return Ok(Self {
                 name: "paper".to_owned(),
-                set: Map::new(),
+                constants: Map::new(),
                 machine: Machine::paper(),
                 spin: Spin::Ramped { profile: Profile::Ramp, peak_rpm: greatest_rpm, ramp_s: 1.0 },
                 timing: Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 },
             });
         };
-        let (plan, at) =
-            if at.is_empty() { (grid.load()?, Vec::new()) } else { grid.load_point(at)? };
-        let at = at.into_iter().map(|(name, value)| (name, value.into()));
-        let set = plan.set.iter().cloned().chain(at).collect();
+        let (plan, point_values) = if point_values.is_empty() {
+            (grid.load()?, Vec::new())
+        } else {
+            grid.load_point(point_values)?
+        };
+        let point_values = point_values.into_iter().map(|(name, value)| (name, value.into()));
+        let constants = plan.set.iter().cloned().chain(point_values).collect();
         let timing = timing(&plan);
         let Washer { machine, spin, .. } = plan.model;
-        Ok(Self { name: plan.name, set, machine, spin, timing })
+        Ok(Self { name: plan.name, constants, machine, spin, timing })
     }
 }
 
@@ -84,7 +87,7 @@ pub(crate) struct ModeAnalysis {
     pub(crate) modes: Vec<ModeOverSpeed>,
     /// The exact motion of each mode at each speed, if it was requested. There is none at
     /// standstill, where theta is frozen, nor for a mode that was not found at theta = 0.
-    pub(crate) exact: Option<Vec<Vec<Option<FloquetMode>>>>,
+    pub(crate) exact_modes: Option<Vec<Vec<Option<FloquetMode>>>>,
     /// The speed amplitudes (m/s) at which friction is linearised, by damper.
     pub(crate) friction_speeds: Map<String, Value>,
 }
@@ -105,23 +108,23 @@ impl ModeAnalysis {
         let point = point.map_err(Error::model)?;
         let modes = campbell_until(&point, speeds_rpm, cancel).map_err(Error::model)?;
         let Some(modes) = modes else { return Ok(None) };
-        let exact =
-            if is_exact { Some(exact_at_speeds(&point, speeds_rpm, &modes)?) } else { None };
+        let exact_modes =
+            if is_exact { Some(find_exact_modes(&point, speeds_rpm, &modes)?) } else { None };
         let friction_speeds = friction_speeds(&point);
-        Ok(Some(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact, friction_speeds }))
+        Ok(Some(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact_modes, friction_speeds }))
     }
 
     /// Returns the modes as JSON.
     pub(crate) fn to_json(&self, name: &str) -> Value {
         let modes = self.modes.iter().enumerate().map(|(k, mode)| {
-            let mut entry = properties(k, mode);
+            let mut entry = mode_properties(k, mode);
             let with_exact = |(i, mode): (usize, &ModeAtSpeed)| {
-                let mut at_speed = at_speed(self.speeds_rpm[i], mode);
-                if let Some(exact) = self.exact.as_ref().and_then(|exact| exact[i][k]) {
-                    at_speed["exact_frequency_rpm"] = exact.frequency_rpm().into();
-                    at_speed["exact_damping_ratio"] = exact.damping_ratio().into();
+                let mut at_speed_json = mode_at_speed_json(self.speeds_rpm[i], mode);
+                if let Some(exact) = self.exact_modes.as_ref().and_then(|modes| modes[i][k]) {
+                    at_speed_json["exact_frequency_rpm"] = exact.frequency_rpm().into();
+                    at_speed_json["exact_damping_ratio"] = exact.damping_ratio().into();
                 }
-                at_speed
+                at_speed_json
             };
             entry["at_speed"] = mode.at_speed.iter().enumerate().map(with_exact).collect();
             entry
@@ -134,7 +137,7 @@ impl ModeAnalysis {
     }
 
     /// Returns the modes as a table, with the properties of each mode in the metadata.
-    pub(crate) fn table(&self, ModesInput { name, set, machine, .. }: &ModesInput) -> Table {
+    pub(crate) fn table(&self, ModesInput { name, constants, machine, .. }: &ModesInput) -> Table {
         let speeds = &self.speeds_rpm;
         let modes = &self.modes;
         let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
@@ -166,10 +169,10 @@ impl ModeAnalysis {
         add_column("frequency_min_rpm", "rpm", description, |at| at.least_rpm);
         let description = "greatest damped natural frequency over a turn";
         add_column("frequency_max_rpm", "rpm", description, |at| at.greatest_rpm);
-        if let Some(exact) = &self.exact {
+        if let Some(exact_modes) = &self.exact_modes {
             let mut add_exact_column =
                 |name: &str, unit: &str, description: &str, value: fn(&FloquetMode) -> f64| {
-                    let values = rows().map(|(k, mode)| exact[k][mode].as_ref().map(value));
+                    let values = rows().map(|(k, mode)| exact_modes[k][mode].as_ref().map(value));
                     table.numbers(name, unit, description, values);
                 };
             let description = "frequency by the linear model's Floquet exponent over whole turns, \
@@ -179,19 +182,19 @@ impl ModeAnalysis {
             add_exact_column("exact_damping_ratio", "1", description, FloquetMode::damping_ratio);
         }
         let mut plan = json!({ "name": name, "machine": config::machine_json(machine) });
-        if !set.is_empty() {
-            plan["set"] = set.clone().into();
+        if !constants.is_empty() {
+            plan["set"] = constants.clone().into();
         }
         table.metadata(key::PLAN, &plan);
         let entries: Value =
-            modes.iter().enumerate().map(|(k, mode)| properties(k, mode)).collect();
+            modes.iter().enumerate().map(|(k, mode)| mode_properties(k, mode)).collect();
         table.metadata(key::MODES, &entries);
         table
     }
 }
 
 /// Returns the exact motion of each mode at each speed (rpm).
-fn exact_at_speeds(
+fn find_exact_modes(
     point: &Point,
     speeds_rpm: &[f64],
     modes: &[ModeOverSpeed],
@@ -201,21 +204,22 @@ fn exact_at_speeds(
             return Ok(vec![None; modes.len()]);
         }
         let motions = floquet_modes(point, speed).map_err(Error::model)?;
-        let exact = |mode: &ModeOverSpeed| {
+        let exact_modes = |mode: &ModeOverSpeed| {
             motions
                 .iter()
                 .find(|motion| motion.frozen_mode.shape == mode.at_speed[k].shape)
                 .copied()
         };
-        Ok(modes.iter().map(exact).collect())
+        Ok(modes.iter().map(exact_modes).collect())
     };
     speeds_rpm.iter().enumerate().map(modes_at_speed).collect()
 }
 
 /// Returns the name, the participation of motions and the resonances of a mode.
-fn properties(k: usize, mode: &ModeOverSpeed) -> Value {
-    let resonance =
-        |resonance: &washer_model::Resonance| at_speed(resonance.speed_rpm, &resonance.mode);
+fn mode_properties(k: usize, mode: &ModeOverSpeed) -> Value {
+    let resonance = |resonance: &washer_model::Resonance| {
+        mode_at_speed_json(resonance.speed_rpm, &resonance.mode)
+    };
     let motion = &mode.motion;
     json!({
         "mode": k + 1,
@@ -230,7 +234,7 @@ fn properties(k: usize, mode: &ModeOverSpeed) -> Value {
     })
 }
 
-fn at_speed(speed_rpm: f64, mode: &ModeAtSpeed) -> Value {
+fn mode_at_speed_json(speed_rpm: f64, mode: &ModeAtSpeed) -> Value {
     let coordinates = (0..COORDINATES).map(|i| (format!("q{}", i + 1), json!(mode.shape[i])));
     json!({
         "speed_rpm": speed_rpm,

@@ -26,14 +26,16 @@ impl PointTable {
     pub fn new(schema: &Schema, batches: &[RecordBatch]) -> Result<Self, Diagnostics> {
         // Filtered or sorted data frames have an index column, which is ignored.
         let is_data = |k: &usize| !is_index(schema.field(*k).name());
-        let used: Vec<usize> = (0..schema.fields().len()).filter(is_data).collect();
-        let names: Vec<String> = used.iter().map(|k| schema.field(*k).name().clone()).collect();
+        let data_columns: Vec<usize> = (0..schema.fields().len()).filter(is_data).collect();
+        let names: Vec<String> =
+            data_columns.iter().map(|k| schema.field(*k).name().clone()).collect();
         let mut columns = Vec::with_capacity(names.len());
-        for (position, k) in used.into_iter().enumerate() {
+        for (position, k) in data_columns.into_iter().enumerate() {
             let field = schema.field(k);
-            let not_a_number = || not_numbers(&names, position, &field.data_type().to_string());
+            let not_numbers_error =
+                || not_numbers(&names, position, &field.data_type().to_string());
             if !cells::is_number(field.data_type()) {
-                return Err(not_a_number());
+                return Err(not_numbers_error());
             }
             // A single batch without nulls is shared, not copied, because tables may fill the
             // memory.
@@ -44,9 +46,10 @@ impl PointTable {
                 columns.push(column.clone());
                 continue;
             }
-            let parts = batches.iter().map(|batch| cells::numbers(batch.column(k)));
-            let parts = parts.collect::<Result<Vec<_>, _>>().map_err(|_| not_a_number())?;
-            columns.push(parts.concat().into());
+            let column_parts = batches.iter().map(|batch| cells::numbers(batch.column(k)));
+            let column_parts =
+                column_parts.collect::<Result<Vec<_>, _>>().map_err(|_| not_numbers_error())?;
+            columns.push(column_parts.concat().into());
         }
         Ok(Self { names, columns, rows: batches.iter().map(RecordBatch::num_rows).sum() })
     }

@@ -64,13 +64,13 @@ impl MemoryTable {
     /// write it.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let file = ParquetFile::open(path)?;
-        let foreign_file = || FileError::NotParquet {
+        let unknown_file_error = || FileError::NotParquet {
             path: path.to_path_buf(),
             reason: "it is no result of this program".to_owned(),
         };
         let plan = file.json(key::PLAN).or_else(|| file.json(key::DIFFERENCES));
-        let plan = plan.ok_or_else(foreign_file)?;
-        let kind = file.kind().ok_or_else(foreign_file)?;
+        let plan = plan.ok_or_else(unknown_file_error)?;
+        let kind = file.kind().ok_or_else(unknown_file_error)?;
         let all_columns = (0..file.schema().fields().len()).collect();
         let batches = file.batches(all_columns)?.collect::<Result<Vec<_>, _>>()?;
         let schema = SchemaRef::clone(file.schema());
@@ -143,8 +143,8 @@ impl MemoryTable {
     /// # Errors
     /// Returns the errors of [`sweep_plot::render`] and [`Self::save`].
     pub fn draw(&self, output: &Path) -> Result<(), Error> {
-        let shown_path = Path::new("a temporary folder");
-        let folder = tempfile::tempdir().map_err(FileError::io("make", shown_path))?;
+        let description = Path::new("a temporary folder");
+        let folder = tempfile::tempdir().map_err(FileError::io("make", description))?;
         let path = folder.path().join("result.parquet");
         self.save(&path)?;
         Ok(render(&path, &PlotOptions::default(), &WasherFigures::default(), output)?)

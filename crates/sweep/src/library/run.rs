@@ -9,13 +9,13 @@ use sweep_engine::{Engine, Error, Job, run as runner};
 
 /// The end of a run into a file.
 #[derive(Debug)]
-pub enum RanToFile {
+pub enum FileRunEnd {
     /// The run is complete; the table has the rows of its file.
     Complete(MemoryTable),
     /// The interrupt was raised. Finished chunks are stored, and another call continues the run.
     Interrupted {
         /// The number of stored rows.
-        stored: u64,
+        stored_rows: u64,
         /// The number of all points.
         points: u64,
     },
@@ -34,13 +34,13 @@ impl EvaluationTask<'_> {
     /// # Errors
     ///
     /// Returns the errors of the command. Finished chunks are stored.
-    pub fn to_file(
+    pub fn compute_to_file(
         &self,
         output: &Path,
         fresh: bool,
         tell: &dyn Fn(&str),
         execution: Execution<'_>,
-    ) -> Result<RanToFile, Error> {
+    ) -> Result<FileRunEnd, Error> {
         let options = RunOptions {
             threads: execution.threads()?,
             fresh,
@@ -53,13 +53,15 @@ impl EvaluationTask<'_> {
         report.notes.iter().for_each(|note| tell(note));
         Ok(match report.end {
             RunEnd::Already(..) | RunEnd::Finished(_) => {
-                RanToFile::Complete(MemoryTable::read(output)?)
+                FileRunEnd::Complete(MemoryTable::read(output)?)
             }
-            RunEnd::Interrupted { kept: stored, points, .. } => {
-                RanToFile::Interrupted { stored, points }
+            RunEnd::Interrupted { kept: stored_rows, points, .. } => {
+                FileRunEnd::Interrupted { stored_rows, points }
             }
             // A run has shards only if the scheduler's variables are set.
-            RunEnd::Shard(..) => RanToFile::Interrupted { stored: 0, points: self.job.points },
+            RunEnd::Shard(..) => {
+                FileRunEnd::Interrupted { stored_rows: 0, points: self.job.points }
+            }
         })
     }
 }

@@ -8,7 +8,7 @@ use crate::model::Washer;
 use crate::plan::Plan;
 pub use sweep_engine::boundary::BoundaryOptions;
 use sweep_engine::boundary::BoundaryTask;
-use sweep_engine::commands::boundary::search as trace;
+use sweep_engine::commands::boundary::search as trace_boundary;
 use sweep_engine::optimise::Study;
 use sweep_engine::optimise::file::{table as study_table, trial_columns};
 use sweep_engine::optimise::search::search;
@@ -35,9 +35,10 @@ pub fn find_boundary(
         return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
     }
     let task = BoundaryTask::new(plan, options)?;
-    let search = |trials| trace(&task, trials, execution);
-    let stored = Stored { job: &task.job(), columns: task.trial_columns(), output, fresh };
-    run_search(stored, search, |traced| task.table(traced))
+    let search = |trials| trace_boundary(&task, trials, execution);
+    let search_output =
+        SearchOutput { job: &task.job(), columns: task.trial_columns(), output, fresh };
+    run_search(search_output, search, |boundary| task.table(boundary))
 }
 
 /// Computes the candidates of a study file; `None` if the interrupt was raised. `sets` has
@@ -57,12 +58,13 @@ pub fn optimise_study(
 ) -> Result<Option<MemoryTable>, Error> {
     let study = Study::<Washer>::load(path, sets)?;
     let search = |trials| search(&study, trials, execution);
-    let stored = Stored { job: &study.job(), columns: trial_columns(&study), output, fresh };
-    run_search(stored, search, |tried| study_table(&study, tried))
+    let search_output =
+        SearchOutput { job: &study.job(), columns: trial_columns(&study), output, fresh };
+    run_search(search_output, search, |candidates| study_table(&study, candidates))
 }
 
 /// The output of a search and the trials that are stored with it.
-struct Stored<'a> {
+struct SearchOutput<'a> {
     job: &'a Job<'a>,
     columns: TrialColumns,
     output: Option<&'a Path>,
@@ -72,11 +74,11 @@ struct Stored<'a> {
 /// Runs a search with the trials that its output stores, and returns the result. A finished output
 /// is read instead.
 fn run_search<T>(
-    stored: Stored<'_>,
+    search_output: SearchOutput<'_>,
     search: impl FnOnce(Option<Trials>) -> Result<(Option<T>, Option<Trials>), Error>,
     table: impl FnOnce(&T) -> Table,
 ) -> Result<Option<MemoryTable>, Error> {
-    let Stored { job, columns, output, fresh } = stored;
+    let SearchOutput { job, columns, output, fresh } = search_output;
     let kind = job.layout.kind;
     let file = output.map(|path| Output::begin(path, kind)).transpose()?;
     let open = |path| Trials::open(path, job, columns, fresh);

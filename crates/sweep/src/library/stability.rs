@@ -4,7 +4,7 @@ use super::check_speeds;
 use super::run::EvaluationTask;
 use crate::dwell::AttractorSearch;
 use crate::plan::Plan;
-use crate::stability::{HeldPlan, check};
+use crate::stability::{HeldPlan, check_axes};
 use sweep_engine::Error;
 
 /// Returns the task to find the motions of each point of a plan's grid at increasing held speeds
@@ -15,14 +15,14 @@ use sweep_engine::Error;
 /// Returns an error if speeds do not increase, if an axis has no meaning at a held speed, if an
 /// option of the search is out of bounds, and if `SWEEP_SIMD` names no instruction set of this
 /// processor.
-pub fn hold_speeds<'a>(
+pub fn held_speeds_task<'a>(
     plan: &'a Plan,
     speeds_rpm: &'a [f64],
     search: Option<AttractorSearch>,
 ) -> Result<EvaluationTask<'a>, Error> {
     check_speeds(speeds_rpm, 1, |speed| speed > 0.0, " above 0")?;
-    check(plan, "speeds", &format!("with {} values", speeds_rpm.len()))?;
+    check_axes(plan, "speeds", &format!("with {} values", speeds_rpm.len()))?;
     search.map_or(Ok(()), |search| search.check())?;
-    let held = HeldPlan { plan, speeds_rpm, search };
-    Ok(EvaluationTask { job: held.job(), engine: held.engine()? })
+    let held_plan = HeldPlan { plan, speeds_rpm, search };
+    Ok(EvaluationTask { job: held_plan.job(), engine: held_plan.engine()? })
 }

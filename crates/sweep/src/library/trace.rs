@@ -64,7 +64,7 @@ pub fn trace_point(
     let settings = TraceSettings { every_s, models, start, extras: options.extras, capped: None };
     let cancel = Cancel::Flag(interrupt.flag());
     let trace = trace_in_pool(&plan, parameters, &settings, cancel).map_err(Error::model)?;
-    if interrupt.stopped() {
+    if interrupt.is_raised() {
         return Ok(None);
     }
     Ok(Some((MemoryTable::from_table(FileKind::Trace, trace.table)?, trace.failures)))

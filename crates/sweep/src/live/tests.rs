@@ -39,7 +39,7 @@ fn assert_is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
 #[test]
 fn a_checked_point_is_the_row_of_the_map() {
     let plan = plan(GRID);
-    let (setup, _) = setup(&plan, &usual_sliders(&plan)).unwrap();
+    let (setup, _) = build_setup(&plan, &usual_sliders(&plan)).unwrap();
     // A page has the setup that its numbers give back.
     let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
     let engine = ModelEngine::new(&plan).unwrap();
@@ -61,7 +61,7 @@ stability = { speed_rpm = "200:240:20" }
         let further = further.replace("CRITERION", criterion);
         let mut plan = plan(&(further + GRID));
         assert_eq!(take_held_metrics(&mut plan), (vec![200.0, 220.0, 240.0], vec![Metric::Growth]));
-        let (setup, _) = setup(&plan, &[]).unwrap();
+        let (setup, _) = build_setup(&plan, &[]).unwrap();
         let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
         let engine = ModelEngine::new(&plan).unwrap();
         let values = [0.95, 300.0];
@@ -74,7 +74,7 @@ stability = { speed_rpm = "200:240:20" }
         // The page has the ratios by turn of every channel.
         let turn_ratios = answer.outcome.turn_ratios;
         assert!(criterion == "rms" || turn_ratios == verdict.ratios);
-        let ratios = setup.rule.channels.iter().map(|of| answer.ratios[of.index()]);
+        let ratios = setup.rule.channels.iter().map(|channel| answer.ratios[channel.index()]);
         assert_eq!(ratios.collect::<Vec<_>>(), verdict.ratios, "{criterion}");
     }
 }
@@ -87,7 +87,7 @@ fn motions_of_held_speeds_are_the_rows() {
     let outcome = &ModelEngine::new(&plan).unwrap().outcomes_at(&[values.to_vec()])[0];
     let (speeds_rpm, metrics) = take_held_metrics(&mut plan);
     assert_eq!(metrics, [Metric::Dwell]);
-    let (setup, _) = setup(&plan, &[]).unwrap();
+    let (setup, _) = build_setup(&plan, &[]).unwrap();
     assert!(outcome.dwell_peaks.is_some());
     assert_eq!(washer_live::dwell(&setup, &values, &speeds_rpm).unwrap(), outcome.dwell_peaks);
 }
@@ -97,9 +97,9 @@ fn a_point_beyond_the_axes_is_the_row_of_a_wider_grid() {
     let plan = plan(GRID);
     let sliders =
         requested_sliders(&plan, &[parse_slider_range("tub_mass_kg=20:28").unwrap()]).unwrap();
-    let (setup, _) = setup(&plan, &sliders).unwrap();
-    let wide = with_sliders(&plan, &sliders);
-    let engine = ModelEngine::new(&wide).unwrap();
+    let (setup, _) = build_setup(&plan, &sliders).unwrap();
+    let wide_plan = with_sliders(&plan, &sliders);
+    let engine = ModelEngine::new(&wide_plan).unwrap();
     let values = [0.4, 240.0, 26.0];
     assert_is_row(&engine.outcomes_at(&[values.to_vec()])[0], &setup, &values);
 }
@@ -118,9 +118,9 @@ fn a_setup_comes_back_from_its_numbers() {
     plan.model.machine.springs[1].free_length_m = Some(0.2);
     plan.model.machine.dampers[0].friction_n = 20.0;
     plan.model.machine.dampers[0].friction_linear_speed_m_per_s = Some(0.1);
-    let (mut setup, _) = setup(&plan, &[]).unwrap();
+    let (mut setup, _) = build_setup(&plan, &[]).unwrap();
     let numbers = setup.to_numbers();
-    // Words do not go with them.
+    // The numbers contain no texts.
     for levels in setup.levels.iter_mut().chain(&mut setup.wide_levels) {
         assert!(levels.note.take().is_some() || levels.levels.len() > 3);
     }

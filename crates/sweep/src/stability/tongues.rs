@@ -32,9 +32,9 @@ pub(crate) struct StabilityRow {
 
 /// A range of speeds of one point that are unstable in the same way.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct TongueRows {
+pub(crate) struct UnstableRange {
     /// The row of the largest growth.
-    pub(crate) largest_growth: StabilityRow,
+    pub(crate) largest_growth_row: StabilityRow,
     /// The first and the last unstable speed (rpm).
     pub(crate) end_speeds_rpm: [f64; 2],
 }
@@ -45,73 +45,73 @@ pub(crate) struct StabilitySummary {
     axes: Vec<String>,
     rows: u64,
     points: u64,
-    without_response: u64,
-    unstable: u64,
+    rows_without_response: u64,
+    unstable_rows: u64,
     /// The number of rows that are stable by their multipliers, but exceed the machine's geometry.
-    beyond: u64,
+    rows_beyond_limits: u64,
     /// The number of speeds whose first row is not on the curve of responses.
-    off_curve: u64,
+    rows_off_curve: u64,
     /// The number of stable rows above an unstable speed of their point, which a run-up passes
     /// first.
-    above_tongue: u64,
+    rows_above_tongue: u64,
     /// The number of further rows of the same point and speed, which the other counts omit.
-    coexisting: u64,
-    tongues: Vec<TongueRows>,
+    coexisting_rows: u64,
+    tongues: Vec<UnstableRange>,
     /// The rows on branches that end at a fold which a machine that runs up reaches.
     jumps: Vec<StabilityRow>,
-    /// The greatest speed of all rows.
     greatest_speed_rpm: f64,
-    last: Option<StabilityRow>,
+    last_row: Option<StabilityRow>,
 }
 
 impl StabilitySummary {
     /// Adds the next row of the file.
     pub(crate) fn add(&mut self, row: StabilityRow) {
-        let same_point = self.last.as_ref().is_some_and(|last| last.point == row.point);
+        let same_point = self.last_row.as_ref().is_some_and(|last| last.point == row.point);
         let is_coexisting = |last: &StabilityRow| same_point && last.speed_rpm == row.speed_rpm;
         // A machine that runs up is on the branch of the first row at a speed.
-        if self.last.as_ref().is_some_and(is_coexisting) {
-            self.coexisting += 1;
+        if self.last_row.as_ref().is_some_and(is_coexisting) {
+            self.coexisting_rows += 1;
             return;
         }
         self.rows += 1;
         self.greatest_speed_rpm = self.greatest_speed_rpm.max(row.speed_rpm);
-        let end = |row: &StabilityRow| (row.point, row.branch_to_rpm);
+        let branch_end = |row: &StabilityRow| (row.point, row.branch_to_rpm);
         let has_end = row.branch_to_rpm.is_some() && !row.is_off_curve;
-        if has_end && self.jumps.last().map(end) != Some(end(&row)) {
+        if has_end && self.jumps.last().map(branch_end) != Some(branch_end(&row)) {
             self.jumps.push(row.clone());
         }
         let continues_tongue =
-            same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
+            same_point && self.last_row.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
         self.points += u64::from(!same_point);
-        self.without_response += u64::from(row.status != "ok");
-        self.off_curve += u64::from(row.is_off_curve);
-        self.beyond += u64::from(row.growth_per_s <= 0.0 && row.beyond.is_some());
-        let is_passed = |tongue: &TongueRows| {
-            tongue.largest_growth.point == row.point && tongue.end_speeds_rpm[1] < row.speed_rpm
+        self.rows_without_response += u64::from(row.status != "ok");
+        self.rows_off_curve += u64::from(row.is_off_curve);
+        self.rows_beyond_limits += u64::from(row.growth_per_s <= 0.0 && row.beyond.is_some());
+        let is_passed = |tongue: &UnstableRange| {
+            tongue.largest_growth_row.point == row.point && tongue.end_speeds_rpm[1] < row.speed_rpm
         };
         let is_stable = row.growth_per_s <= 0.0 && row.beyond.is_none();
-        self.above_tongue += u64::from(is_stable && self.tongues.last().is_some_and(is_passed));
+        self.rows_above_tongue +=
+            u64::from(is_stable && self.tongues.last().is_some_and(is_passed));
         if row.growth_per_s > 0.0 {
-            self.unstable += 1;
+            self.unstable_rows += 1;
             match self.tongues.last_mut() {
                 // A tongue ends where the kind changes, even if the next one begins at the same
                 // speed.
-                Some(tongue) if continues_tongue && tongue.largest_growth.kind == row.kind => {
+                Some(tongue) if continues_tongue && tongue.largest_growth_row.kind == row.kind => {
                     tongue.end_speeds_rpm[1] = row.speed_rpm;
-                    if row.growth_per_s > tongue.largest_growth.growth_per_s {
-                        tongue.largest_growth = row.clone();
+                    if row.growth_per_s > tongue.largest_growth_row.growth_per_s {
+                        tongue.largest_growth_row = row.clone();
                     }
                 }
                 _ => {
-                    self.tongues.push(TongueRows {
-                        largest_growth: row.clone(),
+                    self.tongues.push(UnstableRange {
+                        largest_growth_row: row.clone(),
                         end_speeds_rpm: [row.speed_rpm; 2],
                     });
                 }
             }
         }
-        self.last = Some(row);
+        self.last_row = Some(row);
     }
 
     /// Returns the lines of the summary, each with its name.
@@ -120,33 +120,36 @@ impl StabilitySummary {
             "stable",
             format!(
                 "{} of {}, {} not, {} without a response; {}",
-                self.rows - self.unstable - self.without_response - self.beyond,
+                self.rows
+                    - self.unstable_rows
+                    - self.rows_without_response
+                    - self.rows_beyond_limits,
                 counted(self.rows as usize, "row"),
-                self.unstable,
-                self.without_response,
+                self.unstable_rows,
+                self.rows_without_response,
                 counted(self.points as usize, "point")
             ),
         )];
-        if self.above_tongue > 0 {
-            let words = "above an unstable speed: a machine that runs up may be in another motion \
+        if self.rows_above_tongue > 0 {
+            let text = "above an unstable speed: a machine that runs up may be in another motion \
                          there (`sweep dwell --carry up`)";
-            lines[0].1.push_str(&format!("; {} {words}", self.above_tongue));
+            lines[0].1.push_str(&format!("; {} {text}", self.rows_above_tongue));
         }
-        if self.beyond > 0 {
-            let rows = counted(self.beyond as usize, "row");
-            let words = "beyond the machine's geometry (column beyond), counted as neither";
-            lines.push(("beyond", format!("{rows} {words}")));
+        if self.rows_beyond_limits > 0 {
+            let rows = counted(self.rows_beyond_limits as usize, "row");
+            let description = "beyond the machine's geometry (column beyond), counted as neither";
+            lines.push(("beyond", format!("{rows} {description}")));
         }
-        if self.off_curve > 0 {
-            let rows = counted(self.off_curve as usize, "row");
-            let words = "off the curve (column on_curve): a machine that runs up may be in another \
+        if self.rows_off_curve > 0 {
+            let rows = counted(self.rows_off_curve as usize, "row");
+            let text = "off the curve (column on_curve): a machine that runs up may be in another \
                          motion at these speeds (`sweep dwell`)";
-            lines.push(("off curve", format!("{rows} {words}")));
+            lines.push(("off curve", format!("{rows} {text}")));
         }
-        if self.coexisting > 0 {
-            let rows = counted(self.coexisting as usize, "further row");
-            let words = "other responses at the same speeds (column branch)";
-            lines.push(("others", format!("{rows}: {words}")));
+        if self.coexisting_rows > 0 {
+            let rows = counted(self.coexisting_rows as usize, "further row");
+            let description = "other responses at the same speeds (column branch)";
+            lines.push(("others", format!("{rows}: {description}")));
         }
         for row in &self.jumps {
             let point_prefix = self.point_prefix(row);
@@ -154,18 +157,18 @@ impl StabilitySummary {
             if rpm > self.greatest_speed_rpm {
                 continue;
             }
-            let words = "running up, the response folds back and the motion jumps";
-            lines.push(("jump", format!("{point_prefix}at {rpm:.2} rpm, {words}")));
+            let description = "running up, the response folds back and the motion jumps";
+            lines.push(("jump", format!("{point_prefix}at {rpm:.2} rpm, {description}")));
         }
         // The tongues of a single point are listed in order of speed, those of several points by
         // growth.
-        let mut listed: Vec<&TongueRows> = self.tongues.iter().collect();
+        let mut listed: Vec<&UnstableRange> = self.tongues.iter().collect();
         if self.points > 1 {
             listed.sort_by(|a, b| {
-                b.largest_growth.growth_per_s.total_cmp(&a.largest_growth.growth_per_s)
+                b.largest_growth_row.growth_per_s.total_cmp(&a.largest_growth_row.growth_per_s)
             });
         }
-        lines.extend(listed.iter().map(|tongue| ("unstable", self.tongue_line(tongue))));
+        lines.extend(listed.iter().map(|tongue| ("unstable", self.format_tongue(tongue))));
         lines
     }
 
@@ -177,8 +180,9 @@ impl StabilitySummary {
         }
     }
 
-    fn tongue_line(&self, tongue: &TongueRows) -> String {
-        let TongueRows { largest_growth: row, end_speeds_rpm: [first_rpm, last_rpm] } = tongue;
+    fn format_tongue(&self, tongue: &UnstableRange) -> String {
+        let UnstableRange { largest_growth_row: row, end_speeds_rpm: [first_rpm, last_rpm] } =
+            tongue;
         let mut text = self.point_prefix(row);
         let [speed, first, last] = [row.speed_rpm, *first_rpm, *last_rpm].map(format_number);
         let range_end = if first == last { String::new() } else { format!(" to {last}") };
@@ -274,7 +278,7 @@ mod tests {
         let tongue_speeds: Vec<_> = summary
             .tongues
             .iter()
-            .map(|t| (t.end_speeds_rpm, t.largest_growth.speed_rpm))
+            .map(|t| (t.end_speeds_rpm, t.largest_growth_row.speed_rpm))
             .collect();
         assert_eq!(
             tongue_speeds,

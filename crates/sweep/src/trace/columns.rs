@@ -149,15 +149,15 @@ impl<'a> ModelColumns<'a> {
         };
         let Some(first) = forces.first().and_then(Option::as_ref) else { return };
         let axes = ["x", "y", "z"];
-        for (kind, (element, force, description, count)) in
+        for (kind, (element, force, description, components)) in
             Forces::ELEMENT_KINDS.into_iter().enumerate()
         {
             for k in 0..first.by_kind()[kind].len() {
-                let mut name = format!("{element}_{}_{force}", k / count + 1);
+                let mut name = format!("{element}_{}_{force}", k / components + 1);
                 let mut description = description.to_owned();
-                if count > 1 {
-                    name += &format!("_{}", axes[k % count]);
-                    description += &(k % count + 1).to_string();
+                if components > 1 {
+                    name += &format!("_{}", axes[k % components]);
+                    description += &(k % components + 1).to_string();
                 }
                 add(&name, &description, &|forces| forces.by_kind()[kind][k]);
             }

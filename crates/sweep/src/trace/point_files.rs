@@ -17,12 +17,12 @@ use crate::engine::ModelEngine;
 /// doubling it doubles the disk space that one option may take.
 pub(crate) const MAX_POINT_TRACES: u64 = 10_000;
 
-/// Time steps of each file, over the whole run. Basis: the width in pixels of the chart that shows
-/// it. Doubling it doubles the size of the files.
-const TIME_STEPS: f64 = 2000.0;
+/// Number of time steps in each file, over the whole run. Basis: the width in pixels of the chart
+/// that shows it. Doubling it doubles the size of the files.
+const STEPS_PER_FILE: f64 = 2000.0;
 
 /// Writes the trace of every point of `result` into `folder` as `point-<index>.parquet`, until
-/// `stop` returns true. A point without equilibrium gets no file. `on_point` is called after each
+/// `cancel` is requested. A point without equilibrium gets no file. `on_point` is called after each
 /// point.
 ///
 /// The trace of a row that was computed with capped modes is integrated in the same way, in a
@@ -53,18 +53,18 @@ pub(crate) fn write_point_traces(
             let parameters = names.zip(plan.axis_values(point)).collect();
             let kind = method.and_then(|name| MethodKind::named(&name));
             let settings = TraceSettings {
-                every_s: Some(plan.end_s / TIME_STEPS),
+                every_s: Some(plan.end_s / STEPS_PER_FILE),
                 models: Models::Both,
                 start: InitialDeviation::default(),
                 extras: TraceExtras::default(),
                 capped: kind.and_then(|kind| engine.capped_run(kind)),
             };
-            let traced = trace_scenario(plan, plan.scenario(point), parameters, &settings, cancel);
+            let trace = trace_scenario(plan, plan.scenario(point), parameters, &settings, cancel);
             if cancel.is_requested() {
                 return Ok(());
             }
             // A point without equilibrium is an error here; its row in the map reports that.
-            if let Ok(trace) = traced {
+            if let Ok(trace) = trace {
                 let path = folder.join(format!("point-{point}.parquet"));
                 files::write(&path, FileKind::Trace, &trace.table.into_bytes(&path)?)?;
             }
@@ -78,7 +78,7 @@ pub(crate) fn write_point_traces(
 fn remove_point_traces(folder: &Path) -> Result<(), StoreError> {
     for name in regular::names(folder).map_err(StoreError::io("list", folder))? {
         let is_point_trace = name.to_str().is_some_and(|name| {
-            let number = name.strip_prefix("point-").and_then(|it| it.strip_suffix(".parquet"));
+            let number = name.strip_prefix("point-").and_then(|rest| rest.strip_suffix(".parquet"));
             number.is_some_and(|number| number.parse::<u64>().is_ok())
         });
         let path = folder.join(&name);

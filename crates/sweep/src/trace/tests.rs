@@ -48,11 +48,11 @@ fn a_trace_with_friction_is_as_accurate_as_its_row() {
             extras,
             capped: None,
         };
-        let traced =
+        let trace =
             trace_scenario(&plan, plan.scenario(0), Vec::new(), &settings, Cancel::Never).unwrap();
-        let rows = traced.table.finish().unwrap().0;
+        let rows = trace.table.finish().unwrap().0;
         let column = rows.column_by_name("foot_1_load_nonlinear_n").unwrap();
-        (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), traced.method)
+        (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), trace.method)
     };
     let (reference, method) = loads("");
     assert_eq!(method, Some(MethodKind::Dop853));

@@ -19,9 +19,9 @@ pub(super) struct SheetKeys {
     drum_radius_m: Option<f64>,
     drum_depth_m: Option<f64>,
     /// The parameters that the file omits.
-    pub(super) omitted: Vec<MachineParameter>,
+    pub(super) omitted_parameters: Vec<MachineParameter>,
     /// The positions along the axis that the file gives by the name of a plane.
-    pub(super) planes: Vec<(MachineParameter, DrumPlane)>,
+    pub(super) plane_positions: Vec<(MachineParameter, DrumPlane)>,
 }
 
 /// A plane of the drum in which an unbalance lies.
@@ -65,7 +65,7 @@ const DRUM_DEPTH: &str = "depth_m";
 const DRUM_SIZES: [&str; 2] = [DRUM_RADIUS, DRUM_DEPTH];
 
 /// The range of the drum's inner radius and depth (m).
-const DRUM_SIZE: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
+const DRUM_SIZE_FORM: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
 
 impl SheetKeys {
     /// Creates the data sheet of a file whose keys have not been read.
@@ -89,10 +89,10 @@ impl SheetKeys {
             "drum" => {
                 let key =
                     keys::Key::new(DRUM_RADIUS, "inner radius; other numbers follow from it, m");
-                keys.key(key, &DRUM_SIZE, &mut self.drum_radius_m);
+                keys.key(key, &DRUM_SIZE_FORM, &mut self.drum_radius_m);
                 let key =
                     keys::Key::new(DRUM_DEPTH, "inner depth; other numbers follow from it, m");
-                keys.key(key, &DRUM_SIZE, &mut self.drum_depth_m);
+                keys.key(key, &DRUM_SIZE_FORM, &mut self.drum_depth_m);
             }
             name if UNBALANCES.contains(&name) => self.walk_plane(section, k, keys),
             _ => {}
@@ -118,48 +118,51 @@ impl SheetKeys {
         table.report.record_location(name.as_str(), location.location);
         // The paper's machine has no further unbalances, so it has no parameters of them.
         let machine = with_unbalances(k + 1);
-        self.planes.extend(find_parameter(&name, &machine).map(|parameter| (parameter, plane)));
+        self.plane_positions
+            .extend(find_parameter(&name, &machine).map(|parameter| (parameter, plane)));
     }
 
     /// Whether the position of element `k` along the axis is given by the name of a plane.
     pub(super) fn has_plane(&self, section: &MachineSection, k: usize, key: &str) -> bool {
         let name = format!("{}{UNBALANCE_X}", section.prefix(k));
-        key == UNBALANCE_X && self.planes.iter().any(|(parameter, _)| parameter.name() == name)
+        key == UNBALANCE_X
+            && self.plane_positions.iter().any(|(parameter, _)| parameter.name() == name)
     }
 
     /// Sets the parameters that the file omits by their rules, which become the parameters'
     /// sources.
     pub(super) fn fill_omitted(self, machine: &mut Machine, root: &Section<'_>) {
         let report = root.report;
-        let is_omitted = |name: &str| self.omitted.iter().any(|parameter| parameter.name() == name);
-        let are_masses_omitted = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg"].map(is_omitted);
+        let is_omitted =
+            |name: &str| self.omitted_parameters.iter().any(|parameter| parameter.name() == name);
+        let masses_omitted = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg"].map(is_omitted);
         let sheet = DataSheet {
             moving_mass_kg: self.moving_mass_kg,
             drum_radius_m: self.drum_radius_m.unwrap_or_default(),
             drum_depth_m: self.drum_depth_m.unwrap_or_default(),
         };
         let is_complete = self.drum_radius_m.is_some() && self.drum_depth_m.is_some();
-        if !self.omitted.is_empty() {
+        if !self.omitted_parameters.is_empty() {
             for key in DRUM_SIZES.into_iter().filter(|key| !root.has_inner_key("drum", key)) {
                 let expected = "the drum's inner radius_m and depth_m in [drum], from which the \
                                 numbers that are left out follow";
                 root.report_missing(key, expected);
             }
         }
-        if sheet.moving_mass_kg.is_some() && !are_masses_omitted[0] {
+        if sheet.moving_mass_kg.is_some() && !masses_omitted[0] {
             let title = format!("`{MOVING_MASS}` beside the tub's mass");
             let expected =
                 "expected no `mass_kg` in [tub]: it is the moving mass less shaft and drum";
             let location =
                 root.key_location(MOVING_MASS).unwrap_or_else(|| root.location().clone());
             report.refuse::<()>(&location, title, expected);
-        } else if are_masses_omitted.contains(&true) && sheet.moving_mass_kg.is_none() {
+        } else if masses_omitted.contains(&true) && sheet.moving_mass_kg.is_none() {
             let expected = "the mass of tub, shaft and drum without laundry, or `mass_kg` of each";
             root.report_missing(MOVING_MASS, expected);
         } else if is_complete {
-            sheet.fill(&self.omitted, machine);
+            sheet.fill(&self.omitted_parameters, machine);
         }
-        for parameter in &self.omitted {
+        for parameter in &self.omitted_parameters {
             let Some(value) = parameter.get(machine, &no_spin()) else { continue };
             if is_complete && !parameter.range().contains(value) {
                 let name = parameter.name();

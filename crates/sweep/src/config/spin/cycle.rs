@@ -7,7 +7,7 @@ use sweep_engine::config::section::counted;
 use sweep_engine::config::{Diagnostic, Location, Report};
 use washer_model::{Range, decimal};
 
-use super::MAX_ROWS;
+use super::MAX_TABLE_ROWS;
 
 /// Range of a cycle's speeds (rpm), that of a table in the grid file. Basis: far above any washing
 /// machine. Doubling it accepts more mistakes of units.
@@ -18,17 +18,17 @@ const SPEED_RANGE_RPM: Range = Range::Within(-1e5, 1e5);
 /// pieces, each a segment of every run. Doubling it takes 1.4 times fewer pieces.
 const JOINT_TOLERANCE: f64 = 1e-4;
 
-/// The joints between a cycle's points.
+/// The interpolation between the points of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Joints {
+pub(super) enum JointKind {
     /// Straight lines.
     Straight,
     /// Monotone cubics, cut into straight pieces.
     Smooth,
 }
 
-impl Joints {
-    /// All of them, with their names in grid files.
+impl JointKind {
+    /// All interpolations, with their names in grid files.
     pub(super) const ALL: [(Self, &'static str); 2] =
         [(Self::Straight, "straight"), (Self::Smooth, "smooth")];
 }
@@ -40,15 +40,15 @@ pub(super) type CyclePoints = (Vec<f64>, Vec<f64>);
 /// name.
 pub(super) fn read(
     path: &Path,
-    joints: Joints,
+    joints: JointKind,
     location: &Location,
     report: &Report,
 ) -> Option<CyclePoints> {
     let table =
         NumberTable::read(path, &Names { known: &quantity_and_unit, renamed: &[] }, report)?;
     table.notes().into_iter().for_each(|note| report.add_note(format!("the cycle: {note}")));
-    let times = column(&table, "time_s", "time", location, report);
-    let speeds = column(&table, "speed_rpm", "speed", location, report);
+    let times = find_column(&table, "time_s", "time", location, report);
+    let speeds = find_column(&table, "speed_rpm", "speed", location, report);
     let times = times?;
     let speeds = speeds?;
     if !check_columns(&table, times, speeds, report) {
@@ -56,15 +56,17 @@ pub(super) fn read(
     }
     // Smooth joints multiply the number of rows by up to a hundred, so that a table that is too
     // long is not joined.
-    let is_short = |rows: usize| rows <= MAX_ROWS;
+    let is_short = |rows: usize| rows <= MAX_TABLE_ROWS;
     let points = match joints {
-        Joints::Smooth if is_short(times.values.len()) => smooth(&times.values, &speeds.values),
+        JointKind::Smooth if is_short(times.values.len()) => {
+            interpolate_smoothly(&times.values, &speeds.values)
+        }
         _ => (times.values.clone(), speeds.values.clone()),
     };
     if !is_short(points.0.len()) {
         let title = format!("the cycle has {} with its joints", counted(points.0.len(), "row"));
         let expected = format!(
-            "expected at most {MAX_ROWS}: leave out rows between which the speed is straight"
+            "expected at most {MAX_TABLE_ROWS}: leave out rows between which the speed is straight"
         );
         return report.refuse(location, title, expected);
     }
@@ -84,7 +86,7 @@ fn quantity_and_unit(header: &str) -> Option<(String, String)> {
 }
 
 /// Returns the column of a name; `None` and a mistake if the table has none or two.
-fn column<'t>(
+fn find_column<'t>(
     table: &'t NumberTable,
     name: &str,
     quantity: &str,
@@ -155,9 +157,9 @@ fn check_columns(
 ///
 /// F. N. Fritsch, R. E. Carlson, Monotone piecewise cubic interpolation, SIAM Journal on Numerical
 /// Analysis 17 (1980), 238-246.
-fn smooth(time_s: &[f64], speed_rpm: &[f64]) -> CyclePoints {
-    let slopes = slopes(time_s, speed_rpm);
-    let greatest = speed_rpm.iter().fold(0.0, |most: f64, speed| most.max(speed.abs()));
+fn interpolate_smoothly(time_s: &[f64], speed_rpm: &[f64]) -> CyclePoints {
+    let slopes = monotone_slopes(time_s, speed_rpm);
+    let greatest = speed_rpm.iter().fold(0.0, |greatest: f64, speed| greatest.max(speed.abs()));
     let tolerance = JOINT_TOLERANCE * greatest;
     let mut points = (vec![time_s[0]], vec![speed_rpm[0]]);
     for k in 1..time_s.len() {
@@ -193,7 +195,7 @@ fn smooth(time_s: &[f64], speed_rpm: &[f64]) -> CyclePoints {
 }
 
 /// Returns the slopes of monotone cubics at points (rpm/s).
-fn slopes(time_s: &[f64], speed_rpm: &[f64]) -> Vec<f64> {
+fn monotone_slopes(time_s: &[f64], speed_rpm: &[f64]) -> Vec<f64> {
     let chords: Vec<f64> = (1..time_s.len())
         .map(|k| (speed_rpm[k] - speed_rpm[k - 1]) / (time_s[k] - time_s[k - 1]))
         .collect();
@@ -227,7 +229,7 @@ mod tests {
 
     #[test]
     fn smooth_joints_are_monotone_and_pass_through_the_points() {
-        let (times, speeds) = smooth(&TIMES_S, &SPEEDS_RPM);
+        let (times, speeds) = interpolate_smoothly(&TIMES_S, &SPEEDS_RPM);
         assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
         for (time_s, speed) in TIMES_S.iter().zip(SPEEDS_RPM) {
             let position = times.iter().position(|time| time == time_s).expect("it is kept");
@@ -253,7 +255,7 @@ mod tests {
     #[test]
     fn pieces_are_within_the_tolerance_of_the_cubic() {
         // From rest to rest the cubic is 3 x^2 - 2 x^3.
-        let (times, speeds) = smooth(&[0.0, 10.0], &[0.0, 1000.0]);
+        let (times, speeds) = interpolate_smoothly(&[0.0, 10.0], &[0.0, 1000.0]);
         let mut largest_error: f64 = 0.0;
         for k in 1..times.len() {
             for step in 0..=20 {

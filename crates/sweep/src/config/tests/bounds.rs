@@ -43,9 +43,9 @@ fn the_longest_spin_is_checked_and_a_longer_one_is_refused() {
     let mut axes: String = masses.map(axis).concat();
     axes.push_str(&axis("damping_n_s_per_m"));
     axes.push_str(&axis("spin_table_2_speed_rpm"));
-    let plan = load_text(grid_with_table(spin::MAX_ROWS, &axes), &[]).unwrap();
+    let plan = load_text(grid_with_table(spin::MAX_TABLE_ROWS, &axes), &[]).unwrap();
     assert_eq!(plan.corners(), 64);
-    let refusal = load_text(grid_with_table(spin::MAX_ROWS + 1, &axes), &[]).unwrap_err();
+    let refusal = load_text(grid_with_table(spin::MAX_TABLE_ROWS + 1, &axes), &[]).unwrap_err();
     assert!(refusal.contains("`time_s` has 20001 numbers"), "{refusal}");
     assert!(refusal.contains("at most 20000"), "{refusal}");
     assert!(!refusal.contains("is empty"), "{refusal}");
