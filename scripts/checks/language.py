@@ -37,7 +37,8 @@ FUNCTION = re.compile(
     r"\s*(pub(\([a-z: ]+\))? )?(default )?(const )?(async )?(unsafe )?(extern \"C\" )?fn (\w+)")
 CONSTANT = re.compile(r"\s*(pub(\([a-z: ]+\))? )?(const|static) ([A-Z][A-Z0-9_]*): [^,]*(=|;)")
 TYPE = re.compile(r"(pub(\([a-z: ]+\))? )?(struct|enum|union|trait|type) ([A-Z]\w*)")
-TUPLE = re.compile(r"let \(((?:(?:mut )?[a-z_]\w*(?:, )?)+)\)(?:: \([^=]*\))? =\s*\(")
+TUPLE = re.compile(
+    r"let \(((?:mut )?[a-z_]\w*(?:, (?:mut )?[a-z_]\w*)*)\)(?:: \([^=]*\))? =\s*\(")
 OF_NAME = re.compile(r"\bof_[a-z0-9_]+")
 TRAIT_BLOCK = re.compile(r"(unsafe )?impl\b.*\bfor\b")
 STRING = re.compile(r'"(?:[^"\\]|\\.)*"')

@@ -1,4 +1,5 @@
-//! Times, steps and segments of the lanes in adaptive methods. Each lane has its own.
+//! Times, steps and segments of the lanes in adaptive methods. Each lane has its own time, step and
+//! segment.
 
 use crate::control::StepControl;
 use crate::{Failure, Lane, MAX_LANES, N, SegmentEnd, StepCount, Task, Tolerance};
@@ -8,7 +9,7 @@ use crate::{Failure, Lane, MAX_LANES, N, SegmentEnd, StepCount, Task, Tolerance}
 struct AdaptiveSegment {
     is_active: bool,
     end_s: f64,
-    count: StepCount,
+    step_count: StepCount,
 }
 
 /// The times and steps of the lanes.
@@ -68,9 +69,9 @@ impl<T: Lane> AdaptiveLanes<T> {
     pub(crate) fn steps(&self) -> N<T> {
         let mut h = self.control.step;
         for (lane, segment) in self.segments[..T::LANES].iter().enumerate() {
-            let rest_s = segment.end_s - self.time.0.get(lane);
-            if segment.is_active && h.0.get(lane) * 1.01 >= rest_s {
-                h.0.set(lane, rest_s);
+            let remaining_s = segment.end_s - self.time.0.get(lane);
+            if segment.is_active && h.0.get(lane) * 1.01 >= remaining_s {
+                h.0.set(lane, remaining_s);
             } else if !segment.is_active {
                 h.0.set(lane, 0.0);
             }
@@ -100,7 +101,7 @@ impl<T: Lane> AdaptiveLanes<T> {
     ) -> N<T> {
         let mut length = h.lit(0.0);
         let masks = masks.map(T::bits);
-        let proposals = self.control.proposals(error, h);
+        let proposals = self.control.propose_steps(error, h);
         // The lanes are handled one by one, which takes little time compared with the evaluations
         // of a step.
         for lane in 0..T::LANES {
@@ -111,27 +112,28 @@ impl<T: Lane> AdaptiveLanes<T> {
             let end_time = self.step_end_s(lane, h);
             self.control.update(lane, is_accepted, &proposals);
             let segment = &mut self.segments[lane];
-            let count = &mut segment.count;
+            let step_count = &mut segment.step_count;
             let time = if is_accepted {
-                count.accepted += 1;
+                step_count.accepted += 1;
                 length.0.set(lane, h.0.get(lane));
                 self.time.0.set(lane, end_time);
                 end_time
             } else {
-                count.rejected += 1;
+                step_count.rejected += 1;
                 self.time.0.get(lane)
             };
             let min_step = 16.0 * f64::EPSILON * time.abs().max(segment.end_s);
             let is_stuck = !is_accepted && self.control.step.0.get(lane) <= min_step;
-            let fail = |reason, time_s| Some(SegmentEnd::Failed { reason, time_s, count: *count });
+            let to_failed_end =
+                |reason, time_s| Some(SegmentEnd::Failed { reason, time_s, count: *step_count });
             self.segment_ends[lane] = if !is_in_range && (is_accepted || is_stuck) {
-                fail(Failure::Diverged, time)
+                to_failed_end(Failure::Diverged, time)
             } else if is_stuck {
-                fail(Failure::StepTooSmall, time)
+                to_failed_end(Failure::StepTooSmall, time)
             } else if is_accepted && end_time >= segment.end_s {
-                Some(SegmentEnd::Completed(*count))
-            } else if count.accepted + count.rejected >= tolerance.max_steps {
-                fail(Failure::StepLimit, time)
+                Some(SegmentEnd::Completed(*step_count))
+            } else if step_count.accepted + step_count.rejected >= tolerance.max_steps {
+                to_failed_end(Failure::StepLimit, time)
             } else {
                 None
             };

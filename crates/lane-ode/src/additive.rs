@@ -140,9 +140,9 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut x = [zero; D];
     let mut lanes = AdaptiveLanes::new(zero);
     let mut k = [[zero; D]; STAGES];
-    let mut before = x;
-    let mut slope_before = x;
-    let mut length = zero;
+    let mut start_state = x;
+    let mut start_slope = x;
+    let mut length_s = zero;
     let mut is_start = lanes.start_pending_lanes(task, &mut x);
     while lanes.has_active_lane() && !task.cancel().is_requested() {
         let forcing = task.system().forcing_out_of_line(lanes.time);
@@ -154,12 +154,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
                 &forcing,
                 &ObservedStep {
                     end_s: lanes.time,
-                    length_s: length,
-                    before: &before,
-                    slope_before: &slope_before,
-                    after: &x,
-                    slope_after: &k[0],
-                    dense: None,
+                    length_s,
+                    start_state: &start_state,
+                    start_slope: &start_slope,
+                    end_state: &x,
+                    end_slope: &k[0],
+                    dense_term: None,
                 },
             );
             is_start = lanes.start_pending_lanes(task, &mut x);
@@ -191,23 +191,23 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         let mut error = [zero; D];
         for i in 0..D {
             let mut sum = zero;
-            let mut difference = zero;
+            let mut error_sum = zero;
             for j in 0..STAGES {
                 sum += k[j][i] * B[j];
-                difference += k[j][i] * (B[j] - B_HAT[j]);
+                error_sum += k[j][i] * (B[j] - B_HAT[j]);
             }
             y[i] = x[i] + h * sum;
-            error[i] = (h * difference).v();
+            error[i] = (h * error_sum).v();
         }
 
         let in_range = task.system().in_range(&y);
         let error = tolerance.error_norm(&x, &y, &error);
-        before = x;
-        slope_before = k[0];
-        let accepted = error.0.less(zero.lit(1.0).0);
+        start_state = x;
+        start_slope = k[0];
+        let accepted_lanes = error.0.less(zero.lit(1.0).0);
         for i in 0..D {
-            x[i] = N(T::select(accepted, y[i].0, x[i].0));
+            x[i] = N(T::select(accepted_lanes, y[i].0, x[i].0));
         }
-        length = lanes.accept_or_reject(h, error, [accepted, in_range], tolerance);
+        length_s = lanes.accept_or_reject(h, error, [accepted_lanes, in_range], tolerance);
     }
 }

@@ -14,20 +14,20 @@ pub struct Tolerance {
 }
 
 impl Tolerance {
-    /// Returns the largest ratio of a component's error to its tolerance. A step is accepted if it
-    /// is below 1. The result is NaN if any component is not finite.
+    /// Returns the largest ratio of a component's error to its tolerance. A step is accepted if
+    /// this ratio is below 1. The result is NaN if any component is not finite.
     #[inline(always)]
     pub(crate) fn error_norm<T: Lane, const D: usize>(
         &self,
-        before: &[N<T>; D],
-        after: &[N<T>; D],
+        start_state: &[N<T>; D],
+        end_state: &[N<T>; D],
         error: &[N<T>; D],
     ) -> N<T> {
-        let zero = before[0].lit(0.0);
+        let zero = start_state[0].lit(0.0);
         let mut largest = zero;
         let mut nan_sum = zero;
         for i in 0..D {
-            let size = N(before[i].0.abs().larger(after[i].0.abs()));
+            let size = N(start_state[i].0.abs().larger(end_state[i].0.abs()));
             let ratio = error[i].abs() / (size * self.relative + self.absolute);
             largest = N(ratio.0.larger(largest.0));
             // The maximum ignores a NaN, so that the product with zero passes it on to the result.
@@ -60,24 +60,25 @@ pub(crate) struct StepControl<T> {
     /// The step to try next.
     pub(crate) step: N<T>,
     /// The factor err^beta of the last accepted step.
-    memory: N<T>,
+    error_memory: N<T>,
     /// A mask of the lanes whose last step was rejected: their next step must not grow.
-    was_rejected: u32,
+    rejected_lanes: u32,
 }
 
 /// The next step of each lane, if the current one is accepted and if it is rejected.
 pub(crate) struct Proposals<T> {
-    accepted: N<T>,
-    rejected: N<T>,
-    accepted_memory: N<T>,
+    step_if_accepted: N<T>,
+    step_if_rejected: N<T>,
+    error_memory_if_accepted: N<T>,
 }
 
-/// Clamps a step's factor to [`SHRINK_LIMIT`] and `greatest`.
+/// Clamps the factor from one step to the next to the range from [`MIN_STEP_FACTOR`] to
+/// `max_factor`.
 #[inline(always)]
-fn clamp_factor<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
-    let min_factor = factor.lit(SHRINK_LIMIT);
-    let greatest = factor.lit(greatest);
-    let factor = factor.where_less(greatest, factor, greatest);
+fn clamp_factor<T: Lane>(factor: N<T>, max_factor: f64) -> N<T> {
+    let min_factor = factor.lit(MIN_STEP_FACTOR);
+    let max_factor = factor.lit(max_factor);
+    let factor = factor.where_less(max_factor, factor, max_factor);
     min_factor.where_less(factor, factor, min_factor)
 }
 
@@ -86,18 +87,18 @@ fn clamp_factor<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
 const SAFETY_FACTOR: f64 = 0.9;
 /// The least factor from one step to the next. Basis: `dopri5.f` (0.2). Doubling it takes more
 /// rejected steps where the motion suddenly becomes faster.
-const SHRINK_LIMIT: f64 = 0.2;
+const MIN_STEP_FACTOR: f64 = 0.2;
 /// The greatest factor from one step to the next. Basis: half of `dopri5.f`'s 10. Doubling it has
 /// more steps rejected after the first one of a segment.
-const GROWTH_LIMIT: f64 = 5.0;
+const MAX_STEP_FACTOR: f64 = 5.0;
 /// The least error, relative to the tolerance, from which the next step is computed. Basis: such an
-/// error gives a factor far above [`GROWTH_LIMIT`], so that doubling it changes no step.
-const LEAST_ERROR: f64 = 1e-10;
+/// error gives a factor far above [`MAX_STEP_FACTOR`], so that doubling it changes no step.
+const MIN_ERROR: f64 = 1e-10;
 
 impl<T: Lane> StepControl<T> {
     #[inline(always)]
     pub(crate) fn new(zero: N<T>) -> Self {
-        Self { step: zero, memory: zero.lit(1.0), was_rejected: 0 }
+        Self { step: zero, error_memory: zero.lit(1.0), rejected_lanes: 0 }
     }
 
     /// Starts a segment in a lane. The memory of the lane's earlier trajectories is discarded, so
@@ -105,16 +106,16 @@ impl<T: Lane> StepControl<T> {
     #[inline(always)]
     pub(crate) fn start(&mut self, lane: usize, first_step_s: f64) {
         self.step.0.set(lane, first_step_s);
-        self.memory.0.set(lane, 1.0);
-        self.was_rejected &= !(1 << lane);
+        self.error_memory.0.set(lane, 1.0);
+        self.rejected_lanes &= !(1 << lane);
     }
 
     /// Computes the next steps after a step `h` with error `error`.
     #[inline(always)]
-    pub(crate) fn proposals(&self, error: N<T>, h: N<T>) -> Proposals<T> {
+    pub(crate) fn propose_steps(&self, error: N<T>, h: N<T>) -> Proposals<T> {
         // A NaN is treated as a far too large error.
         let error = error.where_less(error.lit(1e30), error, error.lit(1e30));
-        let error = error.lit(LEAST_ERROR).where_less(error, error, error.lit(LEAST_ERROR));
+        let error = error.lit(MIN_ERROR).where_less(error, error, error.lit(MIN_ERROR));
         let root_2 = error.sqrt();
         let root_8 = root_2.sqrt().sqrt();
         let root_32 = root_8.sqrt().sqrt();
@@ -124,9 +125,13 @@ impl<T: Lane> StepControl<T> {
         let alpha = (root_8 * (root_32 * root_64)).v();
         let beta = (root_32 * root_128).v();
         Proposals {
-            accepted: (h * clamp_factor(SAFETY_FACTOR * self.memory / alpha, GROWTH_LIMIT)).v(),
-            rejected: (h * clamp_factor(SAFETY_FACTOR / alpha, 1.0)).v(),
-            accepted_memory: beta,
+            step_if_accepted: (h * clamp_factor(
+                SAFETY_FACTOR * self.error_memory / alpha,
+                MAX_STEP_FACTOR,
+            ))
+            .v(),
+            step_if_rejected: (h * clamp_factor(SAFETY_FACTOR / alpha, 1.0)).v(),
+            error_memory_if_accepted: beta,
         }
     }
 
@@ -135,16 +140,16 @@ impl<T: Lane> StepControl<T> {
     pub(crate) fn update(&mut self, lane: usize, is_accepted: bool, proposals: &Proposals<T>) {
         let bit = 1 << lane;
         if is_accepted {
-            let mut step = proposals.accepted.0.get(lane);
-            if self.was_rejected & bit != 0 {
+            let mut step = proposals.step_if_accepted.0.get(lane);
+            if self.rejected_lanes & bit != 0 {
                 step = step.min(self.step.0.get(lane));
             }
             self.step.0.set(lane, step);
-            self.memory.0.set(lane, proposals.accepted_memory.0.get(lane));
-            self.was_rejected &= !bit;
+            self.error_memory.0.set(lane, proposals.error_memory_if_accepted.0.get(lane));
+            self.rejected_lanes &= !bit;
         } else {
-            self.step.0.set(lane, proposals.rejected.0.get(lane));
-            self.was_rejected |= bit;
+            self.step.0.set(lane, proposals.step_if_rejected.0.get(lane));
+            self.rejected_lanes |= bit;
         }
     }
 }

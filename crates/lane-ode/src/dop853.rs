@@ -126,7 +126,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
     let mut segments = FixedSegments::new(zero);
     while let Some(mut step_limit) = segments.start_pending_lanes(task, &mut x) {
         let clock = segments.clock;
-        let mut index = segments.index;
+        let mut index = segments.step_index;
         let h = clock.h;
         let mut time = clock.time_after(index);
         // `black_box` prevents the compiler from copying the forcing repeatedly.
@@ -141,8 +141,8 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         const STAGE_STATE: usize = 2;
         // Index of the last step's first slope among the slopes.
         const PREVIOUS_SLOPE: usize = DOP853_STAGES;
-        let mut current = 0;
-        let mut previous = 1;
+        let mut current_index = 0;
+        let mut previous_index = 1;
         let mut is_start = true;
         let mut step_count = 0;
         loop {
@@ -152,9 +152,9 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             let next_time = clock.time_after(index + 1.0);
             for stage in 0..DOP853_STAGES {
                 if stage == 0 {
-                    slopes[0] = task.system().derivative(forcing, &states[current]);
+                    slopes[0] = task.system().derivative(forcing, &states[current_index]);
                     if is_start {
-                        task.begin(forcing, &states[current], &slopes[0]);
+                        task.begin(forcing, &states[current_index], &slopes[0]);
                         is_start = false;
                     } else {
                         task.observe(
@@ -162,11 +162,11 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                             &ObservedStep {
                                 end_s: time,
                                 length_s: h,
-                                before: &states[previous],
-                                slope_before: &slopes[PREVIOUS_SLOPE],
-                                after: &states[current],
-                                slope_after: &slopes[0],
-                                dense: None,
+                                start_state: &states[previous_index],
+                                start_slope: &slopes[PREVIOUS_SLOPE],
+                                end_state: &states[current_index],
+                                end_slope: &slopes[0],
+                                dense_term: None,
                             },
                         );
                     }
@@ -181,24 +181,24 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     if stage == DOP853_STAGES - 1 { next_time } else { stage_time },
                     forcing,
                 );
-                add_slopes(h, A[stage - 1], &slopes, &mut states, current, STAGE_STATE);
+                add_slopes(h, A[stage - 1], &slopes, &mut states, current_index, STAGE_STATE);
                 slopes[stage] = task.system().derivative(forcing, &states[STAGE_STATE]);
             }
             if is_last {
                 break;
             }
-            add_slopes(h, B, &slopes, &mut states, current, previous);
-            (current, previous) = (previous, current);
+            add_slopes(h, B, &slopes, &mut states, current_index, previous_index);
+            (current_index, previous_index) = (previous_index, current_index);
             index = index + 1.0;
             time = next_time;
             step_count += 1;
-            let in_range = task.system().in_range(&states[current]);
-            if !T::all(in_range) && segments.fail(in_range, time, step_count) {
+            let in_range = task.system().in_range(&states[current_index]);
+            if !T::all(in_range) && segments.end_failed_segments(in_range, time, step_count) {
                 step_limit = step_count;
             }
         }
-        x = states[current];
-        segments.index = index;
+        x = states[current_index];
+        segments.step_index = index;
         segments.count_steps(step_count);
     }
 }

@@ -104,26 +104,26 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 
         let in_range = task.system().in_range(&y);
         let error = tolerance.error_norm(&x, &y, &combine_stages(h, &k, &E));
-        let accepted = error.0.less(zero.lit(1.0).0);
-        let before = x;
-        let slope_before = k[0];
-        let dense = combine_stages(h, &k, &DENSE);
+        let accepted_lanes = error.0.less(zero.lit(1.0).0);
+        let start_state = x;
+        let start_slope = k[0];
+        let dense_term = combine_stages(h, &k, &DENSE);
         for i in 0..D {
-            x[i] = N(T::select(accepted, y[i].0, x[i].0));
-            k[0][i] = N(T::select(accepted, k[STAGES - 1][i].0, k[0][i].0));
+            x[i] = N(T::select(accepted_lanes, y[i].0, x[i].0));
+            k[0][i] = N(T::select(accepted_lanes, k[STAGES - 1][i].0, k[0][i].0));
         }
-        let length = lanes.accept_or_reject(h, error, [accepted, in_range], tolerance);
+        let length = lanes.accept_or_reject(h, error, [accepted_lanes, in_range], tolerance);
         let forcing = task.system().forcing_out_of_line(lanes.time);
         task.observe(
             &forcing,
             &ObservedStep {
                 end_s: lanes.time,
                 length_s: length,
-                before: &before,
-                slope_before: &slope_before,
-                after: &x,
-                slope_after: &k[0],
-                dense: Some(&dense),
+                start_state: &start_state,
+                start_slope: &start_slope,
+                end_state: &x,
+                end_slope: &k[0],
+                dense_term: Some(&dense_term),
             },
         );
     }

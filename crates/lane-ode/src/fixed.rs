@@ -2,7 +2,7 @@
 
 use crate::{Failure, Lane, MAX_LANES, N, Segment, SegmentEnd, StepCount, Task};
 
-/// Greatest number of steps between two polls of [`Task::cancel`]. Basis: they take some
+/// Greatest number of steps between two polls of [`Task::cancel`]. Basis: these steps take some
 /// hundredths of a second. Doubling it doubles the time until an interrupt takes effect.
 pub const CANCEL_POLL_STEPS: u64 = 1 << 14;
 
@@ -24,14 +24,14 @@ pub(crate) struct SegmentClock<T> {
     /// The step of each lane; zero in an idle lane.
     pub(crate) h: N<T>,
     /// The number of steps in the segment.
-    total: N<T>,
+    step_total: N<T>,
 }
 
 impl<T: Lane> SegmentClock<T> {
-    /// Returns the time after `index` steps.
+    /// Returns the time after `step_index` steps.
     #[inline(always)]
-    pub(crate) fn time_after(&self, index: N<T>) -> N<T> {
-        index.where_less(self.total, index * self.h + self.start, self.end)
+    pub(crate) fn time_after(&self, step_index: N<T>) -> N<T> {
+        step_index.where_less(self.step_total, step_index * self.h + self.start, self.end)
     }
 }
 
@@ -46,8 +46,8 @@ struct FixedProgress {
 /// The current segments of the lanes.
 pub(crate) struct FixedSegments<T> {
     pub(crate) clock: SegmentClock<T>,
-    /// The number of steps made in the segment.
-    pub(crate) index: N<T>,
+    /// The number of steps made in each lane's segment.
+    pub(crate) step_index: N<T>,
     lanes: [FixedProgress; MAX_LANES],
     segment_ends: [Option<SegmentEnd>; MAX_LANES],
 }
@@ -57,8 +57,8 @@ impl<T: Lane> FixedSegments<T> {
     #[inline(always)]
     pub(crate) fn new(zero: N<T>) -> Self {
         Self {
-            clock: SegmentClock { start: zero, end: zero, h: zero, total: zero },
-            index: zero,
+            clock: SegmentClock { start: zero, end: zero, h: zero, step_total: zero },
+            step_index: zero,
             lanes: [FixedProgress::default(); MAX_LANES],
             segment_ends: [Some(SegmentEnd::Idle); MAX_LANES],
         }
@@ -87,20 +87,25 @@ impl<T: Lane> FixedSegments<T> {
             self.clock.start.0.set(lane, start_s);
             self.clock.end.0.set(lane, end_s);
             self.clock.h.0.set(lane, (end_s - start_s) / steps.max(1) as f64);
-            self.clock.total.0.set(lane, steps as f64);
-            self.index.0.set(lane, 0.0);
+            self.clock.step_total.0.set(lane, steps as f64);
+            self.step_index.0.set(lane, 0.0);
         }
         if task.cancel().is_requested() {
             return None;
         }
-        let active = self.lanes[..T::LANES].iter().filter(|lane| lane.is_active);
-        active.map(|lane| lane.remaining_steps.min(CANCEL_POLL_STEPS)).min()
+        let active_lanes = self.lanes[..T::LANES].iter().filter(|lane| lane.is_active);
+        active_lanes.map(|lane| lane.remaining_steps.min(CANCEL_POLL_STEPS)).min()
     }
 
     /// Ends the segments of lanes that are out of range at `time`, `new_steps` steps after the last
     /// call of [`Self::start_pending_lanes`]. Returns whether any lane's segment has ended.
     #[inline(always)]
-    pub(crate) fn fail(&mut self, in_range: T::Mask, time: N<T>, new_steps: u64) -> bool {
+    pub(crate) fn end_failed_segments(
+        &mut self,
+        in_range: T::Mask,
+        time: N<T>,
+        new_steps: u64,
+    ) -> bool {
         let out_of_range = !T::bits(in_range);
         for lane in (0..T::LANES)
             .filter(|lane| self.lanes[*lane].is_active && out_of_range >> lane & 1 == 1)

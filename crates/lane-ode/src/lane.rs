@@ -39,14 +39,15 @@ pub trait Lane: Real {
     }
 }
 
-/// Work over lanes of one type that is compiled once, as a separate function instead of inline in
-/// each caller. It suits long code that runs rarely, because the time to compile a function grows
-/// faster than its length. [`Lane::run_out_of_line`] runs it over several lanes,
-/// [`Simd::one_lane`](crate::Simd::one_lane) over a single one.
+/// A computation over lanes of one type that is compiled once, as a separate function instead of
+/// inline in each caller. This suits long code that runs rarely, because the time to compile a
+/// function grows faster than its length. [`Lane::run_out_of_line`] runs the computation over
+/// several lanes, [`Simd::one_lane`](crate::Simd::one_lane) over a single one.
 pub trait OutOfLine {
-    /// The result of the work.
+    /// The result of the computation.
     type Output;
-    /// Does the work. Mark it `#[inline(always)]`, like [`Kernel::run`](crate::Kernel::run).
+    /// Runs the computation. Mark implementations `#[inline(always)]`, like those of
+    /// [`Kernel::run`](crate::Kernel::run).
     fn run(self) -> Self::Output;
 }
 

@@ -15,8 +15,8 @@
 //! 2. [`Task`]: the trajectories of a system, each divided into [`Segment`]s at its kinks, and what
 //!    is recorded at every [`ObservedStep`]. [`Peaks`] finds the largest magnitudes, also inside
 //!    steps.
-//! 3. [`Kernel`]: the work as a whole. [`Simd::dispatch`] is compiled for every instruction set and
-//!    runs it on one.
+//! 3. [`Kernel`]: the computation as a whole. [`Simd::dispatch`] is compiled for every instruction
+//!    set and runs the kernel on one.
 //!
 //! The methods are [`rk4`] (classical, fixed step), [`dop853`] (order 8, fixed step), [`dopri5`]
 //! (Dormand-Prince 5(4), adaptive, with dense output) and [`additive`] (Kennedy and Carpenter's

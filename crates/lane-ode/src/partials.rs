@@ -34,18 +34,18 @@ impl<const C: usize> Partials<C> {
         const { assert!(D == 2 * C, "a state is the coordinates and their speeds") };
         let zero = N(zero);
         let forcing = system.forcing_out_of_line(zero.lit(t_s).constant());
-        let mut constant = [zero.constant(); D];
+        let mut constant_state = [zero.constant(); D];
         for i in 0..D {
-            constant[i] = zero.lit(x[i].0).constant();
+            constant_state[i] = zero.lit(x[i].0).constant();
         }
         // The directions are a loop, so that the right-hand side is compiled once for all of them.
         for group in 0..D.div_ceil(T::LANES) {
             let first = group * T::LANES;
-            let mut seeded = constant;
+            let mut seeded_state = constant_state;
             for lane in 0..T::LANES.min(D - first) {
-                seeded[first + lane].0.slope.set(lane, 1.0);
+                seeded_state[first + lane].0.slope.set(lane, 1.0);
             }
-            let slopes = system.derivative_out_of_line(&forcing, &seeded);
+            let slopes = system.derivative_out_of_line(&forcing, &seeded_state);
             for i in 0..C {
                 let slope = slopes[C + i].0.slope;
                 for lane in 0..T::LANES.min(D - first) {

@@ -11,7 +11,7 @@ use crate::{Lane, N, Sample};
 /// so that the sampling error is of sixth order in the step.
 #[derive(Clone, Copy, Debug)]
 pub struct Peaks<T, const M: usize> {
-    peak: [N<T>; M],
+    peaks: [N<T>; M],
     pub(crate) last_samples: [Sample<T>; M],
 }
 
@@ -19,58 +19,59 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     /// Creates peaks without samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
-        Self { peak: [zero; M], last_samples: [Sample::constant(zero, zero); M] }
+        Self { peaks: [zero; M], last_samples: [Sample::constant(zero, zero); M] }
     }
 
     /// Sets the peaks of one lane to zero.
     #[inline(always)]
     pub fn reset(&mut self, lane: usize) {
-        self.peak.iter_mut().for_each(|peak| peak.0.set(lane, 0.0));
+        self.peaks.iter_mut().for_each(|peak| peak.0.set(lane, 0.0));
     }
 
     /// Returns the peaks of one lane.
     #[inline(always)]
     pub fn lane(&self, lane: usize) -> [f64; M] {
-        self.peak.map(|peak| peak.0.get(lane))
+        self.peaks.map(|peak| peak.0.get(lane))
     }
 
-    /// Adds the samples at the start of the first step, in the lanes in which `counts` is true.
+    /// Adds the samples at the start of the first step, in the lanes in which `counted_lanes` is
+    /// true.
     #[inline(always)]
-    pub fn begin(&mut self, samples: &[Sample<T>; M], counts: T::Mask) {
+    pub fn begin(&mut self, samples: &[Sample<T>; M], counted_lanes: T::Mask) {
         for i in 0..M {
-            self.raise_peak(i, samples[i].value.abs(), counts);
+            self.raise_peak(i, samples[i].value.abs(), counted_lanes);
         }
         self.last_samples = *samples;
     }
 
     /// Adds the samples at the end of a step of `length_s` that began at the last samples, in the
-    /// lanes in which `counts` is true.
+    /// lanes in which `counted_lanes` is true.
     #[inline(always)]
-    pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
+    pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counted_lanes: T::Mask) {
         let zero = length_s.lit(0.0);
         let third = (length_s * (1.0 / 3.0)).v();
-        let mut highest = zero;
-        let mut rises = [zero; M];
+        let mut max_rise = zero;
+        let mut polygon_rises = [zero; M];
         for i in 0..M {
             let start = self.last_samples[i];
             let end = &samples[i];
-            self.raise_peak(i, end.value.abs(), counts);
+            self.raise_peak(i, end.value.abs(), counted_lanes);
             // The height of the control polygon above the peak.
-            let polygon = (start.value + third * start.slope)
+            let polygon_height = (start.value + third * start.slope)
                 .abs()
                 .0
                 .larger((end.value - third * end.slope).abs().0);
-            rises[i] = N(polygon) - self.peak[i];
-            highest = N(rises[i].0.larger(highest.0));
+            polygon_rises[i] = N(polygon_height) - self.peaks[i];
+            max_rise = N(polygon_rises[i].0.larger(max_rise.0));
         }
-        if T::bits(zero.0.less(T::select(counts, highest.0, zero.0))) != 0 {
+        if T::bits(zero.0.less(T::select(counted_lanes, max_rise.0, zero.0))) != 0 {
             for i in 0..M {
-                let rise = N(T::select(counts, rises[i].0, zero.0));
+                let rise = N(T::select(counted_lanes, polygon_rises[i].0, zero.0));
                 if T::bits(zero.0.less(rise.0)) != 0 {
                     let extremum =
                         Quintic::new(length_s, &self.last_samples[i], &samples[i]).extremum();
                     let extremum = zero.where_less(rise, extremum.abs(), zero);
-                    self.peak[i] = N(extremum.0.larger(self.peak[i].0));
+                    self.peaks[i] = N(extremum.0.larger(self.peaks[i].0));
                 }
             }
         }
@@ -80,17 +81,22 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     /// Adds samples like [`Peaks::advance`], for outputs whose curvatures are not known. A step is
     /// then the cubic through values and slopes, and the sampling error is of fourth order.
     #[inline(always)]
-    pub fn advance_by_slopes(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
+    pub fn advance_by_slopes(
+        &mut self,
+        length_s: N<T>,
+        samples: &[Sample<T>; M],
+        counted_lanes: T::Mask,
+    ) {
         let mut samples = *samples;
         for i in 0..M {
-            Sample::curve_as_cubic(length_s, &mut self.last_samples[i], &mut samples[i]);
+            Sample::set_cubic_curvatures(length_s, &mut self.last_samples[i], &mut samples[i]);
         }
-        self.advance(length_s, &samples, counts);
+        self.advance(length_s, &samples, counted_lanes);
     }
 
     #[inline(always)]
-    fn raise_peak(&mut self, i: usize, magnitude: N<T>, counts: T::Mask) {
-        let raised = magnitude.0.larger(self.peak[i].0);
-        self.peak[i] = N(T::select(counts, raised, self.peak[i].0));
+    fn raise_peak(&mut self, i: usize, magnitude: N<T>, counted_lanes: T::Mask) {
+        let raised_peak = magnitude.0.larger(self.peaks[i].0);
+        self.peaks[i] = N(T::select(counted_lanes, raised_peak, self.peaks[i].0));
     }
 }

@@ -25,7 +25,7 @@ impl<T: Copy> Sample<T> {
 impl<T: Lane> Sample<T> {
     /// Sets the curvatures at both ends of a step to those of the cubic through values and slopes.
     #[inline(always)]
-    pub(crate) fn curve_as_cubic(length_s: N<T>, start: &mut Self, end: &mut Self) {
+    pub(crate) fn set_cubic_curvatures(length_s: N<T>, start: &mut Self, end: &mut Self) {
         let mean_slope = (end.value - start.value) / length_s;
         start.curvature = (6.0 * mean_slope - (4.0 * start.slope + 2.0 * end.slope)) / length_s;
         end.curvature = (2.0 * start.slope + 4.0 * end.slope - 6.0 * mean_slope) / length_s;

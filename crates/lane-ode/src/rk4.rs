@@ -22,7 +22,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
     let mut segments = FixedSegments::new(zero);
     while let Some(mut step_limit) = segments.start_pending_lanes(task, &mut x) {
         let clock = segments.clock;
-        let mut index = segments.index;
+        let mut index = segments.step_index;
         let h = clock.h;
         let one_third = zero.lit(1.0 / 3.0);
         let h_sixth = h / zero.lit(6.0);
@@ -37,8 +37,8 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         // further registers. There are only four, so that they fit in the first-level cache.
         let mut states = [x; 4];
         let mut slopes = [x; 2];
-        let mut current = 0;
-        let mut previous = 1;
+        let mut current_index = 0;
+        let mut previous_index = 1;
         let mut is_start = true;
         let mut step_count = 0;
         loop {
@@ -48,12 +48,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             let next_time = clock.time_after(index + 1.0);
             // The state at the last step's start is overwritten only after that step has been
             // observed.
-            let second = 2;
-            let third = previous;
-            let fourth = 3;
+            let second_index = 2;
+            let third_index = previous_index;
+            let fourth_index = 3;
             // The stages are a loop, because four copies of the right-hand side do not fit in the
             // instruction cache.
-            let stage_inputs = [current, second, third, fourth];
+            let stage_inputs = [current_index, second_index, third_index, fourth_index];
             for stage in 0..4 {
                 if stage % 2 == 1 {
                     task.system().update_forcing(
@@ -67,23 +67,24 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     // the states of the later stages. No sum of slopes is stored, because stores
                     // are the bottleneck of this loop.
                     for i in 0..D {
-                        let x = states[current][i];
-                        let stage_sum =
-                            states[second][i] + states[fourth][i] + 2.0 * states[third][i]
-                                - 4.0 * x;
-                        states[previous][i] = x + one_third * stage_sum + h_sixth * slope[i];
+                        let x = states[current_index][i];
+                        let stage_sum = states[second_index][i]
+                            + states[fourth_index][i]
+                            + 2.0 * states[third_index][i]
+                            - 4.0 * x;
+                        states[previous_index][i] = x + one_third * stage_sum + h_sixth * slope[i];
                     }
                     break;
                 }
-                let stage_output = [second, third, fourth][stage];
+                let stage_output = [second_index, third_index, fourth_index][stage];
                 let a_step = (h * A[stage]).v();
                 for i in 0..D {
-                    states[stage_output][i] = states[current][i] + a_step * slope[i];
+                    states[stage_output][i] = states[current_index][i] + a_step * slope[i];
                 }
                 if stage == 0 {
-                    slopes[current] = slope;
+                    slopes[current_index] = slope;
                     if is_start {
-                        task.begin(forcing, &states[current], &slopes[current]);
+                        task.begin(forcing, &states[current_index], &slopes[current_index]);
                         is_start = false;
                     } else {
                         task.observe(
@@ -91,11 +92,11 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                             &ObservedStep {
                                 end_s: time,
                                 length_s: h,
-                                before: &states[previous],
-                                slope_before: &slopes[previous],
-                                after: &states[current],
-                                slope_after: &slopes[current],
-                                dense: None,
+                                start_state: &states[previous_index],
+                                start_slope: &slopes[previous_index],
+                                end_state: &states[current_index],
+                                end_slope: &slopes[current_index],
+                                dense_term: None,
                             },
                         );
                     }
@@ -107,17 +108,17 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             if is_last {
                 break;
             }
-            (current, previous) = (previous, current);
+            (current_index, previous_index) = (previous_index, current_index);
             index = index + 1.0;
             time = next_time;
             step_count += 1;
-            let in_range = task.system().in_range(&states[current]);
-            if !T::all(in_range) && segments.fail(in_range, time, step_count) {
+            let in_range = task.system().in_range(&states[current_index]);
+            if !T::all(in_range) && segments.end_failed_segments(in_range, time, step_count) {
                 step_limit = step_count;
             }
         }
-        x = states[current];
-        segments.index = index;
+        x = states[current_index];
+        segments.step_index = index;
         segments.count_steps(step_count);
     }
 }

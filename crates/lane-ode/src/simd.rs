@@ -41,15 +41,15 @@ impl fmt::Display for UnsupportedProcessor {
 
 impl core::error::Error for UnsupportedProcessor {}
 
-/// Work that is written once and compiled for every instruction set.
+/// A computation that is written once and compiled for every instruction set.
 ///
 /// Mark `run`, and every function that it calls in a loop, `#[inline(always)]`: only code that is
 /// inlined into the entry function of an instruction set is compiled with its instructions.
 pub trait Kernel {
-    /// The result of the work.
+    /// The result of the computation.
     type Output;
-    /// Does the work over lanes of type `T`. `zero` is a value of that type, from which the kernel
-    /// makes all constants.
+    /// Runs the computation over lanes of type `T`. `zero` is a value of that type, from which the
+    /// kernel makes all constants.
     fn run<T: Lane>(self, zero: T) -> Self::Output;
 }
 
@@ -156,8 +156,8 @@ impl Simd {
         }
     }
 
-    /// Runs work on one lane, for single trajectories. The work is compiled once, not for every
-    /// number of lanes, and its results have the same bits as in any lane.
+    /// Runs a computation on one lane, for single trajectories. The computation is compiled once,
+    /// not for every number of lanes, and the results have the same bits as in any lane.
     ///
     /// # Panics
     /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].

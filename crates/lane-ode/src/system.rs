@@ -17,8 +17,8 @@ pub trait System<T: Lane, const D: usize> {
         *forcing = self.forcing(t_s);
     }
 
-    /// Computes [`Self::forcing`] in a function that all callers share. It suits callers that need
-    /// it rarely.
+    /// Computes [`Self::forcing`] in a function that all callers share, for callers that need the
+    /// forcing rarely.
     #[inline(always)]
     fn forcing_out_of_line(&self, t_s: N<T>) -> Self::Forcing
     where
@@ -40,7 +40,7 @@ pub trait System<T: Lane, const D: usize> {
     }
 
     /// Returns the lanes whose states are in the model's range. The trajectory of a lane that
-    /// leaves it has diverged. NaN is out of range.
+    /// leaves the range has diverged. NaN is out of range.
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask;
 }
 
@@ -94,9 +94,9 @@ pub trait Task<T: Lane, const D: usize> {
     /// Returns the system with the lanes' current parameters.
     fn system(&self) -> &Self::System;
 
-    /// Receives the end of the segment in lane `lane`, and returns the next segment. It belongs to
-    /// the same trajectory or to a new one, whose parameters and start state are then written into
-    /// the lane. Returns `None` if there is no further trajectory.
+    /// Receives the end of the segment in lane `lane`, and returns the next segment. The next
+    /// segment belongs to the same trajectory or to a new one, whose parameters and start state are
+    /// then written into the lane. Returns `None` if there is no further trajectory.
     fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment>;
 
     /// Receives the state at the start of a segment in one or more lanes, where the trajectory may
@@ -118,7 +118,7 @@ pub trait Task<T: Lane, const D: usize> {
 /// The forcing of a task's system.
 pub type Forcing<P, T, const D: usize> = <<P as Task<T, D>>::System as System<T, D>>::Forcing;
 
-/// A segment of a trajectory without kinks. The last step ends exactly at its end.
+/// A segment of a trajectory, without kinks. The last step ends exactly at the segment's end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     /// The time of the segment's start.
@@ -143,7 +143,7 @@ pub enum SegmentEnd {
         reason: Failure,
         /// The time of the last valid state.
         time_s: f64,
-        /// The number of steps so far.
+        /// The number of steps in the segment so far.
         count: StepCount,
     },
 }
@@ -183,15 +183,15 @@ pub struct ObservedStep<'a, T, const D: usize> {
     /// The length; zero in an idle lane.
     pub length_s: N<T>,
     /// The state at the start.
-    pub before: &'a [N<T>; D],
+    pub start_state: &'a [N<T>; D],
     /// The derivative at the start.
-    pub slope_before: &'a [N<T>; D],
+    pub start_slope: &'a [N<T>; D],
     /// The state at the end.
-    pub after: &'a [N<T>; D],
+    pub end_state: &'a [N<T>; D],
     /// The derivative at the end.
-    pub slope_after: &'a [N<T>; D],
+    pub end_slope: &'a [N<T>; D],
     /// The fourth-order term of the method's own dense output, if it has one.
-    pub dense: Option<&'a [N<T>; D]>,
+    pub dense_term: Option<&'a [N<T>; D]>,
 }
 
 impl<T: Lane, const D: usize> ObservedStep<'_, T, D> {
@@ -203,12 +203,12 @@ impl<T: Lane, const D: usize> ObservedStep<'_, T, D> {
     #[inline(always)]
     pub fn interpolate(&self, s: N<T>) -> [N<T>; D] {
         let remainder = 1.0 - s;
-        let mut x = *self.before;
+        let mut x = *self.start_state;
         for i in 0..D {
-            let difference = self.after[i] - self.before[i];
-            let start = self.length_s * self.slope_before[i] - difference;
-            let end = difference - self.length_s * self.slope_after[i] - start;
-            let curvature_term = match self.dense {
+            let difference = self.end_state[i] - self.start_state[i];
+            let start = self.length_s * self.start_slope[i] - difference;
+            let end = difference - self.length_s * self.end_slope[i] - start;
+            let curvature_term = match self.dense_term {
                 Some(dense) => end + remainder * dense[i],
                 None => end,
             };

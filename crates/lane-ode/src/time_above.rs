@@ -14,14 +14,14 @@ const MAX_BISECTIONS: usize = 40;
 #[derive(Clone, Copy, Debug)]
 pub struct TimeAbove<T> {
     time_s: N<T>,
-    last: Sample<T>,
+    last_sample: Sample<T>,
 }
 
 impl<T: Lane> TimeAbove<T> {
     /// Creates a time without samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
-        Self { time_s: zero, last: Sample::constant(zero, zero) }
+        Self { time_s: zero, last_sample: Sample::constant(zero, zero) }
     }
 
     /// Sets the time of one lane to zero.
@@ -37,44 +37,50 @@ impl<T: Lane> TimeAbove<T> {
     /// Sets the sample at the start of the first step.
     #[inline(always)]
     pub fn begin(&mut self, sample: &Sample<T>) {
-        self.last = *sample;
+        self.last_sample = *sample;
     }
 
-    /// Adds a step of `length_s` from the last sample to `sample`, in the lanes in which `counts`
-    /// is true.
+    /// Adds a step of `length_s` from the last sample to `sample`, in the lanes in which
+    /// `counted_lanes` is true.
     #[inline(always)]
-    pub fn advance(&mut self, length_s: N<T>, sample: &Sample<T>, counts: T::Mask) {
+    pub fn advance(&mut self, length_s: N<T>, sample: &Sample<T>, counted_lanes: T::Mask) {
         let zero = length_s.lit(0.0);
         let one = length_s.lit(1.0);
         let third = (length_s * (1.0 / 3.0)).v();
         // The control points a, b, c, d of the cubic.
-        let a = self.last.value;
+        let a = self.last_sample.value;
         let d = sample.value;
-        let b = a + third * self.last.slope;
+        let b = a + third * self.last_sample.slope;
         let c = d - third * sample.slope;
         // The greatest height of the control polygon above zero and its greatest depth below zero,
         // which bound the cubic.
-        let height = N(a.0.larger(b.0).larger(c.0.larger(d.0)));
-        let depth = N((-a).0.larger((-b).0).larger((-c).0.larger((-d).0)));
-        let mut fraction = depth.where_less(zero, one, zero);
-        let counted = N(T::select(counts, one.0, zero.0));
-        let has_zero = depth.where_less(zero, zero, zero.where_less(height, counted, zero));
+        let max_height = N(a.0.larger(b.0).larger(c.0.larger(d.0)));
+        let max_depth = N((-a).0.larger((-b).0).larger((-c).0.larger((-d).0)));
+        let mut fraction = max_depth.where_less(zero, one, zero);
+        let is_counted = N(T::select(counted_lanes, one.0, zero.0));
+        let has_zero =
+            max_depth.where_less(zero, zero, zero.where_less(max_height, is_counted, zero));
         if T::bits(zero.0.less(has_zero.0)) != 0 {
             let positive_fraction =
-                positive_fraction_of_step(&Quintic::new(length_s, &self.last, sample));
+                positive_fraction_of_step(&Quintic::new(length_s, &self.last_sample, sample));
             fraction = zero.where_less(has_zero, positive_fraction, fraction);
         }
-        self.time_s += N(T::select(counts, (fraction * length_s).v().0, zero.0));
-        self.last = *sample;
+        self.time_s += N(T::select(counted_lanes, (fraction * length_s).v().0, zero.0));
+        self.last_sample = *sample;
     }
 
     /// Adds a step like [`TimeAbove::advance`], for an output whose curvature is not known. The
     /// step is then the cubic through values and slopes.
     #[inline(always)]
-    pub fn advance_by_slopes(&mut self, length_s: N<T>, sample: &Sample<T>, counts: T::Mask) {
+    pub fn advance_by_slopes(
+        &mut self,
+        length_s: N<T>,
+        sample: &Sample<T>,
+        counted_lanes: T::Mask,
+    ) {
         let mut sample = *sample;
-        Sample::curve_as_cubic(length_s, &mut self.last, &mut sample);
-        self.advance(length_s, &sample, counts);
+        Sample::set_cubic_curvatures(length_s, &mut self.last_sample, &mut sample);
+        self.advance(length_s, &sample, counted_lanes);
     }
 }
 
@@ -111,9 +117,9 @@ fn positive_length_between<T: Lane>(quintic: &Quintic<T>, start: N<T>, end: N<T>
         low = zero.where_less(has_start_sign, middle, low);
         high = zero.where_less(has_start_sign, high, middle);
     }
-    let length_before = (low - start).abs();
-    let length_after = (end - low).abs();
-    let positive_before = zero.where_less(start_value, length_before, zero);
-    let positive_after = zero.where_less(end_value, length_after, zero);
-    positive_before + positive_after
+    let start_length = (low - start).abs();
+    let end_length = (end - low).abs();
+    let positive_start_length = zero.where_less(start_value, start_length, zero);
+    let positive_end_length = zero.where_less(end_value, end_length, zero);
+    positive_start_length + positive_end_length
 }

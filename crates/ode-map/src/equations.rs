@@ -107,7 +107,7 @@ pub(crate) struct Equations<O, T, const C: usize, const D: usize, const P: usize
     equilibrium: [N<T>; C],
     by_coordinate: [[N<T>; C]; C],
     by_speed: [[N<T>; C]; C],
-    limit: N<T>,
+    divergence_limit: N<T>,
     oscillator: PhantomData<O>,
 }
 
@@ -122,7 +122,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             equilibrium: [zero; C],
             by_coordinate: [[zero; C]; C],
             by_speed: [[zero; C]; C],
-            limit: zero.lit(DIVERGENCE_LIMIT),
+            divergence_limit: zero.lit(DIVERGENCE_LIMIT),
             oscillator: PhantomData,
         }
     }
@@ -187,7 +187,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             max_magnitude =
                 N(T::select(x[i].abs().0.less(max_magnitude.0), max_magnitude.0, x[i].abs().0));
         }
-        max_magnitude.0.less(self.limit.0)
+        max_magnitude.0.less(self.divergence_limit.0)
     }
 }
 
@@ -197,8 +197,8 @@ fn split_state<T: Copy, const C: usize, const D: usize>(x: &[T; D]) -> ([T; C], 
     (std::array::from_fn(|i| x[i]), std::array::from_fn(|i| x[C + i]))
 }
 
-fn set_lane<T: Lane>(to: &mut [N<T>], lane: usize, from: &[N<f64>]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        to.0.set(lane, from.0);
+fn set_lane<T: Lane>(target: &mut [N<T>], lane: usize, source: &[N<f64>]) {
+    for (target, source) in target.iter_mut().zip(source) {
+        target.0.set(lane, source.0);
     }
 }

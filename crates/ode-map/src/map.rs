@@ -73,14 +73,14 @@ pub struct Map<O, const C: usize, const D: usize, const P: usize> {
     oscillator: PhantomData<O>,
 }
 
-/// The edges of the window, which can be set and swept like parameters.
-const WINDOW_EDGES: [(&str, &str); 2] =
+/// The ends of the window, which can be set and swept like parameters.
+const WINDOW_ENDS: [(&str, &str); 2] =
     [("window_from_s", "where the window begins"), ("window_to_s", "where the window ends")];
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Model
     for Map<O, C, D, P>
 {
-    /// The position in the list of the oscillator's parameters and the window's edges.
+    /// The position in the list of the oscillator's parameters and the window's ends.
     type Handle = usize;
 
     const ABOUT: About = About::new(
@@ -100,7 +100,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
                 (name, unit, description, range, source, Some(value))
             });
         let source = "the grid file's [time]";
-        let window_edges = WINDOW_EDGES
+        let window_ends = WINDOW_ENDS
             .into_iter()
             .map(|(name, description)| (name, "s", description, Range::NonNegative, source, None));
         let to_model = |(handle, (name, unit, description, range, source, value))| {
@@ -118,7 +118,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
                 handle,
             }
         };
-        model_parameters.chain(window_edges).enumerate().map(to_model).collect()
+        model_parameters.chain(window_ends).enumerate().map(to_model).collect()
     }
 
     fn write(&mut self, handle: &usize, value: f64) {
@@ -193,14 +193,14 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     RowEvaluator<'_, O, C, D, P>
 {
     /// Computes rows at points with these values of the axes, in lanes.
-    fn compared(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<Compared> {
+    fn compare_points(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<Compared> {
         let channels = self.channels();
         let limits = self.plan.reliability.limits;
         let method = self.common_method().1;
-        let compared = |row: PointRuns<C>| {
+        let to_compared = |row: PointRuns<C>| {
             let amplitudes = row.runs.map(|run| {
-                let sound = channels.iter().filter(|_| run.failure.is_none());
-                sound.map(|k| run.peaks[*k]).collect::<Vec<_>>()
+                let sound_channels = channels.iter().filter(|_| run.failure.is_none());
+                sound_channels.map(|k| run.peaks[*k]).collect::<Vec<_>>()
             });
             let ratio = |k: usize| {
                 let linear = amplitudes[1].get(k).filter(|linear| **linear != 0.0)?;
@@ -221,7 +221,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 amplitudes,
             }
         };
-        self.rows(axis_values, cancel).into_iter().map(compared).collect()
+        self.evaluate_points(axis_values, cancel).into_iter().map(to_compared).collect()
     }
 
     /// Returns the indices of the coordinates that the plan compares.
@@ -242,7 +242,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         }
     }
 
-    fn rows(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<PointRuns<C>> {
+    fn evaluate_points(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<PointRuns<C>> {
         let prepare = |values: &Vec<f64>| {
             let Scenario { model, window_s } = self.plan.scenario_at(values);
             PreparedPoint::new::<O, D>(model.values, window_s)
@@ -250,9 +250,13 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         let points: Vec<Option<PreparedPoint<C, P>>> = axis_values.iter().map(prepare).collect();
         let positions: Vec<usize> = (0..points.len()).filter(|k| points[*k].is_some()).collect();
         let prepared: Vec<&PreparedPoint<C, P>> = points.iter().flatten().collect();
-        let none = ModelRun { failure: Some((NO_EQUILIBRIUM, None)), ..ModelRun::NONE };
+        let run_without_equilibrium =
+            ModelRun { failure: Some((NO_EQUILIBRIUM, None)), ..ModelRun::NONE };
         let mut rows =
-            vec![PointRuns { runs: [none; 2], error: None, converged: None }; points.len()];
+            vec![
+                PointRuns { runs: [run_without_equilibrium; 2], error: None, converged: None };
+                points.len()
+            ];
         if let (Some(method), _) = self.common_method() {
             for (position, runs) in
                 positions.into_iter().zip(self.run_both_models(method, &prepared, cancel))
@@ -350,7 +354,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eva
                 if points.is_empty() {
                     break;
                 }
-                let rows = self.compared(&axis_values, Cancel::When(&|| context.must_stop()));
+                let rows = self.compare_points(&axis_values, Cancel::When(&|| context.must_stop()));
                 // The rows may be incomplete if the engine was stopped.
                 if context.must_stop() {
                     break;

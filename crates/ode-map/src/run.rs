@@ -16,7 +16,7 @@ const MAX_STEPS: u64 = 100_000_000;
 
 /// First step that adaptive methods try, relative to the length of the run. Basis: far shorter than
 /// any motion's period; the step control then corrects it. Doubling it saves less than a step.
-const FIRST_STEP: f64 = 1e-6;
+const FIRST_STEP_RATIO: f64 = 1e-6;
 
 /// Number of segments of a trajectory: before its window, in it and after it.
 const SEGMENTS: usize = 3;
@@ -82,7 +82,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Ker
                 task.runs
             }
             OscillatorMethod::Dopri5(relative, absolute) => {
-                let mut task = Trajectories::new(zero, &self, FIRST_STEP * self.end_s);
+                let mut task = Trajectories::new(zero, &self, FIRST_STEP_RATIO * self.end_s);
                 dopri5::integrate(zero, &mut task, &tolerance(relative, absolute));
                 task.runs
             }
@@ -95,12 +95,12 @@ struct Trajectories<'a, O, T, const C: usize, const D: usize, const P: usize> {
     integration: &'a Integration<'a, O, C, D, P>,
     system: Equations<O, T, C, D, P>,
     step_s: f64,
-    started: usize,
+    started_count: usize,
     /// The index of the trajectory and of its segment in each lane.
-    current: [(usize, usize); MAX_LANES],
+    current_segments: [(usize, usize); MAX_LANES],
     peaks: Peaks<T, C>,
     /// A number for each lane: 1 within the window, else 0.
-    in_window: N<T>,
+    window_indicator: N<T>,
     runs: Vec<ModelRun<C>>,
 }
 
@@ -114,10 +114,10 @@ impl<'a, O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const 
             integration,
             system: Equations::new(integration.model, zero),
             step_s,
-            started: 0,
-            current: [(0, 0); MAX_LANES],
+            started_count: 0,
+            current_segments: [(0, 0); MAX_LANES],
             peaks: Peaks::new(zero),
-            in_window: zero,
+            window_indicator: zero,
             runs: vec![ModelRun::NONE; integration.points.len()],
         }
     }
@@ -127,8 +127,8 @@ impl<'a, O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const 
         std::array::from_fn(|i| Sample { value: x[i], slope: x[C + i], curvature: dx[C + i] })
     }
 
-    fn counts(&self) -> T::Mask {
-        self.in_window.lit(0.5).0.less(self.in_window.0)
+    fn window_mask(&self) -> T::Mask {
+        self.window_indicator.lit(0.5).0.less(self.window_indicator.0)
     }
 }
 
@@ -142,7 +142,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
     }
 
     fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment> {
-        let (trajectory, mut segment) = self.current[lane];
+        let (trajectory, mut segment) = self.current_segments[lane];
         if let SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } = end {
             let run = &mut self.runs[trajectory];
             run.steps += count.accepted;
@@ -159,15 +159,16 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
         }
         loop {
             while segment < SEGMENTS {
-                // The run is divided into segments at the edges of the window.
-                let [from_s, to_s] = self.integration.points[self.current[lane].0].window_s;
+                // The run is divided into segments at the ends of the window.
+                let [from_s, to_s] =
+                    self.integration.points[self.current_segments[lane].0].window_s;
                 let ends = [0.0, from_s, to_s, self.integration.end_s];
                 let start_s = ends[segment];
                 let end_s = ends[segment + 1];
                 // A segment is empty if the window begins with the run or ends with it.
                 if start_s < end_s {
-                    self.current[lane].1 = segment;
-                    self.in_window.0.set(lane, if segment == 1 { 1.0 } else { 0.0 });
+                    self.current_segments[lane].1 = segment;
+                    self.window_indicator.0.set(lane, if segment == 1 { 1.0 } else { 0.0 });
                     return Some(Segment {
                         start_s,
                         end_s,
@@ -177,10 +178,10 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
                 segment += 1;
             }
             self.peaks.reset(lane);
-            self.in_window.0.set(lane, 0.0);
-            let point = *self.integration.points.get(self.started)?;
-            self.current[lane] = (self.started, 0);
-            self.started += 1;
+            self.window_indicator.0.set(lane, 0.0);
+            let point = *self.integration.points.get(self.started_count)?;
+            self.current_segments[lane] = (self.started_count, 0);
+            self.started_count += 1;
             self.system.set_point(lane, point);
             x.iter_mut().for_each(|value| value.0.set(lane, 0.0));
             segment = 0;
@@ -190,15 +191,15 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
     #[inline(always)]
     fn begin(&mut self, _: &Forcing<Self, T, D>, x: &[N<T>; D], dx: &[N<T>; D]) {
         let samples = self.samples(x, dx);
-        let counts = self.counts();
-        self.peaks.begin(&samples, counts);
+        let window_mask = self.window_mask();
+        self.peaks.begin(&samples, window_mask);
     }
 
     #[inline(always)]
     fn observe(&mut self, _: &Forcing<Self, T, D>, step: &ObservedStep<'_, T, D>) {
-        let samples = self.samples(step.after, step.slope_after);
-        let counts = self.counts();
-        self.peaks.advance(step.length_s, &samples, counts);
+        let samples = self.samples(step.end_state, step.end_slope);
+        let window_mask = self.window_mask();
+        self.peaks.advance(step.length_s, &samples, window_mask);
     }
 
     fn cancel(&self) -> Cancel<'_> {

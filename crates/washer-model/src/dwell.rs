@@ -19,13 +19,13 @@ use crate::stability::settings::{HeldCase, Settings};
 use crate::{HeldSpeed, Modes, Reading, Recorders, Response, ResponseError, find_responses};
 use exponent::compute_exponents;
 use lane_ode::{Cancel, Simd};
-use multipliers::{PeriodicOrbit, growths_per_s};
+use multipliers::{PeriodicOrbit, compute_growths_per_s};
 use starts::{
     Directions, Kick, MODE_DIRECTIONS, add_kick, is_from_rest, kick_directions, kicks, perturb,
     random_kick_count,
 };
 use std::sync::Arc;
-use trajectory::{BLOCK_TURNS, HeldTrajectory, NextComputation, WINDOW_TURNS, are_close};
+use trajectory::{BLOCK_TURNS, HeldTrajectory, NextComputation, WINDOW_TURNS, are_peaks_close};
 use turns::{HeldState, integrate_turns, record_turns};
 
 pub use exponent::Exponent;
@@ -45,7 +45,7 @@ const UNSETTLED_TOLERANCE: f64 = 0.05;
 
 /// Number of bisections between a kick after which the machine returns and one after which it does
 /// not. Doubling it divides the width of the bracket by 32.
-const BISECTIONS: usize = 5;
+const THRESHOLD_BISECTIONS: usize = 5;
 
 /// The starts of the trajectories at a held speed, and their length.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -168,7 +168,8 @@ pub struct Attractors {
 
 /// Finds the motions in which machines end at held speeds, on lanes of `simd` or of a narrower
 /// instruction set. The results at a held speed do not depend on the other held speeds. A held
-/// speed with a state in `carried` has this state, perturbed like a response, as its only start.
+/// speed with a state in `carried_states` has this state, perturbed like a response, as its only
+/// start.
 ///
 /// # Errors
 /// Returns [`ResponseError`] for a held speed without an answer, and [`ResponseError::Stopped`]
@@ -176,7 +177,7 @@ pub struct Attractors {
 pub fn find_attractors(
     simd: Simd,
     held_speeds: &[HeldSpeed<'_>],
-    carried: &[Option<[f64; STATES]>],
+    carried_states: &[Option<[f64; STATES]>],
     rule: &StartRule,
     cancel: Cancel<'_>,
 ) -> Vec<Result<Attractors, ResponseError>> {
@@ -184,7 +185,7 @@ pub fn find_attractors(
         simd,
         held_speeds,
         find_responses(held_speeds, cancel),
-        carried,
+        carried_states,
         rule,
         cancel,
     )
@@ -198,8 +199,8 @@ pub fn find_attractors(
 pub fn find_attractors_from_responses(
     simd: Simd,
     held_speeds: &[HeldSpeed<'_>],
-    response_answers: Vec<Result<Vec<Response>, ResponseError>>,
-    carried: &[Option<[f64; STATES]>],
+    responses_by_speed: Vec<Result<Vec<Response>, ResponseError>>,
+    carried_states: &[Option<[f64; STATES]>],
     rule: &StartRule,
     cancel: Cancel<'_>,
 ) -> Vec<Result<Attractors, ResponseError>> {
@@ -207,13 +208,13 @@ pub fn find_attractors_from_responses(
         Vec::with_capacity(held_speeds.len());
     let mut settings: Option<Settings<'_>> = None;
     for (k, (held_speed, responses_or_error)) in
-        held_speeds.iter().zip(response_answers).enumerate()
+        held_speeds.iter().zip(responses_by_speed).enumerate()
     {
         // Consecutive held speeds of the same point share the point's settings.
         let is_same_point =
             |settings: &Settings<'_>| core::ptr::eq(settings.point, held_speed.point);
         let settings = match settings.take().filter(is_same_point) {
-            Some(reusable) => settings.insert(reusable),
+            Some(same_point_settings) => settings.insert(same_point_settings),
             None => settings.insert(Settings::new(held_speed.point)),
         };
         let responses = match responses_or_error {
@@ -224,8 +225,8 @@ pub fn find_attractors_from_responses(
                 continue;
             }
         };
-        let carried = carried.get(k).copied().flatten();
-        let search = |held_case| SpeedSearch::new(held_case, responses, carried, rule);
+        let carried_state = carried_states.get(k).copied().flatten();
+        let search = |held_case| SpeedSearch::new(held_case, responses, carried_state, rule);
         searches.push(settings.held_case(held_speed.speed_rpm).map(search));
     }
     let mut is_complete = run_to_end(simd, &mut searches, cancel);
@@ -240,7 +241,7 @@ pub fn find_attractors_from_responses(
         for search in searches.iter_mut().flatten() {
             search.find_brackets();
         }
-        for _ in 0..BISECTIONS {
+        for _ in 0..THRESHOLD_BISECTIONS {
             for search in searches.iter_mut().flatten() {
                 search.start_at_midpoints();
             }
@@ -250,20 +251,16 @@ pub fn find_attractors_from_responses(
             }
         }
     }
-    let response_answers = searches.into_iter().map(|search| match search {
+    let results = searches.into_iter().map(|search| match search {
         Ok(search) if is_complete => Ok(search.into_attractors()),
         Ok(_) => Err(ResponseError::Stopped),
         Err(reason) => Err(reason),
     });
-    let mut response_answers: Vec<Result<(Attractors, TurnSetup<'_>), ResponseError>> =
-        response_answers.collect();
+    let mut results: Vec<Result<(Attractors, TurnSetup<'_>), ResponseError>> = results.collect();
     if rule.recorders.need_all_states() {
-        record_motions(simd, response_answers.iter_mut().flatten(), rule.recorders);
+        record_motions(simd, results.iter_mut().flatten(), rule.recorders);
     }
-    response_answers
-        .into_iter()
-        .map(|response_answers| response_answers.map(|(attractors, _)| attractors))
-        .collect()
+    results.into_iter().map(|results| results.map(|(attractors, _)| attractors)).collect()
 }
 
 /// Integrates motions further, and records them with `recorders`.
@@ -302,51 +299,54 @@ fn run_to_end(
         if cancel.is_requested() {
             return false;
         }
-        let mut needing_turns: Vec<&mut HeldTrajectory<'_>> = Vec::new();
-        let mut needing_exponent = Vec::new();
+        let mut turn_trajectories: Vec<&mut HeldTrajectory<'_>> = Vec::new();
+        let mut exponent_trajectories = Vec::new();
         let mut exponent_requests = Vec::new();
-        let mut needing_multipliers: Vec<(&mut HeldTrajectory<'_>, u32)> = Vec::new();
+        let mut multiplier_trajectories: Vec<(&mut HeldTrajectory<'_>, u32)> = Vec::new();
         let mut orbits: Vec<PeriodicOrbit<'_, '_>> = Vec::new();
         for search in searches.iter_mut().flatten() {
             let direction = search.directions[MODE_DIRECTIONS - 1];
             let held_case = &search.held_case;
             for trajectory in &mut search.trajectories {
                 match trajectory.next_computation {
-                    NextComputation::Turns => needing_turns.push(trajectory),
+                    NextComputation::Turns => turn_trajectories.push(trajectory),
                     NextComputation::Multipliers(period) => {
                         orbits.push(PeriodicOrbit {
                             held_case,
                             held_state: trajectory.held_state,
                             period,
                         });
-                        needing_multipliers.push((trajectory, period));
+                        multiplier_trajectories.push((trajectory, period));
                     }
                     NextComputation::Exponent => {
                         exponent_requests.push((trajectory.held_state, direction));
-                        needing_exponent.push(trajectory);
+                        exponent_trajectories.push(trajectory);
                     }
                     NextComputation::Nothing => {}
                 }
             }
         }
-        if needing_turns.is_empty() && needing_exponent.is_empty() && needing_multipliers.is_empty()
+        if turn_trajectories.is_empty()
+            && exponent_trajectories.is_empty()
+            && multiplier_trajectories.is_empty()
         {
             return true;
         }
-        let growths = growths_per_s(&orbits, cancel);
-        for ((trajectory, period), growth_per_s) in needing_multipliers.into_iter().zip(growths) {
+        let growths = compute_growths_per_s(&orbits, cancel);
+        for ((trajectory, period), growth_per_s) in multiplier_trajectories.into_iter().zip(growths)
+        {
             trajectory.add_growth(period, growth_per_s);
         }
         let held_states: Vec<HeldState<'_>> =
-            needing_turns.iter().map(|trajectory| trajectory.held_state).collect();
+            turn_trajectories.iter().map(|trajectory| trajectory.held_state).collect();
         for (trajectory, turns) in
-            needing_turns.into_iter().zip(integrate_turns(simd, &held_states, BLOCK_TURNS))
+            turn_trajectories.into_iter().zip(integrate_turns(simd, &held_states, BLOCK_TURNS))
         {
             trajectory.add_turns(turns);
         }
-        if !needing_exponent.is_empty() {
+        if !exponent_trajectories.is_empty() {
             let exponents = compute_exponents(simd, &exponent_requests);
-            for (trajectory, exponent) in needing_exponent.into_iter().zip(exponents) {
+            for (trajectory, exponent) in exponent_trajectories.into_iter().zip(exponents) {
                 trajectory.add_exponent(exponent);
             }
         }
@@ -389,14 +389,14 @@ struct SpeedSearch<'a> {
     /// which the machine returns, and of one after which it does not (rad/s).
     brackets: [Option<[f64; 2]>; MODE_DIRECTIONS],
     /// The smallest kick in a random direction after which the machine does not return (rad/s).
-    random_threshold: Option<f64>,
+    random_threshold_rad_per_s: Option<f64>,
 }
 
 impl<'a> SpeedSearch<'a> {
     fn new(
         held_case: HeldCase<'a>,
         responses: Vec<Response>,
-        carried: Option<[f64; STATES]>,
+        carried_state: Option<[f64; STATES]>,
         rule: &StartRule,
     ) -> Self {
         let point = held_case.setup.point;
@@ -405,8 +405,8 @@ impl<'a> SpeedSearch<'a> {
         let kicked_state = responses.first().map_or(rest_state, |response| response.start);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
         let directions = kick_directions(point, &frozen_modes, random_kick_count(rule.count));
-        if let Some(carried) = carried {
-            states.push((perturb(point, &frozen_modes, &carried), Origin::Carried));
+        if let Some(carried_state) = carried_state {
+            states.push((perturb(point, &frozen_modes, &carried_state), Origin::Carried));
         } else {
             let response_states = responses.iter().map(|response| response.start);
             let response_states: Vec<_> =
@@ -434,7 +434,7 @@ impl<'a> SpeedSearch<'a> {
             start_count: states.len(),
             survivors: Vec::new(),
             brackets: [None; MODE_DIRECTIONS],
-            random_threshold: None,
+            random_threshold_rad_per_s: None,
         };
         for (state, origin) in states {
             search.start(state, origin);
@@ -445,8 +445,8 @@ impl<'a> SpeedSearch<'a> {
     fn start(&mut self, state: [f64; STATES], origin: Origin) {
         let held_state = HeldState { setup: self.held_case.setup, state };
         let is_unstable = |response: &&Response| response.growth_per_s() > 0.0;
-        let unstable = self.responses.iter().filter(is_unstable);
-        let unstable_orbits = unstable.map(|response| vec![response.start]).collect();
+        let unstable_responses = self.responses.iter().filter(is_unstable);
+        let unstable_orbits = unstable_responses.map(|response| vec![response.start]).collect();
         self.trajectories.push(HeldTrajectory::new(held_state, unstable_orbits, self.max_time_s));
         self.origins.push(origin);
     }
@@ -462,7 +462,7 @@ impl<'a> SpeedSearch<'a> {
             for state in self.trajectories[chaotic].recent_states() {
                 let held_state = HeldState { setup: self.held_case.setup, state };
                 self.trajectories
-                    .push(HeldTrajectory::survivor(held_state, unstable_orbits.clone()));
+                    .push(HeldTrajectory::new_survivor(held_state, unstable_orbits.clone()));
                 self.origins.push(Origin::Trajectory);
             }
             self.survivors.push((chaotic, first_survivor..self.trajectories.len()));
@@ -486,10 +486,10 @@ impl<'a> SpeedSearch<'a> {
         {
             let Some(survivors) = self.find_survivors(chaotic) else { continue };
             let survivors = &self.trajectories[survivors];
-            let ended = survivors.iter().filter(|trajectory| trajectory.has_ended()).count();
-            if ended > 0 {
+            let ended_count = survivors.iter().filter(|trajectory| trajectory.has_ended()).count();
+            if ended_count > 0 {
                 let time_s: f64 = survivors.iter().map(HeldTrajectory::time_s).sum();
-                lives.push((chaotic, time_s / ended as f64));
+                lives.push((chaotic, time_s / ended_count as f64));
             }
         }
         for (trajectory, life_s) in lives {
@@ -513,8 +513,9 @@ impl<'a> SpeedSearch<'a> {
                 && direction >= MODE_DIRECTIONS
                 && !self.returns_to_first(trajectory)
             {
-                let smallest = self.random_threshold.map_or(size, |smallest| smallest.min(size));
-                self.random_threshold = Some(smallest);
+                let smallest =
+                    self.random_threshold_rad_per_s.map_or(size, |smallest| smallest.min(size));
+                self.random_threshold_rad_per_s = Some(smallest);
             }
         }
         for direction in 0..MODE_DIRECTIONS {
@@ -527,11 +528,12 @@ impl<'a> SpeedSearch<'a> {
                 }
             }
             kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let first_above = kicks.iter().position(|(_, has_returned)| !has_returned);
-            self.brackets[direction] = first_above.map(|first_above| {
-                let last_below =
-                    first_above.checked_sub(1).map_or(0.0, |last_below| kicks[last_below].0);
-                [last_below, kicks[first_above].0]
+            let first_index_above = kicks.iter().position(|(_, has_returned)| !has_returned);
+            self.brackets[direction] = first_index_above.map(|first_index_above| {
+                let last_index_below = first_index_above
+                    .checked_sub(1)
+                    .map_or(0.0, |last_index_below| kicks[last_index_below].0);
+                [last_index_below, kicks[first_index_above].0]
             });
         }
     }
@@ -575,9 +577,10 @@ impl<'a> SpeedSearch<'a> {
                 None => motions.push(attractor),
             }
         }
-        let ends_of_transients = self.survivors.iter().flat_map(|(_, survivors)| survivors.clone());
+        let transient_trajectories =
+            self.survivors.iter().flat_map(|(_, survivors)| survivors.clone());
         for trajectory in
-            ends_of_transients.filter(|&trajectory| self.trajectories[trajectory].has_ended())
+            transient_trajectories.filter(|&trajectory| self.trajectories[trajectory].has_ended())
         {
             let attractor = Attractor { starts: 0, ..self.trajectories[trajectory].attractor() };
             if !motions.iter().any(|motion| are_same_motion(motion, &attractor)) {
@@ -588,7 +591,9 @@ impl<'a> SpeedSearch<'a> {
         let attractors = Attractors {
             attractors: motions,
             starts: self.start_count as u32,
-            threshold_rad_per_s: mode_thresholds.chain(self.random_threshold).reduce(f64::min),
+            threshold_rad_per_s: mode_thresholds
+                .chain(self.random_threshold_rad_per_s)
+                .reduce(f64::min),
             responses: self.responses,
         };
         (attractors, self.held_case.setup)
@@ -611,7 +616,7 @@ fn are_same_motion(a: &Attractor, b: &Attractor) -> bool {
         (None, _) | (_, None) => UNSETTLED_TOLERANCE,
         _ => SETTLED_TOLERANCE,
     };
-    are_close(&a.peaks, &b.peaks, tolerance)
+    are_peaks_close(&a.peaks, &b.peaks, tolerance)
 }
 
 impl Attractors {
@@ -619,7 +624,7 @@ impl Attractors {
     /// near a response that has not settled approaches or leaves the response slowly.
     pub fn is_near_response(&self, motion: &Attractor) -> bool {
         let is_near = |response: &Response| {
-            are_close(&motion.peaks, &response.nonlinear_peaks, CHAOS_TOLERANCE)
+            are_peaks_close(&motion.peaks, &response.nonlinear_peaks, CHAOS_TOLERANCE)
         };
         self.responses.iter().any(is_near)
     }

@@ -53,7 +53,7 @@ lane_struct! {
 #[derive(Clone, Debug)]
 pub(crate) struct LinearPoint {
     pub(crate) constants: Constants<f64>,
-    pub(crate) terms: RotorCoefficients<f64>,
+    pub(crate) rotor_coefficients: RotorCoefficients<f64>,
 }
 
 /// The linearisation of one machine per lane about the equilibrium `q`.
@@ -75,60 +75,60 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
         let dual_machine = machine.constant();
 
         // The tub's equations do not depend on the spin.
-        let at_rest = assemble_tub(machine, q, &zeros);
+        let tub_at_rest = assemble_tub(machine, q, &zeros);
         let [tub_stiffness, tub_damping] = tub_tangents(machine, q);
 
         let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
         for (k, &(cos, sin)) in SAMPLE_ANGLES.iter().enumerate() {
-            for (kind, (speed, acceleration)) in
+            for (spin_case, (speed, acceleration)) in
                 [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate()
             {
                 let angle = (zero.lit(sin), zero.lit(cos));
                 let spin = SpinState::new(angle, zero.lit(speed), zero.lit(acceleration));
-                let Half { mut floating, inertia, .. } =
+                let Half { mut chain, inertia, .. } =
                     assemble_rotor_in_lanes(bodies, &spin, q, &zeros);
-                floating.apply(&shaft_load);
-                let (force, torque) = floating.generalised_forces();
-                let arm = floating.arm;
+                chain.add_load(&shaft_load);
+                let (force, torque) = chain.generalised_forces();
+                let arm = chain.arm;
                 let dual_spin = spin.constant();
                 // The stiffness depends on speed and acceleration. The damping is proportional to
                 // the speed, so that a unit speed determines it.
-                let directions = if kind == 1 { 8 } else { 4 };
+                let directions = if spin_case == 1 { 8 } else { 4 };
                 for direction in 0..directions {
                     let column = direction % 4;
                     let entry = if direction < 4 { entry::stiffness } else { entry::damping };
                     let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
                     let q = with_derivative(q, ROTOR_ROTATIONS[column], dq);
                     let u = with_derivative(&zeros, ROTOR_ROTATIONS[column], du);
-                    let Half { mut floating, .. } =
+                    let Half { mut chain, .. } =
                         assemble_rotor_in_lanes(&dual_machine.bodies, &dual_spin, &q, &u);
-                    floating.apply(&shaft_load.constant());
+                    chain.add_load(&shaft_load.constant());
                     let rows: [_; ROWS] =
-                        transform_to_mass_centre(floating.generalised_forces(), &arm);
+                        transform_to_mass_centre(chain.generalised_forces(), &arm);
                     for row in 0..ROWS {
-                        samples[kind][entry(row, column)][k] = -rows[row];
+                        samples[spin_case][entry(row, column)][k] = -rows[row];
                     }
                 }
                 for i in 0..2 {
-                    samples[kind][entry::force(i)][k] = force[i];
+                    samples[spin_case][entry::force(i)][k] = force[i];
                 }
                 for r in 0..4 {
-                    samples[kind][entry::force(2 + r)][k] =
+                    samples[spin_case][entry::force(2 + r)][k] =
                         torque[r] - arm[r][0] * force[0] - arm[r][1] * force[1];
                     for s in 0..=r {
-                        samples[kind][ENTRIES + entry::inertia(r, s)][k] = inertia[r][s];
+                        samples[spin_case][ENTRIES + entry::inertia(r, s)][k] = inertia[r][s];
                     }
-                    samples[kind][entry::arm(r, 0)][k] = arm[r][0];
-                    samples[kind][entry::arm(r, 1)][k] = arm[r][1];
+                    samples[spin_case][entry::arm(r, 0)][k] = arm[r][0];
+                    samples[spin_case][entry::arm(r, 1)][k] = arm[r][1];
                 }
             }
         }
 
         let constants = Constants {
             tub_inverse_mass: bodies.tub_inverse_mass,
-            tub_arm: at_rest.floating.arm,
-            tub_axis: at_rest.floating.axis,
-            tub_inertia: at_rest.inertia,
+            tub_arm: tub_at_rest.chain.arm,
+            tub_axis: tub_at_rest.chain.axis,
+            tub_inertia: tub_at_rest.inertia,
             tub_stiffness,
             tub_damping,
             rotor_inverse_mass: bodies.rotor_inverse_mass,
@@ -137,7 +137,11 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
         (0..T::LANES)
             .map(|lane| LinearPoint {
                 constants: constants.get_lane(lane),
-                terms: lane_rotor_coefficients(&samples, lane, bodies.is_skewed_in(lane)),
+                rotor_coefficients: lane_rotor_coefficients(
+                    &samples,
+                    lane,
+                    bodies.is_skewed_in(lane),
+                ),
             })
             .collect()
     }
@@ -154,18 +158,18 @@ pub(crate) fn tub_tangents<T: Lane>(
     let shaft_load =
         Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load_on_shaft(&machine.bodies);
     let tub_load = shaft_load.reaction().constant();
-    let arm = assemble_tub(machine, q, &zeros).floating.arm;
+    let arm = assemble_tub(machine, q, &zeros).chain.arm;
     let dual_machine = machine.constant();
     let mut tangents = [[[zero; 4]; 4]; 2];
     for (column, &j) in TUB.iter().enumerate() {
         for (tangent, (dq, du)) in tangents.iter_mut().zip([(1.0, 0.0), (0.0, 1.0)]) {
-            let Half { mut floating, .. } = assemble_tub(
+            let Half { mut chain, .. } = assemble_tub(
                 &dual_machine,
                 &with_derivative(q, j, dq),
                 &with_derivative(&zeros, j, du),
             );
-            floating.apply(&tub_load);
-            let rows: [_; 4] = transform_to_mass_centre(floating.generalised_forces(), &arm);
+            chain.add_load(&tub_load);
+            let rows: [_; 4] = transform_to_mass_centre(chain.generalised_forces(), &arm);
             for (row, slope) in rows.iter().enumerate() {
                 tangent[row][column] = -*slope;
             }
@@ -199,20 +203,21 @@ fn lane_rotor_coefficients<T: Lane>(
 ) -> RotorCoefficients<f64> {
     let entry_coefficients = |entry: usize| {
         let mut coefficients = [0.0; FUNCTIONS];
-        let harmonics_at = |kind: usize| {
-            harmonics::harmonic_coefficients(samples[kind][entry].map(|v| v.0.get(lane)))
+        let harmonics_at = |spin_case: usize| {
+            harmonics::harmonic_coefficients(samples[spin_case][entry].map(|v| v.0.get(lane)))
         };
-        let at_rest = harmonics_at(0);
-        let at_speed = harmonics_at(1);
-        let at_acceleration = harmonics_at(2);
-        coefficients[harmonics::ONE..harmonics::SPEED].copy_from_slice(&at_rest);
+        let values_at_rest = harmonics_at(0);
+        let values_at_speed = harmonics_at(1);
+        let values_at_acceleration = harmonics_at(2);
+        coefficients[harmonics::ONE..harmonics::SPEED].copy_from_slice(&values_at_rest);
         if (entry::damping(0, 0)..ENTRIES).contains(&entry) {
-            coefficients[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&at_speed);
+            coefficients[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&values_at_speed);
         } else {
             for harmonic in 0..HARMONICS {
-                coefficients[harmonics::SPIN + harmonic] = at_speed[harmonic] - at_rest[harmonic];
+                coefficients[harmonics::SPIN + harmonic] =
+                    values_at_speed[harmonic] - values_at_rest[harmonic];
             }
-            coefficients[harmonics::ACCELERATION] = at_acceleration[0] - at_rest[0];
+            coefficients[harmonics::ACCELERATION] = values_at_acceleration[0] - values_at_rest[0];
         }
         coefficients
     };
@@ -280,7 +285,7 @@ impl LinearPoint {
     /// Computes the matrices at an instant. `bodies` are those of the same machine.
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let constants = &self.constants;
-        let (inertia, entries) = self.terms.evaluate(&harmonics::spin_functions(spin));
+        let (inertia, entries) = self.rotor_coefficients.evaluate(&harmonics::spin_functions(spin));
         let tub = MassCentreMap {
             midpoint: [TUB_Y, TUB_Z],
             rotations: TUB_ROTATIONS,
@@ -297,21 +302,22 @@ impl LinearPoint {
             stiffness: self.bearing_stiffness(bodies),
             force: rotor.generalised_forces(|row| entries[entry::force(row)]),
         };
-        let mut add = |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
-            for i in 0..COORDINATES {
-                matrices.stiffness[i][j] += stiffness[i];
-                matrices.damping[i][j] += damping[i];
-            }
-        };
+        let mut add_column =
+            |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
+                for i in 0..COORDINATES {
+                    matrices.stiffness[i][j] += stiffness[i];
+                    matrices.damping[i][j] += damping[i];
+                }
+            };
         for column in 0..4 {
             let stiffness = tub.generalised_forces(|row| constants.tub_stiffness[row][column]);
-            add(
+            add_column(
                 TUB[column],
                 stiffness,
                 tub.generalised_forces(|row| constants.tub_damping[row][column]),
             );
             let stiffness = rotor.generalised_forces(|row| entries[entry::stiffness(row, column)]);
-            add(
+            add_column(
                 ROTOR_ROTATIONS[column],
                 stiffness,
                 rotor.generalised_forces(|row| entries[entry::damping(row, column)]),
@@ -356,20 +362,20 @@ impl<const R: usize> MassCentreMap<R> {
         inverse_mass: N<f64>,
         inertia: impl Fn(usize, usize) -> N<f64>,
     ) {
-        let m = 1.0 / inverse_mass.0;
+        let mass_kg = 1.0 / inverse_mass.0;
         let arm = &self.arm;
         let rotations = &self.rotations;
         for (i, midpoint) in self.midpoint.into_iter().enumerate() {
-            mass[midpoint][midpoint] = m;
+            mass[midpoint][midpoint] = mass_kg;
             for r in 0..R {
-                mass[midpoint][rotations[r]] = m * arm[r][i].0;
-                mass[rotations[r]][midpoint] = m * arm[r][i].0;
+                mass[midpoint][rotations[r]] = mass_kg * arm[r][i].0;
+                mass[rotations[r]][midpoint] = mass_kg * arm[r][i].0;
             }
         }
         for r in 0..R {
             for s in 0..=r {
                 let product = arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0;
-                let mass_entry = inertia(r, s).0 + m * product;
+                let mass_entry = inertia(r, s).0 + mass_kg * product;
                 mass[rotations[r]][rotations[s]] = mass_entry;
                 mass[rotations[s]][rotations[r]] = mass_entry;
             }

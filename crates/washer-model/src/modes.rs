@@ -18,7 +18,7 @@ use lane_ode::N;
 use lane_ode::additive::GAMMA;
 
 /// The coordinates of the hinge, q9 and q10.
-const HINGE: [usize; 2] = [HINGE_YAW, HINGE_PITCH];
+const HINGE_COORDINATES: [usize; 2] = [HINGE_YAW, HINGE_PITCH];
 
 /// The number of angles over a turn at which the highest frequency is computed. Basis: M and K have
 /// harmonics 0 to 2 of theta, for which eight angles suffice. Doubling it doubles the time.
@@ -61,7 +61,7 @@ impl Mode {
 
     /// Returns the hinge's share of the mode's strain energy at the greatest deflection.
     pub(crate) fn hinge_share(&self, point: &Point) -> f64 {
-        let squared = HINGE
+        let squared = HINGE_COORDINATES
             .map(|q| self.shape[q][0] * self.shape[q][0] + self.shape[q][1] * self.shape[q][1]);
         let stiffness = point.machine.bodies.flexure_stiffness.0;
         stiffness * (squared[0] + squared[1])
@@ -129,13 +129,14 @@ pub(crate) fn modes_with_caps(
     let system = first_order_system(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
     let mass = system.mass;
     let decomposition = system.matrix.eigen().map_err(|_| ModesError::Eigenvalues)?;
-    let values = decomposition.S().column_vector();
-    let vectors = decomposition.U();
+    let eigenvalues = decomposition.S().column_vector();
+    let eigenvectors = decomposition.U();
     let shape = |state: usize| {
-        normalize_to_unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)]))
+        normalize_to_unit_mass(&mass, &core::array::from_fn(|i| eigenvectors[(i, state)]))
     };
     let similarity = |a: usize, b: usize| modal_assurance(&mass, &shape(a), &shape(b));
-    let motions = sort_into_modes((0..STATES).map(|k| values[k] * system.unit_per_s), &similarity)?;
+    let motions =
+        sort_into_modes((0..STATES).map(|k| eigenvalues[k] * system.unit_per_s), &similarity)?;
     let modes = motions.map(|(ModeRoot { s, magnitude_rad_per_s }, state)| Mode {
         re_per_s: s.re,
         im_rad_per_s: s.im,
@@ -153,8 +154,8 @@ pub(crate) fn mode_roots(
     caps: Option<&Caps>,
 ) -> Result<[ModeRoot; COORDINATES], ModesError> {
     let system = first_order_system(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
-    let values = system.matrix.eigenvalues().map_err(|_| ModesError::Eigenvalues)?;
-    if values.iter().filter(|s| s.im == 0.0).count() > 2 {
+    let eigenvalues = system.matrix.eigenvalues().map_err(|_| ModesError::Eigenvalues)?;
+    if eigenvalues.iter().filter(|s| s.im == 0.0).count() > 2 {
         // If several modes are overdamped, their shapes decide which two real rates belong to one
         // mode.
         return Ok(modes_with_caps(point, 0.0, speed_rad_per_s, caps)?.modes.map(|mode| {
@@ -164,8 +165,8 @@ pub(crate) fn mode_roots(
             }
         }));
     }
-    let values = values.into_iter().map(|s| s * system.unit_per_s);
-    Ok(sort_into_modes(values, &|_, _| 1.0)?.map(|(motion, _)| motion))
+    let eigenvalues = eigenvalues.into_iter().map(|s| s * system.unit_per_s);
+    Ok(sort_into_modes(eigenvalues, &|_, _| 1.0)?.map(|(motion, _)| motion))
 }
 
 /// The eigenvalue of a mode.
@@ -181,12 +182,12 @@ pub(crate) struct ModeRoot {
 /// of the slower one of two real ones. `similarity` compares the shapes of the eigenvectors with
 /// two indices.
 fn sort_into_modes(
-    values: impl Iterator<Item = c64>,
+    eigenvalues: impl Iterator<Item = c64>,
     similarity: &dyn Fn(usize, usize) -> f64,
 ) -> Result<[(ModeRoot, usize); COORDINATES], ModesError> {
     let mut modes = Vec::with_capacity(COORDINATES);
     let mut real_roots = Vec::new();
-    for (state, s) in values.enumerate() {
+    for (state, s) in eigenvalues.enumerate() {
         if !(s.re.is_finite() && s.im.is_finite()) {
             return Err(ModesError::Eigenvalues);
         }
@@ -201,10 +202,10 @@ fn sort_into_modes(
     real_roots.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
     while let Some((slow, state)) = real_roots.pop() {
         let similarity_to_slow = |&index: &usize| similarity(state, real_roots[index].1);
-        let partner = (0..real_roots.len())
+        let partner_index = (0..real_roots.len())
             .rev()
             .max_by(|a, b| similarity_to_slow(a).total_cmp(&similarity_to_slow(b)));
-        let (fast, _) = real_roots.remove(partner.ok_or(ModesError::Eigenvalues)?);
+        let (fast, _) = real_roots.remove(partner_index.ok_or(ModesError::Eigenvalues)?);
         let s = c64::new(0.5 * (slow + fast), 0.0);
         modes.push((ModeRoot { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
     }
@@ -311,10 +312,11 @@ pub(crate) fn highest_rigid_frequency_rad_per_s(
     };
     let mass = add_rigid_pairs(&mass);
     let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| ModesError::Mass)?;
-    let values = factors.solve(add_rigid_pairs(&stiffness)).eigenvalues();
-    let values = values.map_err(|_| ModesError::Eigenvalues)?;
-    let fastest = values.iter().map(|square| magnitude(*square)).fold(0.0, f64::max).sqrt();
-    if fastest.is_finite() { Ok(fastest) } else { Err(ModesError::Eigenvalues) }
+    let eigenvalues = factors.solve(add_rigid_pairs(&stiffness)).eigenvalues();
+    let eigenvalues = eigenvalues.map_err(|_| ModesError::Eigenvalues)?;
+    let highest_rad_per_s =
+        eigenvalues.iter().map(|square| magnitude(*square)).fold(0.0, f64::max).sqrt();
+    if highest_rad_per_s.is_finite() { Ok(highest_rad_per_s) } else { Err(ModesError::Eigenvalues) }
 }
 
 /// The first-order form x' = unit A x with x = (q, q' / unit).
@@ -349,11 +351,11 @@ fn first_order_system(
         }
         if let Some(cap) = caps.hinge_rad_per_s {
             let inertia = bodies.flexure_stiffness.0 / (cap * cap);
-            for q in HINGE {
+            for q in HINGE_COORDINATES {
                 matrices.mass[q][q] += inertia;
             }
             let torque_per_speed = (1.0 + BACKWARD_WHIRL_RATIO) * speed_rad_per_s * inertia;
-            let [hinge_yaw, hinge_pitch] = HINGE;
+            let [hinge_yaw, hinge_pitch] = HINGE_COORDINATES;
             matrices.damping[hinge_yaw][hinge_pitch] -= torque_per_speed;
             matrices.damping[hinge_pitch][hinge_yaw] += torque_per_speed;
         }

@@ -31,7 +31,7 @@ use lane_ode::{Lane, N, OutOfLine, Real};
 
 /// The tub or the rotor: equations of motion, lower triangle of the inertia, and orientation.
 pub(crate) struct Half<T, const R: usize> {
-    pub(crate) floating: FloatingChain<T, R>,
+    pub(crate) chain: FloatingChain<T, R>,
     pub(crate) inertia: [[N<T>; R]; R],
     pub(crate) tilt: Tilt<T>,
 }
@@ -45,7 +45,7 @@ pub(crate) struct Halves<T> {
 /// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`, with the bearing
 /// forces in both halves.
 #[inline(always)]
-pub(crate) fn coupled_halves<T: Lane>(
+pub(crate) fn assemble_coupled_halves<T: Lane>(
     machine: &Coefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
@@ -54,8 +54,8 @@ pub(crate) fn coupled_halves<T: Lane>(
     let mut tub = assemble_tub(machine, q, u);
     let mut rotor = assemble_rotor_in_lanes(&machine.bodies, spin, q, u);
     let shaft_load = Deflection::new(q, &tub.tilt, &rotor.tilt).load_on_shaft(&machine.bodies);
-    tub.floating.apply(&shaft_load.reaction());
-    rotor.floating.apply(&shaft_load);
+    tub.chain.add_load(&shaft_load.reaction());
+    rotor.chain.add_load(&shaft_load);
     Halves { tub, rotor }
 }
 
@@ -70,12 +70,12 @@ pub(crate) fn accelerations<T: Lane>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
-    let (tub, rotor) = uncoupled_halves(machine, coupling, sag, spin, q, u);
+    let (tub, rotor) = assemble_uncoupled_halves(machine, coupling, sag, spin, q, u);
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
     let tub_factors = LdltFactors::new(tub.inertia);
     let rotor_factors = LdltFactors::new(rotor.inertia);
-    let tub = (&tub.floating, &tub_factors);
-    let rotor = (&rotor.floating, &rotor_factors);
+    let tub = (&tub.chain, &tub_factors);
+    let rotor = (&rotor.chain, &rotor_factors);
     coupling.accelerations(&machine.bodies, spin.speed, &deflection, &sag.bearings, tub, rotor)
 }
 
@@ -90,7 +90,7 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; TUB.len()] {
-    let (tub, rotor) = uncoupled_halves(machine, coupling, sag, spin, q, u);
+    let (tub, rotor) = assemble_uncoupled_halves(machine, coupling, sag, spin, q, u);
     let tub_factors = LdltFactors::new(tub.inertia);
     let rotor_factors = LdltFactors::new(rotor.inertia);
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
@@ -101,12 +101,12 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     // The first pass of the loop has no load, so that the code with and without a load is compiled
     // once.
     for load_case in 0..=TUB.len() {
-        let mut floating = tub.floating;
+        let mut chain = tub.chain;
         if load_case > 0 {
-            floating.add_unit_force(load_case - 1);
+            chain.add_unit_force(load_case - 1);
         }
-        let tub = (&floating, &tub_factors);
-        let rotor = (&rotor.floating, &rotor_factors);
+        let tub = (&chain, &tub_factors);
+        let rotor = (&rotor.chain, &rotor_factors);
         let accelerations =
             coupling.accelerations(bodies, speed, &deflection, &sag.bearings, tub, rotor);
         if load_case == 0 {
@@ -121,7 +121,7 @@ pub(crate) fn accelerations_per_load<T: Lane>(
 /// Computes both halves without the bearings' forces. If the hinge's modes are capped, the rotor
 /// includes the hinge's scaled mass.
 #[inline(always)]
-fn uncoupled_halves<T: Lane>(
+fn assemble_uncoupled_halves<T: Lane>(
     machine: &Coefficients<T>,
     coupling: &Coupling<T>,
     sag: &Sag<T>,
@@ -136,10 +136,10 @@ fn uncoupled_halves<T: Lane>(
     {
         for (index, r) in [2, 3].into_iter().enumerate() {
             rotor.inertia[r][r] += hinge_mass.inertia;
-            rotor.floating.torque[r] += hinge_mass.torque[index];
+            rotor.chain.torque[r] += hinge_mass.torque[index];
         }
-        rotor.floating.torque[2] += hinge_mass.torque_per_speed * u[HINGE_PITCH];
-        rotor.floating.torque[3] -= hinge_mass.torque_per_speed * u[HINGE_YAW];
+        rotor.chain.torque[2] += hinge_mass.torque_per_speed * u[HINGE_PITCH];
+        rotor.chain.torque[3] -= hinge_mass.torque_per_speed * u[HINGE_YAW];
     }
     (tub, rotor)
 }
@@ -193,7 +193,7 @@ pub(crate) fn assemble_tub<T: Lane>(
     let c = tilt.cos_pitch;
     let zero = s.lit(0.0);
     Half {
-        floating: FloatingChain {
+        chain: FloatingChain {
             inverse_mass: b.tub_inverse_mass,
             force: [force[0] - b.gravity * b.tub_mass, force[1]],
             drift: [drift[1], drift[2]],
@@ -390,7 +390,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         }
     }
     Half {
-        floating: FloatingChain {
+        chain: FloatingChain {
             inverse_mass: b.rotor_inverse_mass,
             force: [-(b.gravity * b.rotor_mass).v(), zero],
             drift: [drift[1], drift[2]],

@@ -111,14 +111,14 @@ impl<F: ModelFamily> StepperVisitor<F> for (SimulationRequest<'_>, Simd) {
 
     fn visit<S: Stepper>(self, stepper: S) -> Self::Output {
         let (request, simd) = self;
-        simd.dispatch(Simulate(request, stepper, PhantomData::<F>))
+        simd.dispatch(SimulationKernel(request, stepper, PhantomData::<F>))
     }
 }
 
 /// The kernel of a simulation.
-struct Simulate<'a, F, S>(SimulationRequest<'a>, S, PhantomData<F>);
+struct SimulationKernel<'a, F, S>(SimulationRequest<'a>, S, PhantomData<F>);
 
-impl<F: ModelFamily, S: Stepper> Kernel for Simulate<'_, F, S> {
+impl<F: ModelFamily, S: Stepper> Kernel for SimulationKernel<'_, F, S> {
     type Output = Option<(Vec<Record>, Vec<Reading>)>;
 
     #[inline(always)]
@@ -155,16 +155,16 @@ struct SimulationTask<'a, T, M> {
     points: &'a [&'a Point],
     cancel: Cancel<'a>,
     /// The number of points that have started.
-    started: usize,
+    started_count: usize,
     /// The number of points that have ended.
-    finished: usize,
+    finished_count: usize,
     lanes: [LaneState; MAX_LANES],
     method: &'a Method,
     channel_peaks: Peaks<T, CHANNELS>,
     /// The greatest square of the radial distance between the fronts of drum and tub.
     radial_peaks: Peaks<T, 1>,
     /// 1 in lanes that are inside their window, 0 in others.
-    in_window: N<T>,
+    window_indicator: N<T>,
     records: Vec<Record>,
     active_recorders: Option<ActiveRecorders<T>>,
     /// The coordinates at the ends of each point's segments; empty if checkpoints are not recorded.
@@ -205,7 +205,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
             state.segment += 1;
             return Some(self.start_segment(lane));
         }
-        self.finished += 1;
+        self.finished_count += 1;
         let StepCount { accepted: steps, rejected } = state.step_count;
         let record = &mut self.records[state.point];
         *record = Record { failure, steps, rejected, ..EMPTY_RECORD };
@@ -214,15 +214,15 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
             let [radial_squared] = self.radial_peaks.lane(lane);
             record.min_gap_m = point.machine.bodies.clearance.0 - radial_squared.sqrt();
         }
-        if let Some(active) = &mut self.active_recorders {
-            active.finish(lane, state.point, point, failure.is_some());
+        if let Some(active_recorders) = &mut self.active_recorders {
+            active_recorders.finish(lane, state.point, point, failure.is_some());
         }
         self.start_next_point(lane, x)
     }
 
     #[inline(always)]
     fn begin(&mut self, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        self.in_window.0.run_out_of_line(RecordStart { task: self, forcing, x, dx });
+        self.window_indicator.0.run_out_of_line(RecordStart { task: self, forcing, x, dx });
     }
 
     #[inline(always)]
@@ -230,19 +230,25 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
         let lanes_in_window = self.lanes_in_window();
         let (radial, channels) = self.model.observe(
             forcing,
-            step.after,
-            step.slope_after,
+            step.end_state,
+            step.end_slope,
             T::bits(lanes_in_window) != 0,
         );
         if let Some(channels) = channels {
             self.channel_peaks.advance(step.length_s, &channels, lanes_in_window);
-            let times = Some((step.end_s, step.length_s));
-            self.record(times, (step.after, step.slope_after), &radial, &channels, lanes_in_window);
+            let step_times = Some((step.end_s, step.length_s));
+            self.record(
+                step_times,
+                (step.end_state, step.end_slope),
+                &radial,
+                &channels,
+                lanes_in_window,
+            );
         }
         self.radial_peaks.advance(
             step.length_s,
             &[squared_distance(&radial)],
-            all_lanes(self.in_window),
+            all_lanes(self.window_indicator),
         );
     }
 
@@ -272,7 +278,7 @@ impl<T: Lane, M: LaneModel<T>> OutOfLine for RecordStart<'_, '_, T, M> {
             task.channel_peaks.begin(&channels, lanes_in_window);
             task.record(None, (x, dx), &radial, &channels, lanes_in_window);
         }
-        task.radial_peaks.begin(&[squared_distance(&radial)], all_lanes(task.in_window));
+        task.radial_peaks.begin(&[squared_distance(&radial)], all_lanes(task.window_indicator));
     }
 }
 
@@ -297,13 +303,13 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
             model: M::splat(zero, points[0], coupling_for_method(method, zero)),
             points,
             cancel,
-            started: 0,
-            finished: 0,
+            started_count: 0,
+            finished_count: 0,
             lanes: [LaneState::default(); MAX_LANES],
             method,
             channel_peaks: Peaks::new(zero),
             radial_peaks: Peaks::new(zero),
-            in_window: zero,
+            window_indicator: zero,
             records: vec![EMPTY_RECORD; points.len()],
             active_recorders: ActiveRecorders::new(
                 zero,
@@ -318,10 +324,12 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
 
     /// Returns all records and readings; `None` if some trajectory has not ended.
     fn into_records(self) -> Option<(Vec<Record>, Vec<Reading>)> {
-        if self.finished < self.points.len() {
+        if self.finished_count < self.points.len() {
             return None;
         }
-        let mut readings = self.active_recorders.map_or_else(Vec::new, |active| active.readings);
+        let mut readings = self
+            .active_recorders
+            .map_or_else(Vec::new, |active_recorders| active_recorders.readings);
         if !self.checkpoints.is_empty() {
             readings.resize(self.checkpoints.len(), Reading::default());
         }
@@ -342,7 +350,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         lanes_in_window: T::Mask,
     ) {
         if let Some(recorders) = &mut self.active_recorders {
-            self.in_window.0.run_out_of_line(ObservedState {
+            self.window_indicator.0.run_out_of_line(ObservedState {
                 recorders,
                 step,
                 x,
@@ -357,15 +365,15 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
     /// Returns the lanes that are inside their windows.
     #[inline(always)]
     fn lanes_in_window(&self) -> T::Mask {
-        self.in_window.lit(0.0).0.less(self.in_window.0)
+        self.window_indicator.lit(0.0).0.less(self.window_indicator.0)
     }
 
     /// Starts the next point in a lane, if there is one.
     fn start_next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Segment> {
-        self.in_window.0.set(lane, 0.0);
+        self.window_indicator.0.set(lane, 0.0);
         // An idle lane has the initial state of its last point, at which the model is defined.
-        let is_idle = self.started == self.points.len();
-        let index = if is_idle { self.lanes[lane].point } else { self.started };
+        let is_idle = self.started_count == self.points.len();
+        let index = if is_idle { self.lanes[lane].point } else { self.started_count };
         let point = self.points[index];
         for (x, at_rest) in x.iter_mut().zip(M::at_rest(point)) {
             x.0.set(lane, at_rest);
@@ -373,13 +381,13 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         if is_idle {
             return None;
         }
-        self.started += 1;
+        self.started_count += 1;
         self.lanes[lane] = LaneState { point: index, ..LaneState::default() };
         self.model.set_point(lane, point);
         self.channel_peaks.reset(lane);
         self.radial_peaks.reset(lane);
-        if let Some(active) = &mut self.active_recorders {
-            active.set_point(lane, point);
+        if let Some(active_recorders) = &mut self.active_recorders {
+            active_recorders.set_point(lane, point);
         }
         Some(self.start_segment(lane))
     }
@@ -389,7 +397,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         let state = &self.lanes[lane];
         let point = self.points[state.point];
         let segment = &point.segments[state.segment];
-        self.in_window.0.set(lane, f64::from(u8::from(segment.in_window)));
+        self.window_indicator.0.set(lane, f64::from(u8::from(segment.in_window)));
         start_segment(&mut self.model, lane, self.method, point, segment)
     }
 }

@@ -14,11 +14,11 @@ fn waves(seed: u64) -> Waves {
     }
 }
 
-/// Returns the peaks of the parts between cuts, from `steps` equal steps over 0 to `end`.
-fn part_peaks(waves: &Waves, cuts: &[f64], end: f64, steps: u32) -> Vec<f64> {
+/// Returns the peaks of the parts between division times, from `steps` equal steps over 0 to `end`.
+fn part_peaks(waves: &Waves, division_times_s: &[f64], end: f64, steps: u32) -> Vec<f64> {
     let h = end / f64::from(steps);
     let mut peaks = IntervalPeaks::<f64, 1>::new(N(0.0));
-    peaks.reset(0, cuts);
+    peaks.reset(0, division_times_s);
     peaks.begin(&[waves.sample(0.0)], true);
     for i in 1..=steps {
         let t = h * f64::from(i);
@@ -41,24 +41,24 @@ fn peak_between(waves: &Waves, start: f64, end: f64) -> f64 {
 
 #[test]
 fn the_peak_of_a_part_is_that_of_a_separate_trajectory() {
-    // The cuts are at the end of a step, one step apart, several within a step, and far apart.
-    let cut_times_s = [0.5, 0.71, 0.775, 0.78, 0.79, 1.7, 4.3];
-    let boundaries_s: Vec<f64> = [0.0].into_iter().chain(cut_times_s).chain([5.0]).collect();
+    // The division times are at the end of a step, one step apart, several within a step, and far apart.
+    let division_times_s = [0.5, 0.71, 0.775, 0.78, 0.79, 1.7, 4.3];
+    let boundaries_s: Vec<f64> = [0.0].into_iter().chain(division_times_s).chain([5.0]).collect();
     for seed in 0..20 {
         let waves = waves(seed);
-        let peaks = part_peaks(&waves, &cut_times_s, 5.0, 100);
-        assert_eq!(peaks.len(), cut_times_s.len() + 1);
-        for (peak, edge) in peaks.iter().zip(boundaries_s.windows(2)) {
-            let expected = peak_between(&waves, edge[0], edge[1]);
-            assert!((peak - expected).abs() < 1e-6, "{edge:?}: {peak} for {expected}");
+        let peaks = part_peaks(&waves, &division_times_s, 5.0, 100);
+        assert_eq!(peaks.len(), division_times_s.len() + 1);
+        for (peak, part_s) in peaks.iter().zip(boundaries_s.windows(2)) {
+            let expected = peak_between(&waves, part_s[0], part_s[1]);
+            assert!((peak - expected).abs() < 1e-6, "{part_s:?}: {peak} for {expected}");
         }
     }
     assert_eq!(part_peaks(&waves(1), &[], 5.0, 100).len(), 1);
 }
 
 #[test]
-fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
-    let cut_times_s = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
+fn the_parts_of_a_lane_do_not_depend_on_division_times_of_other_lanes() {
+    let division_times_s = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
     let mut combined = IntervalPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
     let waves_by_lane: Vec<Waves> = (0..3).map(waves).collect();
     let sample = |t: f64| {
@@ -71,8 +71,8 @@ fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
         }
         [lanes]
     };
-    for (lane, cuts) in cut_times_s.iter().enumerate() {
-        combined.reset(lane, cuts);
+    for (lane, lane_times_s) in division_times_s.iter().enumerate() {
+        combined.reset(lane, lane_times_s);
     }
     combined.begin(&sample(0.0), [true; 3]);
     for i in 1..=60 {
@@ -82,7 +82,7 @@ fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
     }
     for lane in 0..3 {
         let mut separate = IntervalPeaks::<f64, 1>::new(N(0.0));
-        separate.reset(0, &cut_times_s[lane]);
+        separate.reset(0, &division_times_s[lane]);
         separate.begin(&[waves_by_lane[lane].sample(0.0)], true);
         for i in 1..=60 {
             let t = 0.05 * f64::from(i);

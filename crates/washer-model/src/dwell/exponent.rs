@@ -19,7 +19,7 @@ const TRANSIENT_TURNS: usize = 16;
 
 /// Number of parts whose scatter gives the standard error. Doubling it doubles the length of a
 /// measurement.
-const PARTS: usize = 8;
+const MEASUREMENT_PARTS: usize = 8;
 
 /// Number of turns of a part. Doubling it doubles the length of a measurement and makes the parts
 /// less dependent on each other.
@@ -44,10 +44,10 @@ impl Exponent {
 /// Returns the distance of two states (m, rad): the maximum over the tub's coordinates of the
 /// difference of the coordinate plus the difference of its speed divided by the drum's speed.
 pub(super) fn distance(setup: &TurnSetup<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
-    let speed = setup.speed_rpm * TAU / 60.0;
+    let speed_rad_per_s = setup.speed_rpm * TAU / 60.0;
     let difference = |&i: &usize| {
         let j = COORDINATES + i;
-        (a[i] - b[i]).abs() + (a[j] - b[j]).abs() / speed
+        (a[i] - b[i]).abs() + (a[j] - b[j]).abs() / speed_rad_per_s
     };
     TUB.iter().map(difference).fold(0.0, f64::max)
 }
@@ -59,7 +59,7 @@ pub(super) fn compute_exponents(
     simd: Simd,
     requests: &[(HeldState<'_>, [f64; COORDINATES])],
 ) -> Vec<Option<Exponent>> {
-    let initial_separation: Vec<f64> = requests
+    let initial_separations: Vec<f64> = requests
         .iter()
         .map(|(held_state, _)| {
             RESCALED_SEPARATION * largest_deviation(held_state.setup.point, &held_state.state)
@@ -67,45 +67,52 @@ pub(super) fn compute_exponents(
         .collect();
     // In the list, each run is followed by its perturbed run.
     let mut pairs = Vec::with_capacity(2 * requests.len());
-    for ((held_state, direction), initial_separation) in requests.iter().zip(&initial_separation) {
-        let speed = held_state.setup.speed_rpm * TAU / 60.0;
+    for ((held_state, direction), initial_separations) in requests.iter().zip(&initial_separations)
+    {
+        let speed_rad_per_s = held_state.setup.speed_rpm * TAU / 60.0;
         let mut perturbed_state = *held_state;
         for i in 0..COORDINATES {
-            perturbed_state.state[COORDINATES + i] += initial_separation * speed * direction[i];
+            perturbed_state.state[COORDINATES + i] +=
+                initial_separations * speed_rad_per_s * direction[i];
         }
         pairs.extend([*held_state, perturbed_state]);
     }
-    let mut growth_in_parts = vec![[0.0_f64; PARTS]; requests.len()];
-    for turn in 0..TRANSIENT_TURNS + PARTS * PART_TURNS {
+    let mut growth_in_parts = vec![[0.0_f64; MEASUREMENT_PARTS]; requests.len()];
+    for turn in 0..TRANSIENT_TURNS + MEASUREMENT_PARTS * PART_TURNS {
         let turns = integrate_turns(simd, &pairs, 1);
-        for (k, initial_separation) in initial_separation.iter().enumerate() {
-            let (Some(run), Some(perturbed_turn)) =
+        for (k, initial_separations) in initial_separations.iter().enumerate() {
+            let (Some(reference_turn), Some(perturbed_turn)) =
                 (turns[2 * k].first(), turns[2 * k + 1].first())
             else {
                 growth_in_parts[k][0] = f64::NAN;
                 continue;
             };
             let setup = pairs[2 * k].setup;
-            let separation = distance(&setup, &run.end, &perturbed_turn.end);
+            let separation = distance(&setup, &reference_turn.end, &perturbed_turn.end);
             if let Some(measured_turn) = turn.checked_sub(TRANSIENT_TURNS) {
                 growth_in_parts[k][measured_turn / PART_TURNS] +=
-                    libm::log(separation / initial_separation);
+                    libm::log(separation / initial_separations);
             }
-            pairs[2 * k].state = run.end;
+            pairs[2 * k].state = reference_turn.end;
             pairs[2 * k + 1].state = core::array::from_fn(|i| {
-                run.end[i]
-                    + (perturbed_turn.end[i] - run.end[i]) * (initial_separation / separation)
+                reference_turn.end[i]
+                    + (perturbed_turn.end[i] - reference_turn.end[i])
+                        * (initial_separations / separation)
             });
         }
     }
     let exponents =
         growth_in_parts.iter().zip(requests).map(|(growth_in_parts, (held_state, _))| {
             let part_s = PART_TURNS as f64 * held_state.setup.turn_s();
-            let mean = growth_in_parts.iter().sum::<f64>() / PARTS as f64;
-            let squares: f64 =
-                growth_in_parts.iter().map(|part| (part - mean) * (part - mean)).sum();
-            let error = (squares / (PARTS * (PARTS - 1)) as f64).sqrt();
-            let exponent = Exponent { per_s: mean / part_s, error_per_s: error / part_s };
+            let mean_growth = growth_in_parts.iter().sum::<f64>() / MEASUREMENT_PARTS as f64;
+            let sum_of_squares: f64 = growth_in_parts
+                .iter()
+                .map(|part| (part - mean_growth) * (part - mean_growth))
+                .sum();
+            let standard_error =
+                (sum_of_squares / (MEASUREMENT_PARTS * (MEASUREMENT_PARTS - 1)) as f64).sqrt();
+            let exponent =
+                Exponent { per_s: mean_growth / part_s, error_per_s: standard_error / part_s };
             (exponent.per_s.is_finite() && exponent.error_per_s.is_finite()).then_some(exponent)
         });
     exponents.collect()

@@ -34,7 +34,7 @@ pub(super) struct SpectralLine {
 }
 
 /// Returns Hann's window at sample `n` of `count`.
-fn window(n: usize, count: usize) -> f64 {
+fn hann_window(n: usize, count: usize) -> f64 {
     let sin = libm::sin(0.5 * TAU * (n as f64 + 0.5) / count as f64);
     sin * sin
 }
@@ -51,12 +51,12 @@ fn fourier_means<const M: usize>(
     let mut im = [0.0_f64; M];
     let mut sums = [[0.0; 2]; M];
     let mut window_sum = 0.0;
-    for (value, window) in signal.iter().zip(windows) {
-        let windowed = window * value;
-        window_sum += window;
+    for (value, window_value) in signal.iter().zip(windows) {
+        let windowed_value = window_value * value;
+        window_sum += window_value;
         for k in 0..M {
-            sums[k][0] += windowed * re[k];
-            sums[k][1] -= windowed * im[k];
+            sums[k][0] += windowed_value * re[k];
+            sums[k][1] -= windowed_value * im[k];
             (re[k], im[k]) = (re[k] * cos[k] - im[k] * sin[k], re[k] * sin[k] + im[k] * cos[k]);
         }
     }
@@ -83,19 +83,23 @@ fn powers<const M: usize>(
 /// if the signals are too short or constant.
 pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> {
     let count = signals.first()?.len();
-    let windows: Vec<f64> = (0..count).map(|n| window(n, count)).collect();
+    let windows: Vec<f64> = (0..count).map(|n| hann_window(n, count)).collect();
     let mut residuals = signals.to_vec();
     for signal in &mut residuals {
         let [[mean, _]] = fourier_means(signal, &windows, [0.0]);
         signal.iter_mut().for_each(|value| *value -= mean);
     }
-    let squares = |signals: &[Vec<f64>]| -> f64 {
+    let windowed_power = |signals: &[Vec<f64>]| -> f64 {
         let square = |signal: &Vec<f64>| -> f64 {
-            signal.iter().zip(&windows).map(|(value, window)| window * value * value).sum()
+            signal
+                .iter()
+                .zip(&windows)
+                .map(|(value, window_value)| window_value * value * value)
+                .sum()
         };
         signals.iter().map(square).sum()
     };
-    let total_power = squares(&residuals);
+    let total_power = windowed_power(&residuals);
     let frequency_at = |trial: usize| 0.5 * trial as f64 / (TRIALS_PER_SAMPLE * count) as f64;
     // The lowest frequencies are excluded, because the mean dominates them.
     let trials: Vec<usize> = (2 * TRIALS_PER_SAMPLE * 2..=TRIALS_PER_SAMPLE * count).collect();
@@ -117,13 +121,16 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     let mut min_frequency = frequency_at(strongest_trial - 1);
     let mut max_frequency = frequency_at(strongest_trial + 1).min(0.5);
     for _ in 0..TERNARY_ROUNDS {
-        let third = (max_frequency - min_frequency) / 3.0;
-        let [below, above] =
-            powers(&residuals, &windows, [min_frequency + third, max_frequency - third]);
-        if below < above {
-            min_frequency += third;
+        let third_of_interval = (max_frequency - min_frequency) / 3.0;
+        let [lower_power, upper_power] = powers(
+            &residuals,
+            &windows,
+            [min_frequency + third_of_interval, max_frequency - third_of_interval],
+        );
+        if lower_power < upper_power {
+            min_frequency += third_of_interval;
         } else {
-            max_frequency -= third;
+            max_frequency -= third_of_interval;
         }
     }
     let frequency = 0.5 * (min_frequency + max_frequency);
@@ -136,7 +143,7 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
             }
         }
     }
-    let residual = (squares(&residuals) / total_power).sqrt();
+    let residual = (windowed_power(&residuals) / total_power).sqrt();
     (residual.is_finite()).then_some(SpectralLine { frequency, residual })
 }
 
@@ -160,9 +167,9 @@ impl Harmonic {
         // A real signal also has a line at the negative frequency. Both lines coincide at the
         // frequencies 0 and 0.5.
         let distance = self.frequency.min((self.frequency - 0.5).abs()).min(1.0 - self.frequency);
-        let lines = if distance < 1.0 / signal.len() as f64 { 1.0 } else { 2.0 };
+        let line_count = if distance < 1.0 / signal.len() as f64 { 1.0 } else { 2.0 };
         for (value, [cos, sin]) in signal.iter_mut().zip(&self.wave) {
-            *value -= lines * (re * cos - im * sin);
+            *value -= line_count * (re * cos - im * sin);
         }
     }
 }

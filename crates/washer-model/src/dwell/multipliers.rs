@@ -8,7 +8,7 @@ use crate::stability::responses::leading_multiplier;
 use crate::stability::settings::HeldCase;
 use lane_ode::{Cancel, N};
 
-/// A periodic orbit: a state on it, and the turns after which it repeats.
+/// A periodic orbit: a state on the orbit, and the number of turns after which the state repeats.
 pub(super) struct PeriodicOrbit<'c, 'a> {
     pub(super) held_case: &'c HeldCase<'a>,
     pub(super) held_state: HeldState<'a>,
@@ -19,7 +19,7 @@ pub(super) struct PeriodicOrbit<'c, 'a> {
 /// decay: ln |mu| over the period, with mu the largest multiplier of the suspension's motions. The
 /// monodromy matrix is the product of those of the turns. An orbit has `None` if its eigenvalues
 /// are not finite, and all orbits have `None` once `cancel` is requested.
-pub(super) fn growths_per_s(
+pub(super) fn compute_growths_per_s(
     orbits: &[PeriodicOrbit<'_, '_>],
     cancel: Cancel<'_>,
 ) -> Vec<Option<f64>> {
@@ -28,9 +28,9 @@ pub(super) fn growths_per_s(
         orbits.iter().map(|orbit| orbit.held_state.state).collect();
     let max_period = orbits.iter().map(|orbit| orbit.period).max().unwrap_or(0);
     for turn in 0..max_period {
-        let unfinished: Vec<usize> =
+        let unfinished_orbits: Vec<usize> =
             (0..orbits.len()).filter(|&k| turn < orbits[k].period).collect();
-        let requests: Vec<TurnRequest<'_>> = unfinished
+        let requests: Vec<TurnRequest<'_>> = unfinished_orbits
             .iter()
             .map(|&k| TurnRequest {
                 setup: orbits[k].held_state.setup,
@@ -42,11 +42,11 @@ pub(super) fn growths_per_s(
         if cancel.is_requested() {
             return vec![None; orbits.len()];
         }
-        for (k, result) in unfinished.into_iter().zip(results) {
+        for (k, result) in unfinished_orbits.into_iter().zip(results) {
             states[k] = result.end;
             if let Some(record) = result.record {
                 matrices[k] = Some(match &matrices[k] {
-                    Some(previous) => product(&record.monodromy, previous),
+                    Some(previous) => multiply_matrices(&record.monodromy, previous),
                     None => record.monodromy,
                 });
             }
@@ -62,7 +62,7 @@ pub(super) fn growths_per_s(
     orbits.iter().zip(matrices).map(growth).collect()
 }
 
-fn product(left: &StateMatrix, right: &StateMatrix) -> StateMatrix {
+fn multiply_matrices(left: &StateMatrix, right: &StateMatrix) -> StateMatrix {
     let mut product = [[N(0.0); STATES]; STATES];
     for i in 0..STATES {
         for k in 0..STATES {

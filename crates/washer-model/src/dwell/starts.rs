@@ -53,10 +53,15 @@ pub(super) fn perturb(point: &Point, frozen_modes: &Modes, state: &[f64; STATES]
 /// A kick along mode shapes turns the tub by 1 rad/s: in the two modes that rock most, and in both
 /// at once. A random kick has the kinetic energy of the first, and a direction that is uniform over
 /// the sphere of this energy, because a basin may lie in none of the directions of mode shapes.
-pub(super) fn kick_directions(point: &Point, frozen_modes: &Modes, random: usize) -> Directions {
+pub(super) fn kick_directions(
+    point: &Point,
+    frozen_modes: &Modes,
+    random_count: usize,
+) -> Directions {
     let mut modes: Vec<(usize, f64)> = (0..SUSPENSION_MODES)
         .map(|k| {
-            let motion = shape::motion(point, &frozen_modes.mass, &frozen_modes.modes[k].shape);
+            let motion =
+                shape::dominant_motion(point, &frozen_modes.mass, &frozen_modes.modes[k].shape);
             (k, motion.yaw + motion.pitch)
         })
         .collect();
@@ -68,20 +73,21 @@ pub(super) fn kick_directions(point: &Point, frozen_modes: &Modes, random: usize
         let pitch = shape[TUB_PITCH][0];
         1.0 / (yaw * yaw + pitch * pitch).sqrt()
     };
-    let unit = |rank: usize| -> [f64; COORDINATES] {
+    let scale_shape = |rank: usize| -> [f64; COORDINATES] {
         let shape = &frozen_modes.modes[modes[rank].0].shape;
         core::array::from_fn(|i| round_last_digits(shape[i][0] * amplitude(rank)))
     };
-    let first_scaled_shape = unit(0);
-    let second_scaled_shape = unit(1);
+    let first_scaled_shape = scale_shape(0);
+    let second_scaled_shape = scale_shape(1);
     let mut directions = vec![
         first_scaled_shape,
         second_scaled_shape,
         core::array::from_fn(|i| first_scaled_shape[i] + second_scaled_shape[i]),
     ];
     let mut numbers = fastrand::Rng::with_seed(DIRECTION_SEED);
-    for _ in 0..random {
-        let components: [f64; SUSPENSION_MODES] = core::array::from_fn(|_| normal(&mut numbers));
+    for _ in 0..random_count {
+        let components: [f64; SUSPENSION_MODES] =
+            core::array::from_fn(|_| draw_normal(&mut numbers));
         let length = components.iter().map(|component| component * component).sum::<f64>().sqrt();
         let velocity = |i: usize| -> f64 {
             let shapes = frozen_modes.modes[..SUSPENSION_MODES].iter().map(|mode| mode.shape[i][0]);
@@ -94,7 +100,7 @@ pub(super) fn kick_directions(point: &Point, frozen_modes: &Modes, random: usize
 }
 
 /// Returns a number of the standard normal distribution (Box and Muller).
-fn normal(numbers: &mut fastrand::Rng) -> f64 {
+fn draw_normal(numbers: &mut fastrand::Rng) -> f64 {
     let radius = (-2.0 * libm::log(1.0 - numbers.f64())).sqrt();
     radius * libm::cos(core::f64::consts::TAU * numbers.f64())
 }
@@ -114,19 +120,23 @@ pub(super) const fn is_from_rest((direction, _): Kick) -> bool {
 /// Returns a number of kicks up to a size (rad/s): those along mode shapes first, the hardest in
 /// all directions before weaker ones, then random ones, from the hardest to the weakest.
 pub(super) fn kicks(count: usize, max_kick_rad_per_s: f64) -> Vec<Kick> {
-    let random = random_kick_count(count);
-    let mode_kicks = count - random;
-    let size = |level: usize, levels: usize| {
-        let step = if levels > 1 { libm::log(MIN_KICK_RATIO) / (levels - 1) as f64 } else { 0.0 };
-        max_kick_rad_per_s * libm::exp(step * level as f64)
+    let random_count = random_kick_count(count);
+    let mode_kick_count = count - random_count;
+    let kick_size_rad_per_s = |level: usize, level_count: usize| {
+        let log_step = if level_count > 1 {
+            libm::log(MIN_KICK_RATIO) / (level_count - 1) as f64
+        } else {
+            0.0
+        };
+        max_kick_rad_per_s * libm::exp(log_step * level as f64)
     };
-    let levels = mode_kicks.div_ceil(MODE_DIRECTIONS);
+    let level_count = mode_kick_count.div_ceil(MODE_DIRECTIONS);
     let mut kicks = Vec::with_capacity(count);
-    for k in 0..mode_kicks {
-        kicks.push((k % MODE_DIRECTIONS, size(k / MODE_DIRECTIONS, levels)));
+    for k in 0..mode_kick_count {
+        kicks.push((k % MODE_DIRECTIONS, kick_size_rad_per_s(k / MODE_DIRECTIONS, level_count)));
     }
-    for k in 0..random {
-        kicks.push((MODE_DIRECTIONS + k, size(k, random)));
+    for k in 0..random_count {
+        kicks.push((MODE_DIRECTIONS + k, kick_size_rad_per_s(k, random_count)));
     }
     kicks
 }
@@ -135,10 +145,10 @@ pub(super) fn kicks(count: usize, max_kick_rad_per_s: f64) -> Vec<Kick> {
 pub(super) fn add_kick(
     state: &[f64; STATES],
     directions: &Directions,
-    (direction, size): Kick,
+    (direction, size_rad_per_s): Kick,
 ) -> [f64; STATES] {
     core::array::from_fn(|i| match i.checked_sub(COORDINATES) {
-        Some(i) => state[COORDINATES + i] + size * directions[direction][i],
+        Some(i) => state[COORDINATES + i] + size_rad_per_s * directions[direction][i],
         None => state[i],
     })
 }

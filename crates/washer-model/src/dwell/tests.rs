@@ -50,7 +50,7 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
                 is_selected(name, reference_point["speed_rpm"].as_f64().unwrap())
             })
             .collect();
-        let dwells: Vec<HeldSpeed<'_>> = reference_points
+        let held_speeds: Vec<HeldSpeed<'_>> = reference_points
             .iter()
             .map(|reference_point| HeldSpeed {
                 point: &point,
@@ -59,7 +59,7 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
             .collect();
         let start_time = std::time::Instant::now();
         let search_results =
-            find_attractors(Simd::best(), &dwells, &[], &StartRule::default(), Cancel::Never);
+            find_attractors(Simd::best(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
         println!(
             "{name}: {} speeds in {:.1} s",
             reference_points.len(),
@@ -127,10 +127,10 @@ fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, search_res
             }
             continue;
         }
-        let by_error = |a: &&Attractor, b: &&Attractor| {
+        let compare_errors = |a: &&Attractor, b: &&Attractor| {
             relative_error(a, end).total_cmp(&relative_error(b, end))
         };
-        let motion = search_result.attractors.iter().min_by(by_error).unwrap();
+        let motion = search_result.attractors.iter().min_by(compare_errors).unwrap();
         // Close to the edge of a tongue the reference has an error by its steps of 2e-4 s: RK4 of
         // this crate with these steps gives its 29.34 and 31.75 mrad, with 2.5e-5 s 29.64 and
         // 32.07.
@@ -164,10 +164,10 @@ fn val_more_motions_of_held_speeds_match_an_independent_program() {
 fn slow_decay_is_not_taken_for_a_doubled_period() {
     let point =
         prepare_at(&json!({ "unbalance_mass_kg": 0.4, "damping_n_s_per_m": 140.0 }), 100.0, 1.0);
-    let dwells = [HeldSpeed { point: &point, speed_rpm: 317.0 }];
+    let held_speeds = [HeldSpeed { point: &point, speed_rpm: 317.0 }];
     let starts = StartRule { max_time_s: 120.0, ..StartRule::default() };
     let search_result =
-        find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
+        find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never).remove(0).unwrap();
     assert!((-2e-3..0.0).contains(&search_result.responses[0].growth_per_s()));
     for motion in &search_result.attractors {
         let settled = motion.motion_kind;
@@ -215,9 +215,11 @@ fn random_motions_continue_unchanged_in_short_steps() {
         let point = prepare_at(&keys, 100.0, 1.0);
         let starts =
             StartRule { count: 4, max_kick_rad_per_s: kick_rad_per_s, ..StartRule::default() };
-        let dwells = [HeldSpeed { point: &point, speed_rpm }];
+        let held_speeds = [HeldSpeed { point: &point, speed_rpm }];
         let search_result =
-            find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
+            find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never)
+                .remove(0)
+                .unwrap();
         for motion in &search_result.attractors {
             counts[motion.kind()] += 1;
             if matches!(motion.motion_kind, None | Some(MotionKind::Chaotic)) {
@@ -262,10 +264,12 @@ fn random_kicks_end_in_motions_that_the_search_found() {
     for number in 0..number_from_env("MACHINES", 6) {
         let (keys, speed_rpm) = random_machine(number, &mut numbers);
         let point = prepare_at(&keys, 100.0, 1.0);
-        let dwells = [HeldSpeed { point: &point, speed_rpm }];
+        let held_speeds = [HeldSpeed { point: &point, speed_rpm }];
         let starts = StartRule::default();
         let search_result =
-            find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
+            find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never)
+                .remove(0)
+                .unwrap();
         let case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
         let state_at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
         let response =
@@ -309,7 +313,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
             let (before, last) = turn_records[turns - 2 * WINDOW_TURNS..].split_at(WINDOW_TURNS);
             let before = peaks(before);
             let last = peaks(last);
-            if !are_close(&before, &last, SETTLED_TOLERANCE) {
+            if !are_peaks_close(&before, &last, SETTLED_TOLERANCE) {
                 continue;
             }
             settled += 1;
@@ -318,7 +322,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
                     Some(MotionKind::Chaotic) | None => CHAOS_TOLERANCE,
                     Some(_) => 2.0 * SETTLED_TOLERANCE,
                 };
-                are_close(&motion.peaks, &last, share)
+                are_peaks_close(&motion.peaks, &last, share)
             };
             if !search_result.attractors.iter().any(is_this_motion) {
                 missed.push(format!("{description}: {last:.4?}"));

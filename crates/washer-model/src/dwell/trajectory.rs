@@ -158,7 +158,7 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Creates a trajectory from a state of a chaotic one, which tests for [`SURVIVAL_S`] whether
     /// the motion lasts. Its exponent is not computed.
-    pub(super) fn survivor(
+    pub(super) fn new_survivor(
         held_state: HeldState<'a>,
         unstable_orbits: Vec<Vec<[f64; STATES]>>,
     ) -> Self {
@@ -234,7 +234,7 @@ impl<'a> HeldTrajectory<'a> {
 
     /// Tests whether the motion repeats or has two frequencies, or may be chaotic.
     fn test_motion(&mut self) {
-        if let Some(period) = self.unambiguous_period(PERIOD_TOLERANCE)
+        if let Some(period) = self.find_unambiguous_period(PERIOD_TOLERANCE)
             && self.has_steady_peaks(PERIOD_TEST_TURNS, PERIOD_TOLERANCE)
             && self.remaining_change(period) < REMAINING_TOLERANCE
         {
@@ -246,12 +246,12 @@ impl<'a> HeldTrajectory<'a> {
         }
         let may_compute_exponent = self.turn_count >= self.next_exponent_turn;
         if self.has_steady_peaks(WINDOW_TURNS, STEADY_TOLERANCE) {
-            if let Some(period) = self.unambiguous_period(WIDE_PERIOD_TOLERANCE) {
+            if let Some(period) = self.find_unambiguous_period(WIDE_PERIOD_TOLERANCE) {
                 if self.remaining_change(period) < REMAINING_TOLERANCE {
                     self.next_computation = NextComputation::Multipliers(period);
                 }
             } else if let Some(quasi_periodic) = self.find_two_frequencies(MAX_SPECTRUM_RESIDUAL) {
-                self.end_settled(quasi_periodic);
+                self.mark_settled(quasi_periodic);
             } else if may_compute_exponent {
                 self.next_computation = NextComputation::Exponent;
             }
@@ -270,7 +270,7 @@ impl<'a> HeldTrajectory<'a> {
         match growth_per_s {
             Some(per_s) if per_s <= 0.0 => {
                 self.exponent = Some(Exponent { per_s, error_per_s: 0.0 });
-                return self.end_settled(MotionKind::Periodic { turns: period });
+                return self.mark_settled(MotionKind::Periodic { turns: period });
             }
             Some(_) => {
                 let orbit = self.turns.iter().rev().take(period as usize).map(|turn| turn.end);
@@ -289,22 +289,22 @@ impl<'a> HeldTrajectory<'a> {
         self.next_computation = NextComputation::Turns;
         self.exponent = exponent;
         self.next_exponent_turn = 2 * self.turn_count;
-        let is_passing = self.period(PASSING_PERIOD_TOLERANCE).is_some()
+        let is_passing = self.find_period(PASSING_PERIOD_TOLERANCE).is_some()
             || self.find_two_frequencies(PASSING_SPECTRUM_RESIDUAL).is_some();
         let is_positive = exponent.is_some_and(|exponent| exponent.is_positive());
         if is_positive && !is_passing {
-            self.end_settled(MotionKind::Chaotic);
+            self.mark_settled(MotionKind::Chaotic);
         } else if !is_positive
             && self.has_steady_peaks(WINDOW_TURNS, STEADY_TOLERANCE)
             && let Some(quasi_periodic) = self.find_two_frequencies(f64::INFINITY)
         {
-            self.end_settled(quasi_periodic);
+            self.mark_settled(quasi_periodic);
         } else if self.turn_count >= self.max_turns {
             self.next_computation = NextComputation::Nothing;
         }
     }
 
-    fn end_settled(&mut self, motion_kind: MotionKind) {
+    fn mark_settled(&mut self, motion_kind: MotionKind) {
         self.status = AttractorStatus::Ok;
         self.motion_kind = Some(motion_kind);
         self.next_computation = NextComputation::Nothing;
@@ -315,7 +315,7 @@ impl<'a> HeldTrajectory<'a> {
     }
 
     /// Returns a state with its coordinates from equilibrium.
-    fn deviation(&self, state: &[f64; STATES]) -> [f64; STATES] {
+    fn subtract_equilibrium(&self, state: &[f64; STATES]) -> [f64; STATES] {
         let equilibrium = self.held_state.setup.point.equilibrium();
         core::array::from_fn(|i| state[i] - equilibrium.get(i).copied().unwrap_or(0.0))
     }
@@ -338,15 +338,15 @@ impl<'a> HeldTrajectory<'a> {
             least_kick_rad_per_s: None,
             time_s: self.time_s(),
             end: self.held_state.state,
-            sections: self.turns.iter().map(|turn| self.deviation(&turn.end)).collect(),
+            sections: self.turns.iter().map(|turn| self.subtract_equilibrium(&turn.end)).collect(),
             extra: Reading::default(),
         }
     }
 
     /// Whether the trajectory is close to an unstable orbit, or near one and departs from it.
     fn is_near_unstable_orbit(&self) -> bool {
-        let window = (self.turns.len() / 2).min(WINDOW_TURNS);
-        let (before, after) = self.turns.split_at(self.turns.len() - window);
+        let window_turns = (self.turns.len() / 2).min(WINDOW_TURNS);
+        let (earlier_turns, later_turns) = self.turns.split_at(self.turns.len() - window_turns);
         self.unstable_orbits.iter().any(|orbit| {
             let sizes =
                 orbit.iter().map(|state| largest_deviation(self.held_state.setup.point, state));
@@ -358,8 +358,8 @@ impl<'a> HeldTrajectory<'a> {
             };
             let max_distance =
                 |turns: &[TurnRecord]| turns.iter().map(orbit_distance).fold(0.0, f64::max);
-            let last = max_distance(after);
-            let previous = max_distance(&before[before.len() - window..]);
+            let last = max_distance(later_turns);
+            let previous = max_distance(&earlier_turns[earlier_turns.len() - window_turns..]);
             last < CLOSE_ORBIT_DISTANCE
                 || (last < NEAR_ORBIT_DISTANCE && last > DEPARTURE_RATIO * previous)
         })
@@ -368,13 +368,13 @@ impl<'a> HeldTrajectory<'a> {
     /// Whether the largest deviations of the last turns agree with those of as many turns before.
     fn has_steady_peaks(&self, turns: usize, tolerance: f64) -> bool {
         let Some(first) = self.turns.len().checked_sub(2 * turns) else { return false };
-        let (before, after) = self.turns[first..].split_at(turns);
-        are_close(&peaks(before), &peaks(after), tolerance)
+        let (earlier_turns, later_turns) = self.turns[first..].split_at(turns);
+        are_peaks_close(&peaks(earlier_turns), &peaks(later_turns), tolerance)
     }
 
     /// Returns the period (turns) of the last turns, within a tolerance as a share of the motion's
     /// size.
-    fn period(&self, tolerance: f64) -> Option<u32> {
+    fn find_period(&self, tolerance: f64) -> Option<u32> {
         let first = self.turns.len().checked_sub(PERIOD_TEST_TURNS)?;
         let deviation =
             |turn: &TurnRecord| largest_deviation(self.held_state.setup.point, &turn.end);
@@ -389,11 +389,11 @@ impl<'a> HeldTrajectory<'a> {
         (1..=MAX_PERIOD_TURNS).find(repeats).map(|period| period as u32)
     }
 
-    /// Returns [`Self::period`], if no shorter period fits with the tolerance times
+    /// Returns [`Self::find_period`], if no shorter period fits with the tolerance times
     /// [`SHORTER_PERIOD_FACTOR`].
-    fn unambiguous_period(&self, tolerance: f64) -> Option<u32> {
-        let period = self.period(tolerance)?;
-        (self.period(SHORTER_PERIOD_FACTOR * tolerance) == Some(period)).then_some(period)
+    fn find_unambiguous_period(&self, tolerance: f64) -> Option<u32> {
+        let period = self.find_period(tolerance)?;
+        (self.find_period(SHORTER_PERIOD_FACTOR * tolerance) == Some(period)).then_some(period)
     }
 
     /// Returns the remaining change of a periodic motion, as a share of its size. The changes
@@ -437,6 +437,6 @@ fn peaks(turns: &[TurnRecord]) -> [f64; CHANNELS] {
 }
 
 /// Whether largest deviations agree in every channel, to a share of the larger one.
-pub(super) fn are_close(a: &[f64; CHANNELS], b: &[f64; CHANNELS], share: f64) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= share * a.max(*b))
+pub(super) fn are_peaks_close(a: &[f64; CHANNELS], b: &[f64; CHANNELS], tolerance: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance * a.max(*b))
 }

@@ -42,12 +42,12 @@ pub(super) fn integrate_turns(
     results.into_iter().map(|(turns, _)| turns).collect()
 }
 
-/// Integrates like [`integrate_turns`], with the recorders of `wanted_recorders` over all turns.
+/// Integrates like [`integrate_turns`], with the recorders of `requested_recorders` over all turns.
 pub(super) fn record_turns(
     simd: Simd,
     held_states: &[HeldState<'_>],
     turns: usize,
-    wanted_recorders: Recorders,
+    requested_recorders: Recorders,
 ) -> Vec<(Vec<TurnRecord>, Reading)> {
     let integrate_batch = |held_states: &[HeldState<'_>]| {
         let lane_groups = held_states.chunks(simd.lanes());
@@ -55,7 +55,7 @@ pub(super) fn record_turns(
             simd.narrowed(held_states.len()).dispatch(HeldTurnsKernel {
                 held_states,
                 turns,
-                wanted_recorders,
+                requested_recorders,
             })
         };
         lane_groups.flat_map(integrate_group).collect()
@@ -67,7 +67,7 @@ pub(super) fn record_turns(
 struct HeldTurnsKernel<'a> {
     held_states: &'a [HeldState<'a>],
     turns: usize,
-    wanted_recorders: Recorders,
+    requested_recorders: Recorders,
 }
 
 impl Kernel for HeldTurnsKernel<'_> {
@@ -77,7 +77,13 @@ impl Kernel for HeldTurnsKernel<'_> {
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut results = Vec::with_capacity(self.held_states.len());
         for held_states in self.held_states.chunks(T::LANES) {
-            integrate_lanes(N(zero), held_states, self.turns, self.wanted_recorders, &mut results);
+            integrate_lanes(
+                N(zero),
+                held_states,
+                self.turns,
+                self.requested_recorders,
+                &mut results,
+            );
         }
         results
     }
@@ -88,7 +94,7 @@ fn integrate_lanes<T: Lane>(
     zero: N<T>,
     held_states: &[HeldState<'_>],
     turns: usize,
-    wanted_recorders: Recorders,
+    requested_recorders: Recorders,
     results: &mut Vec<(Vec<TurnRecord>, Reading)>,
 ) {
     let setups: Vec<TurnSetup<'_>> =
@@ -104,11 +110,16 @@ fn integrate_lanes<T: Lane>(
     let first_result = results.len();
     results.extend(held_states.iter().map(|_| (Vec::with_capacity(turns), Reading::default())));
     let mut recorder = TurnRecorder::new(zero, &model, &grid);
-    recorder.with_states = false;
-    let step_parts = Substeps::new(setups[0].caps.is_none());
-    let run_kind = (ModelKind::Nonlinear, step_parts);
-    recorder.further_recorders =
-        ActiveRecorders::new(zero, wanted_recorders, run_kind, setups[0].point, held_states.len());
+    recorder.records_states = false;
+    let substeps = Substeps::new(setups[0].caps.is_none());
+    let run_kind = (ModelKind::Nonlinear, substeps);
+    recorder.further_recorders = ActiveRecorders::new(
+        zero,
+        requested_recorders,
+        run_kind,
+        setups[0].point,
+        held_states.len(),
+    );
     if let Some(further_recorders) = &mut recorder.further_recorders {
         for lane in 0..T::LANES {
             further_recorders.set_point(lane, setups[lane.min(setups.len() - 1)].point);
@@ -116,11 +127,11 @@ fn integrate_lanes<T: Lane>(
     }
     for finished_turns in 0..turns {
         integrate_turn(&model, &grid, &mut states, Some(&mut recorder));
-        let in_range = T::bits(model.in_range(&states[0]));
+        let lanes_in_range = T::bits(model.in_range(&states[0]));
         for (lane, held_state) in held_states.iter().enumerate() {
             let (records, _) = &mut results[first_result + lane];
             // A trajectory that has left the range gets no further records.
-            if in_range >> lane & 1 == 1 && records.len() == finished_turns {
+            if lanes_in_range >> lane & 1 == 1 && records.len() == finished_turns {
                 let radial_m = recorder.max_radial_squared.0.get(lane).sqrt();
                 records.push(TurnRecord {
                     end: core::array::from_fn(|i| states[0][i].0.get(lane)),

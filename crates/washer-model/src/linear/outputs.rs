@@ -55,10 +55,10 @@ macro_rules! expand {
         $(, turning cos [$($cos:ident)+] sin [$($sin:ident)+] rest [$($part:literal)+])?;
     )+) => {
         /// The channels with harmonics of theta.
-        const HARMONIC_CHANNELS: &[usize] = &[$($(turns!($name $($part)+),)?)+];
+        const HARMONIC_CHANNELS: &[usize] = &[$($(channel_index!($name $($part)+),)?)+];
 
         /// The entries of the channels' parts of order zero.
-        const CHANNELS_AT_REST: &[usize] =
+        const CHANNEL_REST_ENTRIES: &[usize] =
             &[$($($(channel_entry(Channel::$name, $part),)+)?)+];
 
         sparse_sums! {
@@ -72,7 +72,7 @@ macro_rules! expand {
         }
     };
 }
-macro_rules! turns {
+macro_rules! channel_index {
     ($name:ident $($part:literal)+) => {
         Channel::$name.index()
     };
@@ -91,7 +91,7 @@ const HARMONIC_RADIAL: [usize; RADIAL_COMPONENTS] = [0, 1];
 /// The number of entries of the radial distance's terms.
 const RADIAL_ENTRIES: usize = 3 * RADIAL_COMPONENTS;
 /// The entries of the radial distance's parts of order zero, which are all.
-const RADIAL_AT_REST: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
+const RADIAL_REST_ENTRIES: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
 
 const fn radial_entry(component: usize, harmonic_part: usize) -> usize {
     entry_index(component, harmonic_part, &HARMONIC_RADIAL, RADIAL_COMPONENTS)
@@ -114,9 +114,9 @@ lane_struct! {
     #[derive(Clone, Debug)]
     LinearOutputs {
         channels: ChannelTerms<T>,
-        channels_at_rest: [N<T>; CHANNELS_AT_REST.len()],
+        channels_at_rest: [N<T>; CHANNEL_REST_ENTRIES.len()],
         radial: RadialTerms<T>,
-        radial_at_rest: [N<T>; RADIAL_AT_REST.len()],
+        radial_at_rest: [N<T>; RADIAL_REST_ENTRIES.len()],
         /// The terms that only skewed drums have, by entry, then column.
         further_channels: FurtherTerms<T>,
         further_radial: FurtherTerms<T>,
@@ -129,7 +129,7 @@ impl<T: Lane> LinearOutputs<T> {
     pub(crate) fn channels(&self, motion: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
         let mut sums = [[motion.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
         self.channels.sum(&motion.coordinates, &mut sums);
-        add_rest_values(&mut sums, CHANNELS_AT_REST, &self.channels_at_rest);
+        add_rest_values(&mut sums, CHANNEL_REST_ENTRIES, &self.channels_at_rest);
         if !self.further_channels.is_empty() {
             self.further_channels.add(&motion.columns(), &mut sums);
         }
@@ -141,7 +141,7 @@ impl<T: Lane> LinearOutputs<T> {
     pub(crate) fn radial(&self, motion: &LinearMotion<T>) -> [Sample<T>; RADIAL_COMPONENTS] {
         let mut sums = [[motion.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
         self.radial.sum(&motion.coordinates, &mut sums);
-        add_rest_values(&mut sums, &RADIAL_AT_REST, &self.radial_at_rest);
+        add_rest_values(&mut sums, &RADIAL_REST_ENTRIES, &self.radial_at_rest);
         if !self.further_radial.is_empty() {
             self.further_radial.add(&motion.columns(), &mut sums);
         }
@@ -325,13 +325,13 @@ fn select_lane_coefficients(
                 &channels,
                 &channels_at_rest,
                 &ChannelTerms::POSITIONS,
-                CHANNELS_AT_REST,
+                CHANNEL_REST_ENTRIES,
             ),
             select_further_terms(
                 &radial,
                 &radial_at_rest,
                 &RadialTerms::POSITIONS,
-                &RADIAL_AT_REST,
+                &RADIAL_REST_ENTRIES,
             ),
         ]
     } else {
@@ -341,9 +341,9 @@ fn select_lane_coefficients(
         further_channels,
         further_radial,
         channels: ChannelTerms::select_coefficients(&channels),
-        channels_at_rest: from_fn(|k| N(channels_at_rest[CHANNELS_AT_REST[k]])),
+        channels_at_rest: from_fn(|k| N(channels_at_rest[CHANNEL_REST_ENTRIES[k]])),
         radial: RadialTerms::select_coefficients(&radial),
-        radial_at_rest: RADIAL_AT_REST.map(|entry| N(radial_at_rest[entry])),
+        radial_at_rest: RADIAL_REST_ENTRIES.map(|entry| N(radial_at_rest[entry])),
     }
 }
 

@@ -19,16 +19,16 @@ pub(crate) const ROWS: usize = 6;
 pub(crate) const ROTATIONS: usize = 4;
 
 /// The first entry of the partial velocities.
-const ARM: usize = 0;
+const FIRST_ARM: usize = 0;
 /// The first entry of the force.
-const FORCE: usize = ARM + 2 * ROTATIONS;
+const FIRST_FORCE: usize = FIRST_ARM + 2 * ROTATIONS;
 /// The first entry of the stiffness.
-const STIFFNESS: usize = FORCE + ROWS;
+const FIRST_STIFFNESS: usize = FIRST_FORCE + ROWS;
 /// The first entry of the damping.
-const DAMPING: usize = STIFFNESS + ROWS * ROTATIONS;
+const FIRST_DAMPING: usize = FIRST_STIFFNESS + ROWS * ROTATIONS;
 
 /// The number of entries of all arrays of the rotor except the inertia.
-pub(crate) const ENTRIES: usize = DAMPING + ROWS * ROTATIONS;
+pub(crate) const ENTRIES: usize = FIRST_DAMPING + ROWS * ROTATIONS;
 /// The number of entries of the inertia's lower triangle.
 pub(crate) const INERTIA_ENTRIES: usize = ROTATIONS * (ROTATIONS + 1) / 2;
 
@@ -39,12 +39,12 @@ pub(crate) const fn inertia(row: usize, column: usize) -> usize {
 
 /// Returns the entry of the mass centre's partial velocity by a rotation, along y (0) or z (1).
 pub(crate) const fn arm(rotation: usize, direction: usize) -> usize {
-    ARM + 2 * rotation + direction
+    FIRST_ARM + 2 * rotation + direction
 }
 
 /// Returns the entry of the force.
 pub(crate) const fn force(row: usize) -> usize {
-    FORCE + row
+    FIRST_FORCE + row
 }
 
 /// Whether a force depends on a rotation and its speed. Only the force along y does not depend on
@@ -55,12 +55,12 @@ pub(crate) const fn depends_on_rotation(row: usize, column: usize) -> bool {
 
 /// Returns the entry of the stiffness matrix.
 pub(crate) const fn stiffness(row: usize, column: usize) -> usize {
-    STIFFNESS + row * ROTATIONS + column
+    FIRST_STIFFNESS + row * ROTATIONS + column
 }
 
 /// Returns the entry of the damping and gyroscopic matrix.
 pub(crate) const fn damping(row: usize, column: usize) -> usize {
-    DAMPING + row * ROTATIONS + column
+    FIRST_DAMPING + row * ROTATIONS + column
 }
 
 lane_struct! {

@@ -28,9 +28,9 @@ lane_struct! {
     /// z) on the shaft's axis.
     #[derive(Clone, Copy, Debug)]
     StepConstants {
-        tub_per_position: [[N<T>; 4]; 4],
-        tub_per_speed: [[N<T>; 4]; 4],
-        tub_per_load: [[N<T>; 4]; 4],
+        tub_acceleration_per_position: [[N<T>; 4]; 4],
+        tub_acceleration_per_speed: [[N<T>; 4]; 4],
+        tub_acceleration_per_load: [[N<T>; 4]; 4],
         /// The lower triangle of the bearings' deflections by the tub's accelerations under loads.
         tub_compliance: [[N<T>; 4]; 4],
         tub_axis: [[N<T>; 2]; 2],
@@ -52,7 +52,7 @@ impl StepConstants<f64> {
         // Computes the tub's accelerations from forces and torques about its mass centre and from
         // loads on its axis.
         let accelerations_under = |[y, z, yaw, pitch]: [N<f64>; 4], load: [N<f64>; 4]| {
-            let floating = FloatingChain {
+            let chain = FloatingChain {
                 inverse_mass: linear.tub_inverse_mass,
                 force: [y, z],
                 drift: [zero; 2],
@@ -62,13 +62,13 @@ impl StepConstants<f64> {
                 torque: [yaw, pitch],
             };
             let load = AxisLoad { force: [load[0], load[1]], moment: [load[2], load[3]] };
-            let ([y, z], [yaw, pitch]) = floating.accelerations(&inertia, &load);
+            let ([y, z], [yaw, pitch]) = chain.accelerations(&inertia, &load);
             [y, z, yaw, pitch]
         };
         let mut constants = Self {
-            tub_per_position: [[zero; 4]; 4],
-            tub_per_speed: [[zero; 4]; 4],
-            tub_per_load: [[zero; 4]; 4],
+            tub_acceleration_per_position: [[zero; 4]; 4],
+            tub_acceleration_per_speed: [[zero; 4]; 4],
+            tub_acceleration_per_load: [[zero; 4]; 4],
             tub_compliance: [[zero; 4]; 4],
             tub_axis: linear.tub_axis,
             rotor_inverse_mass: linear.rotor_inverse_mass,
@@ -86,17 +86,22 @@ impl StepConstants<f64> {
             let force_by_column = |matrix: &[[N<f64>; 4]; 4]| matrix.map(|row| -row[column]);
             let mut unit_reaction = [zero; 4];
             unit_reaction[column] = N(-1.0);
-            let by_position =
+            let accelerations_per_position =
                 accelerations_under(force_by_column(&linear.tub_stiffness), [zero; 4]);
-            let by_speed = accelerations_under(force_by_column(&linear.tub_damping), [zero; 4]);
-            let by_load = accelerations_under([zero; 4], unit_reaction);
+            let accelerations_per_speed =
+                accelerations_under(force_by_column(&linear.tub_damping), [zero; 4]);
+            let accelerations_per_load = accelerations_under([zero; 4], unit_reaction);
             for row in 0..4 {
-                constants.tub_per_position[row][column] = by_position[row];
-                constants.tub_per_speed[row][column] = by_speed[row];
-                constants.tub_per_load[row][column] = by_load[row];
+                constants.tub_acceleration_per_position[row][column] =
+                    accelerations_per_position[row];
+                constants.tub_acceleration_per_speed[row][column] = accelerations_per_speed[row];
+                constants.tub_acceleration_per_load[row][column] = accelerations_per_load[row];
             }
-            let deflection =
-                constants.deflection(&to_coordinate_order(&by_load, &[zero; 2], &[zero; 4]));
+            let deflection = constants.deflection(&to_coordinate_order(
+                &accelerations_per_load,
+                &[zero; 2],
+                &[zero; 4],
+            ));
             for row in 0..4 {
                 constants.tub_compliance[row][column] = deflection[row];
             }
@@ -116,13 +121,13 @@ impl<T: Lane> StepConstants<T> {
     /// Computes the load of the bearings' springs on the shaft.
     #[inline(always)]
     fn spring_load(&self, [y, z, tilt_y, tilt_z]: &[N<T>; 4]) -> [N<T>; 4] {
-        let [by_offset, mixed, by_tilt] = self.bearing_stiffness;
+        let [force_per_offset, force_per_tilt, moment_per_tilt] = self.bearing_stiffness;
         let zero = y.lit(0.0);
         [
-            zero - by_offset * *y - mixed * *tilt_y,
-            zero - by_offset * *z - mixed * *tilt_z,
-            zero - mixed * *y - by_tilt * *tilt_y,
-            zero - mixed * *z - by_tilt * *tilt_z,
+            zero - force_per_offset * *y - force_per_tilt * *tilt_y,
+            zero - force_per_offset * *z - force_per_tilt * *tilt_z,
+            zero - force_per_tilt * *y - moment_per_tilt * *tilt_y,
+            zero - force_per_tilt * *z - moment_per_tilt * *tilt_z,
         ]
     }
 }
@@ -133,7 +138,7 @@ pub(crate) struct RotorArrays<T> {
     entries: [N<T>; ENTRIES],
     /// The inverse of the inertia about the mass centre.
     inverse_inertia: Symmetric4<T>,
-    bearings: BearingArrays<T>,
+    bearing_arrays: BearingArrays<T>,
 }
 
 /// The bearings with scaled mass at an instant (`nonlinear/coupling.rs`); not computed for springs.
@@ -142,7 +147,7 @@ struct BearingArrays<T> {
     /// The inverse of w^2 K^-1 + C.
     system_inverse: Symmetric4<T>,
     /// The factor of the deflection, w^2 + theta'^2, with w the cap of the bearings' modes.
-    per_deflection: N<T>,
+    deflection_factor: N<T>,
     rotor: RotorLoadResponse<T>,
 }
 
@@ -160,19 +165,20 @@ impl<T: Lane> RotorArrays<T> {
     pub(crate) fn new(
         constants: &StepConstants<T>,
         coupling: &Coupling<T>,
-        terms: &RotorCoefficients<T>,
+        rotor_coefficients: &RotorCoefficients<T>,
         spin: &SpinState<T>,
         hinge_mass: Option<HingeMass<T>>,
     ) -> Self {
         let zero = spin.sin.lit(0.0);
         let zero_matrix = Symmetric4([[zero; 4]; 4]);
-        let bearings = BearingArrays {
+        let bearing_arrays = BearingArrays {
             system_inverse: zero_matrix,
-            per_deflection: zero,
+            deflection_factor: zero,
             rotor: RotorLoadResponse { translation: [[zero; 4]; 2], rotation: [[zero; 4]; 4] },
         };
-        let mut rotor = Self { entries: [zero; ENTRIES], inverse_inertia: zero_matrix, bearings };
-        rotor.update(constants, coupling, terms, spin, hinge_mass);
+        let mut rotor =
+            Self { entries: [zero; ENTRIES], inverse_inertia: zero_matrix, bearing_arrays };
+        rotor.update(constants, coupling, rotor_coefficients, spin, hinge_mass);
         rotor
     }
 
@@ -182,17 +188,17 @@ impl<T: Lane> RotorArrays<T> {
         &mut self,
         constants: &StepConstants<T>,
         coupling: &Coupling<T>,
-        terms: &RotorCoefficients<T>,
+        rotor_coefficients: &RotorCoefficients<T>,
         spin: &SpinState<T>,
         hinge_mass: Option<HingeMass<T>>,
     ) {
         let functions = harmonics::spin_functions(spin);
         let zero = spin.sin.lit(0.0);
-        terms.sum_loads(&functions, &mut self.entries);
+        rotor_coefficients.sum_loads(&functions, &mut self.entries);
         // The inverse is a long chain of dependent operations. It comes last, because a stage
         // begins with operations that do not need it.
         let mut sums = [zero; INERTIA_ENTRIES];
-        terms.sum_inertia(&functions, &mut sums);
+        rotor_coefficients.sum_inertia(&functions, &mut sums);
         let mut inertia = [[zero; 4]; 4];
         for row in 0..4 {
             for column in 0..=row {
@@ -214,9 +220,9 @@ impl<T: Lane> RotorArrays<T> {
             let (rotor, compliance) =
                 RotorLoadResponse::new(constants, &self.inverse_inertia, &arms);
             let system = bearing_system(constants, cap_squared, &compliance);
-            self.bearings = BearingArrays {
+            self.bearing_arrays = BearingArrays {
                 system_inverse: Symmetric4(system).inverse(),
-                per_deflection: cap_squared + spin.speed * spin.speed,
+                deflection_factor: cap_squared + spin.speed * spin.speed,
                 rotor,
             };
         }
@@ -239,16 +245,21 @@ impl<T: Lane> RotorLoadResponse<T> {
             let by_yaw = inverse.entry(row, 0);
             let by_pitch = inverse.entry(row, 1);
             // The partial velocity by the yaw has no y component.
-            let mut by_force =
+            let mut rotation_per_force =
                 [zero - by_pitch * arm[1][0], zero - by_yaw * arm[0][1] - by_pitch * arm[1][1]];
             for r in 2..4 {
                 for i in 0..2 {
-                    by_force[i] -= inverse.entry(row, r) * arm[r][i];
+                    rotation_per_force[i] -= inverse.entry(row, r) * arm[r][i];
                 }
             }
-            let by_moment =
+            let rotation_per_moment =
                 [(by_pitch * axis[1][0]).v(), by_yaw * axis[0][1] + by_pitch * axis[1][1]];
-            rotation[row] = [by_force[0], by_force[1], by_moment[0], by_moment[1]];
+            rotation[row] = [
+                rotation_per_force[0],
+                rotation_per_force[1],
+                rotation_per_moment[0],
+                rotation_per_moment[1],
+            ];
         }
         // The rotor's compliance C: the accelerations of its midpoint and axis per unit of load.
         let mut compliance = [[zero; 4]; 4];
@@ -302,7 +313,7 @@ impl<T: Lane> BearingArrays<T> {
     fn reaction(&self, deflection: &[N<T>; 4], second_derivative: &[N<T>; 4]) -> [N<T>; 4] {
         let mut right_hand_side = *second_derivative;
         for i in 0..4 {
-            right_hand_side[i] += self.per_deflection * deflection[i];
+            right_hand_side[i] += self.deflection_factor * deflection[i];
         }
         self.system_inverse.times(&right_hand_side)
     }
@@ -324,11 +335,11 @@ pub(crate) fn accelerations<T: Lane>(
             HalfAccelerations::new(constants, rotor_arrays, Some(load), q, u).to_coordinates()
         }
         Coupling::MassScaled(_) => {
-            let bearings = &rotor_arrays.bearings;
+            let bearing_arrays = &rotor_arrays.bearing_arrays;
             let mut halves = HalfAccelerations::new(constants, rotor_arrays, None, q, u);
             let second_derivative = constants.deflection(&halves.to_coordinates());
-            let reaction = bearings.reaction(&deflection, &second_derivative);
-            halves.add_bearing_reaction(constants, &bearings.rotor, &reaction);
+            let reaction = bearing_arrays.reaction(&deflection, &second_derivative);
+            halves.add_bearing_reaction(constants, &bearing_arrays.rotor, &reaction);
             halves.to_coordinates()
         }
     }
@@ -341,7 +352,7 @@ pub(crate) fn accelerations<T: Lane>(
 #[inline(always)]
 pub(crate) fn solve_implicit_stage<T: Lane>(
     constants: &StepConstants<T>,
-    terms: &RotorCoefficients<T>,
+    rotor_coefficients: &RotorCoefficients<T>,
     flexure_stiffness: N<T>,
     spin: &SpinState<T>,
     (q, u): (&[N<T>; COORDINATES], &[N<T>; COORDINATES]),
@@ -363,10 +374,10 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
         torque_per_speed: g.lit(0.0),
     };
     let rotor_arrays =
-        RotorArrays::new(constants, &Coupling::Springs, terms, spin, Some(hinge_mass));
+        RotorArrays::new(constants, &Coupling::Springs, rotor_coefficients, spin, Some(hinge_mass));
     let mut halves = HalfAccelerations::new(constants, &rotor_arrays, None, q, u);
     let arms = entry::arms(&rotor_arrays.entries);
-    let (by_load, compliance) =
+    let (accelerations_per_load, compliance) =
         RotorLoadResponse::new(constants, &rotor_arrays.inverse_inertia, &arms);
     let inverse_g_squared = g_squared.recip();
     let deflection = constants.deflection(&predicted_coordinates);
@@ -378,7 +389,7 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     // almost zero.
     let reaction = LdltFactors::new(bearing_system(constants, inverse_g_squared, &compliance))
         .solve(right_hand_side);
-    halves.add_bearing_reaction(constants, &by_load, &reaction);
+    halves.add_bearing_reaction(constants, &accelerations_per_load, &reaction);
     let a = halves.to_coordinates();
     let mut k = *r;
     for i in 0..COORDINATES {
@@ -407,26 +418,27 @@ impl<T: Lane> HalfAccelerations<T> {
     ) -> Self {
         let mut tub = [q[0]; 4];
         for row in 0..4 {
-            tub[row] = (constants.tub_per_position[row][0] * q[TUB[0]]).v();
+            tub[row] = (constants.tub_acceleration_per_position[row][0] * q[TUB[0]]).v();
             for column in 1..4 {
-                tub[row] += constants.tub_per_position[row][column] * q[TUB[column]];
+                tub[row] += constants.tub_acceleration_per_position[row][column] * q[TUB[column]];
             }
         }
-        let e = &rotor_arrays.entries;
-        let arm = entry::arms(e);
+        let entries = &rotor_arrays.entries;
+        let arm = entry::arms(entries);
         let mut rotor = [q[0]; ROWS];
         for row in 0..ROWS {
-            rotor[row] = e[entry::force(row)];
+            rotor[row] = entries[entry::force(row)];
             for column in 0..4 {
                 if entry::depends_on_rotation(row, column) {
-                    rotor[row] -= e[entry::stiffness(row, column)] * q[ROTOR_ROTATIONS[column]];
+                    rotor[row] -=
+                        entries[entry::stiffness(row, column)] * q[ROTOR_ROTATIONS[column]];
                 }
             }
         }
         if let Some(load) = load {
             for row in 0..4 {
                 for column in 0..4 {
-                    tub[row] += constants.tub_per_load[row][column] * load[column];
+                    tub[row] += constants.tub_acceleration_per_load[row][column] * load[column];
                 }
             }
             let [force_y, force_z, moment_y, moment_z] = load;
@@ -444,13 +456,13 @@ impl<T: Lane> HalfAccelerations<T> {
         }
         for row in 0..4 {
             for column in 0..4 {
-                tub[row] += constants.tub_per_speed[row][column] * u[TUB[column]];
+                tub[row] += constants.tub_acceleration_per_speed[row][column] * u[TUB[column]];
             }
         }
         for row in 0..ROWS {
             for column in 0..4 {
                 if entry::depends_on_rotation(row, column) {
-                    rotor[row] -= e[entry::damping(row, column)] * u[ROTOR_ROTATIONS[column]];
+                    rotor[row] -= entries[entry::damping(row, column)] * u[ROTOR_ROTATIONS[column]];
                 }
             }
         }
@@ -479,7 +491,8 @@ impl<T: Lane> HalfAccelerations<T> {
     ) {
         for column in 0..4 {
             for row in 0..4 {
-                self.tub[row] -= constants.tub_per_load[row][column] * tub_load[column];
+                self.tub[row] -=
+                    constants.tub_acceleration_per_load[row][column] * tub_load[column];
                 self.rotation[row] -= rotor.rotation[row][column] * tub_load[column];
             }
             for i in 0..2 {

@@ -2,7 +2,7 @@
 
 mod turns;
 
-pub(crate) use turns::whole_turn_cuts_s;
+pub(crate) use turns::whole_turn_times_s;
 
 use crate::lanes::lane_struct;
 use core::f64::consts::TAU;

@@ -7,7 +7,7 @@
 //! is too small is halved.
 
 use crate::modes::modal_assurance;
-use crate::modes::shape::motion;
+use crate::modes::shape::dominant_motion;
 use crate::{COORDINATES, Mode, ModeMotion, Modes, ModesError, Point, modes};
 use core::f64::consts::TAU;
 use lane_ode::Cancel;
@@ -46,9 +46,9 @@ pub struct ModeAtSpeed {
     pub damping_ratio: f64,
     /// The mean damped natural frequency (cycles per minute).
     pub frequency_rpm: f64,
-    /// The least damped natural frequency over the turn.
+    /// The least value of the damped natural frequency over the turn.
     pub least_rpm: f64,
-    /// The greatest damped natural frequency over the turn.
+    /// The greatest value of the damped natural frequency over the turn.
     pub greatest_rpm: f64,
     /// The coordinates q1 to q10 (m, rad) at theta = 0 as real and imaginary part, of unit modal
     /// mass.
@@ -94,19 +94,20 @@ pub fn campbell_until(
 ) -> Result<Option<Vec<ModeOverSpeed>>, ModesError> {
     let Some(&lowest) = speeds_rpm.first() else { return Ok(Some(Vec::new())) };
     let mut modes_at_speeds = Vec::with_capacity(speeds_rpm.len());
-    let mut current = modes(point, 0.0, rad_per_s(lowest))?;
+    let mut current_modes = modes(point, 0.0, to_rad_per_s(lowest))?;
     for (k, &speed) in speeds_rpm.iter().enumerate() {
         if cancel.is_requested() {
             return Ok(None);
         }
         if k > 0 {
-            current = follow_modes(&current, speeds_rpm[k - 1], speed, &|rpm| {
-                modes(point, 0.0, rad_per_s(rpm))
+            current_modes = follow_modes(&current_modes, speeds_rpm[k - 1], speed, &|rpm| {
+                modes(point, 0.0, to_rad_per_s(rpm))
             })?;
         }
-        modes_at_speeds.push((average_over_turn(point, speed, &current)?, current.clone()));
+        modes_at_speeds
+            .push((average_over_turn(point, speed, &current_modes)?, current_modes.clone()));
     }
-    let over_speed = (0..COORDINATES)
+    let modes_over_speed = (0..COORDINATES)
         .map(|mode| {
             let mut resonances = Vec::new();
             for k in 1..speeds_rpm.len() {
@@ -125,64 +126,66 @@ pub fn campbell_until(
                     )?);
                 }
             }
-            let at_speed: Vec<_> = modes_at_speeds.iter().map(|(turn, _)| turn[mode]).collect();
+            let at_speed: Vec<_> =
+                modes_at_speeds.iter().map(|(averages, _)| averages[mode]).collect();
             let dominant_shape =
                 resonances.first().map_or(at_speed[0].shape, |resonance| resonance.mode.shape);
             Ok(ModeOverSpeed {
-                motion: motion(point, &modes_at_speeds[0].1.mass, &dominant_shape),
+                motion: dominant_motion(point, &modes_at_speeds[0].1.mass, &dominant_shape),
                 at_speed,
                 resonances,
             })
         })
         .collect::<Result<_, _>>()?;
-    Ok(Some(over_speed))
+    Ok(Some(modes_over_speed))
 }
 
-fn rad_per_s(rpm: f64) -> f64 {
+fn to_rad_per_s(rpm: f64) -> f64 {
     rpm * TAU / 60.0
 }
 
-/// Returns the modes at `end_parameter`, in the order of the modes `start` at `start_parameter`.
+/// Returns the modes at the end of an interval of speeds (rpm) or of angles theta (rad), in the
+/// order of the modes `start` at the interval's start.
 fn follow_modes(
     start: &Modes,
-    start_parameter: f64,
-    end_parameter: f64,
+    start_speed_or_theta: f64,
+    end_speed_or_theta: f64,
     modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
 ) -> Result<Modes, ModesError> {
     follow_halving(
         start,
-        start_parameter,
-        end_parameter,
+        start_speed_or_theta,
+        end_speed_or_theta,
         modes_at,
-        modes_at(end_parameter)?,
+        modes_at(end_speed_or_theta)?,
         MAX_HALVINGS,
     )
 }
 
 /// Returns the modes `end` in the order of the modes `start`, and halves the interval at most
-/// `halvings` times.
+/// `halvings_left` times.
 fn follow_halving(
     start: &Modes,
-    start_parameter: f64,
-    end_parameter: f64,
+    start_speed_or_theta: f64,
+    end_speed_or_theta: f64,
     modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
     end: Modes,
-    halvings: u32,
+    halvings_left: u32,
 ) -> Result<Modes, ModesError> {
     let (order, assurance) = match_modes(start, &end);
-    if assurance >= MIN_ASSURANCE || halvings == 0 {
+    if assurance >= MIN_ASSURANCE || halvings_left == 0 {
         return Ok(Modes { modes: order.map(|k| end.modes[k]), ..end });
     }
-    let midpoint = 0.5 * (start_parameter + end_parameter);
+    let midpoint = 0.5 * (start_speed_or_theta + end_speed_or_theta);
     let midpoint_modes = follow_halving(
         start,
-        start_parameter,
+        start_speed_or_theta,
         midpoint,
         modes_at,
         modes_at(midpoint)?,
-        halvings - 1,
+        halvings_left - 1,
     )?;
-    follow_halving(&midpoint_modes, midpoint, end_parameter, modes_at, end, halvings - 1)
+    follow_halving(&midpoint_modes, midpoint, end_speed_or_theta, modes_at, end, halvings_left - 1)
 }
 
 /// Returns for each mode of `start` the index of the mode of `end` that continues it, and the least
@@ -196,14 +199,14 @@ fn match_modes(start: &Modes, end: &Modes) -> ([usize; COORDINATES], f64) {
     }
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut order = [usize::MAX; COORDINATES];
-    let mut least_assurance = 1.0_f64;
+    let mut min_assurance = 1.0_f64;
     for (assurance, i, j) in pairs {
         if order[i] == usize::MAX && !order.contains(&j) {
             order[i] = j;
-            least_assurance = least_assurance.min(assurance);
+            min_assurance = min_assurance.min(assurance);
         }
     }
-    (order, least_assurance)
+    (order, min_assurance)
 }
 
 /// Averages every mode at a speed over a turn. `start` holds the modes at theta = 0.
@@ -212,16 +215,21 @@ fn average_over_turn(
     speed_rpm: f64,
     start: &Modes,
 ) -> Result<[ModeAtSpeed; COORDINATES], ModesError> {
-    let speed = rad_per_s(speed_rpm);
-    let mut turn = vec![start.clone()];
+    let speed = to_rad_per_s(speed_rpm);
+    let mut modes_by_angle = vec![start.clone()];
     for k in 1..ANGLES {
         let theta = |k: usize| TAU * k as f64 / ANGLES as f64;
         let modes_at = |theta| modes(point, theta, speed);
-        turn.push(follow_modes(&turn[k - 1], theta(k - 1), theta(k), &modes_at)?);
+        modes_by_angle.push(follow_modes(
+            &modes_by_angle[k - 1],
+            theta(k - 1),
+            theta(k),
+            &modes_at,
+        )?);
     }
-    let rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
+    let to_rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
     Ok(core::array::from_fn(|mode| {
-        let turn_modes = turn.iter().map(|modes| &modes.modes[mode]);
+        let turn_modes = modes_by_angle.iter().map(|modes| &modes.modes[mode]);
         let mean =
             |value: fn(&Mode) -> f64| turn_modes.clone().map(value).sum::<f64>() / ANGLES as f64;
         let frequencies = turn_modes.clone().map(|mode| mode.im_rad_per_s);
@@ -231,9 +239,9 @@ fn average_over_turn(
             re_per_s,
             im_rad_per_s,
             damping_ratio: -re_per_s / mean(|mode| mode.magnitude_rad_per_s),
-            frequency_rpm: rpm(im_rad_per_s),
-            least_rpm: rpm(frequencies.clone().fold(f64::INFINITY, f64::min)),
-            greatest_rpm: rpm(frequencies.fold(f64::NEG_INFINITY, f64::max)),
+            frequency_rpm: to_rpm(im_rad_per_s),
+            least_rpm: to_rpm(frequencies.clone().fold(f64::INFINITY, f64::min)),
+            greatest_rpm: to_rpm(frequencies.fold(f64::NEG_INFINITY, f64::max)),
             shape: start.modes[mode].shape,
         }
     }))
@@ -252,11 +260,11 @@ fn find_resonance(
 ) -> Result<Option<Resonance>, ModesError> {
     let mut low = start;
     let mut high = end;
-    let mut side = 0;
+    let mut last_moved_side = 0;
     for _ in 0..MAX_SEARCH_STEPS {
         let speed_rpm = (low * high_excess - high * low_excess) / (high_excess - low_excess);
         let end_modes = follow_modes(previous_modes, start, speed_rpm, &|rpm| {
-            modes(point, 0.0, rad_per_s(rpm))
+            modes(point, 0.0, to_rad_per_s(rpm))
         })?;
         let resonance =
             Resonance { speed_rpm, mode: average_over_turn(point, speed_rpm, &end_modes)?[mode] };
@@ -269,12 +277,12 @@ fn find_resonance(
         }
         if (excess > 0.0) == (high_excess > 0.0) {
             (high, high_excess) = (speed_rpm, excess);
-            low_excess *= if side == 1 { 0.5 } else { 1.0 };
-            side = 1;
+            low_excess *= if last_moved_side == 1 { 0.5 } else { 1.0 };
+            last_moved_side = 1;
         } else {
             (low, low_excess) = (speed_rpm, excess);
-            high_excess *= if side == -1 { 0.5 } else { 1.0 };
-            side = -1;
+            high_excess *= if last_moved_side == -1 { 0.5 } else { 1.0 };
+            last_moved_side = -1;
         }
     }
     Ok(None)

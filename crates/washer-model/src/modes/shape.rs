@@ -97,7 +97,7 @@ const PLANE_SHARE: f64 = 0.6;
 const MAJORITY_SHARE: f64 = 0.5;
 
 /// The coordinates of motions in the horizontal plane: q2 and q4 along c3; q5, q7 and q9 about c2.
-const HORIZONTAL: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
+const HORIZONTAL_COORDINATES: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
 
 /// The coordinates of the motions as one rigid body: along c2, along c3, about c2, about c3. The
 /// drum has none, because its angles are relative to the shaft.
@@ -106,7 +106,7 @@ const RIGID_PAIRS: [[usize; 2]; 4] =
 
 /// Returns the movement with the greatest share of a shape of unit modal mass, if that movement has
 /// more than half of the energy in both planes together.
-pub(crate) fn motion(
+pub(crate) fn dominant_motion(
     point: &Point,
     mass: &[[f64; COORDINATES]; COORDINATES],
     shape: &[[f64; 2]; COORDINATES],
@@ -119,7 +119,7 @@ pub(crate) fn motion(
         rigid_movement(energy_shares)
     };
     let mut horizontal_part = [[0.0; 2]; COORDINATES];
-    for i in HORIZONTAL {
+    for i in HORIZONTAL_COORDINATES {
         horizontal_part[i] = shape[i];
     }
     let horizontal = mass_inner_product(mass, &horizontal_part, &horizontal_part)[0];
@@ -246,7 +246,7 @@ mod tests {
             let Some(Ok(point)) = points.into_iter().next() else { continue };
             let modes = crate::modes::modes(&point, 0.0, 10.0).unwrap();
             for mode in &modes.modes[..4] {
-                let motion = motion(&point, &modes.mass, &mode.shape);
+                let motion = dominant_motion(&point, &modes.mass, &mode.shape);
                 let translation = motion.vertical_translation.max(motion.horizontal_translation);
                 let rocking = motion.yaw.max(motion.pitch);
                 match motion.movement {

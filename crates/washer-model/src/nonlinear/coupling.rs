@@ -181,11 +181,18 @@ impl<T: Lane> Coupling<T> {
         let shaft_load = match self {
             Self::Springs => deflection.load_on_shaft(bodies),
             Self::MassScaled(scaling) => {
-                let tub_response = tub.response(tub_inertia);
-                let rotor_response = rotor.response(rotor_inertia);
+                let tub_response = tub.axis_response(tub_inertia);
+                let rotor_response = rotor.axis_response(rotor_inertia);
                 let speed_squared = (speed * speed).v();
-                let squares = (scaling.bearings_squared, speed_squared);
-                mass_scaled_load(bodies, squares, deflection, sag, &tub_response, &rotor_response)
+                let cap_and_speed_squared = (scaling.bearings_squared, speed_squared);
+                mass_scaled_load(
+                    bodies,
+                    cap_and_speed_squared,
+                    deflection,
+                    sag,
+                    &tub_response,
+                    &rotor_response,
+                )
             }
         };
         accelerations_under_load((tub, tub_inertia), (rotor, rotor_inertia), &shaft_load)
@@ -213,19 +220,19 @@ pub(crate) fn mass_scaled_system<T: Real>(
     tub: &[[N<T>; 4]; 4],
     rotor: &[[N<T>; 4]; 4],
 ) -> [[N<T>; 4]; 4] {
-    let mut system = *rotor;
+    let mut system_matrix = *rotor;
     for row in 0..4 {
         for column in 0..=row {
-            system[row][column] += tub[row][column];
+            system_matrix[row][column] += tub[row][column];
         }
     }
     // K^-1 couples the force and the moment in one direction.
     for i in 0..2 {
-        system[i][i] += cap_squared * by_force;
-        system[2 + i][2 + i] += cap_squared * by_moment;
-        system[2 + i][i] += cap_squared * mixed;
+        system_matrix[i][i] += cap_squared * by_force;
+        system_matrix[2 + i][2 + i] += cap_squared * by_moment;
+        system_matrix[2 + i][i] += cap_squared * mixed;
     }
-    system
+    system_matrix
 }
 
 /// Computes the bearing load on the shaft for springs with scaled mass.
@@ -238,16 +245,17 @@ pub(crate) fn mass_scaled_load<T: Real>(
     tub: &AxisResponse<T>,
     rotor: &AxisResponse<T>,
 ) -> AxisLoad<T> {
-    let system =
+    let system_matrix =
         mass_scaled_system(cap_squared, b.bearing_compliance(), &tub.compliance, &rotor.compliance);
     let sum_of_squares = cap_squared + speed_squared;
     let d = deflection.as_vector();
     let sag = sag.as_vector();
     let mut load = d;
     for i in 0..4 {
-        load[i] =
-            tub.unloaded[i] - (sum_of_squares * d[i] + rotor.unloaded[i]) + speed_squared * sag[i];
+        load[i] = tub.unloaded_accelerations[i]
+            - (sum_of_squares * d[i] + rotor.unloaded_accelerations[i])
+            + speed_squared * sag[i];
     }
-    let [force_y, force_z, moment_y, moment_z] = LdltFactors::new(system).solve(load);
+    let [force_y, force_z, moment_y, moment_z] = LdltFactors::new(system_matrix).solve(load);
     AxisLoad { force: [force_y, force_z], moment: [moment_y, moment_z] }
 }

@@ -120,8 +120,8 @@ impl<T: Lane> Elements<T> {
     /// lane.
     pub(crate) fn widen_corners(&mut self, lane: usize, width_m: f64) {
         let widen = |softness_squared: &mut N<T>| {
-            let widened = softness_squared.0.get(lane).max(width_m * width_m);
-            softness_squared.0.set(lane, widened);
+            let widened_square = softness_squared.0.get(lane).max(width_m * width_m);
+            softness_squared.0.set(lane, widened_square);
         };
         self.stops.iter_mut().for_each(|stop| widen(&mut stop.softness_squared));
         let has_stroke =
@@ -134,9 +134,9 @@ impl<T: Lane> Elements<T> {
     /// Computes the depth (m) of a stop's tub point, which is negative while the stop is open, and
     /// the stop's force (N).
     #[inline(always)]
-    pub(crate) fn stop(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
+    pub(crate) fn stop_depth_and_force(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let stop = &self.stops[index];
-        let point = tub.point(&stop.tub);
+        let point = tub.point_motion(&stop.tub);
         [stop.depth(&point), stop.force(&point)]
     }
 
@@ -144,8 +144,8 @@ impl<T: Lane> Elements<T> {
     #[inline(always)]
     pub(crate) fn damper_motion(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let ends = &self.dampers[index].ends;
-        let span = span(&tub.tilt, &tub.midpoint, ends);
-        let velocity = add_cross_product(&tub.velocity, &tub.rate, &ends.tub);
+        let span = compute_span(&tub.tilt, &tub.midpoint, ends);
+        let velocity = add_cross_product(&tub.velocity, &tub.angular_velocity, &ends.tub);
         let length = dot(&span, &span).sqrt();
         [length, dot(&span, &velocity) / length]
     }
@@ -172,12 +172,12 @@ impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
             add_forces(load, &elements.dampers, tub, true);
         }
         for stop in &elements.stops {
-            let point = tub.point(&stop.tub);
+            let point = tub.point_motion(&stop.tub);
             let force = scale(-stop.force(&point), stop.direction);
             add_force(load, &stop.tub, &tub.tilt.rotate_to_frame(&force));
         }
         for bushing in &elements.bushings {
-            let force = bushing.force(&tub.point(&bushing.tub));
+            let force = bushing.force(&tub.point_motion(&bushing.tub));
             add_force(load, &bushing.tub, &tub.tilt.rotate_to_frame(&force));
         }
     }
@@ -208,7 +208,7 @@ lane_struct! {
         stiffness: N<T>,
         stiffness_times_free_length: N<T>,
         /// The cubic stiffness k_3.
-        cubic: N<T>,
+        cubic_stiffness: N<T>,
         free_length: N<T>,
     }
 }
@@ -220,7 +220,7 @@ impl SpringCoefficients<f64> {
             ends: Ends::new(spring.cabinet_m, spring.tub_m),
             stiffness: N(spring.stiffness_n_per_m),
             stiffness_times_free_length: N(spring.stiffness_n_per_m * free_length_m),
-            cubic: N(spring.cubic_n_per_m3),
+            cubic_stiffness: N(spring.cubic_n_per_m3),
             free_length: N(free_length_m),
         }
     }
@@ -235,7 +235,7 @@ lane_struct! {
         /// The friction force F_f.
         friction: N<T>,
         /// The square of the speed v_s below which friction fades.
-        speed_squared: N<T>,
+        friction_speed_squared: N<T>,
         /// The equivalent viscous damping of the linear model (N s/m).
         equivalent_damping: N<T>,
         /// The damping beyond the free stroke.
@@ -279,7 +279,7 @@ impl DamperCoefficients<f64> {
             ends: Ends::new(damper.cabinet_m, damper.tub_m),
             damping: N(damper.damping_n_s_per_m),
             friction: N(damper.friction_n),
-            speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
+            friction_speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
             equivalent_damping: N(equivalent_damping(damper.friction_n, speed_m_per_s)),
             outer_damping: N(damper.outer_damping_n_s_per_m),
             rest_length: N(damper.given_length_m()),
@@ -305,7 +305,7 @@ impl<T: Real> DamperCoefficients<T> {
     /// Returns the share of friction and outer damping that acts at a length (m): a smooth step
     /// from 0 within the free stroke to 1 beyond the stroke.
     #[inline(always)]
-    fn engagement(&self, length: N<T>) -> N<T> {
+    fn engaged_share(&self, length: N<T>) -> N<T> {
         let elongation = length - self.rest_length;
         // The function (x^2 - s^2) / (2 s) approximates |x| - s near the ends of the stroke, and is
         // smooth at x = 0.
@@ -369,8 +369,8 @@ impl<T: Real> StopCoefficients<T> {
     #[inline(always)]
     fn force_at_depth(&self, depth: N<T>, speed: N<T>) -> N<T> {
         let w = (depth * depth + self.softness_squared).sqrt();
-        let contact = (0.5 * (1.0 + depth / w)).v();
-        (contact * (self.stiffness * w + self.damping * speed)).v()
+        let contact_share = (0.5 * (1.0 + depth / w)).v();
+        (contact_share * (self.stiffness * w + self.damping * speed)).v()
     }
 }
 
@@ -380,7 +380,7 @@ lane_struct! {
     BushingCoefficients {
         tub: [N<T>; 3],
         stiffness: [N<T>; 3],
-        cubic: [N<T>; 3],
+        cubic_stiffness: [N<T>; 3],
         damping: [N<T>; 3],
     }
 }
@@ -390,7 +390,7 @@ impl BushingCoefficients<f64> {
         Self {
             tub: bushing.tub_m.map(N),
             stiffness: bushing.stiffness_n_per_m.map(N),
-            cubic: bushing.cubic_n_per_m3.map(N),
+            cubic_stiffness: bushing.cubic_n_per_m3.map(N),
             damping: bushing.damping_n_s_per_m.map(N),
         }
     }
@@ -404,7 +404,7 @@ impl<T: Real> BushingCoefficients<T> {
         for i in 0..3 {
             let d = point.displacement[i];
             let v = point.velocity[i];
-            let stiffness = self.cubic[i] * (d * d).v() + self.stiffness[i];
+            let stiffness = self.cubic_stiffness[i] * (d * d).v() + self.stiffness[i];
             force[i] = -(stiffness * d + self.damping[i] * v);
         }
         force
@@ -460,7 +460,7 @@ impl<T: Real> ForceLaw<T> for SpringCoefficients<T> {
 
     #[inline(always)]
     fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
-        -line.cubic_force(self.cubic, self.free_length)
+        -line.cubic_force(self.cubic_stiffness, self.free_length)
     }
 }
 
@@ -480,10 +480,10 @@ impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
 
     #[inline(always)]
     fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
-        let friction = line.friction_force(self.friction, self.speed_squared);
+        let friction = line.friction_force(self.friction, self.friction_speed_squared);
         if self.has_second_stage.holds() {
             let force = friction + line.damping_force(self.outer_damping);
-            return -(self.engagement(line.length()) * force).v();
+            return -(self.engaged_share(line.length()) * force).v();
         }
         -friction
     }
@@ -498,7 +498,7 @@ pub(crate) struct TubMotion<T> {
     /// The velocity of P_T, in tub axes.
     velocity: Vec3<T>,
     /// The angular velocity, in tub axes.
-    rate: Vec3<T>,
+    angular_velocity: Vec3<T>,
 }
 
 impl<T: Real> TubMotion<T> {
@@ -507,8 +507,8 @@ impl<T: Real> TubMotion<T> {
     #[inline(always)]
     pub(crate) fn new(q: &[N<T>; 4], u: &[N<T>; 4]) -> Self {
         let tilt = Tilt::new(q[2], q[3]);
-        let rate = tilt.motion_at_constant_speeds(u[2], u[3]).rate;
-        Self::from_rate(tilt, rate, [q[0], q[1]], [u[0], u[1]])
+        let angular_velocity = tilt.motion_at_constant_speeds(u[2], u[3]).rate;
+        Self::from_rate(tilt, angular_velocity, [q[0], q[1]], [u[0], u[1]])
     }
 
     /// Computes the motion from a tilt, an angular velocity, and the midpoint's displacement (m)
@@ -516,7 +516,7 @@ impl<T: Real> TubMotion<T> {
     #[inline(always)]
     pub(crate) fn from_rate(
         tilt: Tilt<T>,
-        rate: Vec3<T>,
+        angular_velocity: Vec3<T>,
         midpoint: [N<T>; 2],
         [vy, vz]: [N<T>; 2],
     ) -> Self {
@@ -525,7 +525,7 @@ impl<T: Real> TubMotion<T> {
             tilt.second_c[1] * vy + tilt.second_c[2] * vz,
             (tilt.cos_yaw * vz).v(),
         ];
-        Self { tilt, midpoint, velocity, rate }
+        Self { tilt, midpoint, velocity, angular_velocity }
     }
 
     /// Transforms a vector from tub axes to cabinet axes.
@@ -536,12 +536,15 @@ impl<T: Real> TubMotion<T> {
 
     /// Computes the motion of a tub point, given in tub axes from P_T.
     #[inline(always)]
-    fn point(&self, tub: &Vec3<T>) -> PointMotion<T> {
+    fn point_motion(&self, tub: &Vec3<T>) -> PointMotion<T> {
         let mut displacement = subtract(self.tilt.rotate_to_cabinet(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
-        let velocity =
-            self.tilt.rotate_to_cabinet(&add_cross_product(&self.velocity, &self.rate, tub));
+        let velocity = self.tilt.rotate_to_cabinet(&add_cross_product(
+            &self.velocity,
+            &self.angular_velocity,
+            tub,
+        ));
         PointMotion { displacement, velocity }
     }
 }
@@ -559,7 +562,10 @@ impl<T: Real> TubLine<'_, T> {
     /// Returns l l' for the length l.
     #[inline(always)]
     fn length_times_rate(&self) -> N<T> {
-        dot(&self.span, &add_cross_product(&self.tub.velocity, &self.tub.rate, self.end))
+        dot(
+            &self.span,
+            &add_cross_product(&self.tub.velocity, &self.tub.angular_velocity, self.end),
+        )
     }
 }
 
@@ -604,7 +610,7 @@ pub(crate) struct CabinetLine<T> {
     pub(crate) span: Vec3<T>,
     pub(crate) length: N<T>,
     /// The rate of the length.
-    pub(crate) rate: N<T>,
+    pub(crate) length_rate: N<T>,
 }
 
 impl<T: Real> ElementLine<T> for CabinetLine<T> {
@@ -626,12 +632,13 @@ impl<T: Real> ElementLine<T> for CabinetLine<T> {
 
     #[inline(always)]
     fn damping_force(&self, damping: N<T>) -> N<T> {
-        (damping * self.rate).v()
+        (damping * self.length_rate).v()
     }
 
     #[inline(always)]
     fn friction_force(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
-        (force * self.rate).v() / (self.rate * self.rate + speed_squared).sqrt()
+        (force * self.length_rate).v()
+            / (self.length_rate * self.length_rate + speed_squared).sqrt()
     }
 }
 
@@ -646,7 +653,8 @@ fn add_forces<T: Real, E: ForceLaw<T>>(
 ) {
     for element in elements {
         let ends = element.ends();
-        let line = TubLine { span: span(&tub.tilt, &tub.midpoint, ends), end: &ends.tub, tub };
+        let line =
+            TubLine { span: compute_span(&tub.tilt, &tub.midpoint, ends), end: &ends.tub, tub };
         let force = if is_optional { element.optional_force(&line) } else { element.force(&line) };
         add_force(load, &ends.tub, &scale(force, line.span));
     }
@@ -666,7 +674,7 @@ fn add_force<T: Real>(
 /// Returns the vector from the cabinet end to the tub end, in tub axes. The axis t3 has no
 /// component along c2.
 #[inline(always)]
-fn span<T: Real>(tilt: &Tilt<T>, midpoint: &[N<T>; 2], ends: &Ends<T>) -> Vec3<T> {
+fn compute_span<T: Real>(tilt: &Tilt<T>, midpoint: &[N<T>; 2], ends: &Ends<T>) -> Vec3<T> {
     let [x, y, z] = [ends.cabinet[0], ends.cabinet[1] - midpoint[0], ends.cabinet[2] - midpoint[1]];
     let [t1, t2] = [&tilt.axis_c, &tilt.second_c];
     [

@@ -15,7 +15,7 @@ use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::floating::LdltFactors;
-use crate::nonlinear::{Halves, coupled_halves};
+use crate::nonlinear::{Halves, assemble_coupled_halves};
 use lane_ode::{Lane, N, OutOfLine};
 
 /// The greatest number of Newton steps. Basis: twice the number of undamped steps. Doubling it
@@ -39,11 +39,11 @@ const STEP_TOLERANCE: f64 = 1e-12;
 /// m/rad); the shift is raised tenfold until the sum is positive definite. Vertical springs, for
 /// example, have no stiffness sideways before they carry load. Basis: small against any
 /// suspension's stiffness. Doubling it changes the path, not the equilibrium.
-const MIN_SHIFT: f64 = 10.0;
+const MIN_STIFFNESS_SHIFT: f64 = 10.0;
 /// The greatest shift (N/m, N m/rad). Basis: far above any suspension's stiffness, so that a
 /// machine that needs a greater one has no equilibrium. Doubling it costs a fraction of an
 /// iteration.
-const MAX_SHIFT: f64 = 1e9;
+const MAX_STIFFNESS_SHIFT: f64 = 1e9;
 
 /// A call of [`solve_equilibrium`] that is not inlined into kernels.
 pub(crate) struct SolveEquilibrium<'a, T> {
@@ -72,7 +72,7 @@ pub(crate) fn solve_equilibrium<T: Lane>(
     let mut q = [zero; COORDINATES];
     let mut solved_lanes = 0_u32;
     let mut unsolvable_lanes = 0_u32;
-    let mut shift = zero;
+    let mut stiffness_shift = zero;
     for iteration in 0..MAX_ITERATIONS {
         let mut stiffness = [[zero; COORDINATES]; COORDINATES];
         let mut force = [zero; COORDINATES];
@@ -82,10 +82,10 @@ pub(crate) fn solve_equilibrium<T: Lane>(
                 stiffness[i][j] = N(forces[i].0.slope.neg());
                 force[i] = N(forces[i].0.value);
             }
-            stiffness[j][j] += shift;
+            stiffness[j][j] += stiffness_shift;
         }
         let factors = LdltFactors::new(stiffness);
-        let is_stable = factors.positive_definite_lanes();
+        let stable_lanes = factors.positive_definite_lanes();
         let step = factors.solve(force);
         let mut largest_step = zero;
         for component in &step {
@@ -95,13 +95,13 @@ pub(crate) fn solve_equilibrium<T: Lane>(
             largest_step.where_less(zero.lit(MAX_STEP), one, zero.lit(MAX_STEP) / largest_step);
         let scale =
             if iteration < FIRST_DAMPED_ITERATION { scale } else { (scale * DAMPING_FACTOR).v() };
-        let unfinished = !(solved_lanes | unsolvable_lanes);
-        for lane in (0..T::LANES).filter(|lane| unfinished >> lane & 1 == 1) {
-            let current_shift = shift.0.get(lane);
+        let unfinished_lanes = !(solved_lanes | unsolvable_lanes);
+        for lane in (0..T::LANES).filter(|lane| unfinished_lanes >> lane & 1 == 1) {
+            let current_shift = stiffness_shift.0.get(lane);
             let largest_step = largest_step.0.get(lane);
-            if is_stable >> lane & 1 == 0 || !largest_step.is_finite() {
-                unsolvable_lanes |= u32::from(current_shift > MAX_SHIFT) << lane;
-                shift.0.set(lane, (10.0 * current_shift).max(MIN_SHIFT));
+            if stable_lanes >> lane & 1 == 0 || !largest_step.is_finite() {
+                unsolvable_lanes |= u32::from(current_shift > MAX_STIFFNESS_SHIFT) << lane;
+                stiffness_shift.0.set(lane, (10.0 * current_shift).max(MIN_STIFFNESS_SHIFT));
                 continue;
             }
             for i in 0..COORDINATES {
@@ -109,7 +109,10 @@ pub(crate) fn solve_equilibrium<T: Lane>(
             }
             solved_lanes |=
                 u32::from(current_shift == 0.0 && largest_step < STEP_TOLERANCE) << lane;
-            shift.0.set(lane, if current_shift > MIN_SHIFT { 0.1 * current_shift } else { 0.0 });
+            stiffness_shift.0.set(
+                lane,
+                if current_shift > MIN_STIFFNESS_SHIFT { 0.1 * current_shift } else { 0.0 },
+            );
         }
         if (solved_lanes | unsolvable_lanes) & ((1 << T::LANES) - 1) == (1 << T::LANES) - 1 {
             break;
@@ -149,11 +152,11 @@ pub(crate) fn unstable_motion(
     };
     let scales = [max_stiffness(&stiffness[..2]), max_stiffness(&stiffness[2..])];
     let relative_stiffnesses = (0..RIGID_MOTIONS.len()).map(|k| (k, stiffness[k] / scales[k / 2]));
-    let (least, _) = relative_stiffnesses
-        .filter(|(_, relative)| *relative < 0.0)
+    let (least_stable_index, _) = relative_stiffnesses
+        .filter(|(_, relative_stiffness)| *relative_stiffness < 0.0)
         .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
-    let (motion, _, unit) = RIGID_MOTIONS[least];
-    Some((motion, stiffness[least], unit))
+    let (motion, _, unit) = RIGID_MOTIONS[least_stable_index];
+    Some((motion, stiffness[least_stable_index], unit))
 }
 
 /// Computes the generalised forces at rest.
@@ -164,9 +167,9 @@ fn static_forces<T: Lane>(
 ) -> [N<T>; COORDINATES] {
     let zero = q[0].lit(0.0);
     let spin = SpinState::new((zero, zero.lit(1.0)), zero, zero);
-    let Halves { tub, rotor } = coupled_halves(machine, &spin, q, &[zero; COORDINATES]);
-    let ([f1, f2], [f5, f6]) = tub.floating.generalised_forces();
-    let ([f3, f4], [f7, f8, f9, f10]) = rotor.floating.generalised_forces();
+    let Halves { tub, rotor } = assemble_coupled_halves(machine, &spin, q, &[zero; COORDINATES]);
+    let ([f1, f2], [f5, f6]) = tub.chain.generalised_forces();
+    let ([f3, f4], [f7, f8, f9, f10]) = rotor.chain.generalised_forces();
     [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]
 }
 

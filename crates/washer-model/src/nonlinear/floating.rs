@@ -11,7 +11,7 @@ use lane_ode::{Lane, N, Real};
 /// The accelerations of a half's midpoint (y, z) and axis (y, z).
 pub(crate) struct AxisResponse<T> {
     /// The accelerations without forces on the axis.
-    pub(crate) unloaded: [N<T>; 4],
+    pub(crate) unloaded_accelerations: [N<T>; 4],
     /// The accelerations per unit of force (y, z) and moment (y, z) on the axis: the lower triangle
     /// of a symmetric matrix.
     pub(crate) compliance: [[N<T>; 4]; 4],
@@ -42,7 +42,7 @@ pub(crate) struct FloatingChain<T, const R: usize> {
 impl<T: Real, const R: usize> FloatingChain<T, R> {
     /// Adds a load on the axis.
     #[inline(always)]
-    pub(crate) fn apply(&mut self, load: &AxisLoad<T>) {
+    pub(crate) fn add_load(&mut self, load: &AxisLoad<T>) {
         (self.force, self.torque) = self.with_load(load);
     }
 
@@ -78,9 +78,9 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
     /// Computes the accelerations of midpoint and axis and the compliance C = 1/m + G^T J^-1 G.
     /// `inertia` holds the factors of J.
     #[inline(always)]
-    pub(crate) fn response(&self, inertia: &LdltFactors<T, R>) -> AxisResponse<T> {
+    pub(crate) fn axis_response(&self, inertia: &LdltFactors<T, R>) -> AxisResponse<T> {
         let zero = self.inverse_mass.lit(0.0);
-        // The rows of G: the torques that `apply` adds per unit of force and moment, which by
+        // The rows of G: the torques that `add_load` adds per unit of force and moment, which by
         // virtual work are also the motions of the axis per unit of rotation.
         let mut torques_per_load = [[zero; 4]; R];
         for r in 0..R {
@@ -103,7 +103,7 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
                 }
             }
         }
-        let mut unloaded = [
+        let mut unloaded_accelerations = [
             self.force[0] * self.inverse_mass - self.drift[0],
             self.force[1] * self.inverse_mass - self.drift[1],
             self.axis_drift[0],
@@ -115,13 +115,13 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
         for r in 0..R {
             for i in 0..4 {
                 let weighted = (torques_per_load[r][i] * inertia.reciprocal_pivot(r)).v();
-                unloaded[i] += weighted * torque[r];
+                unloaded_accelerations[i] += weighted * torque[r];
                 for j in 0..=i {
                     compliance[i][j] += weighted * torques_per_load[r][j];
                 }
             }
         }
-        AxisResponse { unloaded, compliance }
+        AxisResponse { unloaded_accelerations, compliance }
     }
 
     /// Computes the accelerations under a load on the axis: those of the bearing midpoint along y

@@ -95,8 +95,12 @@ fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     if T::all(is_small) && T::all(is_cos_positive) {
         return short_series;
     }
-    let by_quarters = phi_over_sin_by_quarters(sin_squared, cos);
-    N(T::select(is_cos_positive, T::select(is_small, short_series.0, by_quarters.0), by_quarters.0))
+    let quarter_angle_ratio = phi_over_sin_by_quarters(sin_squared, cos);
+    N(T::select(
+        is_cos_positive,
+        T::select(is_small, short_series.0, quarter_angle_ratio.0),
+        quarter_angle_ratio.0,
+    ))
 }
 
 /// Computes phi / sin phi from the quarter angle: with s = sin^2(phi/4) it is (asin sqrt(s) /

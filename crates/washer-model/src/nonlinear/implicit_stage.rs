@@ -38,28 +38,35 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     let g_squared = (g * g).v();
     for (index, i) in [(2, HINGE_YAW), (3, HINGE_PITCH)] {
         rotor.inertia[index][index] += g_squared * b.flexure_stiffness;
-        rotor.floating.torque[index] -= b.flexure_stiffness * coordinate_change[i];
+        rotor.chain.torque[index] -= b.flexure_stiffness * coordinate_change[i];
     }
     let mut deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let change = Deflection::linear(&coordinate_change, &tub.floating.axis, &rotor.floating.axis);
+    let deflection_change =
+        Deflection::linear(&coordinate_change, &tub.chain.axis, &rotor.chain.axis);
     for i in 0..2 {
-        deflection.offset[i] += change.offset[i];
-        deflection.tilt[i] += change.tilt[i];
+        deflection.offset[i] += deflection_change.offset[i];
+        deflection.tilt[i] += deflection_change.tilt[i];
     }
     // The deflection depends on the accelerations only, not on terms of constant speed.
     let zero = g.lit(0.0);
-    tub.floating.axis_drift = [zero; 2];
-    rotor.floating.axis_drift = [zero; 2];
+    tub.chain.axis_drift = [zero; 2];
+    rotor.chain.axis_drift = [zero; 2];
     let no_sag = Deflection { offset: [zero; 2], tilt: [zero; 2] };
     let tub_factors = LdltFactors::new(tub.inertia);
     let rotor_factors = LdltFactors::new(rotor.inertia);
-    let tub = &tub.floating;
-    let rotor = &rotor.floating;
-    let tub_response = tub.response(&tub_factors);
-    let rotor_response = rotor.response(&rotor_factors);
-    let squares = (g_squared.recip(), zero);
-    let shaft_load =
-        mass_scaled_load(b, squares, &deflection, &no_sag, &tub_response, &rotor_response);
+    let tub = &tub.chain;
+    let rotor = &rotor.chain;
+    let tub_response = tub.axis_response(&tub_factors);
+    let rotor_response = rotor.axis_response(&rotor_factors);
+    let cap_and_speed_squared = (g_squared.recip(), zero);
+    let shaft_load = mass_scaled_load(
+        b,
+        cap_and_speed_squared,
+        &deflection,
+        &no_sag,
+        &tub_response,
+        &rotor_response,
+    );
     let a = accelerations_under_load((tub, &tub_factors), (rotor, &rotor_factors), &shaft_load);
     let mut k = *r;
     for i in 0..COORDINATES {

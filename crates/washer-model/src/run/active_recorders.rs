@@ -8,7 +8,7 @@ use super::snapshots::Snapshots;
 use super::{Method, MethodKind};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::machine::spin::whole_turn_cuts_s;
+use crate::machine::spin::whole_turn_times_s;
 use crate::nonlinear::outputs::{RADIAL_COMPONENTS, squared_distance};
 use crate::{ModelKind, Point, Reading, Recorders};
 use lane_ode::{IntervalPeaks, Lane, N, OutOfLine, Sample, SquareIntegrals, TimeAbove};
@@ -99,7 +99,8 @@ impl<T: Lane> ActiveRecorders<T> {
         self.clash_time.reset(lane);
         self.clearance_squared.0.set(lane, clearance_m * clearance_m);
         if self.recorders.turns {
-            self.turn_peaks.reset(lane, &whole_turn_cuts_s(&point.spin_segments, point.window_s()));
+            self.turn_peaks
+                .reset(lane, &whole_turn_times_s(&point.spin_segments, point.window_s()));
         }
         if let Some(loads) = &mut self.loads {
             loads.set_point(lane, point);
@@ -123,7 +124,7 @@ impl<T: Lane> ActiveRecorders<T> {
         }
         let [from_s, to_s] = point.window_s();
         // Rounding may make the integral of a motion at rest negative.
-        let root_mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
+        let to_root_mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let gauges = Gauge::ALL.map(|gauge| match &self.loads {
             _ if !recorders.has_gauge(gauge) => Vec::new(),
             _ if gauge == Gauge::ClashTime => vec![self.clash_time.lane(lane)],
@@ -131,7 +132,7 @@ impl<T: Lane> ActiveRecorders<T> {
             None => Vec::new(),
         });
         let root_mean_squares = match recorders.root_mean_squares {
-            true => Some(self.square_integrals.lane(lane).map(root_mean)),
+            true => Some(self.square_integrals.lane(lane).map(to_root_mean)),
             false => None,
         };
         let checkpoints = Vec::new();
@@ -158,40 +159,41 @@ impl<T: Lane> OutOfLine for ObservedState<'_, T> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { recorders: active, step, x, dx, radial, channels, lanes_in_window } = self;
-        let recorders = active.recorders;
+        let Self { recorders: active_recorders, step, x, dx, radial, channels, lanes_in_window } =
+            self;
+        let recorders = active_recorders.recorders;
         if recorders.root_mean_squares {
             match step {
                 Some((_, length_s)) => {
-                    active.square_integrals.advance(length_s, channels, lanes_in_window)
+                    active_recorders.square_integrals.advance(length_s, channels, lanes_in_window)
                 }
-                None => active.square_integrals.begin(channels),
+                None => active_recorders.square_integrals.begin(channels),
             }
         }
         if recorders.turns {
             match step {
                 Some((end_s, length_s)) => {
-                    active.turn_peaks.advance(end_s, length_s, channels, lanes_in_window)
+                    active_recorders.turn_peaks.advance(end_s, length_s, channels, lanes_in_window)
                 }
-                None => active.turn_peaks.begin(channels, lanes_in_window),
+                None => active_recorders.turn_peaks.begin(channels, lanes_in_window),
             }
         }
-        if let Some(loads) = &mut active.loads {
+        if let Some(loads) = &mut active_recorders.loads {
             loads.record(step, x, dx, lanes_in_window);
         }
-        if let Some(snapshots) = &mut active.snapshots {
+        if let Some(snapshots) = &mut active_recorders.snapshots {
             snapshots.record(step, (x, dx), channels);
         }
         if recorders.has_gauge(Gauge::ClashTime) {
             // The gap is negative where the square of the radial distance exceeds that of the
             // clearance.
             let mut overlap = squared_distance(radial);
-            overlap.value -= active.clearance_squared;
+            overlap.value -= active_recorders.clearance_squared;
             match step {
                 Some((_, length_s)) => {
-                    active.clash_time.advance(length_s, &overlap, lanes_in_window)
+                    active_recorders.clash_time.advance(length_s, &overlap, lanes_in_window)
                 }
-                None => active.clash_time.begin(&overlap),
+                None => active_recorders.clash_time.begin(&overlap),
             }
         }
     }

@@ -24,15 +24,15 @@ pub struct PointEquations {
 }
 
 /// A model over plain numbers and over dual numbers.
-struct Differentiable<M, J> {
+struct DifferentiableModel<M, J> {
     model: M,
     dual_model: J,
 }
 
 /// The nonlinear or the linear model.
 enum EitherModel {
-    Nonlinear(Box<Differentiable<Nonlinear<f64>, Nonlinear<Dual<f64>>>>),
-    Linear(Box<Differentiable<Linear<f64>, Linear<Dual<f64>>>>),
+    Nonlinear(Box<DifferentiableModel<Nonlinear<f64>, Nonlinear<Dual<f64>>>>),
+    Linear(Box<DifferentiableModel<Linear<f64>, Linear<Dual<f64>>>>),
 }
 
 impl PointEquations {
@@ -40,11 +40,11 @@ impl PointEquations {
     pub fn new(point: &Point, model: ModelKind) -> Self {
         let (model, at_rest) = match model {
             ModelKind::Nonlinear => (
-                EitherModel::Nonlinear(Differentiable::new(point)),
+                EitherModel::Nonlinear(DifferentiableModel::new(point)),
                 <Nonlinear<f64> as LaneModel<f64>>::at_rest(point),
             ),
             ModelKind::Linear => (
-                EitherModel::Linear(Differentiable::new(point)),
+                EitherModel::Linear(DifferentiableModel::new(point)),
                 <Linear<f64> as LaneModel<f64>>::at_rest(point),
             ),
         };
@@ -86,15 +86,15 @@ impl PointEquations {
                 Simd::one_lane(JacobianKernel { dual_model: &models.dual_model, t_s, x })
             }
         };
-        let mut rows = [[0.0; STATES]; STATES];
+        let mut jacobian_rows = [[0.0; STATES]; STATES];
         for i in 0..COORDINATES {
-            rows[i][COORDINATES + i] = 1.0;
+            jacobian_rows[i][COORDINATES + i] = 1.0;
             for j in 0..COORDINATES {
-                rows[COORDINATES + i][j] = partials.by_coordinate[i][j].0;
-                rows[COORDINATES + i][COORDINATES + j] = partials.by_speed[i][j].0;
+                jacobian_rows[COORDINATES + i][j] = partials.by_coordinate[i][j].0;
+                jacobian_rows[COORDINATES + i][COORDINATES + j] = partials.by_speed[i][j].0;
             }
         }
-        rows
+        jacobian_rows
     }
 
     /// Computes the channels' deviations from equilibrium (m, rad) in the order of
@@ -134,7 +134,7 @@ impl PointEquations {
     }
 }
 
-impl<M: LaneModel<f64>, J: LaneModel<Dual<f64>>> Differentiable<M, J> {
+impl<M: LaneModel<f64>, J: LaneModel<Dual<f64>>> DifferentiableModel<M, J> {
     fn new(point: &Point) -> Box<Self> {
         Box::new(Self {
             model: M::splat(N(0.0), point, Coupling::Springs),

@@ -18,7 +18,7 @@ use crate::run::method::{
 };
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::run::snapshots::position_in_step;
-use crate::run::suspension::forces;
+use crate::run::suspension::compute_forces;
 use crate::{COORDINATES, Forces, Method, MethodKind, ModelKind, Point};
 use core::marker::PhantomData;
 use lane_ode::{
@@ -148,21 +148,21 @@ fn integrate_family<F: ModelFamily>(
     let family = PhantomData::<F>;
     match requests {
         [single] => {
-            single.method.visit_stepper(SampleHistories { requests, cancel, stepper: (), family })
+            single.method.visit_stepper(HistoryKernel { requests, cancel, stepper: (), family })
         }
         _ => {
             let stepper = Rk4Stepper;
-            Simd::dispatch_narrow(SampleHistories { requests, cancel, stepper, family })
+            Simd::dispatch_narrow(HistoryKernel { requests, cancel, stepper, family })
         }
     }
 }
 
-impl<F: ModelFamily> StepperVisitor<F> for SampleHistories<'_, F, ()> {
+impl<F: ModelFamily> StepperVisitor<F> for HistoryKernel<'_, F, ()> {
     type Output = Vec<SampledStates>;
 
     fn visit<S: Stepper>(self, stepper: S) -> Vec<SampledStates> {
         let Self { requests, cancel, family, .. } = self;
-        Simd::one_lane(SampleHistories { requests, cancel, stepper, family })
+        Simd::one_lane(HistoryKernel { requests, cancel, stepper, family })
     }
 }
 
@@ -188,8 +188,8 @@ impl<'a> History<'a> {
         let state = self.states.get(k)?;
         let time_s = self.times_s[k];
         let ([channels, rates, accelerations], gap_m) = match self.model {
-            ModelKind::Nonlinear => outputs::<Nonlinear<f64>>(self.point, time_s, state),
-            ModelKind::Linear => outputs::<Linear<f64>>(self.point, time_s, state),
+            ModelKind::Nonlinear => compute_outputs::<Nonlinear<f64>>(self.point, time_s, state),
+            ModelKind::Linear => compute_outputs::<Linear<f64>>(self.point, time_s, state),
         };
         let mut deviations: [f64; COORDINATES] = core::array::from_fn(|i| state[i]);
         if self.model == ModelKind::Nonlinear {
@@ -208,12 +208,12 @@ impl<'a> History<'a> {
     /// Computes the forces of the suspension at instant `k`; `None` if the trajectory failed
     /// before.
     pub fn forces(&self, k: usize) -> Option<Forces> {
-        self.states.get(k).map(|state| forces(self.point, self.model, state))
+        self.states.get(k).map(|state| compute_forces(self.point, self.model, state))
     }
 }
 
 /// Computes the channels with their rates and accelerations, and the gap, at a state.
-fn outputs<M: LaneModel<f64>>(
+fn compute_outputs<M: LaneModel<f64>>(
     point: &Point,
     time_s: f64,
     state: &[f64; STATES],
@@ -240,7 +240,7 @@ struct SampledStates {
 }
 
 /// The kernel that integrates histories.
-struct SampleHistories<'a, F, S> {
+struct HistoryKernel<'a, F, S> {
     /// The requests, at most as many as there are lanes.
     requests: &'a [HistoryRequest<'a>],
     cancel: Cancel<'a>,
@@ -248,7 +248,7 @@ struct SampleHistories<'a, F, S> {
     family: PhantomData<F>,
 }
 
-impl<F: ModelFamily, S: Stepper> Kernel for SampleHistories<'_, F, S> {
+impl<F: ModelFamily, S: Stepper> Kernel for HistoryKernel<'_, F, S> {
     type Output = Vec<SampledStates>;
 
     #[inline(always)]
@@ -259,7 +259,7 @@ impl<F: ModelFamily, S: Stepper> Kernel for SampleHistories<'_, F, S> {
     }
 }
 
-impl<F: ModelFamily, S: Stepper> OutOfLine for SampleHistories<'_, F, S> {
+impl<F: ModelFamily, S: Stepper> OutOfLine for HistoryKernel<'_, F, S> {
     type Output = Vec<SampledStates>;
 
     #[inline(always)]
@@ -288,7 +288,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
         for (lane, request) in requests.iter().enumerate().skip(1) {
             model.set_point(lane, request.point);
         }
-        let initial_state_only = |request: &HistoryRequest<'_>| {
+        let to_start_sample = |request: &HistoryRequest<'_>| {
             let mut start = M::at_rest(request.point);
             for i in 0..COORDINATES {
                 start[i] += request.start.deviations[i];
@@ -296,7 +296,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
             }
             SampledStates { states: vec![start], failure: None }
         };
-        let samples = requests.iter().map(initial_state_only).collect();
+        let samples = requests.iter().map(to_start_sample).collect();
         Self { model, zero, requests, cancel, segments: [None; MAX_LANES], samples }
     }
 }
@@ -347,10 +347,10 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
     #[inline(always)]
     fn observe(&mut self, _: &M::Forcing, step: &ObservedStep<'_, T, STATES>) {
         // If a step leaves the range of the model, the states inside it are meaningless too.
-        let in_range = T::bits(self.model.in_range(step.after));
+        let in_range = T::bits(self.model.in_range(step.end_state));
         loop {
             let mut position = self.zero;
-            let mut is_reached = [false; MAX_LANES];
+            let mut has_instant = [false; MAX_LANES];
             for (lane, request) in self.requests.iter().enumerate() {
                 let end_s = step.end_s.0.get(lane);
                 let length_s = step.length_s.0.get(lane);
@@ -359,15 +359,15 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
                     && in_range >> lane & 1 == 1
                     && let Some(lane_position) = position_in_step(*time_s, end_s, length_s)
                 {
-                    is_reached[lane] = true;
+                    has_instant[lane] = true;
                     position.0.set(lane, lane_position);
                 }
             }
-            if is_reached == [false; MAX_LANES] {
+            if has_instant == [false; MAX_LANES] {
                 return;
             }
             let states = step.interpolate(position);
-            for lane in (0..self.requests.len()).filter(|&lane| is_reached[lane]) {
+            for lane in (0..self.requests.len()).filter(|&lane| has_instant[lane]) {
                 self.samples[lane].states.push(states.map(|x| x.0.get(lane)));
             }
         }

@@ -3,7 +3,7 @@
 //! The force laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers
 //! for their rates. The linear model's loads are first order in its deviations from equilibrium.
 
-use super::suspension::{dual, forces, load_on_cabinet_axes, tub_with_deviation};
+use super::suspension::{compute_forces, dual, load_on_cabinet_axes, tub_with_deviation};
 use crate::coordinates::{STATES, TUB};
 use crate::lanes::{InLanes as _, ToDual as _};
 use crate::machine::feet::{LOAD_COMPONENTS, LoadDistribution, MAX_FEET, turning_force_n};
@@ -82,12 +82,12 @@ impl<T: Lane> TubExpansion<T> {
     fn set(
         &mut self,
         lane: usize,
-        rest: f64,
+        value_at_rest: f64,
         k: usize,
         coordinate_derivative: f64,
         speed_derivative: f64,
     ) {
-        self.value_at_rest.0.set(lane, rest);
+        self.value_at_rest.0.set(lane, value_at_rest);
         self.coordinate_derivatives[k].0.set(lane, coordinate_derivative);
         self.speed_derivatives[k].0.set(lane, speed_derivative);
     }
@@ -110,20 +110,20 @@ impl<T: Lane> TubExpansion<T> {
 #[derive(Clone, Copy)]
 struct LoadSelection {
     /// Whether the force on the cabinet is recorded.
-    force: bool,
+    has_cabinet_force: bool,
     /// Whether the loads of the feet and the margins are recorded.
-    feet: bool,
+    has_feet: bool,
     /// The number of stops that are recorded.
-    stops: usize,
+    stop_count: usize,
     /// The number of dampers that are recorded.
-    dampers: usize,
+    damper_count: usize,
 }
 
 impl LoadSelection {
     /// Returns the number of load components: the load on the cabinet, depth and force of each
     /// stop, and the speed of each damper.
     fn component_count(self) -> usize {
-        LOAD_COMPONENTS + 2 * self.stops + self.dampers
+        LOAD_COMPONENTS + 2 * self.stop_count + self.damper_count
     }
 
     /// Computes the load components by the elements' force laws. Returns the force on the tub.
@@ -136,18 +136,19 @@ impl LoadSelection {
     ) -> Vec3<T> {
         let no_force = [tub.midpoint[0].lit(0.0); 3];
         let mut tub_load = (no_force, no_force);
-        if self.force || self.feet {
+        if self.has_cabinet_force || self.has_feet {
             tub_load = elements.load_on_tub(tub);
         }
-        if self.feet {
+        if self.has_feet {
             components[..LOAD_COMPONENTS].copy_from_slice(&load_on_cabinet_axes(tub, &tub_load));
         }
-        for k in 0..self.stops {
+        for k in 0..self.stop_count {
             [components[LOAD_COMPONENTS + 2 * k], components[LOAD_COMPONENTS + 2 * k + 1]] =
-                elements.stop(k, tub);
+                elements.stop_depth_and_force(k, tub);
         }
-        for k in 0..self.dampers {
-            components[LOAD_COMPONENTS + 2 * self.stops + k] = elements.damper_motion(k, tub)[1];
+        for k in 0..self.damper_count {
+            components[LOAD_COMPONENTS + 2 * self.stop_count + k] =
+                elements.damper_motion(k, tub)[1];
         }
         tub_load.0
     }
@@ -169,18 +170,18 @@ impl<T: Lane> LoadLaws<T> {
             Self::Linear { force, components } => (force, components),
         };
         let elements = point.machine.elements.with_viscous_friction().constant();
-        let unit = |state: usize| core::array::from_fn(|i| f64::from(u8::from(i == state)));
+        let unit_state = |state: usize| core::array::from_fn(|i| f64::from(u8::from(i == state)));
         let components_by = |state: usize| {
             let mut components = vec![dual(0.0, 0.0); selection.component_count()];
             selection.evaluate(
                 &elements,
-                &tub_with_deviation(point, &unit(state)),
+                &tub_with_deviation(point, &unit_state(state)),
                 &mut components,
             );
             components
         };
         let cabinet_force_at =
-            |state: &[f64; STATES]| forces(point, ModelKind::Linear, state).cabinet_n;
+            |state: &[f64; STATES]| compute_forces(point, ModelKind::Linear, state).cabinet_n;
         for k in 0..4 {
             let [coordinate, speed] = [TUB[k], COORDINATES + TUB[k]];
             let slopes = components_by(coordinate).into_iter().zip(components_by(speed));
@@ -195,10 +196,10 @@ impl<T: Lane> LoadLaws<T> {
                     speed_derivative.slope,
                 );
             }
-            if selection.force {
+            if selection.has_cabinet_force {
                 let force_at_rest = cabinet_force_at(&[0.0; STATES]);
                 let [at_unit_coordinate, at_unit_speed] =
-                    [coordinate, speed].map(|state| cabinet_force_at(&unit(state)));
+                    [coordinate, speed].map(|state| cabinet_force_at(&unit_state(state)));
                 for i in 0..3 {
                     let coordinate_derivative = at_unit_coordinate[i] - force_at_rest[i];
                     let speed_derivative = at_unit_speed[i] - force_at_rest[i];
@@ -217,9 +218,9 @@ impl<T: Lane> LoadLaws<T> {
 
 /// The records of one stop.
 struct StopRecord<T> {
-    force: Peaks<T, 1>,
+    force_peaks: Peaks<T, 1>,
     /// The time for which the depth is positive.
-    contact: TimeAbove<T>,
+    contact_time: TimeAbove<T>,
 }
 
 /// The recorder of loads, over lanes.
@@ -229,17 +230,17 @@ struct StopRecord<T> {
 /// step.
 pub(crate) struct Loads<T> {
     selection: LoadSelection,
-    laws: LoadLaws<T>,
+    load_laws: LoadLaws<T>,
     /// The load components at the last instant.
     components: Vec<N<Dual<T>>>,
     /// The square of the force on the cabinet.
     force_squared: Peaks<T, 1>,
     /// The distances of the feet's loads, and of the two margins, below [`REFERENCE_N`].
-    below_reference: Peaks<T, { MAX_FEET + 2 }>,
+    distances_below_reference_n: Peaks<T, { MAX_FEET + 2 }>,
     distribution: Option<LoadDistribution<T>>,
     stops: Vec<StopRecord<T>>,
     /// The speed of each damper, if dampers are recorded.
-    speeds: Vec<Peaks<T, 1>>,
+    damper_speed_peaks: Vec<Peaks<T, 1>>,
     /// The coordinates, speeds and accelerations of [`TUB`] at the start of the next step.
     previous_tub: [Sample<T>; 4],
     /// The number of parts of a step.
@@ -264,14 +265,14 @@ impl<T: Lane> Loads<T> {
         let elements = &point.machine.elements;
         let records_dampers = gauges[Gauge::DamperSpeed as usize];
         let selection = LoadSelection {
-            force,
-            feet: records_elements && point.feet.is_some(),
-            stops: if records_elements { elements.stops.len() } else { 0 },
-            dampers: if records_dampers { elements.dampers.len() } else { 0 },
+            has_cabinet_force: force,
+            has_feet: records_elements && point.feet.is_some(),
+            stop_count: if records_elements { elements.stops.len() } else { 0 },
+            damper_count: if records_dampers { elements.dampers.len() } else { 0 },
         };
         // This is not `Option::map`, whose closure would be compiled without the kernel's
         // instruction set.
-        let laws = match model {
+        let load_laws = match model {
             ModelKind::Nonlinear => LoadLaws::Nonlinear(Elements::splat(zero.constant(), elements)),
             ModelKind::Linear => {
                 let zero_expansion = TubExpansion::new(zero);
@@ -279,23 +280,28 @@ impl<T: Lane> Loads<T> {
                 LoadLaws::Linear { force: [zero_expansion; 3], components }
             }
         };
-        let mut stops = Vec::with_capacity(selection.stops);
-        for _ in 0..selection.stops {
-            stops.push(StopRecord { force: Peaks::new(zero), contact: TimeAbove::new(zero) });
+        let mut stops = Vec::with_capacity(selection.stop_count);
+        for _ in 0..selection.stop_count {
+            stops.push(StopRecord {
+                force_peaks: Peaks::new(zero),
+                contact_time: TimeAbove::new(zero),
+            });
         }
         let distribution = match &point.feet {
-            Some(feet) if selection.feet => Some(LoadDistribution::splat(zero, &feet.distribution)),
+            Some(feet) if selection.has_feet => {
+                Some(LoadDistribution::splat(zero, &feet.distribution))
+            }
             _ => None,
         };
         let mut loads = Self {
             selection,
-            laws,
+            load_laws,
             components: vec![zero.constant(); selection.component_count()],
             force_squared: Peaks::new(zero),
-            below_reference: Peaks::new(zero),
+            distances_below_reference_n: Peaks::new(zero),
             distribution,
             stops,
-            speeds: vec![Peaks::new(zero); selection.dampers],
+            damper_speed_peaks: vec![Peaks::new(zero); selection.damper_count],
             previous_tub: [Sample::constant(zero, zero); 4],
             substeps,
         };
@@ -307,14 +313,14 @@ impl<T: Lane> Loads<T> {
 
     /// Begins a point's trajectory in one lane.
     pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
-        self.laws.set_point(lane, point, self.selection);
+        self.load_laws.set_point(lane, point, self.selection);
         self.force_squared.reset(lane);
-        self.below_reference.reset(lane);
+        self.distances_below_reference_n.reset(lane);
         for stop in &mut self.stops {
-            stop.force.reset(lane);
-            stop.contact.reset(lane);
+            stop.force_peaks.reset(lane);
+            stop.contact_time.reset(lane);
         }
-        for speed in &mut self.speeds {
+        for speed in &mut self.damper_speed_peaks {
             speed.reset(lane);
         }
         if let (Some(distribution), Some(feet)) = (&mut self.distribution, &point.feet) {
@@ -328,7 +334,7 @@ impl<T: Lane> Loads<T> {
         let max_value = |peaks: &Peaks<T, 1>| peaks.lane(lane)[0];
         let min_loads = |indices: core::ops::Range<usize>| {
             let indices = if self.distribution.is_some() { indices } else { 0..0 };
-            self.below_reference.lane(lane)[indices]
+            self.distances_below_reference_n.lane(lane)[indices]
                 .iter()
                 .map(|below_n| REFERENCE_N - below_n)
                 .collect()
@@ -336,12 +342,16 @@ impl<T: Lane> Loads<T> {
         match gauge {
             Gauge::ClashTime => Vec::new(),
             Gauge::CabinetForce => vec![max_value(&self.force_squared).sqrt()],
-            Gauge::StopForce => self.stops.iter().map(|stop| max_value(&stop.force)).collect(),
-            Gauge::StopContact => self.stops.iter().map(|stop| stop.contact.lane(lane)).collect(),
+            Gauge::StopForce => {
+                self.stops.iter().map(|stop| max_value(&stop.force_peaks)).collect()
+            }
+            Gauge::StopContact => {
+                self.stops.iter().map(|stop| stop.contact_time.lane(lane)).collect()
+            }
             Gauge::FootLoad => min_loads(0..point.feet.as_ref().map_or(0, |feet| feet.count)),
             Gauge::SlipMargin => min_loads(SLIP_INDEX..WALK_INDEX),
             Gauge::WalkMargin => min_loads(WALK_INDEX..WALK_INDEX + 1),
-            Gauge::DamperSpeed => self.speeds.iter().map(max_value).collect(),
+            Gauge::DamperSpeed => self.damper_speed_peaks.iter().map(max_value).collect(),
         }
     }
 
@@ -391,10 +401,10 @@ impl<T: Lane> Loads<T> {
         tub: &[Sample<T>; 4],
         lanes_in_window: T::Mask,
     ) {
-        let Self { selection, laws, components, .. } = self;
+        let Self { selection, load_laws, components, .. } = self;
         let zero = tub[0].value.lit(0.0);
         let mut force_squared = Sample::constant(zero, zero);
-        match laws {
+        match load_laws {
             LoadLaws::Nonlinear(elements) => {
                 let mut q = [tub[0].value.constant(); 4];
                 let mut u = q;
@@ -405,7 +415,7 @@ impl<T: Lane> Loads<T> {
                 // The force on the tub in tub axes has the same magnitude as the force on the
                 // cabinet.
                 let force = selection.evaluate(elements, &TubMotion::new(&q, &u), components);
-                force_squared = sample(dot(&force, &force));
+                force_squared = to_sample(dot(&force, &force));
             }
             LoadLaws::Linear { force, components: expansions } => {
                 for expansion in force {
@@ -420,26 +430,34 @@ impl<T: Lane> Loads<T> {
                 }
             }
         }
-        if selection.force {
+        if selection.has_cabinet_force {
             record_peaks(&mut self.force_squared, step_s, &[force_squared], lanes_in_window);
         }
         if let Some(distribution) = &self.distribution {
-            let below_reference = distances_below_reference(distribution, &self.components);
-            record_peaks(&mut self.below_reference, step_s, &below_reference, lanes_in_window);
+            let distances_below_reference_n =
+                distances_below_reference(distribution, &self.components);
+            record_peaks(
+                &mut self.distances_below_reference_n,
+                step_s,
+                &distances_below_reference_n,
+                lanes_in_window,
+            );
         }
         let (stops, damper_speeds) =
             self.components[LOAD_COMPONENTS..].split_at(2 * self.stops.len());
         for (record, depth_and_force) in self.stops.iter_mut().zip(stops.chunks(2)) {
-            let depth = sample(depth_and_force[0]);
-            let force = sample(depth_and_force[1]);
-            record_peaks(&mut record.force, step_s, &[force], lanes_in_window);
+            let depth = to_sample(depth_and_force[0]);
+            let force = to_sample(depth_and_force[1]);
+            record_peaks(&mut record.force_peaks, step_s, &[force], lanes_in_window);
             match step_s {
-                Some(step_s) => record.contact.advance_by_slopes(step_s, &depth, lanes_in_window),
-                None => record.contact.begin(&depth),
+                Some(step_s) => {
+                    record.contact_time.advance_by_slopes(step_s, &depth, lanes_in_window)
+                }
+                None => record.contact_time.begin(&depth),
             }
         }
-        for (peaks, speed) in self.speeds.iter_mut().zip(damper_speeds) {
-            record_peaks(peaks, step_s, &[sample(*speed)], lanes_in_window);
+        for (peaks, speed) in self.damper_speed_peaks.iter_mut().zip(damper_speeds) {
+            record_peaks(peaks, step_s, &[to_sample(*speed)], lanes_in_window);
         }
     }
 }
@@ -455,21 +473,21 @@ fn distances_below_reference<T: Lane>(
     let reference = components[0].lit(REFERENCE_N);
     let mut load = [reference; LOAD_COMPONENTS];
     load.copy_from_slice(&components[..LOAD_COMPONENTS]);
-    let mut below_reference = [sample(reference); MAX_FEET + 2];
+    let mut distances_below_reference_n = [to_sample(reference); MAX_FEET + 2];
     let mut foot_loads = distribution.weight_loads;
     for k in 0..MAX_FEET {
         for i in 0..LOAD_COMPONENTS {
             foot_loads[k] += distribution.loads_per_component[k][i] * load[i];
         }
-        below_reference[k] = sample(reference - foot_loads[k]);
+        distances_below_reference_n[k] = to_sample(reference - foot_loads[k]);
     }
     let force_squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(ROOT_SUMMAND_N2);
     let slip_margin =
         distribution.friction * (distribution.weight - load[1]) - force_squared.sqrt();
     let walk_margin = slip_margin - turning_force_n(&distribution.positions, &foot_loads, &load);
-    below_reference[SLIP_INDEX] = sample(reference - slip_margin);
-    below_reference[WALK_INDEX] = sample(reference - walk_margin);
-    below_reference
+    distances_below_reference_n[SLIP_INDEX] = to_sample(reference - slip_margin);
+    distances_below_reference_n[WALK_INDEX] = to_sample(reference - walk_margin);
+    distances_below_reference_n
 }
 
 /// Passes samples to their peaks: after a step of length `step_s`, or at the start of a segment if
@@ -489,7 +507,7 @@ fn record_peaks<T: Lane, const M: usize>(
 
 /// Returns a dual number as a sample without curvature.
 #[inline(always)]
-fn sample<T: Lane>(dual: N<Dual<T>>) -> Sample<T> {
+fn to_sample<T: Lane>(dual: N<Dual<T>>) -> Sample<T> {
     let value = N(dual.0.value);
     let slope = N(dual.0.slope);
     Sample { value, slope, curvature: value.lit(0.0) }

@@ -1,4 +1,4 @@
-//! The methods of integration: their kinds, their numbers, and their steppers.
+//! The methods of integration: their kinds, their parameters, and their steppers.
 //!
 //! Each stepper is compiled as a separate kernel, because the compiler takes longer for one
 //! function with all of them than for all functions together.
@@ -69,8 +69,8 @@ impl MethodKind {
     }
 }
 
-/// A method of integration: its kind with the numbers of that kind. Numbers that the kind does not
-/// use are zero.
+/// A method of integration: the kind with its parameters. Parameters that the kind does not use are
+/// zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Method {
     /// The kind.
@@ -90,7 +90,7 @@ pub(crate) trait StepperVisitor<F: ModelFamily>: Sized {
 }
 
 impl Method {
-    /// Returns a method of a kind whose numbers are zero, except for the first step of adaptive
+    /// Returns a method of a kind whose parameters are zero, except for the first step of adaptive
     /// kinds.
     pub const fn new(kind: MethodKind) -> Self {
         Self {
@@ -126,7 +126,7 @@ impl Method {
         Self { tolerance, ..Self::new(MethodKind::Additive) }
     }
 
-    /// Returns a one-line description of the method with its numbers for a model.
+    /// Returns a one-line description of the method with its parameters for a model.
     pub fn describe(&self, model: ModelKind) -> String {
         let name = self.kind.name();
         let step_ms = 1e3 * self.step_s;

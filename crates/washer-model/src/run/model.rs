@@ -81,8 +81,8 @@ fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
     let mut sum = x[0].lit(0.0);
     for (i, q) in x[..COORDINATES].iter().enumerate() {
         let limit = if i < FIRST_ANGLE { MAX_COORDINATE_M } else { FRAC_PI_2 };
-        let relative = (*q * (1.0 / limit)).v();
-        sum += relative * relative;
+        let relative_coordinate = (*q * (1.0 / limit)).v();
+        sum += relative_coordinate * relative_coordinate;
     }
     sum.0.less(sum.lit(1.0).0)
 }
@@ -222,7 +222,7 @@ pub(crate) struct Linear<T> {
     coupling: Coupling<T>,
     flexure_stiffness: N<T>,
     constants: StepConstants<T>,
-    terms: RotorCoefficients<T>,
+    rotor_coefficients: RotorCoefficients<T>,
     /// The hinge's coordinates q9 and q10 at equilibrium (rad).
     sag: [N<T>; 2],
     outputs: LinearOutputs<T>,
@@ -243,8 +243,13 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     fn forcing(&self, t_s: N<T>) -> LinearForcing<T> {
         let spin = self.spin.at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &spin, self.sag);
-        let rotor =
-            RotorArrays::new(&self.constants, &self.coupling, &self.terms, &spin, hinge_mass);
+        let rotor = RotorArrays::new(
+            &self.constants,
+            &self.coupling,
+            &self.rotor_coefficients,
+            &spin,
+            hinge_mass,
+        );
         LinearForcing { spin, rotor }
     }
 
@@ -252,8 +257,8 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     fn update_forcing(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
         forcing.spin = self.spin.at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &forcing.spin, self.sag);
-        let Self { constants, coupling, terms, .. } = self;
-        forcing.rotor.update(constants, coupling, terms, &forcing.spin, hinge_mass);
+        let Self { constants, coupling, rotor_coefficients, .. } = self;
+        forcing.rotor.update(constants, coupling, rotor_coefficients, &forcing.spin, hinge_mass);
     }
 
     #[inline(always)]
@@ -282,10 +287,10 @@ impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
         g_s: N<T>,
     ) -> [N<T>; STATES] {
         let (q, u) = split_state(x);
-        let Self { constants, terms, flexure_stiffness, .. } = self;
+        let Self { constants, rotor_coefficients, flexure_stiffness, .. } = self;
         step::solve_implicit_stage(
             constants,
-            terms,
+            rotor_coefficients,
             *flexure_stiffness,
             &forcing.spin,
             (&q, &u),
@@ -306,7 +311,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
             coupling,
             flexure_stiffness: zero.lit(point.machine.bodies.flexure_stiffness.0),
             constants: StepConstants::splat(zero, &step_constants(point)),
-            terms: RotorCoefficients::splat(zero, &point.linear.terms),
+            rotor_coefficients: RotorCoefficients::splat(zero, &point.linear.rotor_coefficients),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)).hinge_angles,
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinSegmentLanes::splat(zero, &point.spin_segments[0]),
@@ -317,7 +322,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
         self.flexure_stiffness.set_lane(lane, &point.machine.bodies.flexure_stiffness);
         self.constants.set_lane(lane, &step_constants(point));
         self.sag.set_lane(lane, &Sag::new(&point.equilibrium).hinge_angles);
-        self.terms.set_lane(lane, &point.linear.terms);
+        self.rotor_coefficients.set_lane(lane, &point.linear.rotor_coefficients);
         self.outputs.set_lane(lane, &point.linear_outputs);
     }
 

@@ -3,7 +3,7 @@
 use crate::channel::CHANNELS;
 use crate::coordinates::{STATES, TUB};
 use crate::run::model::tub_samples;
-use crate::run::suspension::forces;
+use crate::run::suspension::compute_forces;
 use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Lane, MAX_LANES, N, Sample};
 use std::sync::Arc;
@@ -39,7 +39,7 @@ impl Snapshot {
             state[q] = position;
             state[COORDINATES + q] = speed;
         }
-        forces(point, model, &state).cabinet_n
+        compute_forces(point, model, &state).cabinet_n
     }
 }
 
@@ -68,8 +68,8 @@ impl<T: Lane> Snapshots<T> {
     /// Begins a point's trajectory in one lane.
     pub(super) fn set_point(&mut self, lane: usize, point: &Point) {
         let instants_s = Arc::clone(&point.instants_s);
-        let recorded = Vec::with_capacity(instants_s.len());
-        self.lanes[lane] = LaneSnapshots { instants_s, snapshots: recorded };
+        let recorded_snapshots = Vec::with_capacity(instants_s.len());
+        self.lanes[lane] = LaneSnapshots { instants_s, snapshots: recorded_snapshots };
     }
 
     /// Removes and returns the snapshots of one lane.
@@ -92,22 +92,23 @@ impl<T: Lane> Snapshots<T> {
             for lane in 0..T::LANES {
                 let end_s = end_s.0.get(lane);
                 let length_s = length_s.0.get(lane);
-                let LaneSnapshots { instants_s, snapshots: recorded } = &mut self.lanes[lane];
-                while let Some(&time_s) = instants_s.get(recorded.len())
-                    && let Some(share) = position_in_step(time_s, end_s, length_s)
+                let LaneSnapshots { instants_s, snapshots: recorded_snapshots } =
+                    &mut self.lanes[lane];
+                while let Some(&time_s) = instants_s.get(recorded_snapshots.len())
+                    && let Some(fraction) = position_in_step(time_s, end_s, length_s)
                 {
                     let mut snapshot =
                         Snapshot { channels: [[0.0; 3]; CHANNELS], tub: [[0.0; 2]; 4] };
                     for i in 0..CHANNELS {
                         let sample =
-                            interpolate(&self.channels[i], &channels[i], lane, length_s, share);
+                            interpolate(&self.channels[i], &channels[i], lane, length_s, fraction);
                         snapshot.channels[i] = [sample.value.0, sample.slope.0, sample.curvature.0];
                     }
                     for i in 0..4 {
-                        let sample = interpolate(&self.tub[i], &tub[i], lane, length_s, share);
+                        let sample = interpolate(&self.tub[i], &tub[i], lane, length_s, fraction);
                         snapshot.tub[i] = [sample.value.0, sample.slope.0];
                     }
-                    recorded.push(snapshot);
+                    recorded_snapshots.push(snapshot);
                 }
             }
         }
@@ -123,14 +124,14 @@ fn interpolate<T: Lane>(
     end: &Sample<T>,
     lane: usize,
     length_s: f64,
-    share: f64,
+    fraction: f64,
 ) -> Sample<f64> {
-    let in_lane = |sample: &Sample<T>| Sample {
+    let to_lane_sample = |sample: &Sample<T>| Sample {
         value: N(sample.value.0.get(lane)),
         slope: N(sample.slope.0.get(lane)),
         curvature: N(sample.curvature.0.get(lane)),
     };
-    Sample::interpolate(&in_lane(start), &in_lane(end), N(length_s), share)
+    Sample::interpolate(&to_lane_sample(start), &to_lane_sample(end), N(length_s), fraction)
 }
 
 #[cfg(test)]
@@ -163,16 +164,17 @@ mod tests {
         let method = Method::rk4(2e-4);
         for model in ModelKind::ALL {
             let all_points: Vec<&Point> = points.iter().collect();
-            let (_, in_lanes) = simulate_with(Simd::best(), model, &method, &all_points, recorders);
-            let (_, single) =
+            let (_, readings_in_lanes) =
+                simulate_with(Simd::best(), model, &method, &all_points, recorders);
+            let (_, single_reading) =
                 simulate_with(Simd::Scalar, model, &method, &all_points[1..2], recorders);
-            assert_eq!(in_lanes[1].snapshots, single[0].snapshots);
+            assert_eq!(readings_in_lanes[1].snapshots, single_reading[0].snapshots);
             let history =
                 history(model, &method, all_points[1], &InitialDeviation::default(), every_s);
             let mut largest_values = [0.0_f64; 3];
             let mut largest_differences = [0.0_f64; 3];
             let yaw_index = Channel::TubYaw.index();
-            for (k, snapshot) in single[0].snapshots.iter().enumerate() {
+            for (k, snapshot) in single_reading[0].snapshots.iter().enumerate() {
                 let expected = history.instant(k).unwrap();
                 let pairs = [
                     (snapshot.channels[yaw_index][0], expected.channels[yaw_index]),
@@ -188,7 +190,7 @@ mod tests {
                 let error_n = (0..3).map(|i| (force[i] - expected[i]).abs()).fold(0.0, f64::max);
                 assert!(error_n < 1e-4, "{error_n} N at {k}");
             }
-            assert_eq!(single[0].snapshots.len(), instants.len());
+            assert_eq!(single_reading[0].snapshots.len(), instants.len());
             let errors = [0, 1, 2].map(|i| largest_differences[i] / largest_values[i]);
             assert!(errors[0] < 1e-9 && errors[1] < 1e-6 && errors[2] < 1e-4, "{errors:?}");
         }

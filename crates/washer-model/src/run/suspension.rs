@@ -54,7 +54,7 @@ impl Forces {
 
 /// Computes the forces at a state: coordinates of the nonlinear model, deviations from equilibrium
 /// of the linear one.
-pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> Forces {
+pub(crate) fn compute_forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> Forces {
     let elements = match model {
         ModelKind::Nonlinear => Cow::Borrowed(&point.machine.elements),
         ModelKind::Linear => Cow::Owned(point.machine.elements.with_viscous_friction()),
@@ -90,7 +90,7 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     }
     for stop in &elements.stops {
         let stop = stop.constant();
-        let force_n = first_order_value(model, stop.force(&tub.point(&stop.tub)));
+        let force_n = first_order_value(model, stop.force(&tub.point_motion(&stop.tub)));
         for k in 0..3 {
             forces.cabinet_n[k] += force_n * stop.direction[k].0.value;
         }
@@ -98,7 +98,7 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     }
     for bushing in &elements.bushings {
         let bushing = bushing.constant();
-        let tub_load = bushing.force(&tub.point(&bushing.tub));
+        let tub_load = bushing.force(&tub.point_motion(&bushing.tub));
         let force = tub_load.map(|force| first_order_value(model, -force));
         for k in 0..3 {
             forces.cabinet_n[k] += force[k];
@@ -162,12 +162,13 @@ pub(crate) fn load_on_cabinet(
         }
     };
     let load = load_on_cabinet_axes(&tub, &elements.load_on_tub(&tub));
-    load.map(|N(first_order)| first_order.value + first_order.slope)
+    load.map(|N(component)| component.value + component.slope)
 }
 
 /// Computes the force of each stop (N) at equilibrium.
 pub fn stops_at_rest_n(point: &Point) -> Vec<f64> {
-    forces(point, ModelKind::Nonlinear, &<Nonlinear<f64> as LaneModel<f64>>::at_rest(point)).stops_n
+    compute_forces(point, ModelKind::Nonlinear, &<Nonlinear<f64> as LaneModel<f64>>::at_rest(point))
+        .stops_n
 }
 
 /// Computes the speed along each damper (m/s) in the linear model, at deviations from equilibrium.
@@ -209,23 +210,23 @@ impl TubState {
         let ends = element.ends();
         let span = dual_span(&self.deviating_coordinates, ends);
         let time_dual_span = dual_span(&self.coordinates_over_time, ends);
-        let rate = self.velocity(dot(&time_dual_span, &time_dual_span).sqrt());
-        let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate };
+        let length_rate = self.time_derivative(dot(&time_dual_span, &time_dual_span).sqrt());
+        let line = CabinetLine { span, length: dot(&span, &span).sqrt(), length_rate };
         (-element.force(&line) - element.optional_force(&line), line)
     }
 
     /// Computes the motion of a tub point.
-    fn point(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
+    fn point_motion(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
         let both_ends = Ends { cabinet: *tub, tub: *tub };
         PointMotion {
             displacement: dual_span(&self.deviating_coordinates, &both_ends),
             velocity: dual_span(&self.coordinates_over_time, &both_ends)
-                .map(|position| self.velocity(position)),
+                .map(|position| self.time_derivative(position)),
         }
     }
 
     /// Returns the time derivative of a number as a dual number of the model's order.
-    fn velocity(&self, time_dual: N<Dual<f64>>) -> N<Dual<f64>> {
+    fn time_derivative(&self, time_dual: N<Dual<f64>>) -> N<Dual<f64>> {
         let rate = time_dual.0.slope;
         N(match self.model {
             ModelKind::Nonlinear => Dual { value: rate, slope: 0.0 },

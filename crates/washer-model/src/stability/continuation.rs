@@ -9,7 +9,7 @@
 //! curve ends at a lower speed, a second curve is continued from a high speed down, and has further
 //! responses.
 
-use super::monodromy::{INSTANTS, StateMatrix};
+use super::monodromy::{INSTANTS_PER_TURN, StateMatrix};
 use super::newton::{
     PeriodMapSearch, factor_fixed_point_equations, factor_matrix, relative_residual,
 };
@@ -22,7 +22,7 @@ use lane_ode::{Lu, N};
 const CURVE_DIMENSION: usize = STATES + 1;
 
 /// The index of the logarithm of the drum's speed in a point of the curve.
-const LOG_SPEED: usize = STATES;
+const LOG_SPEED_INDEX: usize = STATES;
 
 /// The unit of coordinates in a point of the curve (m, rad). Doubling it halves their weight in the
 /// arclength.
@@ -55,17 +55,17 @@ const ALL_INSTANTS_STEP_LENGTH: f64 = 0.5;
 
 /// The factor of a step's length after few corrections. Basis: steps of most curves have the
 /// longest length. Doubling it makes more steps fail.
-const STEP_INCREASE: f64 = 1.6;
+const STEP_INCREASE_FACTOR: f64 = 1.6;
 /// The greatest number of corrections after which the step grows. Basis: a curve that hardly bends
 /// takes four. Doubling it makes all steps longer until they fail.
-const FEW_CORRECTIONS: usize = 4;
+const MAX_CORRECTIONS_TO_GROW: usize = 4;
 
 /// The factor of a step's length after many corrections. Basis: about half the bend of the curve.
 /// Doubling it makes steps longer.
-const STEP_DECREASE: f64 = 0.7;
+const STEP_DECREASE_FACTOR: f64 = 0.7;
 /// The least number of corrections after which the step shrinks. Basis: one more than the number
 /// after which the length does not change. Doubling it shortens no step.
-const MANY_CORRECTIONS: usize = 6;
+const MIN_CORRECTIONS_TO_SHRINK: usize = 6;
 
 /// The greatest number of corrections, after which the step is repeated with half its length.
 /// Basis: a step that converges takes fewer. Doubling it wastes turns.
@@ -119,12 +119,13 @@ const MAX_NODES: usize = 4000;
 /// The number of nodes within which a smooth curve must advance by [`FIRST_STEP_LENGTH`], or it is
 /// lost. Basis: a curve that approaches a singularity of a force, as of a spring that passes its
 /// hook, advances ever more slowly. Doubling it doubles the time until such a curve ends.
-const STALL_NODES: usize = 100;
+const MAX_STALLED_NODES: usize = 100;
 
 /// The magnitude of a coordinate (m, rad) beyond which a curve ends, because no machine moves that
 /// far.
 const MAX_COORDINATE: f64 = 1.0;
 
+/// A point of the curve: the state and the logarithm of the drum's speed, each over its unit.
 type CurvePoint = [f64; CURVE_DIMENSION];
 
 fn dot(a: &CurvePoint, b: &CurvePoint) -> f64 {
@@ -136,8 +137,8 @@ fn normalize(direction: &CurvePoint) -> CurvePoint {
     direction.map(|entry| entry / size)
 }
 
-fn add_scaled(from: &CurvePoint, scale: f64, direction: &CurvePoint) -> CurvePoint {
-    core::array::from_fn(|i| from[i] + scale * direction[i])
+fn add_scaled(origin: &CurvePoint, scale: f64, direction: &CurvePoint) -> CurvePoint {
+    core::array::from_fn(|i| origin[i] + scale * direction[i])
 }
 
 fn component_unit(i: usize) -> f64 {
@@ -146,7 +147,7 @@ fn component_unit(i: usize) -> f64 {
 
 fn to_curve_point(state: &[f64; STATES], speed_rpm: f64) -> CurvePoint {
     core::array::from_fn(|i| {
-        if i == LOG_SPEED {
+        if i == LOG_SPEED_INDEX {
             libm::log(speed_rpm) / LOG_SPEED_UNIT
         } else {
             state[i] / component_unit(i)
@@ -159,7 +160,7 @@ fn to_state(point: &CurvePoint) -> [f64; STATES] {
 }
 
 fn to_speed_rpm(point: &CurvePoint) -> f64 {
-    libm::exp(point[LOG_SPEED] * LOG_SPEED_UNIT)
+    libm::exp(point[LOG_SPEED_INDEX] * LOG_SPEED_UNIT)
 }
 
 /// A computed response on the curve.
@@ -168,11 +169,11 @@ struct Node {
     position: CurvePoint,
     /// The unit tangent in the direction of continuation.
     tangent: CurvePoint,
-    /// Whether the tangent is that of the node itself instead of a nearby point.
+    /// Whether the tangent was computed at the node itself instead of at a nearby point.
     has_own_tangent: bool,
     /// The length of the curve from its beginning to the node.
     arclength: f64,
-    /// The monodromy matrix, of the node itself or of a nearby point.
+    /// The monodromy matrix, at the node itself or at a nearby point.
     monodromy: StateMatrix,
     /// The number of steps of the node's turn, if forces have corners.
     steps: Option<usize>,
@@ -195,7 +196,7 @@ fn interpolate_nodes(a: &Node, b: &Node, share: f64) -> (CurvePoint, CurvePoint)
     (position, slope)
 }
 
-/// Returns the share from 0 to 1 up to which a condition holds, by bisection.
+/// Returns the number from 0 to 1 up to which a condition holds, by bisection.
 fn bisect(is_before: impl Fn(f64) -> bool) -> f64 {
     let mut low = 0.0;
     let mut high = 1.0;
@@ -255,7 +256,7 @@ pub(super) struct Guess {
 
 impl Guess {
     /// Whether the guess is on one of the two curves.
-    pub(super) fn is_followed(&self) -> bool {
+    pub(super) fn is_on_either_curve(&self) -> bool {
         self.is_on_curve || self.factors.is_some()
     }
 }
@@ -304,7 +305,7 @@ impl<'a> ResponseCurve<'a> {
         self.end_rpm = end_rpm;
         self.goes_down = end_rpm < speed_rpm;
         let mut normal = [0.0; CURVE_DIMENSION];
-        normal[LOG_SPEED] = if self.goes_down { -1.0 } else { 1.0 };
+        normal[LOG_SPEED_INDEX] = if self.goes_down { -1.0 } else { 1.0 };
         self.start_correction(to_curve_point(start, speed_rpm), normal);
     }
 
@@ -321,23 +322,24 @@ impl<'a> ResponseCurve<'a> {
             true => [self.end_rpm.next_up(), first_rpm.next_up()],
             false => [first_rpm, self.end_rpm],
         };
-        let is_within = (low_rpm..high_rpm).contains(&last_rpm);
-        let stalls = |previous: &Node| last.arclength - previous.arclength < FIRST_STEP_LENGTH;
-        let is_stalled = node_count > STALL_NODES
-            && stalls(&self.nodes[node_count - STALL_NODES])
+        let is_within_range = (low_rpm..high_rpm).contains(&last_rpm);
+        let is_stalled_since =
+            |previous: &Node| last.arclength - previous.arclength < FIRST_STEP_LENGTH;
+        let is_stalled = node_count > MAX_STALLED_NODES
+            && is_stalled_since(&self.nodes[node_count - MAX_STALLED_NODES])
             && !self.settings.point.machine.elements.has_nonsmooth_force();
-        if !is_within || is_out_of_range || is_stalled || node_count >= MAX_NODES {
+        if !is_within_range || is_out_of_range || is_stalled || node_count >= MAX_NODES {
             return;
         }
         if self.step_length < MIN_STEP_LENGTH {
             // A curve has stairs if the steps of a turn are longer than the width of corners, and
             // jumps if the number of steps changes with the speed. Shorter steps of a turn may
             // allow the continuation to proceed.
-            let kept_arclength = last.arclength - FIRST_STEP_LENGTH;
+            let max_kept_arclength = last.arclength - FIRST_STEP_LENGTH;
             if !self.goes_down && self.settings.refine_continuation() {
-                let kept_nodes =
-                    self.nodes.partition_point(|node| node.arclength < kept_arclength).max(1);
-                self.nodes.truncate(kept_nodes);
+                let kept_node_count =
+                    self.nodes.partition_point(|node| node.arclength < max_kept_arclength).max(1);
+                self.nodes.truncate(kept_node_count);
                 self.step_length = FIRST_STEP_LENGTH;
                 self.recompute_last_node();
             }
@@ -409,9 +411,9 @@ impl<'a> ResponseCurve<'a> {
             }
             let derivative =
                 (faster_turn.end[i] - turn.end[i]) / libm::log1p(RELATIVE_SPEED_DIFFERENCE);
-            matrix[i][LOG_SPEED] = N(derivative * LOG_SPEED_UNIT / component_unit(i));
+            matrix[i][LOG_SPEED_INDEX] = N(derivative * LOG_SPEED_UNIT / component_unit(i));
         }
-        matrix[LOG_SPEED] = step.normal.map(N);
+        matrix[LOG_SPEED_INDEX] = step.normal.map(N);
         let Some(factors) = factor_matrix(&matrix) else { return self.reject_step() };
         let jacobian = Box::new(CurveJacobian { monodromy, factors });
         self.correct_position(
@@ -426,14 +428,15 @@ impl<'a> ResponseCurve<'a> {
         let speed_rpm = to_speed_rpm(&self.position);
         let residual =
             relative_residual(self.settings.point, speed_rpm, &to_state(&self.position), end);
-        let is_slow = step.corrections > 1 && residual > MAX_RESIDUAL_RATIO * step.residual;
+        let converges_slowly =
+            step.corrections > 1 && residual > MAX_RESIDUAL_RATIO * step.residual;
         if !residual.is_finite()
             || step.corrections == MAX_CORRECTIONS
-            || is_slow && step.corrections_since_jacobian == 0
+            || converges_slowly && step.corrections_since_jacobian == 0
         {
             return self.reject_step();
         }
-        if is_slow {
+        if converges_slowly {
             // The Jacobian of a distant point no longer reduces the residual.
             step.residual = f64::INFINITY;
             step.jacobian = None;
@@ -446,7 +449,7 @@ impl<'a> ResponseCurve<'a> {
             gap[i] = N(self.position[i] - end[i]);
         }
         let offset: CurvePoint = core::array::from_fn(|i| step.predicted[i] - self.position[i]);
-        gap[LOG_SPEED] = N(dot(&step.normal, &offset));
+        gap[LOG_SPEED_INDEX] = N(dot(&step.normal, &offset));
         let correction = jacobian.factors.solve(&gap);
         self.position = core::array::from_fn(|i| self.position[i] + correction[i].0);
         let offset: CurvePoint = core::array::from_fn(|i| self.position[i] - step.predicted[i]);
@@ -480,15 +483,15 @@ impl<'a> ResponseCurve<'a> {
     fn accept_step(&mut self, step: CorrectorStep) {
         let Some(jacobian) = step.jacobian else { return self.reject_step() };
         let mut right_hand_side = [N(0.0); CURVE_DIMENSION];
-        right_hand_side[LOG_SPEED] = N(1.0);
+        right_hand_side[LOG_SPEED_INDEX] = N(1.0);
         let tangent = jacobian.factors.solve(&right_hand_side).map(|entry| entry.0);
         let tangent = normalize(&tangent);
         let previous = match self.fold_bracket {
             Some(bracket) => self.nodes.get(bracket.first_node),
             None => self.nodes.last(),
         };
-        let distance = |from: &CurvePoint| {
-            let difference: CurvePoint = core::array::from_fn(|i| self.position[i] - from[i]);
+        let distance = |origin: &CurvePoint| {
+            let difference: CurvePoint = core::array::from_fn(|i| self.position[i] - origin[i]);
             dot(&difference, &difference).sqrt()
         };
         let correction = distance(&step.predicted);
@@ -511,7 +514,7 @@ impl<'a> ResponseCurve<'a> {
             arclength = previous.arclength + chord;
             // Close to a fold the sign of the tangent's speed is uncertain. The number of folds
             // gives the direction, so that two close folds are not merged.
-            turns_back = self.is_rising() == (tangent[LOG_SPEED] < 0.0);
+            turns_back = self.is_rising() == (tangent[LOG_SPEED_INDEX] < 0.0);
         }
         let has_own_tangent = correction < MAX_OWN_TANGENT_DISTANCE && self.uses_all_instants;
         let monodromy = jacobian.monodromy;
@@ -527,14 +530,14 @@ impl<'a> ResponseCurve<'a> {
             return self.narrow_fold_bracket(node, bracket);
         }
         self.nodes.push(node);
-        if step.corrections <= FEW_CORRECTIONS {
-            self.scale_step(STEP_INCREASE);
-        } else if step.corrections >= MANY_CORRECTIONS {
-            self.scale_step(STEP_DECREASE);
+        if step.corrections <= MAX_CORRECTIONS_TO_GROW {
+            self.scale_step(STEP_INCREASE_FACTOR);
+        } else if step.corrections >= MIN_CORRECTIONS_TO_SHRINK {
+            self.scale_step(STEP_DECREASE_FACTOR);
         }
         if turns_back {
             let first_node = self.nodes.len() - 2;
-            if self.nodes[first_node].tangent[LOG_SPEED] * tangent[LOG_SPEED] < 0.0 {
+            if self.nodes[first_node].tangent[LOG_SPEED_INDEX] * tangent[LOG_SPEED_INDEX] < 0.0 {
                 self.interpolate_fold(FoldBracket {
                     first_node,
                     iterations_left: MAX_FOLD_ITERATIONS,
@@ -554,11 +557,11 @@ impl<'a> ResponseCurve<'a> {
     fn narrow_fold_bracket(&mut self, node: Node, bracket: FoldBracket) {
         let FoldBracket { first_node, iterations_left } = bracket;
         let [before, after] = [&self.nodes[first_node], &self.nodes[first_node + 1]];
-        let curvature = (after.tangent[LOG_SPEED] - before.tangent[LOG_SPEED])
+        let curvature = (after.tangent[LOG_SPEED_INDEX] - before.tangent[LOG_SPEED_INDEX])
             / (after.arclength - before.arclength);
-        let slope = node.tangent[LOG_SPEED];
+        let slope = node.tangent[LOG_SPEED_INDEX];
         let error = 0.5 * slope * slope / curvature.abs() * LOG_SPEED_UNIT;
-        let is_before = before.tangent[LOG_SPEED] * slope > 0.0;
+        let is_before = before.tangent[LOG_SPEED_INDEX] * slope > 0.0;
         self.nodes.insert(first_node + 1, node);
         if iterations_left == 0 {
             if let Some(fold) = self.fold_nodes.last_mut().filter(|fold| **fold > first_node) {
@@ -578,11 +581,12 @@ impl<'a> ResponseCurve<'a> {
     fn add_nodes_at_fold(&mut self) {
         self.fold_bracket = None;
         let Some(&fold) = self.fold_nodes.last() else { return self.predict_next() };
-        let is_long = |first_node: usize| {
+        let is_long_interval = |first_node: usize| {
             let pair = self.nodes.get(first_node).zip(self.nodes.get(first_node + 1));
             pair.is_some_and(|(a, b)| b.arclength - a.arclength > MAX_NODE_DISTANCE_AT_FOLD)
         };
-        let Some(first_node) = [fold - 1, fold].into_iter().find(|&first_node| is_long(first_node))
+        let Some(first_node) =
+            [fold - 1, fold].into_iter().find(|&first_node| is_long_interval(first_node))
         else {
             return self.predict_next();
         };
@@ -596,9 +600,9 @@ impl<'a> ResponseCurve<'a> {
     fn interpolate_fold(&mut self, bracket: FoldBracket) {
         let [before, after] =
             [&self.nodes[bracket.first_node], &self.nodes[bracket.first_node + 1]];
-        let is_rising = before.tangent[LOG_SPEED] > 0.0;
+        let is_rising = before.tangent[LOG_SPEED_INDEX] > 0.0;
         let fraction = bisect(|fraction| {
-            (interpolate_nodes(before, after, fraction).1[LOG_SPEED] > 0.0) == is_rising
+            (interpolate_nodes(before, after, fraction).1[LOG_SPEED_INDEX] > 0.0) == is_rising
         });
         let (position, slope) = interpolate_nodes(before, after, fraction);
         self.start_correction(position, normalize(&slope));
@@ -609,19 +613,19 @@ impl<'a> ResponseCurve<'a> {
     /// in speed first, as long as their difference times the number of steps of a turn is below
     /// [`SPURIOUS_FOLD_TOLERANCE`]. The number of steps is that of the pair's own nodes, because
     /// later parts of the curve may have shorter steps.
-    fn true_folds(&self) -> Vec<usize> {
+    fn genuine_folds(&self) -> Vec<usize> {
         let mut folds = self.fold_nodes.clone();
         let difference_in_steps = |pair: &[usize]| {
             let [first, second] = [&self.nodes[pair[0]], &self.nodes[pair[1]]];
             let steps = first.steps.min(second.steps)?;
-            let log_speeds = first.position[LOG_SPEED] - second.position[LOG_SPEED];
+            let log_speeds = first.position[LOG_SPEED_INDEX] - second.position[LOG_SPEED_INDEX];
             Some((log_speeds * LOG_SPEED_UNIT).abs() * steps as f64)
         };
         loop {
             let pairs = folds.windows(2).map(difference_in_steps).enumerate();
             let differences = pairs.filter_map(|(pair, steps)| Some((pair, steps?)));
-            let nearest = differences.min_by(|a, b| a.1.total_cmp(&b.1));
-            match nearest {
+            let nearest_pair = differences.min_by(|a, b| a.1.total_cmp(&b.1));
+            match nearest_pair {
                 Some((pair, difference)) if difference < SPURIOUS_FOLD_TOLERANCE => {
                     folds.drain(pair..pair + 2);
                 }
@@ -640,40 +644,43 @@ impl<'a> ResponseCurve<'a> {
 
     /// Returns the number of folds.
     pub(super) fn fold_count(&self) -> u32 {
-        self.true_folds().len() as u32
+        self.genuine_folds().len() as u32
     }
 
     /// Returns the guesses of all responses of the curve at a speed (rpm), in the curve's order.
     pub(super) fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
-        let is_past = |node: &Node| {
+        let is_past_overshoot = |node: &Node| {
             !self.goes_down && to_speed_rpm(&node.position) >= OVERSHOOT_RATIO * speed_rpm
         };
-        let end = self.nodes.iter().position(is_past);
+        let end = self.nodes.iter().position(is_past_overshoot);
         let nodes = &self.nodes[..end.map_or(self.nodes.len(), |end| end + 1)];
-        let target = libm::log(speed_rpm) / LOG_SPEED_UNIT;
-        let folds = self.true_folds();
+        let target_log_speed = libm::log(speed_rpm) / LOG_SPEED_UNIT;
+        let folds = self.genuine_folds();
         let mut guesses = Vec::new();
         for (k, pair) in nodes.windows(2).enumerate() {
             let [a, b] = pair else { continue };
-            let [from, to] = [a.position[LOG_SPEED], b.position[LOG_SPEED]];
-            let is_rising = to > from;
+            let [from_log_speed, to_log_speed] =
+                [a.position[LOG_SPEED_INDEX], b.position[LOG_SPEED_INDEX]];
+            let is_rising = to_log_speed > from_log_speed;
             // A node at exactly the requested speed counts once.
-            let is_within = if is_rising {
-                (from < target || k == 0 && from == target) && target <= to
+            let contains_target = if is_rising {
+                (from_log_speed < target_log_speed || k == 0 && from_log_speed == target_log_speed)
+                    && target_log_speed <= to_log_speed
             } else {
-                to <= target && target < from
+                to_log_speed <= target_log_speed && target_log_speed < from_log_speed
             };
-            if !is_within {
+            if !contains_target {
                 continue;
             }
             let fraction = bisect(|fraction| {
-                (interpolate_nodes(a, b, fraction).0[LOG_SPEED] < target) == is_rising
+                (interpolate_nodes(a, b, fraction).0[LOG_SPEED_INDEX] < target_log_speed)
+                    == is_rising
             });
-            let interpolated = |i: usize, j: usize| {
+            let interpolate_entry = |i: usize, j: usize| {
                 (1.0 - fraction) * a.monodromy[i][j].0 + fraction * b.monodromy[i][j].0
             };
             let monodromy =
-                core::array::from_fn(|i| core::array::from_fn(|j| N(interpolated(i, j))));
+                core::array::from_fn(|i| core::array::from_fn(|j| N(interpolate_entry(i, j))));
             let branch = folds.iter().filter(|&&fold| fold <= k).count();
             let fold = |number: usize| {
                 let node = *folds.get(number)?;
@@ -705,7 +712,7 @@ impl<'a> PeriodMapSearch<'a> for ResponseCurve<'a> {
             return Vec::new();
         };
         if self.uses_all_instants {
-            setup.instants = setup.instants.max(INSTANTS);
+            setup.instants = setup.instants.max(INSTANTS_PER_TURN);
         }
         let start = to_state(&self.position);
         let mut requests = vec![TurnRequest { setup, start, is_recorded }];
@@ -807,13 +814,27 @@ mod tests {
         speeds_rpm.extend([0.0, -0.2, 0.4, -0.4, 0.0].map(stair_rpm));
         speeds_rpm.extend([171.0, 260.0]);
         let guesses = curve(&point, &speeds_rpm, &[1, 2, 3, 4, 5, 6]).guesses(190.0);
-        let [back, on] = &guesses[..] else { panic!("{} guesses", guesses.len()) };
-        assert_eq!([back.branch, on.branch], [1, 2]);
+        let [backward_guess, forward_guess] = &guesses[..] else {
+            panic!("{} guesses", guesses.len())
+        };
+        assert_eq!([backward_guess.branch, forward_guess.branch], [1, 2]);
         let is_at = |end_rpm: Option<f64>, rpm: f64| (end_rpm.unwrap() - rpm).abs() < 1e-9;
-        assert!(is_at(back.fold_speeds_rpm[0], 171.0), "{:?}", back.fold_speeds_rpm);
-        assert!(is_at(back.fold_speeds_rpm[1], stair_rpm(0.4)), "{:?}", back.fold_speeds_rpm);
-        assert!(is_at(on.fold_speeds_rpm[0], 171.0), "{:?}", on.fold_speeds_rpm);
-        assert_eq!(on.fold_speeds_rpm[1], None);
+        assert!(
+            is_at(backward_guess.fold_speeds_rpm[0], 171.0),
+            "{:?}",
+            backward_guess.fold_speeds_rpm
+        );
+        assert!(
+            is_at(backward_guess.fold_speeds_rpm[1], stair_rpm(0.4)),
+            "{:?}",
+            backward_guess.fold_speeds_rpm
+        );
+        assert!(
+            is_at(forward_guess.fold_speeds_rpm[0], 171.0),
+            "{:?}",
+            forward_guess.fold_speeds_rpm
+        );
+        assert_eq!(forward_guess.fold_speeds_rpm[1], None);
     }
 
     #[test]
@@ -830,7 +851,7 @@ mod tests {
         let point = point(false);
         let mut curve = curve(&point, &[220.0, 230.0], &[1]);
         let mut upward = [0.0; CURVE_DIMENSION];
-        upward[LOG_SPEED] = 1.0;
+        upward[LOG_SPEED_INDEX] = 1.0;
         for node in &mut curve.nodes {
             node.tangent = upward;
         }

@@ -1,8 +1,9 @@
 //! The effect of forces with corners on disturbances.
 //!
-//! A force F along a motion of the tub adds the response r F to the accelerations. Its derivative
-//! is r dF + F dr. F and dF change abruptly, within a step. The response r, dr and the dependence
-//! of the motion on the tub's coordinates are smooth over a turn.
+//! A force F along a motion of the tub adds r F to the accelerations, where r is the vector of
+//! accelerations per unit of force. The derivative of this term is r dF + F dr. F and dF change
+//! abruptly, within a step. The vector r, its derivative dr, and the dependence of the motion on
+//! the tub's coordinates are smooth over a turn.
 
 use crate::coordinates::{COORDINATES, ROTOR_ROTATIONS, STATES, TUB};
 use crate::lanes::lane_struct;
@@ -14,8 +15,8 @@ use lane_ode::{Dual, Lane, N, OutOfLine};
 /// The derivative of every acceleration by each coordinate, then by each speed.
 pub(super) type AccelerationDerivatives = [[N<f64>; STATES]; COORDINATES];
 
-/// The coordinates on which responses depend; those of the tub come first.
-const RESPONSE_COORDINATES: [usize; TUB.len() + ROTOR_ROTATIONS.len()] = {
+/// The coordinates on which accelerations per unit of force depend; those of the tub come first.
+const LOAD_RESPONSE_COORDINATES: [usize; TUB.len() + ROTOR_ROTATIONS.len()] = {
     let [a, b, c, d] = TUB;
     let [e, f, g, h] = ROTOR_ROTATIONS;
     [a, b, c, d, e, f, g, h]
@@ -27,13 +28,13 @@ lane_struct! {
     CornerMotion {
         /// The derivatives of the motion's speed by the tub's speeds, which equal those of its
         /// depth by the tub's coordinates.
-        by_speed: [N<T>; TUB.len()],
+        speed_per_tub_speed: [N<T>; TUB.len()],
         /// The derivatives of the motion's speed by the tub's coordinates.
-        by_coordinate: [N<T>; TUB.len()],
+        speed_per_coordinate: [N<T>; TUB.len()],
         /// The accelerations that a unit of force along the motion causes.
-        response: [N<T>; COORDINATES],
-        /// The derivatives of the response by [`RESPONSE_COORDINATES`].
-        response_derivative: [[N<T>; RESPONSE_COORDINATES.len()]; COORDINATES],
+        acceleration_per_force: [N<T>; COORDINATES],
+        /// The derivatives of `acceleration_per_force` by [`LOAD_RESPONSE_COORDINATES`].
+        acceleration_per_force_derivative: [[N<T>; LOAD_RESPONSE_COORDINATES.len()]; COORDINATES],
     }
 }
 
@@ -42,10 +43,11 @@ impl<T: Lane> CornerMotion<T> {
     pub(super) fn zero(zero: N<T>) -> Self {
         let zeros = [zero; TUB.len()];
         Self {
-            by_speed: zeros,
-            by_coordinate: zeros,
-            response: [zero; COORDINATES],
-            response_derivative: [[zero; RESPONSE_COORDINATES.len()]; COORDINATES],
+            speed_per_tub_speed: zeros,
+            speed_per_coordinate: zeros,
+            acceleration_per_force: [zero; COORDINATES],
+            acceleration_per_force_derivative: [[zero; LOAD_RESPONSE_COORDINATES.len()];
+                COORDINATES],
         }
     }
 }
@@ -69,13 +71,13 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
             state[i] = x[i].constant();
         }
         let mut corners = vec![CornerMotion::zero(zero); model.corner_motions(&state).len()];
-        for direction in 0..RESPONSE_COORDINATES.len() {
-            state[RESPONSE_COORDINATES[direction]].0.slope = zero.lit(1.0).0;
+        for direction in 0..LOAD_RESPONSE_COORDINATES.len() {
+            state[LOAD_RESPONSE_COORDINATES[direction]].0.slope = zero.lit(1.0).0;
             let motions = model.corner_motions(&state);
-            let by_load = model.accelerations_per_load(spin, &state);
+            let accelerations_per_load = model.accelerations_per_load(spin, &state);
             if direction < TUB.len() {
                 for m in 0..corners.len() {
-                    corners[m].by_coordinate[direction] = N(motions[m][1].0.slope);
+                    corners[m].speed_per_coordinate[direction] = N(motions[m][1].0.slope);
                 }
             }
             // A force loads a coordinate by the derivative of the motion's speed by that
@@ -90,17 +92,17 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
                 for m in 0..corners.len() {
                     let corner = &mut corners[m];
                     let speed = speeds[m][1];
-                    corner.by_speed[k] = N(speed.0.value);
+                    corner.speed_per_tub_speed[k] = N(speed.0.value);
                     for i in 0..COORDINATES {
-                        let Dual { value, slope } = (speed * by_load[k][i]).v().0;
-                        corner.response_derivative[i][direction] += N(slope);
+                        let Dual { value, slope } = (speed * accelerations_per_load[k][i]).v().0;
+                        corner.acceleration_per_force_derivative[i][direction] += N(slope);
                         if direction == 0 {
-                            corner.response[i] += N(value);
+                            corner.acceleration_per_force[i] += N(value);
                         }
                     }
                 }
             }
-            state[RESPONSE_COORDINATES[direction]].0.slope = zero.0;
+            state[LOAD_RESPONSE_COORDINATES[direction]].0.slope = zero.0;
         }
         corners
     }
@@ -109,41 +111,44 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
 impl CornerMotion<f64> {
     /// Adds another motion times a factor.
     #[inline(always)]
-    pub(super) fn add(&mut self, other: &Self, factor: f64) {
+    pub(super) fn add_scaled(&mut self, other: &Self, factor: f64) {
         let factor = N(factor);
         for k in 0..TUB.len() {
-            self.by_speed[k] += factor * other.by_speed[k];
-            self.by_coordinate[k] += factor * other.by_coordinate[k];
+            self.speed_per_tub_speed[k] += factor * other.speed_per_tub_speed[k];
+            self.speed_per_coordinate[k] += factor * other.speed_per_coordinate[k];
         }
         for i in 0..COORDINATES {
-            self.response[i] += factor * other.response[i];
-            for k in 0..RESPONSE_COORDINATES.len() {
-                self.response_derivative[i][k] += factor * other.response_derivative[i][k];
+            self.acceleration_per_force[i] += factor * other.acceleration_per_force[i];
+            for k in 0..LOAD_RESPONSE_COORDINATES.len() {
+                self.acceleration_per_force_derivative[i][k] +=
+                    factor * other.acceleration_per_force_derivative[i][k];
             }
         }
     }
 
     /// Adds the derivatives of the accelerations due to a force along the motion, times a factor.
     #[inline(always)]
-    pub(super) fn apply(
+    pub(super) fn add_force_derivatives(
         &self,
         force: &CornerForce<f64>,
         factor: f64,
         derivatives: &mut AccelerationDerivatives,
     ) {
         for i in 0..COORDINATES {
-            for k in 0..RESPONSE_COORDINATES.len() {
-                derivatives[i][RESPONSE_COORDINATES[k]] +=
-                    (force.force * self.response_derivative[i][k]).v() * factor;
+            for k in 0..LOAD_RESPONSE_COORDINATES.len() {
+                derivatives[i][LOAD_RESPONSE_COORDINATES[k]] +=
+                    (force.force * self.acceleration_per_force_derivative[i][k]).v() * factor;
             }
         }
         for k in 0..TUB.len() {
-            let by_speed = (force.by_speed * self.by_speed[k]).v();
-            let by_coordinate =
-                force.by_depth * self.by_speed[k] + force.by_speed * self.by_coordinate[k];
+            let speed_per_tub_speed = (force.force_per_speed * self.speed_per_tub_speed[k]).v();
+            let speed_per_coordinate = force.force_per_depth * self.speed_per_tub_speed[k]
+                + force.force_per_speed * self.speed_per_coordinate[k];
             for i in 0..COORDINATES {
-                derivatives[i][TUB[k]] += (self.response[i] * by_coordinate).v() * factor;
-                derivatives[i][COORDINATES + TUB[k]] += (self.response[i] * by_speed).v() * factor;
+                derivatives[i][TUB[k]] +=
+                    (self.acceleration_per_force[i] * speed_per_coordinate).v() * factor;
+                derivatives[i][COORDINATES + TUB[k]] +=
+                    (self.acceleration_per_force[i] * speed_per_tub_speed).v() * factor;
             }
         }
     }

@@ -74,7 +74,7 @@ pub fn follow_crossings(
         };
         let [from_s, to_s] = crossing.interval_s;
         effects.push(integrate_to(from_s).and_then(|entry_state| {
-            let exit = integrate_to(to_s)?;
+            let exit_state = integrate_to(to_s)?;
             let tangent_map = Simd::dispatch_narrow(TangentMap {
                 point,
                 step_s,
@@ -86,13 +86,13 @@ pub fn follow_crossings(
                 let response = crossing.responses[index]?;
                 let time_s = crossing.interval_s[index];
                 let response_state =
-                    response_at(point, step_s, response, crossing.is_backward, time_s);
+                    response_state_at(point, step_s, response, crossing.is_backward, time_s);
                 let difference = core::array::from_fn(|i| state[i] - response_state[i]);
                 Some(norms[index].energy_j(&difference))
             };
             Ok(CrossingEffect {
                 amplification: amplification(&norms, &tangent_map),
-                departure_j: [departure(0, &entry_state), departure(1, &exit)],
+                departure_j: [departure(0, &entry_state), departure(1, &exit_state)],
             })
         }));
     }
@@ -116,19 +116,19 @@ pub fn peaks_without_departures(
     let mut time_s = 0.0;
     let mut peaks = [0.0_f64; CHANNELS];
     let mut integrate_to = |to_s: f64, state: &mut [f64; STATES]| {
-        // The run is divided at the edges of the window.
-        for edge_s in [window_s[0].min(to_s), window_s[1].min(to_s), to_s] {
-            if edge_s > time_s {
-                let result = integrate(point, step_s, [time_s, edge_s], state);
+        // The run is divided at the ends of the window.
+        for part_end_s in [window_s[0].min(to_s), window_s[1].min(to_s), to_s] {
+            if part_end_s > time_s {
+                let result = integrate(point, step_s, [time_s, part_end_s], state);
                 if let Some(failure) = result.failure {
                     return Err(failure);
                 }
-                if time_s >= window_s[0] && edge_s <= window_s[1] {
-                    for (peak, largest_deviation) in peaks.iter_mut().zip(result.peaks) {
-                        *peak = peak.max(largest_deviation);
+                if time_s >= window_s[0] && part_end_s <= window_s[1] {
+                    for (peak, step_peak) in peaks.iter_mut().zip(result.peaks) {
+                        *peak = peak.max(step_peak);
                     }
                 }
-                (time_s, *state) = (edge_s, result.end);
+                (time_s, *state) = (part_end_s, result.end);
             }
         }
         Ok(())
@@ -140,7 +140,7 @@ pub fn peaks_without_departures(
         }
         integrate_to(from_s, &mut state)?;
         if let Some(response) = crossing.responses[0] {
-            state = response_at(point, step_s, response, crossing.is_backward, from_s);
+            state = response_state_at(point, step_s, response, crossing.is_backward, from_s);
         }
     }
     integrate_to(window_s[1], &mut state)?;
@@ -184,10 +184,10 @@ fn step_sequences(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<S
     let kinks = point.spin_segments.iter().map(|spin_segment| spin_segment.start_s.0);
     let inner_kinks = kinks.filter(|&kink_s| kink_s > from_s && kink_s < to_s);
     let mut start_s = from_s;
-    let mut segments = Vec::new();
+    let mut sequences = Vec::new();
     for end_s in inner_kinks.chain([to_s]) {
         let steps = ((end_s - start_s) / step_s).ceil().max(1.0);
-        segments.push(StepSequence {
+        sequences.push(StepSequence {
             spin: point.spin_segments[segment_index(&point.spin_segments, start_s)],
             start_s,
             step_s: (end_s - start_s) / steps,
@@ -195,7 +195,7 @@ fn step_sequences(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<S
         });
         start_s = end_s;
     }
-    segments
+    sequences
 }
 
 /// The result of a run over an interval of time.
@@ -206,18 +206,18 @@ struct RunResult {
     failure: Option<LeftRangeError>,
 }
 
-fn integrate(point: &Point, step_s: f64, from_to_s: [f64; 2], start: &[f64; STATES]) -> RunResult {
-    let segments = step_sequences(point, step_s, from_to_s);
-    Simd::one_lane(SegmentRun { point, segments: &segments, start })
+fn integrate(point: &Point, step_s: f64, interval_s: [f64; 2], start: &[f64; STATES]) -> RunResult {
+    let sequences = step_sequences(point, step_s, interval_s);
+    Simd::one_lane(SequenceIntegration { point, sequences: &sequences, start })
 }
 
-struct SegmentRun<'a> {
+struct SequenceIntegration<'a> {
     point: &'a Point,
-    segments: &'a [StepSequence],
+    sequences: &'a [StepSequence],
     start: &'a [f64; STATES],
 }
 
-impl OutOfLine for SegmentRun<'_> {
+impl OutOfLine for SequenceIntegration<'_> {
     type Output = RunResult;
 
     #[inline(always)]
@@ -230,13 +230,13 @@ impl OutOfLine for SegmentRun<'_> {
         }
         let mut peaks = [0.0_f64; CHANNELS];
         let mut failure = None;
-        'run: for segment in self.segments {
-            model.set_spin(0, &segment.spin);
-            for k in 0..segment.steps {
-                let forcings = segment.forcings(zero, &model, k);
-                integrate_step(&model, N(segment.step_s), &forcings, &mut x);
+        'run: for sequence in self.sequences {
+            model.set_spin(0, &sequence.spin);
+            for k in 0..sequence.steps {
+                let forcings = sequence.forcings(zero, &model, k);
+                integrate_step(&model, N(sequence.step_s), &forcings, &mut x);
                 if !model.in_range(&x) {
-                    failure = Some(LeftRangeError { time_s: segment.time_s(k as f64 + 1.0) });
+                    failure = Some(LeftRangeError { time_s: sequence.time_s(k as f64 + 1.0) });
                     break 'run;
                 }
                 if let (_, Some(channels)) = model.observe(&forcings[2], &x, &[zero; STATES], true)
@@ -270,7 +270,7 @@ impl Kernel for TangentMap<'_> {
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let zero = N(zero).constant();
-        let segments = step_sequences(self.point, self.step_s, self.crossing.interval_s);
+        let sequences = step_sequences(self.point, self.step_s, self.crossing.interval_s);
         let mut model: Nonlinear<lane_ode::Dual<T>> =
             LaneModel::splat(zero, self.point, Coupling::Springs);
         let mut columns = Vec::with_capacity(STATES);
@@ -285,13 +285,13 @@ impl Kernel for TangentMap<'_> {
                 let column = (first + lane).min(STATES - 1);
                 x[column].0.slope.set(lane, 1.0);
             }
-            for segment in &segments {
+            for sequence in &sequences {
                 for lane in 0..T::LANES {
-                    model.set_spin(lane, &segment.spin);
+                    model.set_spin(lane, &sequence.spin);
                 }
-                for k in 0..segment.steps {
-                    let forcings = segment.forcings(zero, &model, k);
-                    integrate_step(&model, zero.lit(segment.step_s), &forcings, &mut x);
+                for k in 0..sequence.steps {
+                    let forcings = sequence.forcings(zero, &model, k);
+                    integrate_step(&model, zero.lit(sequence.step_s), &forcings, &mut x);
                 }
             }
             for lane in 0..T::LANES.min(STATES - first) {
@@ -307,7 +307,7 @@ impl Kernel for TangentMap<'_> {
 }
 
 /// Returns the state of a periodic response at the drum's angle at a time.
-fn response_at(
+fn response_state_at(
     point: &Point,
     step_s: f64,
     response: &Response,
@@ -325,13 +325,13 @@ fn response_at(
         return start;
     }
     let steps = (end_s / step_s).ceil().max(1.0);
-    let segment = StepSequence {
+    let sequence = StepSequence {
         spin: SpinSegment::steady(direction * response.speed_rpm),
         start_s: 0.0,
         step_s: end_s / steps,
         steps: steps as usize,
     };
-    Simd::one_lane(SegmentRun { point, segments: &[segment], start: &start }).end
+    Simd::one_lane(SequenceIntegration { point, sequences: &[sequence], start: &start }).end
 }
 
 /// Returns the drum's angle (rad) at a time, from -pi to pi.
@@ -340,16 +340,17 @@ fn theta_rad(point: &Point, time_s: f64) -> f64 {
     libm::atan2(spin.sin.0, spin.cos.0)
 }
 
-/// The energy norm of disturbances at the drum's angle at a time. It has the Cholesky factor L of
-/// twice the energy's matrix; `None` if the matrix is not positive definite.
+/// The energy norm of disturbances at the drum's angle at a time.
 struct EnergyNorm {
+    /// The Cholesky factor L of the matrix of twice the energy; `None` if the matrix is not
+    /// positive definite.
     cholesky_factor: Option<Mat<f64>>,
 }
 
 impl EnergyNorm {
     fn new(point: &Point, time_s: f64) -> Self {
         let matrices = point.matrices(theta_rad(point, time_s), 0.0, 0.0);
-        let doubled_energy = Mat::from_fn(STATES, STATES, |i, j| {
+        let doubled_energy_matrix = Mat::from_fn(STATES, STATES, |i, j| {
             let block_i = i / COORDINATES;
             let block_j = j / COORDINATES;
             let i = i % COORDINATES;
@@ -361,7 +362,7 @@ impl EnergyNorm {
             }
         });
         let cholesky_factor =
-            doubled_energy.llt(Side::Lower).ok().map(|factors| factors.L().to_owned());
+            doubled_energy_matrix.llt(Side::Lower).ok().map(|factors| factors.L().to_owned());
         Self { cholesky_factor }
     }
 

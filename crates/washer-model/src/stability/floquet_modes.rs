@@ -1,7 +1,7 @@
 //! The Floquet modes of the linear model, which is periodic in theta: its Floquet exponents are the
 //! exact frequencies and dampings, whereas modal analysis freezes theta.
 
-use super::monodromy::{INSTANTS, StateMatrix, scale_speeds};
+use super::monodromy::{INSTANTS_PER_TURN, StateMatrix, scale_speeds};
 use super::participation::modal_energies;
 use super::period_map::{TurnSetup, lane_model};
 use super::turn::{NoObserver, StepGrid, integrate_turn};
@@ -69,25 +69,25 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
         point,
         speed_rpm,
         steps: steps as usize,
-        instants: INSTANTS,
+        instants: INSTANTS_PER_TURN,
         caps: None,
         corner_width_m: 0.0,
     };
     let unit_per_s = setup.unit_per_s();
-    let matrix = scale_speeds(&Simd::dispatch_narrow(LinearTurn(setup)), unit_per_s);
+    let matrix = scale_speeds(&Simd::dispatch_narrow(LinearMonodromy(setup)), unit_per_s);
     let decomposition = matrix.eigen().map_err(|_| ResponseError::NoEigenvalues)?;
-    let values = decomposition.S().column_vector();
-    let vectors = decomposition.U();
+    let eigenvalues = decomposition.S().column_vector();
+    let eigenvectors = decomposition.U();
     let frozen_modes =
         modes(point, 0.0, speed_rad_per_s).map_err(|_| ResponseError::NoEigenvalues)?;
     // The similarity of each eigenvector with each mode.
     let mut similarities = Vec::with_capacity(STATES * COORDINATES);
     for eigenvalue_index in 0..STATES {
-        let vector = Mat::from_fn(STATES, 1, |i, _| vectors[(i, eigenvalue_index)]);
-        let modal_energies = modal_energies(&frozen_modes, &vector, unit_per_s);
+        let eigenvector = Mat::from_fn(STATES, 1, |i, _| eigenvectors[(i, eigenvalue_index)]);
+        let modal_energies = modal_energies(&frozen_modes, &eigenvector, unit_per_s);
         let total: f64 = modal_energies.iter().map(|(_, energy)| energy).sum();
-        if !(values[eigenvalue_index].re.is_finite()
-            && values[eigenvalue_index].im.is_finite()
+        if !(eigenvalues[eigenvalue_index].re.is_finite()
+            && eigenvalues[eigenvalue_index].im.is_finite()
             && total > 0.0)
         {
             return Err(ResponseError::NoEigenvalues);
@@ -108,10 +108,10 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
         if has_eigenvalue[mode] || is_assigned[eigenvalue_index] {
             continue;
         }
-        let mu = values[eigenvalue_index];
-        let is_pair = |other: c64| (other - mu.conj()).norm() <= 1e-9 * mu.norm();
+        let mu = eigenvalues[eigenvalue_index];
+        let is_conjugate = |other: c64| (other - mu.conj()).norm() <= 1e-9 * mu.norm();
         let conjugate = (0..STATES).find(|&other| {
-            other != eigenvalue_index && !is_assigned[other] && is_pair(values[other])
+            other != eigenvalue_index && !is_assigned[other] && is_conjugate(eigenvalues[other])
         });
         is_assigned[eigenvalue_index] = true;
         if let Some(conjugate) = conjugate {
@@ -150,9 +150,9 @@ fn nearest_floquet_mode(frozen_mode: &Mode, mu: c64, speed_rpm: f64) -> FloquetM
 }
 
 /// The computation of the linear model's monodromy matrix, without caps.
-struct LinearTurn<'a>(TurnSetup<'a>);
+struct LinearMonodromy<'a>(TurnSetup<'a>);
 
-impl Kernel for LinearTurn<'_> {
+impl Kernel for LinearMonodromy<'_> {
     /// The monodromy matrix.
     type Output = StateMatrix;
 

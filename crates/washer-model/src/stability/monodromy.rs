@@ -16,13 +16,13 @@ use crate::run::model::Nonlinear;
 use faer::Mat;
 use lane_ode::{Dual, Lane, MAX_LANES, N, OutOfLine, System, trig};
 
-/// The number of instants of a turn at which derivatives are computed, without corners. Basis: it
-/// resolves harmonics of the turn up to the seventh. Doubling it resolves the fifteenth.
-pub(super) const INSTANTS: usize = 16;
+/// The number of instants of a turn at which derivatives are computed, if no force has corners.
+/// Basis: it resolves harmonics of the turn up to the seventh. Doubling it resolves the fifteenth.
+pub(super) const INSTANTS_PER_TURN: usize = 16;
 
 /// The number of instants of a turn at which derivatives are computed, if forces have corners.
 /// Basis: corners give motions more harmonics. Doubling it doubles the number of derivatives.
-pub(super) const INSTANTS_AT_CORNERS: usize = 32;
+pub(super) const INSTANTS_PER_TURN_WITH_CORNERS: usize = 32;
 
 /// A matrix of the derivatives of a state by another state.
 pub(crate) type StateMatrix = [[N<f64>; STATES]; STATES];
@@ -33,12 +33,12 @@ pub(crate) fn scale_speeds(matrix: &StateMatrix, unit_per_s: f64) -> Mat<f64> {
     Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * unit(j) / unit(i))
 }
 
-/// The number of vectors of disturbances that are integrated through a step at once. Basis: they
-/// fit in the first-level cache. Doubling it is slower.
-const BLOCK_LANES: usize = 5;
+/// The number of vector registers' worth of disturbances that are integrated through a step at
+/// once. Basis: they fit in the first-level cache. Doubling it is slower.
+const VECTORS_PER_BLOCK: usize = 5;
 /// The number of the widest vectors that hold all disturbances. Basis: the number of states.
 /// Doubling it leaves lanes empty.
-const WIDE_BLOCK_LANES: usize = STATES.div_ceil(MAX_LANES);
+const WIDE_VECTORS_PER_BLOCK: usize = STATES.div_ceil(MAX_LANES);
 
 /// The number of steps whose derivatives are interpolated at once. Basis: every number of steps is
 /// a multiple of it. Doubling it needs twice the memory.
@@ -79,33 +79,38 @@ struct SmoothCoefficients {
 
 impl SmoothCoefficients {
     /// Coefficients that are all zero.
-    const NONE: Self = Self { derivatives: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
+    const ZERO: Self = Self { derivatives: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
 }
 
 /// The weights of the samples in a sum.
-type SampleWeights = [f64; INSTANTS_AT_CORNERS];
+type SampleWeights = [f64; INSTANTS_PER_TURN_WITH_CORNERS];
 
 /// Computes several weighted sums of the same samples: coordinate by coordinate, so that the
 /// summands stay in the first-level cache, and four sums at a time, so that each loaded summand is
 /// used four times.
 #[inline(always)]
-fn add_weighted(
+fn compute_weighted_sums(
     samples: &[SmoothCoefficients],
     weights: &[SampleWeights],
     sums: &mut [SmoothCoefficients],
 ) {
-    let ((weights_by_four, remaining_weights), (fours, rest)) =
+    let ((weights_by_four, remaining_weights), (sums_by_four, remaining_sums)) =
         (weights.as_chunks::<4>(), sums.as_chunks_mut::<4>());
     for i in 0..COORDINATES {
-        for index in 0..fours.len() {
-            add_weighted_slopes(samples, i, &weights_by_four[index], &mut fours[index]);
+        for index in 0..sums_by_four.len() {
+            compute_weighted_accelerations(
+                samples,
+                i,
+                &weights_by_four[index],
+                &mut sums_by_four[index],
+            );
         }
-        for index in 0..rest.len() {
-            add_weighted_slopes(
+        for index in 0..remaining_sums.len() {
+            compute_weighted_accelerations(
                 samples,
                 i,
                 &[remaining_weights[index]],
-                core::array::from_mut(&mut rest[index]),
+                core::array::from_mut(&mut remaining_sums[index]),
             );
         }
     }
@@ -114,16 +119,17 @@ fn add_weighted(
         for m in 0..samples[0].corners.len() {
             let mut corner = CornerMotion::zero(N(0.0));
             for k in 0..samples.len() {
-                corner.add(&samples[k].corners[m], weights[k]);
+                corner.add_scaled(&samples[k].corners[m], weights[k]);
             }
             sums[index].corners.push(corner);
         }
     }
 }
 
-/// Adds the derivatives of one acceleration, times the weights of their instants, to each sum.
+/// Sets the derivatives of acceleration `i` in each sum to the weighted sum of those of the
+/// samples.
 #[inline(always)]
-fn add_weighted_slopes<const SUMS: usize>(
+fn compute_weighted_accelerations<const SUMS: usize>(
     samples: &[SmoothCoefficients],
     i: usize,
     weights: &[SampleWeights; SUMS],
@@ -150,7 +156,8 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
     fn run(self) -> Vec<StateMatrix> {
         let Self { zero, weights, .. } = self;
         let samples = self.sample_coefficients(zero);
-        let vectors_per_block = if T::LANES == MAX_LANES { WIDE_BLOCK_LANES } else { BLOCK_LANES };
+        let vectors_per_block =
+            if T::LANES == MAX_LANES { WIDE_VECTORS_PER_BLOCK } else { VECTORS_PER_BLOCK };
         let vectors = STATES.div_ceil(vectors_per_block * T::LANES) * vectors_per_block;
         let mut columns = vec![vec![[zero; STATES]; vectors]; self.turn_count];
         for columns in &mut columns {
@@ -158,13 +165,13 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                 columns[j / T::LANES][j].0.set(j % T::LANES, 1.0);
             }
         }
-        let mut coefficients = vec![SmoothCoefficients::NONE; INSTANTS_AT_ONCE];
-        let mut endpoints_and_middle = [SmoothCoefficients::NONE; 3];
-        let mut parabolas = [[0.0; INSTANTS_AT_CORNERS]; INSTANTS_AT_ONCE];
+        let mut coefficients = vec![SmoothCoefficients::ZERO; INSTANTS_AT_ONCE];
+        let mut endpoints_and_middle = [SmoothCoefficients::ZERO; 3];
+        let mut parabola_weights = [[0.0; INSTANTS_PER_TURN_WITH_CORNERS]; INSTANTS_AT_ONCE];
         for k in 0..INSTANTS_AT_ONCE {
             let t = k as f64 / STEPS_AT_ONCE as f64 - 1.0;
             let lagrange_weights = [0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)];
-            parabolas[k][..lagrange_weights.len()].copy_from_slice(&lagrange_weights);
+            parabola_weights[k][..lagrange_weights.len()].copy_from_slice(&lagrange_weights);
         }
         for first_step in (0..self.grid.steps).step_by(STEPS_AT_ONCE) {
             for (turn, columns) in columns.iter_mut().enumerate() {
@@ -172,9 +179,18 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                     interpolate(&samples[turn], weights, 2 * first_step, &mut coefficients);
                 } else {
                     interpolate(&samples[turn], weights, 2 * first_step, &mut endpoints_and_middle);
-                    add_weighted(&endpoints_and_middle, &parabolas, &mut coefficients);
+                    compute_weighted_sums(
+                        &endpoints_and_middle,
+                        &parabola_weights,
+                        &mut coefficients,
+                    );
                     for k in 0..INSTANTS_AT_ONCE {
-                        self.apply(turn, 2 * first_step + k, 1.0, &mut coefficients[k]);
+                        self.add_corner_derivatives(
+                            turn,
+                            2 * first_step + k,
+                            1.0,
+                            &mut coefficients[k],
+                        );
                     }
                 }
                 let step_s = zero.lit(self.grid.step_s.0.get(turn));
@@ -184,11 +200,11 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                     let end = &coefficients[2 * k + 2].derivatives;
                     let coefficients = [start, middle, middle, end];
                     if T::LANES == MAX_LANES {
-                        for disturbances in columns.as_chunks_mut::<WIDE_BLOCK_LANES>().0 {
+                        for disturbances in columns.as_chunks_mut::<WIDE_VECTORS_PER_BLOCK>().0 {
                             integrate_step(zero, step_s, coefficients, disturbances);
                         }
                     } else {
-                        for disturbances in columns.as_chunks_mut::<BLOCK_LANES>().0 {
+                        for disturbances in columns.as_chunks_mut::<VECTORS_PER_BLOCK>().0 {
                             integrate_step(zero, step_s, coefficients, disturbances);
                         }
                     }
@@ -215,7 +231,7 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
         let last_instant = self.instants - 1;
         let state_stride = self.states.len() / self.instants;
         let steps_per_instant = self.grid.steps / self.instants;
-        let mut samples = vec![vec![SmoothCoefficients::NONE; self.instants]; self.turn_count];
+        let mut samples = vec![vec![SmoothCoefficients::ZERO; self.instants]; self.turn_count];
         let mut instants = [0; MAX_LANES];
         let mut derivatives = [[zero; STATES]; COORDINATES];
         for instant in (0..self.instants).step_by(instants_at_once) {
@@ -251,7 +267,12 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
                     }
                 }
                 coefficients.corners = corners.iter().map(|corner| corner.get_lane(lane)).collect();
-                self.apply(turn, 2 * instants[lane] * steps_per_instant, -1.0, coefficients);
+                self.add_corner_derivatives(
+                    turn,
+                    2 * instants[lane] * steps_per_instant,
+                    -1.0,
+                    coefficients,
+                );
             }
         }
         samples
@@ -259,11 +280,21 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
 
     /// Adds the derivatives of the forces with corners at an instant of a turn, times a sign.
     #[inline(always)]
-    fn apply(&self, turn: usize, instant: usize, sign: f64, coefficients: &mut SmoothCoefficients) {
+    fn add_corner_derivatives(
+        &self,
+        turn: usize,
+        instant: usize,
+        sign: f64,
+        coefficients: &mut SmoothCoefficients,
+    ) {
         let corner_count = coefficients.corners.len();
         for m in 0..corner_count {
             let force = self.corner_forces[instant * corner_count + m].get_lane(turn);
-            coefficients.corners[m].apply(&force, sign, &mut coefficients.derivatives);
+            coefficients.corners[m].add_force_derivatives(
+                &force,
+                sign,
+                &mut coefficients.derivatives,
+            );
         }
     }
 
@@ -323,7 +354,7 @@ fn interpolate(
     first_instant: usize,
     coefficients: &mut [SmoothCoefficients],
 ) {
-    let mut weights_by_sample = [[0.0; INSTANTS_AT_CORNERS]; INSTANTS_AT_ONCE];
+    let mut weights_by_sample = [[0.0; INSTANTS_PER_TURN_WITH_CORNERS]; INSTANTS_AT_ONCE];
     let weights_by_sample = &mut weights_by_sample[..coefficients.len()];
     let stride = (INSTANTS_AT_ONCE - 1) / (coefficients.len() - 1);
     for (k, weights_by_sample) in weights_by_sample.iter_mut().enumerate() {
@@ -334,41 +365,41 @@ fn interpolate(
             weights_by_sample[(first_sample + instant) % samples.len()] = *weight;
         }
     }
-    add_weighted(samples, weights_by_sample, coefficients);
+    compute_weighted_sums(samples, weights_by_sample, coefficients);
 }
 
 /// Integrates a block of disturbances through a step, with the derivatives at each stage.
 #[inline(always)]
-fn integrate_step<T: Lane, const BLOCK_LANES: usize>(
+fn integrate_step<T: Lane, const VECTORS_PER_BLOCK: usize>(
     zero: N<T>,
     h: N<T>,
     stage_derivatives: [&AccelerationDerivatives; 4],
-    disturbances: &mut [[N<T>; STATES]; BLOCK_LANES],
+    disturbances: &mut [[N<T>; STATES]; VECTORS_PER_BLOCK],
 ) {
     let mut stage_states = *disturbances;
     let start_states = stage_states;
     for stage in 0..4 {
         let derivatives = stage_derivatives[stage];
-        let mut accelerations = [[zero; COORDINATES]; BLOCK_LANES];
+        let mut accelerations = [[zero; COORDINATES]; VECTORS_PER_BLOCK];
         // Two rows are computed at a time, so that each loaded component of a disturbance is used
         // twice.
         for i in (0..COORDINATES).step_by(2) {
-            let mut row_sums = [[zero; BLOCK_LANES]; 2];
+            let mut row_sums = [[zero; VECTORS_PER_BLOCK]; 2];
             for j in 0..STATES {
                 let row_pair = [zero.lit(derivatives[i][j].0), zero.lit(derivatives[i + 1][j].0)];
-                for c in 0..BLOCK_LANES {
+                for c in 0..VECTORS_PER_BLOCK {
                     row_sums[0][c] += row_pair[0] * stage_states[c][j];
                     row_sums[1][c] += row_pair[1] * stage_states[c][j];
                 }
             }
-            for c in 0..BLOCK_LANES {
+            for c in 0..VECTORS_PER_BLOCK {
                 accelerations[c][i] = row_sums[0][c];
                 accelerations[c][i + 1] = row_sums[1][c];
             }
         }
         let a_step = (h * A[stage]).v();
         let b_step = (h * B[stage]).v();
-        for c in 0..BLOCK_LANES {
+        for c in 0..VECTORS_PER_BLOCK {
             for i in 0..COORDINATES {
                 let speed = stage_states[c][COORDINATES + i];
                 let acceleration = accelerations[c][i];
@@ -391,12 +422,13 @@ mod tests {
     #[test]
     fn interpolation_reproduces_a_trigonometric_polynomial() {
         let wave = |turns: f64| 0.3 + (TAU * turns).sin() - 0.5 * (7.0 * TAU * turns + 0.2).cos();
-        let values: [f64; INSTANTS] = from_fn(|k| wave(k as f64 / INSTANTS as f64));
+        let values: [f64; INSTANTS_PER_TURN] =
+            from_fn(|k| wave(k as f64 / INSTANTS_PER_TURN as f64));
         for (subdivision, weights) in
-            interpolation_weights(5 * INSTANTS / 2, INSTANTS).iter().enumerate()
+            interpolation_weights(5 * INSTANTS_PER_TURN / 2, INSTANTS_PER_TURN).iter().enumerate()
         {
             let sum: f64 = weights.iter().zip(values).map(|(weight, value)| weight * value).sum();
-            let turns = subdivision as f64 / 5.0 / INSTANTS as f64;
+            let turns = subdivision as f64 / 5.0 / INSTANTS_PER_TURN as f64;
             assert!((sum - wave(turns)).abs() < 1e-14, "{subdivision}: {sum}");
         }
     }

@@ -14,7 +14,7 @@ pub(super) trait PeriodMapSearch<'a> {
     fn next_requests(&mut self) -> Vec<TurnRequest<'a>>;
 
     /// Receives the results of the requested turns, in the order of the requests.
-    fn receive_results(&mut self, turned: Vec<TurnResult>);
+    fn receive_results(&mut self, results: Vec<TurnResult>);
 }
 
 /// Runs searches to their ends, with the turns of all searches together in lanes. Returns false
@@ -89,15 +89,15 @@ pub(crate) fn relative_residual(
     let equilibrium = point.equilibrium();
     let speed_rad_per_s = speed_rpm * TAU / 60.0;
     let mut residual = 0.0_f64;
-    let mut size = MIN_DEVIATION;
+    let mut largest_deviation = MIN_DEVIATION;
     for i in 0..COORDINATES {
-        size = size.max((start[i] - equilibrium[i]).abs());
+        largest_deviation = largest_deviation.max((start[i] - equilibrium[i]).abs());
         let speed_gap = end[COORDINATES + i] - start[COORDINATES + i];
         let gap = (end[i] - start[i]).abs() + speed_gap.abs() / speed_rad_per_s;
         // A residual of NaN is kept.
         residual = if gap > residual || gap.is_nan() { gap } else { residual };
     }
-    residual / size
+    residual / largest_deviation
 }
 
 /// Factors 1 - Phi, the matrix of Newton's equations for a fixed point of the period map, from the
@@ -172,19 +172,19 @@ impl<'a> NewtonSearch<'a> {
 
     /// Creates a search by damped Newton steps, none of which changes a coordinate by more than
     /// `max_step` (m, rad). Such a search stays near its start if another response is close.
-    pub(super) fn damped(setup: TurnSetup<'a>, state: [f64; STATES], max_step: f64) -> Self {
+    pub(super) fn new_damped(setup: TurnSetup<'a>, state: [f64; STATES], max_step: f64) -> Self {
         Self { max_step, ..Self::new(setup, state, None) }
     }
 
     /// Creates a damped search by deflated Newton steps (Farrell, Birkisson and Funke 2015): known
     /// responses repel the search, so that it finds another response.
-    pub(super) fn deflated(
+    pub(super) fn new_deflated(
         setup: TurnSetup<'a>,
         state: [f64; STATES],
         max_step: f64,
         known_responses: Vec<[f64; STATES]>,
     ) -> Self {
-        Self { known_responses, ..Self::damped(setup, state, max_step) }
+        Self { known_responses, ..Self::new_damped(setup, state, max_step) }
     }
 
     /// Returns the factor by which deflation multiplies a Newton step: with the residual multiplied
@@ -197,21 +197,21 @@ impl<'a> NewtonSearch<'a> {
         };
         let mut derivative = 0.0;
         for known_response in &self.known_responses {
-            let mut squared = 0.0;
-            let mut product = 0.0;
+            let mut squared_distance = 0.0;
+            let mut scalar_product = 0.0;
             for i in 0..STATES {
                 let offset = (self.state[i] - known_response[i]) / unit(i);
-                squared += offset * offset;
-                product += offset * step[i].0 / unit(i);
+                squared_distance += offset * offset;
+                scalar_product += offset * step[i].0 / unit(i);
             }
-            derivative -= 2.0 * product / (squared * (1.0 + squared));
+            derivative -= 2.0 * scalar_product / (squared_distance * (1.0 + squared_distance));
         }
         1.0 / (1.0 - derivative)
     }
 
     /// Creates a search that integrates the transient over a number of turns before Newton's
     /// method.
-    pub(super) fn after_transient(
+    pub(super) fn new_after_transient(
         setup: TurnSetup<'a>,
         state: [f64; STATES],
         turn_count: usize,
@@ -281,18 +281,21 @@ impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
             let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
             let correction = factors.solve(&gap);
             let max_correction =
-                correction[..COORDINATES].iter().map(|by| by.0.abs()).fold(0.0, f64::max);
-            let factor = self.deflation_factor(&correction);
-            let step_factor = factor * (self.max_step / (factor.abs() * max_correction)).min(1.0);
+                correction[..COORDINATES].iter().map(|change| change.0.abs()).fold(0.0, f64::max);
+            let deflation_ratio = self.deflation_factor(&correction);
+            let step_factor = deflation_ratio
+                * (self.max_step / (deflation_ratio.abs() * max_correction)).min(1.0);
             for i in 0..STATES {
                 self.state[i] += step_factor * correction[i].0;
             }
             // The next correction is expected to reduce the residual by the same rate.
-            let rate = if self.residual.is_finite() { residual / self.residual } else { 1.0 };
-            let is_close = residual * rate.min(1.0) < LAST_TURN_TOLERANCE
+            let convergence_rate =
+                if self.residual.is_finite() { residual / self.residual } else { 1.0 };
+            let is_nearly_converged = residual * convergence_rate.min(1.0) < LAST_TURN_TOLERANCE
                 || has_own_factors && residual < QUADRATIC_CONVERGENCE_RESIDUAL;
             // A search whose steps are still deflated by known responses has not converged.
-            self.is_last_turn = is_close && (step_factor - 1.0).abs() < MAX_FINAL_DEFLATION;
+            self.is_last_turn =
+                is_nearly_converged && (step_factor - 1.0).abs() < MAX_FINAL_DEFLATION;
             if has_borrowed_factors {
                 self.factors = None;
             }
@@ -316,16 +319,16 @@ mod tests {
         let setup = Settings::new(&point).held_case(250.0).unwrap().setup;
         let known_response = [0.0; STATES];
         // The ratio of the deflated step to Newton's, which leads to the known response.
-        let factor = |distance_m: f64| {
+        let deflation_ratio = |distance_m: f64| {
             let mut state = known_response;
             state[0] = distance_m;
             let mut newton_step = [N(0.0); STATES];
             newton_step[0] = N(-distance_m);
-            NewtonSearch::deflated(setup, state, f64::INFINITY, vec![known_response])
+            NewtonSearch::new_deflated(setup, state, f64::INFINITY, vec![known_response])
                 .deflation_factor(&newton_step)
         };
-        assert!((factor(1e-6) + 1.0).abs() < 1e-3, "{}", factor(1e-6));
-        assert!((factor(1.0) - 1.0).abs() < 1e-3, "{}", factor(1.0));
+        assert!((deflation_ratio(1e-6) + 1.0).abs() < 1e-3, "{}", deflation_ratio(1e-6));
+        assert!((deflation_ratio(1.0) - 1.0).abs() < 1e-3, "{}", deflation_ratio(1.0));
         let factor_without_known =
             NewtonSearch::new(setup, known_response, None).deflation_factor(&[N(1.0); STATES]);
         assert_eq!(factor_without_known, 1.0);

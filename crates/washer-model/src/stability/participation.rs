@@ -58,7 +58,7 @@ pub(super) fn participating_modes(
         named_modes.push(ParticipatingMode {
             mode: mode_index + 1,
             frequency_cpm: mode.frequency_rpm(),
-            motion: shape::motion(point, &frozen_modes.mass, &mode.shape),
+            motion: shape::dominant_motion(point, &frozen_modes.mass, &mode.shape),
             share,
         });
     }

@@ -4,7 +4,7 @@
 //! change motions that turn with the drum (`coupling.rs`). `newton.rs` finds fixed points of the
 //! map at one speed, and `continuation.rs` continues them over speed.
 
-use super::monodromy::{INSTANTS, SmoothMonodromy, StateMatrix, interpolation_weights};
+use super::monodromy::{INSTANTS_PER_TURN, SmoothMonodromy, StateMatrix, interpolation_weights};
 use super::stepwise_monodromy::StepwiseMonodromy;
 use super::turn::{StepGrid, StepObserver, integrate_turn};
 use crate::channel::CHANNELS;
@@ -250,8 +250,8 @@ fn integrate_batch<T: Lane>(
     let recorded_count = requests.iter().filter(|request| request.is_recorded).count();
     let mut recorder = TurnRecorder::new(zero, &model, &grid);
     if !setups[0].differentiates_steps() {
-        recorder.with_corner_forces = setups[0].has_corners();
-        recorder.instants = setups[0].instants.max(INSTANTS);
+        recorder.records_corner_forces = setups[0].has_corners();
+        recorder.instants = setups[0].instants.max(INSTANTS_PER_TURN);
     }
     integrate_turn(
         &model,
@@ -288,7 +288,7 @@ fn integrate_batch<T: Lane>(
         };
         monodromies = zero.0.run_out_of_line(monodromy);
     }
-    let in_lane = |state: &[N<T>; STATES], lane: usize| -> [f64; STATES] {
+    let extract_lane = |state: &[N<T>; STATES], lane: usize| -> [f64; STATES] {
         from_fn(|i| state[i].0.get(lane))
     };
     for (lane, request) in requests.iter().enumerate() {
@@ -298,10 +298,10 @@ fn integrate_batch<T: Lane>(
                 monodromy: monodromies[lane],
                 peaks: recorder.peaks.lane(lane),
                 min_gap_m: clearance_m - recorder.max_radial_squared.0.get(lane).sqrt(),
-                states: recorder.states.iter().map(|state| in_lane(state, lane)).collect(),
+                states: recorder.states.iter().map(|state| extract_lane(state, lane)).collect(),
             })
         });
-        results.push(TurnResult { end: in_lane(&ends[0], lane), record });
+        results.push(TurnResult { end: extract_lane(&ends[0], lane), record });
     }
 }
 
@@ -311,7 +311,7 @@ pub(super) struct LinearResponse {
     pub(super) state: [f64; STATES],
     /// The largest deviations from equilibrium (m, rad).
     pub(super) peaks: [f64; CHANNELS],
-    /// The deviations and their speeds at [`INSTANTS`] equally spaced instants of a turn.
+    /// The deviations and their speeds at [`INSTANTS_PER_TURN`] equally spaced instants of a turn.
     states: Vec<[f64; STATES]>,
 }
 
@@ -319,10 +319,13 @@ impl LinearResponse {
     /// Returns the speed amplitudes (m/s) of dampers.
     fn damper_speeds_m_per_s(&self, point: &Point) -> Vec<f64> {
         let speeds_at = |state| damper_speeds_m_per_s(point, state);
-        let speeds: Vec<Vec<f64>> = self.states[..INSTANTS].iter().map(speeds_at).collect();
+        let speeds: Vec<Vec<f64>> =
+            self.states[..INSTANTS_PER_TURN].iter().map(speeds_at).collect();
         let sum_of_squares =
             |k: usize| speeds.iter().map(|speeds| speeds[k] * speeds[k]).sum::<f64>();
-        (0..speeds[0].len()).map(|k| (2.0 * sum_of_squares(k) / INSTANTS as f64).sqrt()).collect()
+        (0..speeds[0].len())
+            .map(|k| (2.0 * sum_of_squares(k) / INSTANTS_PER_TURN as f64).sqrt())
+            .collect()
     }
 }
 
@@ -416,8 +419,8 @@ fn solve_linear_batch<T: Lane>(
     let mut start = [zero; STATES];
     // The turn from the fixed point is recorded. The loop compiles to a single copy of the model's
     // code.
-    for has_start in [false, true] {
-        if has_start {
+    for is_from_fixed_point in [false, true] {
+        if is_from_fixed_point {
             ends.truncate(1);
             ends[0] = start;
         }
@@ -426,10 +429,10 @@ fn solve_linear_batch<T: Lane>(
             &model,
             &grid,
             &mut ends,
-            if has_start { Some(&mut recorder) } else { None },
+            if is_from_fixed_point { Some(&mut recorder) } else { None },
         );
         for lane in 0..setups.len() {
-            if has_start {
+            if is_from_fixed_point {
                 responses.push(LinearResponse {
                     state: from_fn(|i| start[i].0.get(lane)),
                     peaks: recorder.peaks.lane(lane),
@@ -461,7 +464,7 @@ pub(crate) struct TurnRecorder<'m, T, M> {
     /// The number of equally spaced instants in a turn.
     instants: usize,
     /// Whether to record the states at these instants.
-    pub(crate) with_states: bool,
+    pub(crate) records_states: bool,
     pub(crate) peaks: Peaks<T, CHANNELS>,
     /// The square of the greatest distance of the drum from the tub's axis (m^2).
     pub(crate) max_radial_squared: N<T>,
@@ -469,7 +472,7 @@ pub(crate) struct TurnRecorder<'m, T, M> {
     states: Vec<[N<T>; STATES]>,
     /// The forces with corners at the start, middle and end of all steps, if they are recorded.
     corner_forces: Vec<CornerForce<T>>,
-    with_corner_forces: bool,
+    records_corner_forces: bool,
     /// The last observed state, and its slope.
     last_sample: [[N<T>; STATES]; 2],
     /// The further recorders that the caller has requested.
@@ -482,13 +485,13 @@ impl<'m, T: Lane, M: LaneModel<T>> TurnRecorder<'m, T, M> {
         Self {
             model,
             grid,
-            instants: INSTANTS,
-            with_states: true,
+            instants: INSTANTS_PER_TURN,
+            records_states: true,
             peaks: Peaks::new(zero),
             max_radial_squared: zero,
             states: Vec::new(),
             corner_forces: Vec::new(),
-            with_corner_forces: false,
+            records_corner_forces: false,
             last_sample: [[zero; STATES]; 2],
             further_recorders: None,
         }
@@ -514,10 +517,10 @@ impl<T: Lane, M: LaneModel<T>> OutOfLine for CornerForcesAtState<'_, T, M> {
 impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M> {
     #[inline(always)]
     fn observe(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        if self.with_states && k.is_multiple_of(self.grid.steps / self.instants) {
+        if self.records_states && k.is_multiple_of(self.grid.steps / self.instants) {
             self.states.push(*x);
         }
-        if self.with_corner_forces {
+        if self.records_corner_forces {
             if k > 0 {
                 let [start, rate] = &self.last_sample;
                 let eighth_step = (self.grid.step_s * 0.125).v();

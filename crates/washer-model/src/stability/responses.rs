@@ -76,13 +76,15 @@ pub fn find_responses(
     let is_same_point = |a: &HeldSpeed<'_>, b: &HeldSpeed<'_>| core::ptr::eq(a.point, b.point);
     let mut points_with_max_speed = Vec::new();
     let mut requests = Vec::new();
-    for same_point in held_speeds.chunk_by(is_same_point) {
+    for point_speeds in held_speeds.chunk_by(is_same_point) {
         let max_speed_rpm =
-            same_point.iter().map(|held_speed| held_speed.speed_rpm).fold(0.0, f64::max);
+            point_speeds.iter().map(|held_speed| held_speed.speed_rpm).fold(0.0, f64::max);
         requests.extend(
-            same_point.iter().map(|held_speed| (points_with_max_speed.len(), held_speed.speed_rpm)),
+            point_speeds
+                .iter()
+                .map(|held_speed| (points_with_max_speed.len(), held_speed.speed_rpm)),
         );
-        points_with_max_speed.push((same_point[0].point, max_speed_rpm));
+        points_with_max_speed.push((point_speeds[0].point, max_speed_rpm));
     }
     let mut curves = ResponseCurves::continue_curves(&points_with_max_speed, None, cancel);
     ResponseCurves::find_at_speeds(&mut curves, &requests, cancel)
@@ -187,7 +189,7 @@ impl<'a> ResponseCurves<'a> {
         if cancel.is_requested() {
             return stopped_results();
         }
-        let mut cases = Vec::with_capacity(requests.len());
+        let mut held_cases = Vec::with_capacity(requests.len());
         let mut setups = Vec::new();
         for &(curve, speed_rpm) in requests {
             let Some(Self { upward, .. }) = curves.get_mut(curve) else { return stopped_results() };
@@ -198,14 +200,17 @@ impl<'a> ResponseCurves<'a> {
                     .ok()
                     .map(|held_case| upward.settings.linear_setup(held_case.setup)),
             );
-            cases.push(held_case);
+            held_cases.push(held_case);
         }
-        let mut linear = linear_responses_with_motion_friction(&setups, cancel).into_iter();
+        let mut linear_responses =
+            linear_responses_with_motion_friction(&setups, cancel).into_iter();
         let (mut sought_responses, mut searches): (Vec<SoughtResponse<'_>>, Vec<NewtonSearch<'_>>) =
             Default::default();
-        for (request, (held_case, (curve, speed_rpm))) in cases.iter().zip(requests).enumerate() {
+        for (request, (held_case, (curve, speed_rpm))) in
+            held_cases.iter().zip(requests).enumerate()
+        {
             let Ok(held_case) = held_case else { continue };
-            let Some(linear) = linear.next() else { continue };
+            let Some(linear_response) = linear_responses.next() else { continue };
             let mut guesses = curves[*curve].guesses(*speed_rpm);
             // Friction and stops may cause responses that are not on the curve. At a speed below
             // the beginning of the curve there is only one response.
@@ -214,7 +219,7 @@ impl<'a> ResponseCurves<'a> {
                 let branch = guesses.last().map_or(0, |last_guess| last_guess.branch + 1);
                 let first_rpm = curves[*curve].upward.settings.lowest_rpm();
                 let is_on_curve = first_rpm.is_ok_and(|first_rpm| *speed_rpm < first_rpm);
-                let guess = guess_from_linear(held_case.setup.point, &linear);
+                let guess = guess_from_linear(held_case.setup.point, &linear_response);
                 let position = if is_off_curve { 0 } else { guesses.len() };
                 guesses.insert(position, Guess { branch, is_on_curve, ..guess });
             }
@@ -228,7 +233,7 @@ impl<'a> ResponseCurves<'a> {
                     request,
                     held_case: held_case.clone(),
                     guess,
-                    linear_peaks: linear.peaks,
+                    linear_peaks: linear_response.peaks,
                 });
             }
         }
@@ -251,15 +256,15 @@ impl<'a> ResponseCurves<'a> {
         }
         // Responses whose stability is uncertain, or which caps change, are computed again without
         // caps.
-        let are_changed_by_caps = are_changed_by_caps(&sought_responses, &results, cancel);
-        let mut uncertain = Vec::new();
+        let changed_by_caps = find_changed_by_caps(&sought_responses, &results, cancel);
+        let mut uncertain_responses = Vec::new();
         for (index, response) in results.iter().enumerate() {
             let Ok(response) = response else { continue };
             let is_uncertain = response.growth_per_s().abs() < UNCERTAIN_GROWTH_PER_S;
-            if (is_uncertain || are_changed_by_caps[index])
+            if (is_uncertain || changed_by_caps[index])
                 && sought_responses[index].held_case.setup.caps.is_some()
             {
-                uncertain.push((
+                uncertain_responses.push((
                     index,
                     sought_responses[index].held_case.without_caps(),
                     response.start,
@@ -267,7 +272,7 @@ impl<'a> ResponseCurves<'a> {
             }
         }
         let mut searches: Vec<(usize, NewtonSearch<'_>)> = Vec::new();
-        for (index, held_case, start) in uncertain {
+        for (index, held_case, start) in uncertain_responses {
             match held_case {
                 Ok(held_case) => {
                     searches.push((index, NewtonSearch::new(held_case.setup, start, None)));
@@ -283,14 +288,18 @@ impl<'a> ResponseCurves<'a> {
         }
         // If a harmonic excites the hinge, the response may be far from the one with caps.
         let retries: [fn(&HeldCase<'a>, [f64; STATES]) -> NewtonSearch<'a>; 2] = [
-            |held_case, start| NewtonSearch::damped(held_case.setup, start, MAX_DAMPED_STEP),
+            |held_case, start| NewtonSearch::new_damped(held_case.setup, start, MAX_DAMPED_STEP),
             |held_case, start| {
-                NewtonSearch::after_transient(held_case.setup, start, transient_turns(held_case))
+                NewtonSearch::new_after_transient(
+                    held_case.setup,
+                    start,
+                    transient_turns(held_case),
+                )
             },
         ];
         for retry in retries {
-            let missing = starts.iter().filter(|(index, _)| is_missing(&results[*index]));
-            let searches = missing
+            let missing_starts = starts.iter().filter(|(index, _)| is_missing(&results[*index]));
+            let searches = missing_starts
                 .map(|(index, start)| (*index, retry(&sought_responses[*index].held_case, *start)));
             let searches: Vec<(usize, NewtonSearch<'_>)> = searches.collect();
             if !run_and_store(&sought_responses, &mut results, searches, cancel) {
@@ -304,7 +313,7 @@ impl<'a> ResponseCurves<'a> {
             held_case.err().unwrap_or(ResponseError::NoResponse)
         };
         let mut request_results: Vec<Result<Vec<Response>, ResponseError>> =
-            cases.into_iter().map(|held_case| Err(error(held_case))).collect();
+            held_cases.into_iter().map(|held_case| Err(error(held_case))).collect();
         for (sought_response, response) in sought_responses.iter().zip(results) {
             let request_result = &mut request_results[sought_response.request];
             match (response, request_result.as_mut()) {
@@ -327,7 +336,7 @@ fn continue_between<'a>(
 ) -> Option<Vec<ResponseCurve<'a>>> {
     let (mut curves, ranges_rpm): (Vec<ResponseCurve<'a>>, Vec<Option<[f64; 2]>>) =
         curves_with_range.into_iter().unzip();
-    let starts: Vec<Option<TurnSetup<'_>>> = curves
+    let start_setups: Vec<Option<TurnSetup<'_>>> = curves
         .iter_mut()
         .zip(&ranges_rpm)
         .map(|(curve, range_rpm)| curve.settings.continuation_setup((*range_rpm)?[0]).ok())
@@ -335,16 +344,16 @@ fn continue_between<'a>(
     // The curve must not depend on the speeds at which friction is linearised.
     let setups: Vec<TurnSetup<'_>> = curves
         .iter()
-        .zip(&starts)
+        .zip(&start_setups)
         .filter_map(|(curve, start)| {
             Some(TurnSetup { point: curve.settings.without_friction(), ..(*start)? })
         })
         .collect();
-    let linear = solve_linear_responses(&setups, cancel);
-    let curves_with_range = starts.iter().flatten().zip(&linear);
-    let mut searches: Vec<NewtonSearch<'_>> = curves_with_range
-        .map(|(setup, linear)| {
-            let linear_state = || guess_from_linear(setup.point, linear).state;
+    let linear_responses = solve_linear_responses(&setups, cancel);
+    let setups_with_linear = start_setups.iter().flatten().zip(&linear_responses);
+    let mut searches: Vec<NewtonSearch<'_>> = setups_with_linear
+        .map(|(setup, linear_response)| {
+            let linear_state = || guess_from_linear(setup.point, linear_response).state;
             NewtonSearch::new(
                 *setup,
                 start_response.map_or_else(linear_state, |response| response.start),
@@ -354,7 +363,7 @@ fn continue_between<'a>(
         .collect();
     let is_complete = run_searches(&mut searches, cancel);
     let mut searches = searches.into_iter();
-    for ((curve, range_rpm), start) in curves.iter_mut().zip(&ranges_rpm).zip(&starts) {
+    for ((curve, range_rpm), start) in curves.iter_mut().zip(&ranges_rpm).zip(&start_setups) {
         if let (Some(setup), Some([_, end_rpm])) = (start, range_rpm)
             && let Some((state, _)) = searches.next().and_then(NewtonSearch::into_response)
         {
@@ -375,10 +384,10 @@ fn retry_missing_responses(
 ) -> bool {
     let mut retries: Vec<(usize, NewtonSearch<'_>)> = Vec::new();
     for (index, sought_response) in sought_responses.iter().enumerate() {
-        if sought_response.guess.is_followed() && is_missing(&results[index]) {
+        if sought_response.guess.is_on_either_curve() && is_missing(&results[index]) {
             retries.push((
                 index,
-                NewtonSearch::damped(
+                NewtonSearch::new_damped(
                     sought_response.held_case.setup,
                     sought_response.guess.state,
                     MAX_DAMPED_STEP,
@@ -395,13 +404,13 @@ fn retry_missing_responses(
             .iter()
             .zip(results.iter())
             .filter(|(other, _)| other.request == sought_response.request);
-        if !sought_response.guess.is_followed()
+        if !sought_response.guess.is_on_either_curve()
             && same_request.all(|(_, response)| is_missing(response))
         {
             let turn_count = transient_turns(&sought_response.held_case);
             let setup = sought_response.held_case.setup;
             let state = sought_response.guess.state;
-            retries.push((index, NewtonSearch::after_transient(setup, state, turn_count)));
+            retries.push((index, NewtonSearch::new_after_transient(setup, state, turn_count)));
         }
     }
     run_and_store(sought_responses, results, retries, cancel)
@@ -421,7 +430,7 @@ fn find_lost_branches(
     discard_duplicates(sought_responses, results);
     let mut searches: Vec<(usize, NewtonSearch<'_>)> = Vec::new();
     let indices: Vec<usize> = (0..sought_responses.len())
-        .filter(|&index| sought_responses[index].guess.is_followed())
+        .filter(|&index| sought_responses[index].guess.is_on_either_curve())
         .collect();
     let curve_key =
         |index: usize| (sought_responses[index].request, sought_responses[index].guess.is_on_curve);
@@ -437,7 +446,7 @@ fn find_lost_branches(
             .collect();
         for index in missing_indices {
             let SoughtResponse { held_case, guess, .. } = &sought_responses[index];
-            let search = NewtonSearch::deflated(
+            let search = NewtonSearch::new_deflated(
                 held_case.setup,
                 guess.state,
                 MAX_DAMPED_STEP,
@@ -467,11 +476,12 @@ fn discard_duplicates(
             if other_response.request != *request {
                 break;
             }
-            let are_followed = guess.is_followed() && other_response.guess.is_followed();
+            let are_on_curves =
+                guess.is_on_either_curve() && other_response.guess.is_on_either_curve();
             let are_separate =
                 max_distance(&guess.state, &other_response.guess.state) > SEPARATE_GUESS_DISTANCE;
             let (Ok(a), Ok(b)) = (&results[index], &results[other_index]) else { continue };
-            if are_followed
+            if are_on_curves
                 && are_separate
                 && max_distance(&a.start, &b.start) < SAME_RESPONSE_DISTANCE
             {
@@ -531,7 +541,7 @@ fn discard_known_responses(
         };
         let first_index =
             sought_responses.partition_point(|sought_response| sought_response.request < *request);
-        let last_index = if guess.is_followed() { index } else { results.len() };
+        let last_index = if guess.is_on_either_curve() { index } else { results.len() };
         let same_request = (first_index..last_index)
             .take_while(|other_index| sought_responses[*other_index].request == *request);
         let mut other_indices = same_request.filter(|other_index| *other_index != index);
@@ -545,21 +555,21 @@ fn discard_known_responses(
 
 /// Returns for each response whether a turn without caps fails to close. Only responses are tested
 /// for which a harmonic of the drum's speed may be near the hinge's frequency.
-fn are_changed_by_caps(
+fn find_changed_by_caps(
     sought_responses: &[SoughtResponse<'_>],
     results: &[Result<Response, ResponseError>],
     cancel: Cancel<'_>,
 ) -> Vec<bool> {
-    let mut are_changed_by_caps = vec![false; sought_responses.len()];
+    let mut changed_by_caps = vec![false; sought_responses.len()];
     let mut indices = Vec::new();
     let mut requests = Vec::new();
     for (index, (sought_response, response)) in sought_responses.iter().zip(results).enumerate() {
         let hinge_rpm =
             sought_response.held_case.frozen_modes.modes[SUSPENSION_MODES].frequency_rpm();
-        let is_near = sought_response.held_case.setup.has_corners()
+        let may_excite_hinge = sought_response.held_case.setup.has_corners()
             || hinge_rpm < MAX_HINGE_HARMONIC * sought_response.held_case.setup.speed_rpm;
         if let (true, Ok(response), Some(_)) =
-            (is_near, response, sought_response.held_case.setup.caps)
+            (may_excite_hinge, response, sought_response.held_case.setup.caps)
             && let Ok(uncapped_case) = sought_response.held_case.without_caps()
         {
             indices.push(index);
@@ -575,16 +585,16 @@ fn are_changed_by_caps(
     {
         let TurnSetup { point, speed_rpm, .. } = request.setup;
         let residual = relative_residual(point, speed_rpm, &request.start, &result.end);
-        are_changed_by_caps[index] = residual.is_nan() || residual > CAP_RESIDUAL_TOLERANCE;
+        changed_by_caps[index] = residual.is_nan() || residual > CAP_RESIDUAL_TOLERANCE;
     }
-    are_changed_by_caps
+    changed_by_caps
 }
 
 /// Returns the linear model's response as a guess, or the machine at rest if there is none.
-fn guess_from_linear(point: &Point, linear: &LinearResponse) -> Guess {
+fn guess_from_linear(point: &Point, linear_response: &LinearResponse) -> Guess {
     let rest_state = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
-    let has_response = linear.state.iter().all(|x| x.is_finite());
-    let deviation = |i: usize| if has_response { linear.state[i] } else { 0.0 };
+    let has_response = linear_response.state.iter().all(|x| x.is_finite());
+    let deviation = |i: usize| if has_response { linear_response.state[i] } else { 0.0 };
     let state = core::array::from_fn(|i| rest_state[i] + deviation(i));
     Guess { branch: 0, fold_speeds_rpm: [None; 2], state, factors: None, is_on_curve: false }
 }
@@ -605,7 +615,7 @@ impl SoughtResponse<'_> {
         let (start, record) = search.into_response().ok_or(ResponseError::NoResponse)?;
         let is_far_from_guess =
             |i: usize| (start[i] - self.guess.state[i]).abs() > MAX_GUESS_DISTANCE;
-        if self.guess.is_followed() && (0..COORDINATES).any(is_far_from_guess) {
+        if self.guess.is_on_either_curve() && (0..COORDINATES).any(is_far_from_guess) {
             return Err(ResponseError::NoResponse);
         }
         let setup = &self.held_case.setup;
@@ -658,9 +668,9 @@ pub(crate) fn leading_multiplier(
         let eigenvector = eigenvector(matrix, mu);
         let energy_shares = energy_shares(&held_case.frozen_modes, &eigenvector, unit_per_s);
         let mode_count =
-            if mu.norm_sqr() > 1.0 { held_case.counted_modes } else { SUSPENSION_MODES };
-        let counted_modes = energy_shares.iter().filter(|(mode, _)| *mode < mode_count);
-        let counted_share: f64 = counted_modes.map(|(_, energy)| energy).sum();
+            if mu.norm_sqr() > 1.0 { held_case.counted_mode_count } else { SUSPENSION_MODES };
+        let counted_shares = energy_shares.iter().filter(|(mode, _)| *mode < mode_count);
+        let counted_share: f64 = counted_shares.map(|(_, energy)| energy).sum();
         // The share is NaN if there is no eigenvector.
         (counted_share >= MIN_ENERGY_SHARE).then_some((mu, eigenvector))
     })
@@ -672,9 +682,10 @@ fn exceeded_limit(point: &Point, record: &OrbitRecord) -> Option<GeometryLimit> 
     let mut exceeds = [false; 2];
     for state in &record.states {
         let vectors_now = attachment_vectors(point, &core::array::from_fn(|i| state[i]));
-        for ((exceeds, now), at_rest) in exceeds.iter_mut().zip(vectors_now).zip(&rest_vectors) {
-            *exceeds |= now.iter().zip(at_rest).any(|(now, at_rest)| {
-                let projection: f64 = now.iter().zip(at_rest).map(|(a, b)| a * b).sum();
+        for ((exceeds, now), rest_vector) in exceeds.iter_mut().zip(vectors_now).zip(&rest_vectors)
+        {
+            *exceeds |= now.iter().zip(rest_vector).any(|(now, rest_vector)| {
+                let projection: f64 = now.iter().zip(rest_vector).map(|(a, b)| a * b).sum();
                 projection.is_nan() || projection <= 0.0
             });
         }

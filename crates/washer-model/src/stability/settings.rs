@@ -1,7 +1,7 @@
 //! The choice of steps and caps at constant speeds, with limits on their effect on the suspension.
 
 use super::ResponseError;
-use super::monodromy::{INSTANTS, INSTANTS_AT_CORNERS};
+use super::monodromy::{INSTANTS_PER_TURN, INSTANTS_PER_TURN_WITH_CORNERS};
 use super::period_map::{TurnSetup, caps_for_steps};
 use crate::coordinates::COORDINATES;
 use crate::modes::{Mode, Modes, highest_frequency_rad_per_s, mode_roots, modes};
@@ -30,10 +30,10 @@ const UNCAPPED_STEP_PHASE_RAD: f64 = 1.0;
 struct AccuracyLimits {
     /// The least number of steps of a turn.
     min_steps: usize,
-    /// The number of instants of a turn at which derivatives are computed, without corners.
+    /// The number of instants of a turn at which derivatives are computed, if no force has corners.
     instants: usize,
     /// The greatest product of step and frequency of the suspension's fastest mode (rad).
-    max_phase_rad: f64,
+    max_step_phase_rad: f64,
     /// The greatest shift of the suspension's modes by caps (1/s, rad/s).
     max_shift_per_s: f64,
     /// The longest step (s) if friction or stops give forces corners.
@@ -52,8 +52,8 @@ enum Purpose {
 /// The limits for responses at requested speeds.
 const RESPONSE_LIMITS: AccuracyLimits = AccuracyLimits {
     min_steps: 96,
-    instants: INSTANTS,
-    max_phase_rad: 0.25,
+    instants: INSTANTS_PER_TURN,
+    max_step_phase_rad: 0.25,
     max_shift_per_s: 3e-4,
     max_corner_step_s: 1e-4,
 };
@@ -64,7 +64,7 @@ const RESPONSE_LIMITS: AccuracyLimits = AccuracyLimits {
 const CONTINUATION_LIMITS: AccuracyLimits = AccuracyLimits {
     min_steps: 48,
     instants: 8,
-    max_phase_rad: 0.4,
+    max_step_phase_rad: 0.4,
     max_shift_per_s: 3e-3,
     max_corner_step_s: f64::INFINITY,
 };
@@ -75,6 +75,7 @@ const CONTINUATION_LIMITS: AccuracyLimits = AccuracyLimits {
 /// caps would break the curve. Basis: smooth forces take half as many steps at low speeds. Doubling
 /// it doubles the time.
 const MIN_CONTINUATION_STEPS: usize = 256;
+
 /// The least width of the corners of stops and free strokes in the continuation, over the duration
 /// of a step (m/s).
 ///
@@ -85,7 +86,7 @@ const MIN_CONTINUATION_STEPS: usize = 256;
 /// machine in test `a_curve_passes_the_corners_of_stops`, a width of 0.5 mm at all speeds leaves
 /// nine times as many folds as one of 1 mm. Doubling it shifts folds twice as far from those of the
 /// machine as it is.
-const CORNER_SPEED_M_PER_S: f64 = 1.0;
+const CORNER_WIDTH_PER_STEP_M_PER_S: f64 = 1.0;
 
 /// The greatest number of steps of every turn in the continuation. Basis: these steps are as short
 /// as contacts at usual speeds. Doubling it doubles the time of curves that are lost.
@@ -108,7 +109,7 @@ const MAX_STEPS: usize = 1 << 15;
 
 /// The number of speed ranges in an octave, in each of which steps and caps are chosen once.
 /// Doubling it chooses them twice as often, and closer to their limits.
-const RANGES_PER_OCTAVE: f64 = 4.0;
+const SPEED_RANGES_PER_OCTAVE: f64 = 4.0;
 
 /// A point at a held speed: the set-up of its turns, and its modes with theta frozen.
 #[derive(Clone)]
@@ -117,7 +118,7 @@ pub(crate) struct HeldCase<'a> {
     /// The modes with theta frozen, at the lower end of the speed range.
     pub(crate) frozen_modes: Arc<Modes>,
     /// The number of modes, from the slowest on, whose multipliers count.
-    pub(super) counted_modes: usize,
+    pub(super) counted_mode_count: usize,
 }
 
 impl<'a> HeldCase<'a> {
@@ -127,12 +128,13 @@ impl<'a> HeldCase<'a> {
     pub(crate) fn without_caps(&self) -> Result<Self, ResponseError> {
         let steps =
             uncapped_step_count(self.setup.point, self.setup.speed_rpm, self.setup.turn_s())?;
-        let steps = steps.next_multiple_of(INSTANTS_AT_CORNERS);
-        let setup = TurnSetup { steps, instants: INSTANTS_AT_CORNERS, caps: None, ..self.setup };
+        let steps = steps.next_multiple_of(INSTANTS_PER_TURN_WITH_CORNERS);
+        let setup =
+            TurnSetup { steps, instants: INSTANTS_PER_TURN_WITH_CORNERS, caps: None, ..self.setup };
         Ok(Self {
             setup,
             frozen_modes: Arc::clone(&self.frozen_modes),
-            counted_modes: self.counted_modes,
+            counted_mode_count: self.counted_mode_count,
         })
     }
 }
@@ -146,7 +148,11 @@ fn uncapped_step_count(point: &Point, speed_rpm: f64, turn_s: f64) -> Result<usi
 
 /// Returns the greatest number of instants of a turn at which derivatives are computed.
 fn max_instants(point: &Point) -> usize {
-    if point.machine.elements.has_nonsmooth_force() { INSTANTS_AT_CORNERS } else { INSTANTS }
+    if point.machine.elements.has_nonsmooth_force() {
+        INSTANTS_PER_TURN_WITH_CORNERS
+    } else {
+        INSTANTS_PER_TURN
+    }
 }
 
 /// Rounds a number of steps up to a multiple of [`max_instants`].
@@ -181,9 +187,9 @@ struct RangeSetting {
     is_capped: bool,
 }
 
-/// Returns the lower end of a range (rpm).
+/// Returns the lower end (rpm) of the speed range with an index.
 fn range_start_rpm(range: i64) -> f64 {
-    libm::exp2(range as f64 / RANGES_PER_OCTAVE)
+    libm::exp2(range as f64 / SPEED_RANGES_PER_OCTAVE)
 }
 
 impl<'a> Settings<'a> {
@@ -262,7 +268,7 @@ impl<'a> Settings<'a> {
         let caps = Some(caps_for_steps(steps, 60.0 / speed_rpm));
         let setup =
             TurnSetup { point, speed_rpm, steps, instants: steps, caps, corner_width_m: 0.0 };
-        Ok(TurnSetup { corner_width_m: CORNER_SPEED_M_PER_S * setup.step_s(), ..setup })
+        Ok(TurnSetup { corner_width_m: CORNER_WIDTH_PER_STEP_M_PER_S * setup.step_s(), ..setup })
     }
 
     /// Returns the number of steps of every turn in the continuation, which is at least
@@ -274,7 +280,7 @@ impl<'a> Settings<'a> {
         let longest_turn_s = 60.0 / self.lowest_rpm()?;
         let steps = round_up_steps(
             self.point,
-            highest_frequency_rad_per_s * longest_turn_s / CONTINUATION_LIMITS.max_phase_rad,
+            highest_frequency_rad_per_s * longest_turn_s / CONTINUATION_LIMITS.max_step_phase_rad,
         )?;
         Ok(steps.max(min_steps))
     }
@@ -300,7 +306,7 @@ impl<'a> Settings<'a> {
         speed_rpm: f64,
         purpose: Purpose,
     ) -> Result<HeldCase<'a>, ResponseError> {
-        let range = (RANGES_PER_OCTAVE * libm::log2(speed_rpm)).floor() as i64;
+        let range = (SPEED_RANGES_PER_OCTAVE * libm::log2(speed_rpm)).floor() as i64;
         let limits = match purpose {
             Purpose::Response => RESPONSE_LIMITS,
             Purpose::Continuation => CONTINUATION_LIMITS,
@@ -314,10 +320,10 @@ impl<'a> Settings<'a> {
         let RangeSetting { frozen_modes, steps, is_capped } = setting?;
         let point = self.point;
         let caps = is_capped.then(|| caps_for_steps(steps, 60.0 / speed_rpm));
-        let instants = limits.instants * max_instants(point) / INSTANTS;
+        let instants = limits.instants * max_instants(point) / INSTANTS_PER_TURN;
         let setup = TurnSetup { point, speed_rpm, steps, instants, caps, corner_width_m: 0.0 };
-        let counted_modes = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
-        Ok(HeldCase { setup, frozen_modes, counted_modes })
+        let counted_mode_count = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
+        Ok(HeldCase { setup, frozen_modes, counted_mode_count })
     }
 
     /// Returns the modes at the lower end of a range.
@@ -346,9 +352,11 @@ impl<'a> Settings<'a> {
         let turn_s = 60.0 / bounds_rpm[0];
         let highest_frequency_rad_per_s =
             modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
-        let mut steps =
-            round_up_steps(point, highest_frequency_rad_per_s * turn_s / limits.max_phase_rad)?
-                .max(limits.min_steps);
+        let mut steps = round_up_steps(
+            point,
+            highest_frequency_rad_per_s * turn_s / limits.max_step_phase_rad,
+        )?
+        .max(limits.min_steps);
         if point.machine.elements.has_nonsmooth_force() {
             steps = steps.max(round_up_steps(point, turn_s / limits.max_corner_step_s)?);
         }
@@ -360,7 +368,7 @@ impl<'a> Settings<'a> {
             let highest_rad_per_s = modes_at_rest.modes[COORDINATES - 1].magnitude_rad_per_s;
             // With more steps caps would exceed all modes.
             while !is_capped && (steps as f64) < highest_rad_per_s * turn_s {
-                let shift_at = |bound: usize| {
+                let compute_shift_per_s = |bound: usize| {
                     let caps = caps_for_steps(steps, 60.0 / bounds_rpm[bound]);
                     max_shift_per_s(
                         &self.frictionless_point,
@@ -369,7 +377,8 @@ impl<'a> Settings<'a> {
                         &caps,
                     )
                 };
-                is_capped = shift_at(0)?.max(shift_at(1)?) <= limits.max_shift_per_s;
+                is_capped =
+                    compute_shift_per_s(0)?.max(compute_shift_per_s(1)?) <= limits.max_shift_per_s;
                 if !is_capped {
                     steps = round_up_steps(point, STEP_COUNT_INCREASE * steps as f64)?;
                 }
@@ -410,15 +419,16 @@ fn max_shift_per_s(
     caps: &Caps,
 ) -> Result<f64, ResponseError> {
     let bearing_caps = Caps { hinge_rad_per_s: None, ..*caps };
-    let capped = mode_roots(point, speed_rad_per_s, Some(&bearing_caps))
+    let capped_root = mode_roots(point, speed_rad_per_s, Some(&bearing_caps))
         .map_err(|_| ResponseError::NoEigenvalues)?;
-    let shifts =
-        frozen_modes.modes.iter().zip(&capped).take(SUSPENSION_MODES).map(|(mode, capped)| {
-            let decay_shift = capped.s.re - mode.re_per_s;
-            let frequency_shift = capped.s.im - mode.im_rad_per_s;
+    let shifts = frozen_modes.modes.iter().zip(&capped_root).take(SUSPENSION_MODES).map(
+        |(mode, capped_root)| {
+            let decay_shift = capped_root.s.re - mode.re_per_s;
+            let frequency_shift = capped_root.s.im - mode.im_rad_per_s;
             let hinge_shift_per_s = hinge_shift(point, mode, speed_rad_per_s, caps.hinge_rad_per_s);
             (decay_shift * decay_shift + frequency_shift * frequency_shift).sqrt()
                 + hinge_shift_per_s
-        });
+        },
+    );
     Ok(shifts.fold(0.0, f64::max))
 }

@@ -26,7 +26,7 @@ pub(super) fn prepared(machine: Machine, speed_rpm: f64) -> Point {
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
-fn case_machine(case: &Value) -> Machine {
+fn machine_of_case(case: &Value) -> Machine {
     machine_with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"))
 }
 
@@ -102,7 +102,7 @@ fn find_response(setup: &TurnSetup<'_>, start: [f64; STATES]) -> ([f64; STATES],
 #[test]
 fn val_growth_and_amplitudes_match_an_independent_program() {
     for case in reference_list("points") {
-        let computed = response_at(case_machine(&case), number(&case, "speed_rpm"));
+        let computed = response_at(machine_of_case(&case), number(&case, "speed_rpm"));
         let [growth, frequency] = ["growth_per_s", "frequency_cpm"].map(|name| number(&case, name));
         // If all disturbances decay, the slowest is that of the hinge, which is not compared.
         if growth > 0.0 {
@@ -139,11 +139,11 @@ fn val_edges_match_an_independent_program() {
             .iter()
             .flat_map(|boundary_rpm| [boundary_rpm - 0.05, boundary_rpm + 0.05])
             .collect();
-        let unstable: Vec<bool> = responses_of_machine(case_machine(&case), &test_speeds_rpm)
+        let is_unstable: Vec<bool> = responses_of_machine(machine_of_case(&case), &test_speeds_rpm)
             .iter()
             .map(|r| r.kind() != StabilityKind::Stable)
             .collect();
-        assert_eq!(unstable, [false, true, true, false, false, true, true, false], "{case}");
+        assert_eq!(is_unstable, [false, true, true, false, false, true, true, false], "{case}");
     }
 }
 
@@ -188,8 +188,8 @@ fn multipliers_are_those_of_the_machine_without_caps() {
         assert!(difference.abs() < 2e-4, "{speed_rpm}: {nearest} {difference:e}");
         // No other disturbance grows; the hinge's disturbances decay slowly.
         for other in expected.iter().map(|mu| growth_per_s([mu.re, mu.im], speed_rpm)) {
-            let is_ours = other <= nearest.max(-0.1) + 1e-9;
-            assert!(is_ours, "{speed_rpm}: {other} against {nearest}");
+            let is_at_most_nearest = other <= nearest.max(-0.1) + 1e-9;
+            assert!(is_at_most_nearest, "{speed_rpm}: {other} against {nearest}");
         }
     }
 }
@@ -333,8 +333,8 @@ fn disturbances_of_simulated_runs_grow_as_fast() {
         .collect();
     assert!(growing.len() >= 10);
     for case in growing.iter().take(10) {
-        let response = response_at(case_machine(case), number(case, "speed_rpm"));
-        let simulated_per_s = simulated_growth_per_s(case_machine(case), &response);
+        let response = response_at(machine_of_case(case), number(case, "speed_rpm"));
+        let simulated_per_s = simulated_growth_per_s(machine_of_case(case), &response);
         let error = simulated_per_s / response.growth_per_s() - 1.0;
         println!("{error:e}");
         assert!(error.abs() < 0.01, "{case}: {simulated_per_s}");
@@ -352,28 +352,28 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
         let turn_s = 60.0 / speed_rpm;
         let speed = speed_rpm * TAU / 60.0;
         let matrices = point.matrices(0.0, speed, 0.0);
-        let full = |m: &[[f64; COORDINATES]; COORDINATES]| {
+        let to_matrix = |m: &[[f64; COORDINATES]; COORDINATES]| {
             Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j])
         };
-        let mass = full(&matrices.mass).partial_piv_lu();
+        let mass = to_matrix(&matrices.mass).partial_piv_lu();
         use faer::linalg::solvers::Solve as _;
-        let [k, c] = [&matrices.stiffness, &matrices.damping].map(|m| mass.solve(full(m)));
+        let [k, c] = [&matrices.stiffness, &matrices.damping].map(|m| mass.solve(to_matrix(m)));
         let unit = 1e4;
-        let system = Mat::from_fn(STATES, STATES, |i, j| {
+        let system_matrix = Mat::from_fn(STATES, STATES, |i, j| {
             let row = i % COORDINATES;
             let column = j % COORDINATES;
-            let model = match (i < COORDINATES, j < COORDINATES) {
+            let model_term = match (i < COORDINATES, j < COORDINATES) {
                 (true, true) => 0.0,
                 (true, false) => f64::from(u8::from(row == column)) * unit,
                 (false, true) => -k[(row, column)] / unit,
                 (false, false) => -c[(row, column)],
             };
-            let turning = match (row, column, i / COORDINATES == j / COORDINATES) {
+            let rotation_term = match (row, column, i / COORDINATES == j / COORDINATES) {
                 (8, 9, true) => -speed,
                 (9, 8, true) => speed,
                 _ => 0.0,
             };
-            model + turning
+            model_term + rotation_term
         });
         let setup = Settings::new(&point).held_case(speed_rpm).unwrap().setup;
         let rest_state =
@@ -381,7 +381,7 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
         let computed = find_response(&setup, rest_state).1;
         // The eigenvalues of the suspension's motions.
         let suspension_eigenvalues =
-            system.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
+            system_matrix.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
         let suspension_eigenvalues: Vec<c64> = suspension_eigenvalues.collect();
         assert_eq!(
             suspension_eigenvalues.len(),

@@ -178,16 +178,22 @@ fn slopes_of_dampers_in_two_stages_are_derivatives_of_their_force() {
         for speed in [-0.2, -0.004, 0.03] {
             let force = force_at(elongation_m, speed);
             let step = 1e-7;
-            let by_depth = (force_at(elongation_m + step, speed).force
+            let force_per_depth = (force_at(elongation_m + step, speed).force
                 - force_at(elongation_m - step, speed).force)
                 .0
                 / (2.0 * step);
-            let by_speed = (force_at(elongation_m, speed + step).force
+            let force_per_speed = (force_at(elongation_m, speed + step).force
                 - force_at(elongation_m, speed - step).force)
                 .0
                 / (2.0 * step);
-            assert!((force.by_depth.0 - by_depth).abs() < 1e-3 + 1e-5 * by_depth.abs());
-            assert!((force.by_speed.0 - by_speed).abs() < 1e-3 + 1e-5 * by_speed.abs());
+            assert!(
+                (force.force_per_depth.0 - force_per_depth).abs()
+                    < 1e-3 + 1e-5 * force_per_depth.abs()
+            );
+            assert!(
+                (force.force_per_speed.0 - force_per_speed).abs()
+                    < 1e-3 + 1e-5 * force_per_speed.abs()
+            );
             // The force opposes the motion.
             assert!(force.force.0 * speed <= 0.0);
         }

@@ -5,7 +5,7 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::floating::FloatingChain;
-use crate::nonlinear::{Half, Halves, coupled_halves};
+use crate::nonlinear::{Half, Halves, assemble_coupled_halves};
 use crate::point::Point;
 use crate::{
     Gauge, Machine, MachineParameter, Profile, Recorders, Spin, Target, Timing, Unbalance, prepare,
@@ -95,7 +95,7 @@ fn inertia_forces<T: Real, const R: usize>(
     midpoint: [N<T>; 2],
     rotation: [N<T>; R],
 ) -> ([N<T>; 2], [N<T>; R]) {
-    let FloatingChain { inverse_mass, arm, .. } = &half.floating;
+    let FloatingChain { inverse_mass, arm, .. } = &half.chain;
     let mut force = midpoint;
     for i in 0..2 {
         for r in 0..R {
@@ -121,8 +121,8 @@ pub(super) fn loaded_equations<T: Real>(
     let ([i1, i2], [i5, i6]) = inertia_forces(&halves.tub, [a[0], a[1]], [a[4], a[5]]);
     let ([i3, i4], [i7, i8, i9, i10]) =
         inertia_forces(&halves.rotor, [a[2], a[3]], [a[6], a[7], a[8], a[9]]);
-    let ([f1, f2], [f5, f6]) = halves.tub.floating.generalised_forces();
-    let ([f3, f4], [f7, f8, f9, f10]) = halves.rotor.floating.generalised_forces();
+    let ([f1, f2], [f5, f6]) = halves.tub.chain.generalised_forces();
+    let ([f3, f4], [f7, f8, f9, f10]) = halves.rotor.chain.generalised_forces();
     [[i1, i2, i3, i4, i5, i6, i7, i8, i9, i10], [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]]
 }
 
@@ -134,7 +134,7 @@ pub(super) fn equations<T: Lane>(
     u: &[N<T>; COORDINATES],
     a: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; 2] {
-    loaded_equations(&coupled_halves(machine, spin, q, u), a)
+    loaded_equations(&assemble_coupled_halves(machine, spin, q, u), a)
 }
 
 /// Computes the mass matrix of the nonlinear model by columns from unit accelerations.

@@ -7,7 +7,7 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::forces::Deflection;
 use crate::nonlinear::frame::Tilt;
-use crate::nonlinear::{accelerations, coupled_halves};
+use crate::nonlinear::{accelerations, assemble_coupled_halves};
 use crate::tests::reference::{assert_matrix, machine, numbers, reference, spin};
 use lane_ode::{Dual, N};
 
@@ -95,9 +95,9 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
                 tilt: mass_deflection(d.tilt, tilt),
             };
             let load = deflection.load_on_shaft(&machine.bodies);
-            let mut halves = coupled_halves(machine, spin, q, u);
-            halves.tub.floating.apply(&load.reaction());
-            halves.rotor.floating.apply(&load);
+            let mut halves = assemble_coupled_halves(machine, spin, q, u);
+            halves.tub.chain.add_load(&load.reaction());
+            halves.rotor.chain.add_load(&load);
             if let Some(cap) = hinge_rad_per_s {
                 // The deflection by weight does not turn with the drum, so that it rotates
                 // backwards in the shaft's frame.
@@ -109,7 +109,7 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
                 for i in 0..2 {
                     let whirl = N(1.5 * spin.speed.0) * forwards[i]
                         - N(0.5 * speed_squared) * rotated_sag[i];
-                    halves.rotor.floating.torque[2 + i] -= mass * (a[8 + i] + whirl);
+                    halves.rotor.chain.torque[2 + i] -= mass * (a[8 + i] + whirl);
                 }
             }
             max_error = max_error.max(residual(&loaded_equations(&halves, &a)));

@@ -40,7 +40,7 @@ impl Spin {
 /// of the run in either direction (at theta = 2 pi k if the drum never reverses). Partial turns at
 /// the window's ends are joined to the adjacent whole turn, so that a window with less than two
 /// whole turns is not cut.
-pub(crate) fn whole_turn_cuts_s(segments: &[SpinSegment], window_s: [f64; 2]) -> Vec<f64> {
+pub(crate) fn whole_turn_times_s(segments: &[SpinSegment], window_s: [f64; 2]) -> Vec<f64> {
     let mut times_s = whole_turns_s(segments, window_s);
     times_s.pop();
     if !times_s.is_empty() {
@@ -212,7 +212,7 @@ mod tests {
     fn partial_turns_are_joined_to_the_adjacent_whole_turn() {
         // The drum makes one turn per second after the first turn, which takes two seconds.
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 2.0 };
-        let turn_times_s = |window_s| whole_turn_cuts_s(&spin.segments(), window_s);
+        let turn_times_s = |window_s| whole_turn_times_s(&spin.segments(), window_s);
         let assert_near = |times: Vec<f64>, expected: &[f64]| {
             assert_eq!(times.len(), expected.len(), "{times:?}");
             assert!(times.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{times:?}");
@@ -224,7 +224,7 @@ mod tests {
         assert_near(turn_times_s([2.5, 3.4]), &[]);
         assert_near(turn_times_s([3.2, 3.4]), &[]);
         let zero_spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 2.0 };
-        assert_near(whole_turn_cuts_s(&zero_spin.segments(), [0.0, 100.0]), &[]);
+        assert_near(whole_turn_times_s(&zero_spin.segments(), [0.0, 100.0]), &[]);
     }
 
     #[test]

@@ -15,7 +15,7 @@ const MAX_TRAVEL_M: f64 = 0.05;
 /// The depth at which a stop counts as in full contact, as a multiple of its softness. Basis: at
 /// this depth the slope of the force is within a thousandth of its limit. Doubling it reduces the
 /// difference to a quarter.
-const CONTACT_DEPTH: f64 = 20.0;
+const CONTACT_DEPTH_PER_SOFTNESS: f64 = 20.0;
 
 impl Elements<f64> {
     /// Returns linear elements with the greatest tangents that the elements have near the
@@ -24,46 +24,48 @@ impl Elements<f64> {
         if !self.has_optional_forces.holds() {
             return None;
         }
-        let mut linearised = self.clone();
+        let mut linear_elements = self.clone();
         let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
-        for spring in &mut linearised.springs {
+        for spring in &mut linear_elements.springs {
             let ends = &spring.ends;
-            let displacement = tub.point(&ends.tub).displacement;
+            let displacement = tub.point_motion(&ends.tub).displacement;
             let span = subtract(displacement, &subtract(ends.cabinet, &ends.tub));
             let length = dot(&span, &span).sqrt();
             let elongation = length - spring.free_length;
-            let cubic = spring.cubic;
+            let cubic = spring.cubic_stiffness;
             let tension = spring.stiffness * length - spring.stiffness_times_free_length
                 + cubic * elongation * elongation * elongation;
             let max_elongation = elongation.abs() + MAX_TRAVEL_M;
             spring.stiffness += 3.0 * (cubic * max_elongation * max_elongation).v();
             // The tension at rest is kept, because the stiffness across the line depends on it.
             spring.stiffness_times_free_length = spring.stiffness * length - tension;
-            spring.cubic = N(0.0);
+            spring.cubic_stiffness = N(0.0);
         }
         let mut onset_springs = Vec::new();
-        for damper in &mut linearised.dampers {
+        for damper in &mut linear_elements.dampers {
             onset_springs.extend(damper.onset_spring());
-            damper.damping += damper.friction / damper.speed_squared.sqrt() + damper.outer_damping;
+            damper.damping +=
+                damper.friction / damper.friction_speed_squared.sqrt() + damper.outer_damping;
             damper.friction = N(0.0);
             damper.outer_damping = N(0.0);
         }
-        linearised.springs.append(&mut onset_springs);
-        for stop in &mut linearised.stops {
-            let depth = stop.depth(&tub.point(&stop.tub));
+        linear_elements.springs.append(&mut onset_springs);
+        for stop in &mut linear_elements.stops {
+            let depth = stop.depth(&tub.point_motion(&stop.tub));
             let StopCoefficients { clearance, softness_squared, .. } = *stop;
-            stop.clearance = clearance + depth - CONTACT_DEPTH * softness_squared.sqrt();
+            stop.clearance =
+                clearance + depth - CONTACT_DEPTH_PER_SOFTNESS * softness_squared.sqrt();
         }
-        for bushing in &mut linearised.bushings {
-            let displacement = tub.point(&bushing.tub).displacement;
+        for bushing in &mut linear_elements.bushings {
+            let displacement = tub.point_motion(&bushing.tub).displacement;
             for i in 0..3 {
                 let max_elongation = displacement[i].abs() + MAX_TRAVEL_M;
                 bushing.stiffness[i] +=
-                    3.0 * (bushing.cubic[i] * max_elongation * max_elongation).v();
-                bushing.cubic[i] = N(0.0);
+                    3.0 * (bushing.cubic_stiffness[i] * max_elongation * max_elongation).v();
+                bushing.cubic_stiffness[i] = N(0.0);
             }
         }
-        Some(linearised)
+        Some(linear_elements)
     }
 }
 
@@ -80,7 +82,7 @@ impl DamperCoefficients<f64> {
             ends: self.ends,
             stiffness,
             stiffness_times_free_length: (stiffness * self.rest_length).v(),
-            cubic: N(0.0),
+            cubic_stiffness: N(0.0),
             free_length: self.rest_length,
         })
     }

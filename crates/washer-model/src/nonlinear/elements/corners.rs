@@ -9,7 +9,7 @@ lane_struct! {
     /// A force along a motion of the tub (N), and its derivatives with respect to depth (N/m) and
     /// speed (N s/m).
     #[derive(Clone, Copy)]
-    CornerForce { force, by_depth, by_speed }
+    CornerForce { force, force_per_depth, force_per_speed }
 }
 
 impl<T: Lane> Elements<T> {
@@ -22,7 +22,7 @@ impl<T: Lane> Elements<T> {
             motions.push(self.damper_motion(number, tub));
         }
         for stop in &self.stops {
-            let point = tub.point(&stop.tub);
+            let point = tub.point_motion(&stop.tub);
             motions.push([stop.depth(&point), stop.speed(&point)]);
         }
         motions
@@ -42,18 +42,18 @@ impl<T: Lane> Elements<T> {
             let mut line = CabinetLine {
                 span: [zero.constant(); 3],
                 length: length.constant(),
-                rate: speed.constant(),
+                length_rate: speed.constant(),
             };
-            line.rate.0.slope = zero.lit(1.0).0;
-            let N(by_speed) = damper.optional_force(&line);
-            let mut by_depth = zero;
+            line.length_rate.0.slope = zero.lit(1.0).0;
+            let N(force_per_speed) = damper.optional_force(&line);
+            let mut force_per_depth = zero;
             if damper.has_second_stage.holds() {
-                line.rate.0.slope = zero.0;
+                line.length_rate.0.slope = zero.0;
                 line.length.0.slope = zero.lit(1.0).0;
-                by_depth = N(damper.optional_force(&line).0.slope);
+                force_per_depth = N(damper.optional_force(&line).0.slope);
             }
-            let [force, by_speed] = [N(by_speed.value), N(by_speed.slope)];
-            forces.push(CornerForce { force, by_depth, by_speed });
+            let [force, force_per_speed] = [N(force_per_speed.value), N(force_per_speed.slope)];
+            forces.push(CornerForce { force, force_per_depth, force_per_speed });
         }
         for (stop, [depth, speed]) in self.stops.iter().zip(stop_motions) {
             let stop = stop.constant();
@@ -61,12 +61,12 @@ impl<T: Lane> Elements<T> {
             let mut speed_dual = speed.constant();
             depth_dual.0.slope = depth.lit(1.0).0;
             speed_dual.0.slope = depth.lit(1.0).0;
-            let N(by_depth) = -stop.force_at_depth(depth_dual, speed.constant());
-            let N(by_speed) = -stop.force_at_depth(depth.constant(), speed_dual);
+            let N(force_per_depth) = -stop.force_at_depth(depth_dual, speed.constant());
+            let N(force_per_speed) = -stop.force_at_depth(depth.constant(), speed_dual);
             forces.push(CornerForce {
-                force: N(by_depth.value),
-                by_depth: N(by_depth.slope),
-                by_speed: N(by_speed.slope),
+                force: N(force_per_depth.value),
+                force_per_depth: N(force_per_depth.slope),
+                force_per_speed: N(force_per_speed.slope),
             });
         }
     }

@@ -31,7 +31,7 @@ fn the_tangent_map_agrees_with_differences_of_nearby_runs() {
     let entry_state = integrate(&point, STEP_S, [0.0, 1.8], &at_rest).end;
     // The interval contains the profile's kink.
     let crossing = forward_crossing([1.8, 2.2], None);
-    let map = Simd::dispatch_narrow(TangentMap {
+    let tangent_map = Simd::dispatch_narrow(TangentMap {
         point: &point,
         step_s: STEP_S,
         crossing: &crossing,
@@ -44,14 +44,14 @@ fn the_tangent_map_agrees_with_differences_of_nearby_runs() {
     };
     for index in 0..STATES {
         let size = if index < COORDINATES { 1e-7 } else { 1e-5 };
-        let above = end(size, index);
-        let below = end(-size, index);
+        let end_above = end(size, index);
+        let end_below = end(-size, index);
         let max_slope =
-            map[index].iter().fold(0.0_f64, |max_slope, slope| max_slope.max(slope.abs()));
+            tangent_map[index].iter().fold(0.0_f64, |max_slope, slope| max_slope.max(slope.abs()));
         for i in 0..STATES {
-            let slope = (above[i] - below[i]) / (2.0 * size);
-            let difference = (slope - map[index][i]).abs() / max_slope;
-            assert!(difference < 1e-6, "{index} {i}: {slope} {}", map[index][i]);
+            let slope = (end_above[i] - end_below[i]) / (2.0 * size);
+            let difference = (slope - tangent_map[index][i]).abs() / max_slope;
+            assert!(difference < 1e-6, "{index} {i}: {slope} {}", tangent_map[index][i]);
         }
     }
 }
@@ -72,7 +72,7 @@ fn a_run_on_its_response_does_not_depart() {
     let response = response.into_iter().next().unwrap().unwrap().remove(0);
     for time_s in [0.0_f64, 0.1, 0.2, 1.0] {
         let followed = integrate(&point, STEP_S, [0.0, time_s.max(1e-12)], &response.start).end;
-        let expected = response_at(&point, STEP_S, &response, false, time_s);
+        let expected = response_state_at(&point, STEP_S, &response, false, time_s);
         let difference = core::array::from_fn(|i| followed[i] - expected[i]);
         let deviation = core::array::from_fn(|i| {
             expected[i] - if i < COORDINATES { point.equilibrium()[i] } else { 0.0 }
@@ -91,10 +91,10 @@ fn peaks_are_those_of_the_window_and_of_a_run_that_starts_on_its_response() {
     let state_at_1_s = integrate(&point, STEP_S, [0.0, 1.0], &at_rest);
     let window_peaks = integrate(&point, STEP_S, [1.0, 3.0], &state_at_1_s.end).peaks;
     let all_peaks = peaks_without_departures(&point, STEP_S, &[], [0.0, 3.0]).unwrap();
-    let window_only = peaks_without_departures(&point, STEP_S, &[], [1.0, 3.0]).unwrap();
+    let window_only_peaks = peaks_without_departures(&point, STEP_S, &[], [1.0, 3.0]).unwrap();
     for i in 0..CHANNELS {
         assert!((all_peaks[i] / ramp_peaks[i] - 1.0).abs() < 1e-6);
-        assert!((window_only[i] / window_peaks[i] - 1.0).abs() < 1e-6);
+        assert!((window_only_peaks[i] / window_peaks[i] - 1.0).abs() < 1e-6);
     }
     // After the ramp of two seconds the run differs much from the response.
     let response = find_responses(&[HeldSpeed { point: &point, speed_rpm: 225.0 }], Cancel::Never);
@@ -141,7 +141,7 @@ fn a_backward_response_is_that_of_the_mirrored_machine() {
     for time_s in [1e-12, 0.1, 0.2, 1.0] {
         let start = mirror_state(&response.start);
         let followed = integrate(&point, STEP_S, [0.0, time_s], &start).end;
-        let expected = response_at(&point, STEP_S, &response, true, time_s);
+        let expected = response_state_at(&point, STEP_S, &response, true, time_s);
         let deviation = core::array::from_fn(|i| {
             expected[i] - if i < COORDINATES { point.equilibrium()[i] } else { 0.0 }
         });
