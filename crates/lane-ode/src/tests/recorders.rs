@@ -41,7 +41,8 @@ fn peak_between(waves: &Waves, start: f64, end: f64) -> f64 {
 
 #[test]
 fn the_peak_of_a_part_is_that_of_a_separate_trajectory() {
-    // The division times are at the end of a step, one step apart, several within a step, and far apart.
+    // The division times are at the end of a step, one step apart, several within a step, and far
+    // apart.
     let division_times_s = [0.5, 0.71, 0.775, 0.78, 0.79, 1.7, 4.3];
     let boundaries_s: Vec<f64> = [0.0].into_iter().chain(division_times_s).chain([5.0]).collect();
     for seed in 0..20 {
