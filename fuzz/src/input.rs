@@ -3,9 +3,9 @@
 use std::path::Path;
 
 /// The line before the machine file, which the grid can name as `machine.toml`.
-const MACHINE: &[u8] = b"\n%% machine.toml\n";
+const MACHINE_MARKER: &[u8] = b"\n%% machine.toml\n";
 /// The line before the constants, which have a line each.
-const SETS: &[u8] = b"\n%% set\n";
+const SETS_MARKER: &[u8] = b"\n%% set\n";
 
 /// The parts of an input.
 pub(crate) struct Input<'a> {
@@ -16,8 +16,8 @@ pub(crate) struct Input<'a> {
 
 impl<'a> Input<'a> {
     pub(crate) fn new(bytes: &'a [u8]) -> Self {
-        let (files, sets) = split_at_line(bytes, SETS);
-        let (grid, machine) = split_at_line(files, MACHINE);
+        let (files, sets) = split_at_line(bytes, SETS_MARKER);
+        let (grid, machine) = split_at_line(files, MACHINE_MARKER);
         let sets =
             String::from_utf8_lossy(sets.unwrap_or_default()).lines().map(str::to_owned).collect();
         Self { grid, machine, sets }

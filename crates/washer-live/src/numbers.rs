@@ -20,7 +20,7 @@ impl NumberWalk<'_> {
         matches!(self, Self::Read(_))
     }
 
-    pub(crate) fn numbers<const N: usize>(&mut self, values: [&mut f64; N]) -> Option<()> {
+    pub(crate) fn walk_numbers<const N: usize>(&mut self, values: [&mut f64; N]) -> Option<()> {
         for value in values {
             match self {
                 Self::Write(numbers) => numbers.push(*value),
@@ -34,46 +34,46 @@ impl NumberWalk<'_> {
     }
 
     /// Writes or reads a number that may be missing, as NaN.
-    pub(crate) fn optional(&mut self, value: &mut Option<f64>) -> Option<()> {
+    pub(crate) fn walk_optional(&mut self, value: &mut Option<f64>) -> Option<()> {
         let mut number = value.unwrap_or(f64::NAN);
-        self.numbers([&mut number])?;
+        self.walk_numbers([&mut number])?;
         *value = (!number.is_nan()).then_some(number);
         Some(())
     }
 
     /// Writes `count` and returns it, or reads another count and returns the latter.
-    pub(crate) fn count(&mut self, count: usize) -> Option<usize> {
+    pub(crate) fn walk_count(&mut self, count: usize) -> Option<usize> {
         let mut value = count as f64;
-        self.numbers([&mut value])?;
+        self.walk_numbers([&mut value])?;
         let is_count = value >= 0.0 && value < COUNT_LIMIT as f64 && value == value.trunc();
         is_count.then_some(value as usize)
     }
 
     /// Writes or reads an element of `choices` as its index.
-    pub(crate) fn choice<T: Clone + PartialEq>(
+    pub(crate) fn walk_choice<T: Clone + PartialEq>(
         &mut self,
         value: &mut T,
         choices: &[T],
     ) -> Option<()> {
         let index = choices.iter().position(|choice| choice == value).unwrap_or(choices.len());
-        *value = choices.get(self.count(index)?)?.clone();
+        *value = choices.get(self.walk_count(index)?)?.clone();
         Some(())
     }
 
     /// Writes or reads some elements of `choices` as their indices.
-    pub(crate) fn choices<T: Clone + PartialEq>(
+    pub(crate) fn walk_choices<T: Clone + PartialEq>(
         &mut self,
         values: &mut Vec<T>,
         choices: &[T],
     ) -> Option<()> {
-        self.resize(values, choices.first()?)?;
-        values.iter_mut().try_for_each(|value| self.choice(value, choices))
+        self.walk_length(values, choices.first()?)?;
+        values.iter_mut().try_for_each(|value| self.walk_choice(value, choices))
     }
 
     /// Writes the length of a list, or reads a length and resizes the list. The elements are
     /// written or read separately.
-    pub(crate) fn resize<T: Clone>(&mut self, list: &mut Vec<T>, blank: &T) -> Option<()> {
-        list.resize(self.count(list.len())?, blank.clone());
+    pub(crate) fn walk_length<T: Clone>(&mut self, list: &mut Vec<T>, blank: &T) -> Option<()> {
+        list.resize(self.walk_count(list.len())?, blank.clone());
         Some(())
     }
 }

@@ -45,19 +45,19 @@ impl Answer {
         outcome: Outcome,
         amplitudes: [Deviations; 2],
         level_indices: [usize; 2],
-        levels_of_models: &[RefinementLevels; 2],
+        levels_by_model: &[RefinementLevels; 2],
         limits: RatioLimits,
     ) -> Self {
-        let with_all_channels = |run: &Trajectory, amplitudes: &Deviations| match run.status {
+        let to_all_channels = |run: &Trajectory, amplitudes: &Deviations| match run.status {
             Status::Ok => Trajectory { amplitudes: amplitudes.to_vec(), ..run.clone() },
             failure => Trajectory::failed(failure),
         };
-        let nonlinear = with_all_channels(&outcome.nonlinear, &amplitudes[0]);
-        let linear = with_all_channels(&outcome.linear, &amplitudes[1]);
+        let nonlinear = to_all_channels(&outcome.nonlinear, &amplitudes[0]);
+        let linear = to_all_channels(&outcome.linear, &amplitudes[1]);
         let mut all_channels_outcome = Outcome::new(outcome.point, nonlinear, linear);
         all_channels_outcome.compare(&Channel::ALL, limits);
         let ratios = all_channels_outcome.verdict.ratios;
-        let methods = [0, 1].map(|model| levels_of_models[model].levels[level_indices[model]].kind);
+        let methods = [0, 1].map(|model| levels_by_model[model].levels[level_indices[model]].kind);
         Self { outcome, amplitudes, ratios, level_indices, methods, errors: [None; 2] }
     }
 }
@@ -94,7 +94,7 @@ impl PointScenario {
                 return Err(PointError::Impossible);
             }
             match parameter.target() {
-                Target::Window(edge) => scenario.window_s[edge] = value,
+                Target::Window(end_index) => scenario.window_s[end_index] = value,
                 _ => parameter.set(&mut scenario.machine, &mut scenario.spin, value),
             }
         }
@@ -136,30 +136,30 @@ fn prepare_point(setup: &Setup, values: &[f64]) -> Result<Point, PointError> {
 
 /// Integrates both models at some points at the quick level, in lanes, without an error estimate.
 pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, PointError>> {
-    let prepared = points.iter();
-    let prepared =
-        prepared.map(|values| (refinement_levels(setup, values), prepare_point(setup, values)));
-    let prepared: Vec<_> = prepared.collect();
+    let prepared_points: Vec<_> = points
+        .iter()
+        .map(|values| (refinement_levels(setup, values), prepare_point(setup, values)))
+        .collect();
     let rule = RowRule { accuracy: f64::INFINITY, ..setup.rule.clone() };
     let mut answers: Vec<Result<Answer, PointError>> = Vec::with_capacity(points.len());
     // Points with the same refinement levels are integrated together in lanes.
-    for group in prepared.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
+    for group in prepared_points.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
         let levels = group[0].0;
         let valid_points: Vec<&Point> =
-            group.iter().filter_map(|(_, prepared)| prepared.as_ref().ok()).collect();
+            group.iter().filter_map(|(_, prepared_point)| prepared_point.as_ref().ok()).collect();
         let level_indices = [0, 1].map(|model| quick_level_index(&levels[model]));
         let [nonlinear, linear] = [0, 1].map(|model| {
             run_method(model, levels[model].method(level_indices[model]), &valid_points, &rule)
         });
         let mut run_pairs = nonlinear.into_iter().zip(linear);
-        let answer = |(nonlinear, linear): (LevelRun, LevelRun)| {
+        let to_answer = |(nonlinear, linear): (LevelRun, LevelRun)| {
             let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
             let mut outcome = Outcome::new(0, nonlinear.trajectory, linear.trajectory);
             outcome.compare(&rule.channels, rule.limits);
             Answer::new(outcome, amplitudes, level_indices, levels, rule.limits)
         };
-        answers.extend(group.iter().map(|(_, prepared)| match prepared {
-            Ok(_) => run_pairs.next().map(answer).ok_or(PointError::NoEquilibrium),
+        answers.extend(group.iter().map(|(_, prepared_point)| match prepared_point {
+            Ok(_) => run_pairs.next().map(to_answer).ok_or(PointError::NoEquilibrium),
             Err(error) => Err(*error),
         }));
     }
@@ -192,13 +192,15 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
             runs.extend(run.into_iter().map(|run| ((model, level_index), run)));
         }
     };
-    let finest = [0, 1].map(|model| refinement.finest_run(model, &point, refinement_rule));
-    let [Some(nonlinear), Some(linear)] = finest else { return Err(PointError::NoEquilibrium) };
-    let finest = [nonlinear, linear];
-    let amplitudes = finest.map(|(run, ..)| run.amplitudes);
-    let level_indices = finest.map(|(_, level_index, _)| level_index);
+    let finest_runs = [0, 1].map(|model| refinement.finest_run(model, &point, refinement_rule));
+    let [Some(nonlinear), Some(linear)] = finest_runs else {
+        return Err(PointError::NoEquilibrium);
+    };
+    let finest_runs = [nonlinear, linear];
+    let amplitudes = finest_runs.map(|(run, ..)| run.amplitudes);
+    let level_indices = finest_runs.map(|(_, level_index, _)| level_index);
     let answer = Answer::new(outcome, amplitudes, level_indices, levels, rule.limits);
-    Ok(Answer { errors: finest.map(|(.., error)| error), ..answer })
+    Ok(Answer { errors: finest_runs.map(|(.., error)| error), ..answer })
 }
 
 fn run_method(model: usize, method: &Method, points: &[&Point], rule: &RowRule) -> Vec<LevelRun> {

@@ -50,8 +50,8 @@ impl Setup {
 
     /// Decodes a setup from [`Self::to_numbers`]; `None` for other numbers.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        let direct = RefinementLevels::direct(Method::new(MethodKind::Rk4));
-        let levels = [direct.clone(), direct];
+        let direct_levels = RefinementLevels::direct(Method::new(MethodKind::Rk4));
+        let levels = [direct_levels.clone(), direct_levels];
         let mut setup = Self {
             machine: Machine::paper(),
             spin: Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() },
@@ -75,34 +75,34 @@ impl Setup {
     fn walk(&mut self, walk: &mut NumberWalk<'_>) -> Option<()> {
         let Self { machine, spin, .. } = self;
         for list in ElementList::all() {
-            let count = walk.count((list.count)(machine))?;
+            let count = walk.walk_count((list.count)(machine))?;
             if walk.is_reading() {
                 (list.fill)(machine, count);
             }
         }
-        let cabinets = walk.count(usize::from(machine.cabinet.is_some()))?;
-        machine.cabinet = (cabinets > 0).then(|| machine.cabinet.unwrap_or_default());
+        let cabinet_count = walk.walk_count(usize::from(machine.cabinet.is_some()))?;
+        machine.cabinet = (cabinet_count > 0).then(|| machine.cabinet.unwrap_or_default());
         walk_profile(walk, spin)?;
         let parameters = MachineParameter::all(machine, spin);
         // The parameters of single elements come after those that set all elements.
         for parameter in &parameters {
             let mut value = parameter.get(machine, spin);
-            walk.optional(&mut value)?;
+            walk.walk_optional(&mut value)?;
             if let Some(value) = value.filter(|_| walk.is_reading()) {
                 parameter.set(machine, spin, value);
             }
         }
         // If a spring has no free length, it follows from the positions of its ends.
         for spring in &mut machine.springs {
-            walk.optional(&mut spring.free_length_m)?;
+            walk.walk_optional(&mut spring.free_length_m)?;
         }
-        self.checkpoints = u32::try_from(walk.count(self.checkpoints as usize)?).ok()?;
+        self.checkpoints = u32::try_from(walk.walk_count(self.checkpoints as usize)?).ok()?;
         walk_rule(walk, &mut self.rule)?;
         let RowRule { measures, .. } = &mut self.rule;
         (measures.stops, measures.feet) = (machine.stops.len(), machine.feet.len());
         measures.dampers = machine.dampers.len();
-        walk.choices(&mut self.sliders.parameters, &parameters)?;
-        self.sliders.axes = walk.count(self.sliders.axes)?;
+        walk.walk_choices(&mut self.sliders.parameters, &parameters)?;
+        self.sliders.axes = walk.walk_count(self.sliders.axes)?;
         let mut all_levels = self.levels.iter_mut().chain(&mut self.wide_levels);
         all_levels.try_for_each(|levels| walk_levels(walk, levels))
     }
@@ -110,15 +110,15 @@ impl Setup {
 
 /// Writes or reads the profile of the spin; its numbers are parameters.
 fn walk_profile(walk: &mut NumberWalk<'_>, spin: &mut Spin) -> Option<()> {
-    let code = walk.count(match spin {
+    let profile_code = walk.walk_count(match spin {
         Spin::Ramped { profile, .. } => *profile as usize,
         Spin::Table { time_s, .. } => Profile::ALL.len() + time_s.len(),
     })?;
     if walk.is_reading() {
-        *spin = match Profile::ALL.get(code) {
+        *spin = match Profile::ALL.get(profile_code) {
             Some(&profile) => Spin::Ramped { profile, peak_rpm: 0.0, ramp_s: 0.0 },
             None => {
-                let zeros = vec![0.0; code - Profile::ALL.len()];
+                let zeros = vec![0.0; profile_code - Profile::ALL.len()];
                 Spin::Table { time_s: zeros.clone(), speed_rpm: zeros }
             }
         };
@@ -129,42 +129,42 @@ fn walk_profile(walk: &mut NumberWalk<'_>, spin: &mut Spin) -> Option<()> {
 /// Writes or reads the rule, without the numbers of stops, feet and dampers.
 fn walk_rule(walk: &mut NumberWalk<'_>, rule: &mut RowRule) -> Option<()> {
     let RowRule { end_s, window_s: [from_s, to_s], accuracy, limits, channels, measures } = rule;
-    walk.numbers([end_s, from_s, to_s, accuracy, &mut limits.upper])?;
-    walk.optional(&mut limits.lower)?;
-    walk.choices(channels, &Channel::ALL)?;
-    walk.choice(&mut measures.criterion, &Criterion::ALL)?;
-    walk.choices(&mut measures.metrics, &Metric::ALL)
+    walk.walk_numbers([end_s, from_s, to_s, accuracy, &mut limits.upper])?;
+    walk.walk_optional(&mut limits.lower)?;
+    walk.walk_choices(channels, &Channel::ALL)?;
+    walk.walk_choice(&mut measures.criterion, &Criterion::ALL)?;
+    walk.walk_choices(&mut measures.metrics, &Metric::ALL)
 }
 
 /// Writes or reads the refinement levels, of which there are at least two.
 fn walk_levels(walk: &mut NumberWalk<'_>, levels: &mut RefinementLevels) -> Option<()> {
-    let mut resized = levels.levels.clone();
-    walk.resize(&mut resized, &levels.levels[0])?;
-    resized.iter_mut().try_for_each(|method| walk_method(walk, method))?;
-    if resized.len() < 2 {
+    let mut methods = levels.levels.clone();
+    walk.walk_length(&mut methods, &levels.levels[0])?;
+    methods.iter_mut().try_for_each(|method| walk_method(walk, method))?;
+    if methods.len() < 2 {
         return None;
     }
-    *levels = RefinementLevels::checked(resized, None);
+    *levels = RefinementLevels::checked(methods, None);
     Some(())
 }
 
 fn walk_method(walk: &mut NumberWalk<'_>, method: &mut Method) -> Option<()> {
-    walk.choice(&mut method.kind, &MethodKind::ALL)?;
+    walk.walk_choice(&mut method.kind, &MethodKind::ALL)?;
     if walk.is_reading() {
         *method = Method::new(method.kind);
     }
     let Method { kind, step_s, caps, tolerance } = method;
     if kind.adapts_steps() {
         let Tolerance { relative, absolute, max_steps } = tolerance;
-        let mut steps = *max_steps as f64;
-        walk.numbers([relative, absolute, &mut steps])?;
-        *max_steps = steps as u64;
+        let mut max_step_count = *max_steps as f64;
+        walk.walk_numbers([relative, absolute, &mut max_step_count])?;
+        *max_steps = max_step_count as u64;
         return Some(());
     }
-    walk.numbers([step_s])?;
+    walk.walk_numbers([step_s])?;
     if kind.is_capped() {
-        walk.numbers([&mut caps.bearings_rad_per_s])?;
-        walk.optional(&mut caps.hinge_rad_per_s)?;
+        walk.walk_numbers([&mut caps.bearings_rad_per_s])?;
+        walk.walk_optional(&mut caps.hinge_rad_per_s)?;
     }
     Some(())
 }

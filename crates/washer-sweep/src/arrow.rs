@@ -16,35 +16,41 @@ use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 
 /// The name of capsules with a stream, which the protocol defines.
-const STREAM: &CStr = c"arrow_array_stream";
+const STREAM_CAPSULE_NAME: &CStr = c"arrow_array_stream";
 /// The name of capsules with a schema, which the protocol defines.
-const SCHEMA: &CStr = c"arrow_schema";
+const SCHEMA_CAPSULE_NAME: &CStr = c"arrow_schema";
 
 /// Returns rows as a stream.
-pub(crate) fn stream<'py>(
+pub(crate) fn to_stream_capsule<'py>(
     py: Python<'py>,
     schema: &SchemaRef,
     batches: &[RecordBatch],
 ) -> PyResult<Bound<'py, PyCapsule>> {
     let batches: Vec<Result<RecordBatch, ArrowError>> = batches.iter().cloned().map(Ok).collect();
     let reader = RecordBatchIterator::new(batches, SchemaRef::clone(schema));
-    PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(reader)), STREAM)
+    PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(reader)), STREAM_CAPSULE_NAME)
 }
 
 /// Returns a schema without rows.
-pub(crate) fn schema<'py>(py: Python<'py>, schema: &SchemaRef) -> PyResult<Bound<'py, PyCapsule>> {
+pub(crate) fn to_schema_capsule<'py>(
+    py: Python<'py>,
+    schema: &SchemaRef,
+) -> PyResult<Bound<'py, PyCapsule>> {
     let schema = FFI_ArrowSchema::try_from(schema.as_ref()).map_err(stream_error)?;
-    PyCapsule::new_with_value(py, schema, SCHEMA)
+    PyCapsule::new_with_value(py, schema, SCHEMA_CAPSULE_NAME)
 }
 
 /// Reads the schema and all rows of a table; `None` if the table does not support the protocol.
-pub(crate) fn rows(table: &Bound<'_, PyAny>) -> PyResult<Option<(SchemaRef, Vec<RecordBatch>)>> {
+pub(crate) fn read_rows(
+    table: &Bound<'_, PyAny>,
+) -> PyResult<Option<(SchemaRef, Vec<RecordBatch>)>> {
     let Some(method) = table.getattr_opt("__arrow_c_stream__")? else { return Ok(None) };
     let capsule = method.call0()?;
     let capsule = capsule.cast::<PyCapsule>().map_err(|_| {
         PyTypeError::new_err("`__arrow_c_stream__` of this table returns no capsule")
     })?;
-    let pointer = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
+    let pointer =
+        capsule.pointer_checked(Some(STREAM_CAPSULE_NAME))?.cast::<FFI_ArrowArrayStream>();
     // SAFETY: A capsule of this name holds a stream by the protocol. `from_raw` moves the stream
     // out and leaves a released one, for which the capsule's destructor does nothing.
     let reader =

@@ -12,9 +12,9 @@ use crate::arrow;
 use crate::errors::plan_error;
 
 /// Reads the points of a table.
-pub(crate) fn points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
+pub(crate) fn read_points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
     let py = table.py();
-    if let Some((schema, batches)) = arrow::rows(table)? {
+    if let Some((schema, batches)) = arrow::read_rows(table)? {
         return PointTable::new(&schema, &batches).map_err(|error| plan_error(py, &error));
     }
     let Ok(columns) = table.cast::<PyMapping>() else {
@@ -24,9 +24,9 @@ pub(crate) fn points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
              mapping of parameter name to numbers; got `{type_name}`"
         )));
     };
-    let column = |entry: Bound<'_, PyAny>| {
-        let (name, values): (String, Bound<'_, PyAny>) = entry.extract()?;
-        let values = numbers(&values).map_err(|error| {
+    let column = |item: Bound<'_, PyAny>| {
+        let (name, values): (String, Bound<'_, PyAny>) = item.extract()?;
+        let values = read_numbers(&values).map_err(|error| {
             let type_error = PyTypeError::new_err(format!("column `{name}`: expected numbers"));
             type_error.set_cause(py, Some(error));
             type_error
@@ -38,7 +38,7 @@ pub(crate) fn points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
 }
 
 /// Reads the numbers of a one-dimensional NumPy array, or of another iterable.
-pub(crate) fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+pub(crate) fn read_numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     check_numbers(values)?;
     let dimensions = values.getattr_opt("ndim")?.map(|count| count.extract::<usize>());
     let dimensions = dimensions.transpose()?.unwrap_or(1);
@@ -52,7 +52,7 @@ pub(crate) fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
         Ok(buffer) if [c"d", NATIVE_DOUBLE].contains(&buffer.format()) => {
             buffer.to_vec(values.py())
         }
-        _ => values.try_iter()?.map(|value| number(&value?)).collect(),
+        _ => values.try_iter()?.map(|value| read_number(&value?)).collect(),
     }
 }
 
@@ -60,7 +60,7 @@ pub(crate) fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 const NATIVE_DOUBLE: &CStr = if cfg!(target_endian = "little") { c"<d" } else { c">d" };
 
 /// Reads a number. Other types that Python converts to numbers are errors.
-pub(crate) fn number(value: &Bound<'_, PyAny>) -> PyResult<f64> {
+pub(crate) fn read_number(value: &Bound<'_, PyAny>) -> PyResult<f64> {
     check_numbers(value)?;
     if value.is_instance_of::<PyBool>() {
         return Err(PyTypeError::new_err("expected a number, got a truth value"));

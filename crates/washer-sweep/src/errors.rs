@@ -16,18 +16,18 @@ fn package_error(py: Python<'_>, class: &str, text: String, data: Py<PyAny>) -> 
 
 /// Creates the exception of mistakes in a plan, or in a table of points.
 pub(crate) fn plan_error(py: Python<'_>, mistakes: &Diagnostics) -> PyErr {
-    let entry = |mistake: Mistake| -> PyResult<Bound<'_, PyDict>> {
-        let entry = PyDict::new(py);
-        entry.set_item("file", mistake.file)?;
-        entry.set_item("line", mistake.line)?;
-        entry.set_item("column", mistake.column)?;
-        entry.set_item("message", mistake.message)?;
-        entry.set_item("expected", mistake.expected)?;
+    let to_entry = |mistake: Mistake| -> PyResult<Bound<'_, PyDict>> {
+        let mistake_entry = PyDict::new(py);
+        mistake_entry.set_item("file", mistake.file)?;
+        mistake_entry.set_item("line", mistake.line)?;
+        mistake_entry.set_item("column", mistake.column)?;
+        mistake_entry.set_item("message", mistake.message)?;
+        mistake_entry.set_item("expected", mistake.expected)?;
         let hint = mistake.hints.join("\n");
-        entry.set_item("hint", (!hint.is_empty()).then_some(hint))?;
-        Ok(entry)
+        mistake_entry.set_item("hint", (!hint.is_empty()).then_some(hint))?;
+        Ok(mistake_entry)
     };
-    let entries = mistakes.mistakes().into_iter().map(entry).collect::<PyResult<Vec<_>>>();
+    let entries = mistakes.mistakes().into_iter().map(to_entry).collect::<PyResult<Vec<_>>>();
     match entries.and_then(|entries| PyList::new(py, entries)) {
         Ok(entries) => {
             package_error(py, "PlanError", mistakes.to_string(), entries.into_any().unbind())
@@ -37,7 +37,7 @@ pub(crate) fn plan_error(py: Python<'_>, mistakes: &Diagnostics) -> PyErr {
 }
 
 /// Creates the exception of any error of the engine.
-pub(crate) fn error(py: Python<'_>, error: &Error) -> PyErr {
+pub(crate) fn to_exception(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Input(mistakes) => plan_error(py, mistakes),
         Error::Files(_)
@@ -57,7 +57,7 @@ pub(crate) fn interrupted(py: Python<'_>, text: String, result: Py<PyAny>) -> Py
     package_error(py, "Interrupted", text, result)
 }
 
-/// Creates the exception of Ctrl-C during work that has no result before its end.
+/// Creates the exception of Ctrl-C during a computation that has no result before its end.
 pub(crate) fn interrupted_without_result(py: Python<'_>) -> PyErr {
     interrupted(py, "interrupted".to_owned(), py.None())
 }

@@ -1,4 +1,4 @@
-//! Returns tables from work that has ended, and raises exceptions if it was interrupted.
+//! Returns the tables of computations that have ended, and raises exceptions after interruptions.
 
 use std::path::PathBuf;
 
@@ -6,17 +6,17 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sweep::{Error, EvaluationTask, FileRunEnd, MemoryTable, counted};
 
+use crate::computation::{ComputationOptions, Supervised, supervise};
 use crate::errors;
 use crate::result::PyResultTable;
-use crate::work::{Supervised, WorkOptions, supervise};
 
-/// Returns the rows. After Ctrl-C it raises an exception with the rows computed before.
+/// Returns the rows; after Ctrl-C raises an exception with the rows computed before.
 pub(crate) fn rows_or_raise(
     py: Python<'_>,
     evaluated: Supervised<MemoryTable>,
 ) -> PyResult<PyResultTable> {
     let table = evaluated.value_or_raise(py, |evaluated| match evaluated {
-        Err(error) => errors::error(py, &error),
+        Err(error) => errors::to_exception(py, &error),
         Ok(table) => {
             let rows = counted(table.rows(), "row");
             let text = format!("interrupted; `result` of this exception holds {rows}");
@@ -33,20 +33,20 @@ pub(crate) fn rows_or_file(
     py: Python<'_>,
     task: Result<EvaluationTask<'_>, Error>,
     (out, fresh): (Option<PathBuf>, bool),
-    options: WorkOptions,
+    options: ComputationOptions,
 ) -> PyResult<PyResultTable> {
-    let task = &task.map_err(|error| errors::error(py, &error))?;
+    let task = &task.map_err(|error| errors::to_exception(py, &error))?;
     let Some(out) = out else {
         return rows_or_raise(
             py,
             supervise(py, options, |execution| task.compute_in_memory(execution))?,
         );
     };
-    let tell: fn(&str) = if options.progress { sweep::tell } else { |_| () };
+    let report: fn(&str) = if options.progress { sweep::tell } else { |_| () };
     let result =
-        supervise(py, options, |execution| task.compute_to_file(&out, fresh, &tell, execution))?;
+        supervise(py, options, |execution| task.compute_to_file(&out, fresh, &report, execution))?;
     let result = result.value_or_raise(py, |result| match result {
-        Err(error) => errors::error(py, &error),
+        Err(error) => errors::to_exception(py, &error),
         Ok(FileRunEnd::Complete(table)) => {
             let text = format!("interrupted after {} was complete", out.display());
             interruption(py, text, Some(table))

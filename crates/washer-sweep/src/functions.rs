@@ -7,13 +7,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PyMapping};
 use sweep::{AttractorSearch, CommandReport, FitOptions};
 
-use crate::columns::{numbers, points};
+use crate::columns::{read_numbers, read_points};
+use crate::computation::{ComputationOptions, supervise, supervise_abandonable};
 use crate::errors;
 use crate::finish;
 use crate::mappings::assignments;
 use crate::plan::PyPlan;
 use crate::result::PyResultTable;
-use crate::work::{WorkOptions, supervise, supervise_abandonable};
 
 /// Computes natural frequencies, damping and resonances over spin speeds, by default 0 to 1200
 /// rpm.
@@ -30,7 +30,7 @@ pub(crate) fn modes(
     at: Option<&Bound<'_, PyMapping>>,
 ) -> PyResult<PyResultTable> {
     let at = assignments(at)?;
-    let speeds_rpm = speeds_rpm.map(numbers).transpose()?;
+    let speeds_rpm = speeds_rpm.map(read_numbers).transpose()?;
     if plan.is_none() && !at.is_empty() {
         return Err(PyTypeError::new_err("`at` needs a plan"));
     }
@@ -61,7 +61,7 @@ pub(crate) fn stability(
     progress: bool,
     fresh: bool,
 ) -> PyResult<PyResultTable> {
-    held_speeds(plan, speeds_rpm, None, (out, fresh), WorkOptions { threads, progress })
+    held_speeds(plan, speeds_rpm, None, (out, fresh), ComputationOptions { threads, progress })
 }
 
 /// Finds the attractors of each point of the plan's grid at each held speed, a row for each.
@@ -93,7 +93,13 @@ pub(crate) fn dwell(
     let carry = carry.map(str::parse).transpose();
     let carry = carry.map_err(|wrong: String| PyValueError::new_err(format!("carry: {wrong}")))?;
     let search = AttractorSearch { starts, kick, carry, threshold, sections, longest };
-    held_speeds(plan, speeds_rpm, Some(search), (out, fresh), WorkOptions { threads, progress })
+    held_speeds(
+        plan,
+        speeds_rpm,
+        Some(search),
+        (out, fresh),
+        ComputationOptions { threads, progress },
+    )
 }
 
 /// Returns the results at held speeds: attractors if there is a `search`, else periodic responses
@@ -103,10 +109,10 @@ fn held_speeds(
     speeds_rpm: &Bound<'_, PyAny>,
     search: Option<AttractorSearch>,
     output: (Option<PathBuf>, bool),
-    options: WorkOptions,
+    options: ComputationOptions,
 ) -> PyResult<PyResultTable> {
     let py = plan.py();
-    let speeds_rpm = &numbers(speeds_rpm)?;
+    let speeds_rpm = &read_numbers(speeds_rpm)?;
     let task = sweep::held_speeds_task(plan.get().evaluator.plan(), speeds_rpm, search);
     finish::rows_or_file(py, task, output, options)
 }
@@ -129,7 +135,7 @@ pub(crate) fn optimise(
     fresh: bool,
 ) -> PyResult<PyResultTable> {
     let sets = assignments(set)?;
-    let result = supervise(py, WorkOptions { threads, progress }, |execution| {
+    let result = supervise(py, ComputationOptions { threads, progress }, |execution| {
         sweep::optimise_study(&study, &sets, out.as_deref(), fresh, execution)
     })?;
     finish::table_or_raise(py, result, || errors::interrupted_without_result(py))
@@ -150,7 +156,7 @@ pub(crate) fn explain<'py>(
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
-    let speeds_rpm = speeds_rpm.map(numbers).transpose()?;
+    let speeds_rpm = speeds_rpm.map(read_numbers).transpose()?;
     let at = assignments(at)?;
     let input = plan.get().input.clone();
     let explained = supervise_abandonable(py, threads, move |execution| {
@@ -201,8 +207,10 @@ pub(crate) fn fit<'py>(
         Some(at) => assignments(Some(at.cast::<PyMapping>()?)),
         None => Ok(Vec::new()),
     };
-    let tables =
-        tables.iter().enumerate().map(|(k, table)| Ok((points(table)?, constants_of_table(k)?)));
+    let tables = tables
+        .iter()
+        .enumerate()
+        .map(|(k, table)| Ok((read_points(table)?, constants_of_table(k)?)));
     let tables = tables.collect::<PyResult<Vec<_>>>()?;
     let model = if linear { "linear" } else { "nonlinear" }.to_owned();
     let no_shift = !shift;

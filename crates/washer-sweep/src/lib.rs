@@ -6,13 +6,13 @@
 
 mod arrow;
 mod columns;
+mod computation;
 mod errors;
 mod finish;
 mod functions;
 mod mappings;
 mod plan;
 mod result;
-mod work;
 
 use pyo3::pymodule;
 

@@ -6,9 +6,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
 use sweep::{BoundaryOptions, PlanEvaluator, TraceExtras, TraceOptions, WasherGridInput, counted};
 
+use crate::computation::{ComputationOptions, supervise, supervise_abandonable};
 use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
-use crate::work::{WorkOptions, supervise, supervise_abandonable};
 use crate::{columns, errors, finish};
 
 /// The name of a plan without a file and without a name.
@@ -32,7 +32,7 @@ struct PlanSource {
 }
 
 impl PlanSource {
-    fn input(&self) -> WasherGridInput {
+    fn to_input(&self) -> WasherGridInput {
         match self.is_file {
             true => WasherGridInput::file(self.text.clone().into(), self.constants.clone()),
             false => WasherGridInput::text(UNNAMED, self.text.clone(), self.constants.clone()),
@@ -54,10 +54,10 @@ impl PyPlan {
     #[pyo3(signature = (grid, *, set=None))]
     fn new(grid: &Bound<'_, PyMapping>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = grid.py();
-        let text = mappings::text(grid)?;
+        let text = mappings::to_grid_text(grid)?;
         let constants = assignments(set)?;
         let source = PlanSource { text, is_file: false, constants };
-        Self::load(py, source.input(), source)
+        Self::load(py, source.to_input(), source)
     }
 
     /// Reads a plan from a grid file, or from the text of one.
@@ -76,7 +76,7 @@ impl PyPlan {
         let (input, source) = match text {
             Some(text) => {
                 let source = PlanSource { text, is_file: false, constants };
-                (source.input(), source)
+                (source.to_input(), source)
             }
             None => {
                 let path: PathBuf = source.extract()?;
@@ -99,7 +99,7 @@ impl PyPlan {
         constants: Vec<String>,
     ) -> PyResult<Self> {
         let source = PlanSource { text, is_file, constants };
-        Self::load(py, source.input(), source)
+        Self::load(py, source.to_input(), source)
     }
 
     /// Returns the function and the arguments by which pickle creates the plan again: from its
@@ -133,8 +133,8 @@ impl PyPlan {
         progress: bool,
     ) -> PyResult<PyResultTable> {
         let py = table.py();
-        let points = columns::points(table)?;
-        let evaluated = supervise(py, WorkOptions { threads, progress }, |execution| {
+        let points = columns::read_points(table)?;
+        let evaluated = supervise(py, ComputationOptions { threads, progress }, |execution| {
             self.evaluator.evaluate(&points, execution)
         })?;
         finish::rows_or_raise(py, evaluated)
@@ -160,7 +160,7 @@ impl PyPlan {
             py,
             self.evaluator.task_for_all_points(),
             (out, fresh),
-            WorkOptions { threads, progress },
+            ComputationOptions { threads, progress },
         )
     }
 
@@ -238,7 +238,7 @@ impl PyPlan {
         let output = out.as_deref();
         let quantity = quantity.to_owned();
         let options = BoundaryOptions { quantity, limit, tolerance, lattice };
-        let search = supervise(py, WorkOptions { threads, progress }, |execution| {
+        let search = supervise(py, ComputationOptions { threads, progress }, |execution| {
             sweep::find_boundary(self.evaluator.plan(), &options, output, fresh, execution)
         })?;
         finish::table_or_raise(py, search, || {

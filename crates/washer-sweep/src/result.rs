@@ -42,13 +42,15 @@ impl PyResultTable {
             return false;
         }
         let axes = plan["axis"].as_array().map_or(&[][..], Vec::as_slice);
-        let distinct = axes.iter().filter_map(|axis| axis["parameter"].as_str()).map(|name| {
-            let column_chunks =
-                self.0.batches().iter().filter_map(|batch| batch.column_by_name(name));
-            let values = column_chunks.flat_map(|chunk| cells::numbers(chunk).unwrap_or_default());
-            values.map(|value| value.map(f64::to_bits)).collect::<HashSet<_>>().len()
-        });
-        distinct.product::<usize>() != self.0.rows()
+        let distinct_counts =
+            axes.iter().filter_map(|axis| axis["parameter"].as_str()).map(|name| {
+                let column_chunks =
+                    self.0.batches().iter().filter_map(|batch| batch.column_by_name(name));
+                let values =
+                    column_chunks.flat_map(|chunk| cells::numbers(chunk).unwrap_or_default());
+                values.map(|value| value.map(f64::to_bits)).collect::<HashSet<_>>().len()
+            });
+        distinct_counts.product::<usize>() != self.0.rows()
     }
 
     /// Returns an entry of the metadata of every column.
@@ -71,11 +73,11 @@ impl PyResultTable {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         // The protocol allows a producer to ignore the requested schema.
         drop(requested_schema);
-        arrow::stream(py, self.0.schema(), self.0.batches())
+        arrow::to_stream_capsule(py, self.0.schema(), self.0.batches())
     }
 
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
-        arrow::schema(py, self.0.schema())
+        arrow::to_schema_capsule(py, self.0.schema())
     }
 
     fn __len__(&self) -> usize {
@@ -111,7 +113,7 @@ impl PyResultTable {
             _ => {
                 let values = PyList::empty(py);
                 for chunk in column_chunks {
-                    append(&values, chunk)?;
+                    append_cells(&values, chunk)?;
                 }
                 let options = PyDict::new(py);
                 options.set_item("dtype", "object")?;
@@ -162,7 +164,7 @@ impl PyResultTable {
             true => self.0.save(&path),
             false => self.0.draw(&path),
         })
-        .map_err(|error| errors::error(py, &error))
+        .map_err(|error| errors::to_exception(py, &error))
     }
 
     /// Draws the figure of `sweep plot` as SVG; `None` for points that do not form a grid, which
@@ -189,7 +191,7 @@ impl PyResultTable {
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let bytes = in_temporary_file(|path| {
-            self.0.save(path).map_err(|error| errors::error(py, &error))?;
+            self.0.save(path).map_err(|error| errors::to_exception(py, &error))?;
             Ok(std::fs::read(path)?)
         })?;
         let constructor = py.get_type::<Self>().getattr("_unpickled")?;
@@ -221,7 +223,7 @@ fn in_temporary_file<T>(action: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T
 }
 
 /// Appends flags or words to a list; a null becomes `None`.
-fn append(values: &Bound<'_, PyList>, chunk: &ArrayRef) -> PyResult<()> {
+fn append_cells(values: &Bound<'_, PyList>, chunk: &ArrayRef) -> PyResult<()> {
     if let Ok(flags) = cells::flags(chunk) {
         return flags.iter().try_for_each(|flag| values.append(flag));
     }
@@ -232,5 +234,5 @@ fn append(values: &Bound<'_, PyList>, chunk: &ArrayRef) -> PyResult<()> {
 #[pyfunction]
 pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<PyResultTable> {
     let table = py.detach(|| MemoryTable::read(&path));
-    table.map(PyResultTable::new).map_err(|error| errors::error(py, &error))
+    table.map(PyResultTable::new).map_err(|error| errors::to_exception(py, &error))
 }

@@ -1,5 +1,5 @@
-"""The package with nothing beside it but Python: `scripts/checks/python.sh` runs this in an
-environment that holds the wheel alone."""
+"""Tests the package without NumPy and other libraries. `scripts/checks/python.sh` runs this script
+in an environment that has only the wheel."""
 
 import importlib.util
 import pathlib

@@ -1,4 +1,5 @@
-"""What the package's tests share. `scripts/checks/python.sh` runs them."""
+"""Fixtures and functions that the package's tests share. `scripts/checks/python.sh` runs the
+tests."""
 
 import os
 import pathlib
@@ -12,13 +13,16 @@ import washer_sweep
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 
-# Shells let a script's background jobs ignore it, and Python leaves that so.
+# Shells start background jobs of scripts with SIGINT ignored, and Python keeps this setting.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def rows(result):
-    """Rows as a table of pyarrow's, words as such: a file's dictionaries hold those words alone
-    that appear in it, and a result's in memory all that may."""
+    """Returns the rows as a pyarrow table in which dictionary columns are plain strings.
+
+    Dictionaries of a file have only the words that occur in the file, those of a result in memory
+    have all words that may occur.
+    """
     table = pa.table(result)
     words = [field.with_type(pa.string()) if pa.types.is_dictionary(field.type) else field
              for field in table.schema]
@@ -27,13 +31,13 @@ def rows(result):
 
 @pytest.fixture
 def short():
-    """A plan of 20 points."""
+    """Returns a plan of 20 points."""
     return washer_sweep.Plan(SHORT)
 
 
 @pytest.fixture
 def long():
-    """A plan that takes minutes."""
+    """Returns a plan whose run takes minutes."""
     time = {"end_s": 200.0, "window_s": [0.5, 200.0]}
     return washer_sweep.Plan({**SHORT, "name": "long", "time": time,
                               "integrator": {"method": "rk4", "step_s": 1e-4}})
@@ -41,5 +45,5 @@ def long():
 
 @pytest.fixture(scope="session")
 def sweep():
-    """The command, of the same build."""
+    """Returns the path of the command `sweep` of the same build."""
     return os.environ["SWEEP"]

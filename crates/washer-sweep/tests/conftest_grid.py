@@ -1,6 +1,6 @@
-"""The grid that most tests share."""
+"""The grid that most tests use."""
 
-# Two seconds of a short run-up: the whole machinery at a hundredth of the cost of Fig. 12.
+# A grid with a short run-up of two seconds, which takes a hundredth of the time of Fig. 12.
 SHORT = {
     "name": "short",
     "spin": {"profile": "ramp", "peak_rpm": 300, "ramp_s": 1.5},

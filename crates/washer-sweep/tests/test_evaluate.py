@@ -1,4 +1,4 @@
-"""A table of designs in, a table of results out."""
+"""Tests of `Plan.evaluate`, which computes a table of results from a table of points."""
 
 import itertools
 import types
@@ -19,7 +19,7 @@ AXES = ["unbalance_mass_kg", "damping_n_s_per_m"]
 
 
 def columns(plan):
-    """The plan's grid as columns."""
+    """Returns the plan's grid as columns."""
     points = itertools.product(np.linspace(0.1, 0.9, 5), np.linspace(60.0, 300.0, 4))
     return dict(zip(AXES, map(np.array, zip(*points)), strict=True))
 
@@ -32,24 +32,24 @@ def test_fig12_has_the_bits_of_the_commands_rows(sweep, tmp_path):
     subprocess.run([sweep, "run", grid, "--out", path, "--progress", "none"], check=True,
                    capture_output=True)
     table = rows(washer_sweep.read(path))
-    # In another order, in pieces, and only some at first.
+    # The points are evaluated in another order and in several pieces, first only a part of them.
     order = np.random.default_rng(1).permutation(len(table))
     plan = Plan.from_toml(grid)
-    for some in (order[:37], order):
+    for order_part in (order[:37], order):
         points = pa.concat_tables([table.select(AXES).take(part)
-                                   for part in np.array_split(some, 3)])
-        found = rows(plan.evaluate(points)).drop_columns("point")
-        assert found == table.take(some).drop_columns("point").combine_chunks()
+                                   for part in np.array_split(order_part, 3)])
+        evaluated = rows(plan.evaluate(points)).drop_columns("point")
+        assert evaluated == table.take(order_part).drop_columns("point").combine_chunks()
 
 
-def test_numbers_are_read_whatever_their_bytes_and_nothing_else_is(short):
+def test_numbers_of_every_format_are_read_and_other_values_are_rejected(short):
     table = columns(short)
     expected = rows(short.evaluate(table))
-    for kind in (">f8", "<f8", ">f4", "O", "longdouble"):
-        found = {name: values.astype(kind) for name, values in table.items()}
-        if kind == ">f4":
+    for dtype in (">f8", "<f8", ">f4", "O", "longdouble"):
+        typed_table = {name: values.astype(dtype) for name, values in table.items()}
+        if dtype == ">f4":
             table = {name: values.astype("f4").astype("f8") for name, values in table.items()}
-        assert rows(short.evaluate(found)) == rows(short.evaluate(table)), kind
+        assert rows(short.evaluate(typed_table)) == rows(short.evaluate(table)), dtype
         table = columns(short)
     counts = {name: np.round(values + 0.5).astype(">i4") for name, values in table.items()}
     counts["unbalance_mass_kg"] = table["unbalance_mass_kg"]
@@ -57,18 +57,19 @@ def test_numbers_are_read_whatever_their_bytes_and_nothing_else_is(short):
         np.round(table["damping_n_s_per_m"] + 0.5))
     assert expected == rows(short.evaluate({name: list(values) for name, values in table.items()}))
     mass = table["unbalance_mass_kg"]
-    for wrong in (np.ma.masked_less(mass, 0.3), mass + 0j, mass.astype("c8"), mass > 0.5,
-                  list(mass > 0.5), [True] * len(mass), mass.astype("M8[s]"), mass.astype("U")):
+    for invalid_values in (np.ma.masked_less(mass, 0.3), mass + 0j, mass.astype("c8"), mass > 0.5,
+                           list(mass > 0.5), [True] * len(mass), mass.astype("M8[s]"), mass.astype("U")):
         with pytest.raises(TypeError, match="column `unbalance_mass_kg`: expected numbers"):
-            short.evaluate({**table, "unbalance_mass_kg": wrong})
-    for wrong in (np.ma.masked_less(np.arange(60.0, 63.0), 61), np.arange(60, 62) + 0j, [True]):
+            short.evaluate({**table, "unbalance_mass_kg": invalid_values})
+    for invalid_values in (np.ma.masked_less(np.arange(60.0, 63.0), 61), np.arange(60, 62) + 0j,
+                           [True]):
         with pytest.raises(TypeError, match="expected"):
-            washer_sweep.modes(speeds_rpm=wrong)
+            washer_sweep.modes(speeds_rpm=invalid_values)
     assert rows(washer_sweep.modes(speeds_rpm=np.array([60.0, 70.0]).astype(">f8"))) == rows(
         washer_sweep.modes(speeds_rpm=[60, 70]))
 
 
-def test_every_source_of_columns_is_the_same(short):
+def test_every_kind_of_table_gives_the_same_rows(short):
     table = columns(short)
     expected = pa.table(short.evaluate(table))
     assert expected == pa.table(short.run(progress=False))
@@ -101,13 +102,13 @@ def test_no_row_depends_on_the_others_or_on_threads(short):
     expected = pa.table(short.evaluate(table))
     for row in (0, 7, 19):
         alone = {name: values[row : row + 1] for name, values in table.items()}
-        found = pa.table(short.evaluate(alone, threads=1)).drop_columns("point")
-        assert found == expected.slice(row, 1).drop_columns("point")
+        evaluated = pa.table(short.evaluate(alone, threads=1)).drop_columns("point")
+        assert evaluated == expected.slice(row, 1).drop_columns("point")
     assert pa.table(short.evaluate(table, threads=1)) == expected
     assert pa.table(short.evaluate(table, threads=3)) == expected
 
 
-@pytest.mark.parametrize(("table", "said"), [
+@pytest.mark.parametrize(("table", "expected_text"), [
     ({"unbalance_mass_kg": [0.1]}, "the table has no column `damping_n_s_per_m`"),
     ({"unbalance_mass": [0.1], "damping_n_s_per_m": [60]}, "did you mean `unbalance_mass_kg`"),
     ({"unbalance_mass_kg": [0.1], "damping_n_s_per_m": [60], "tub_mass_kg": [20]},
@@ -123,14 +124,14 @@ def test_no_row_depends_on_the_others_or_on_threads(short):
     (pa.table([[0.1], [0.1], [60.0]], names=[*AXES[:1], *AXES[:1], AXES[1]]), "is given twice"),
     ({}, "has no column `unbalance_mass_kg`"),
 ])
-def test_a_table_that_does_not_fit_is_refused_with_its_place(short, table, said):
+def test_an_invalid_table_is_rejected_with_the_location(short, table, expected_text):
     with pytest.raises(PlanError) as caught:
         short.evaluate(table)
-    assert said in str(caught.value)
+    assert expected_text in str(caught.value)
     assert caught.value.diagnostics[0]["file"] == "table"
 
 
-def test_what_is_no_table_is_refused(short):
+def test_other_objects_than_tables_are_rejected(short):
     for table in ([1, 2], None, "x", 3.0):
         with pytest.raises(TypeError, match="__arrow_c_stream__"):
             short.evaluate(table)
@@ -144,19 +145,19 @@ def test_what_is_no_table_is_refused(short):
             short.evaluate(columns(short), threads=threads)
 
 
-def test_no_rows_are_no_rows(short):
-    found = short.evaluate({"unbalance_mass_kg": [], "damping_n_s_per_m": []})
-    assert len(found) == 0
-    assert pa.table(found).schema == pa.table(short.run(progress=False)).schema
+def test_a_table_without_rows_gives_a_result_without_rows(short):
+    evaluated = short.evaluate({"unbalance_mass_kg": [], "damping_n_s_per_m": []})
+    assert len(evaluated) == 0
+    assert pa.table(evaluated).schema == pa.table(short.run(progress=False)).schema
 
 
 def test_an_axis_of_one_value_may_be_left_out():
     plan = Plan({**SHORT, "axis": [*SHORT["axis"], {"parameter": "tub_mass_kg", "values": [20]}]})
-    found = plan.evaluate({"unbalance_mass_kg": [0.4], "damping_n_s_per_m": [100]})
-    assert found["tub_mass_kg"].tolist() == [20.0]
+    evaluated = plan.evaluate({"unbalance_mass_kg": [0.4], "damping_n_s_per_m": [100]})
+    assert evaluated["tub_mass_kg"].tolist() == [20.0]
 
 
-def test_a_million_refused_rows_are_told_in_a_moment(short):
+def test_a_million_invalid_rows_are_reported_quickly(short):
     with pytest.raises(PlanError, match=r"1000000 mistakes \(100 shown\)"):
         short.evaluate({"unbalance_mass_kg": np.full(1_000_000, 2.0),
                         "damping_n_s_per_m": np.full(1_000_000, 60.0)})

@@ -1,4 +1,5 @@
-"""Stability and explanations: the command's bytes and words."""
+"""Tests that stability, attractors, explanations and fits have the bytes and the text of the
+command."""
 
 import json
 import pickle
@@ -18,15 +19,15 @@ QUICK = ROOT / "sweeps/quick.toml"
 POINT = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100.0}
 
 
-def told(*words):
-    """What the command prints."""
-    return subprocess.run(words, check=True, capture_output=True, text=True).stdout
+def standard_output(*command):
+    """Returns the standard output of a command."""
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
-def test_stability_has_the_commands_bytes(sweep, tmp_path):
+def test_stability_has_the_bytes_of_the_command(sweep, tmp_path):
     by_command, by_call, saved = (tmp_path / f"{name}.parquet" for name in "abc")
-    told(sweep, "stability", QUICK, "--speed", "240:320:20", "--out", by_command,
-         "--progress", "none")
+    standard_output(sweep, "stability", QUICK, "--speed", "240:320:20", "--out", by_command,
+                    "--progress", "none")
     plan = Plan.from_toml(QUICK)
     result = washer_sweep.stability(plan, range(240, 321, 20), by_call, progress=False)
     assert by_call.read_bytes() == by_command.read_bytes()
@@ -42,55 +43,56 @@ def test_stability_has_the_commands_bytes(sweep, tmp_path):
         washer_sweep.stability(plan, [240.0], by_call, progress=False)
 
 
-def test_dwells_have_the_commands_bytes(sweep, tmp_path):
+def test_attractors_have_the_bytes_of_the_command(sweep, tmp_path):
     by_command, by_call, saved = (tmp_path / f"{name}.parquet" for name in "abc")
-    told(sweep, "dwell", QUICK, "--speed", "250,297.5", "--starts", "2", "--out", by_command,
-         "--progress", "none")
+    standard_output(sweep, "dwell", QUICK, "--speed", "250,297.5", "--starts", "2", "--out",
+                    by_command, "--progress", "none")
     plan = Plan.from_toml(QUICK)
     result = washer_sweep.dwell(plan, [250, 297.5], by_call, starts=2, progress=False)
     assert by_call.read_bytes() == by_command.read_bytes()
     washer_sweep.dwell(plan, [250, 297.5], starts=2, progress=False).save(saved)
     assert saved.read_bytes() == by_command.read_bytes()
     assert result.kind == "dwell"
-    for options, said in [
+    for options, expected_text in [
         ({"starts": 0}, "from 1 to 1024"), ({"kick": -1}, "above 0"), ({"carry": "x"}, "up or down")
     ]:
-        with pytest.raises(ValueError, match=said):
+        with pytest.raises(ValueError, match=expected_text):
             washer_sweep.dwell(plan, [250], **options)
 
 
-def test_an_explanation_is_the_commands(sweep):
-    words = [sweep, "explain", QUICK, "--speed", "240:320:4"]
+def test_an_explanation_is_that_of_the_command(sweep):
+    command = [sweep, "explain", QUICK, "--speed", "240:320:4"]
     for name, value in POINT.items():
-        words += ["--at", f"{name}={value}"]
-    found = washer_sweep.explain(Plan.from_toml(QUICK), POINT, speeds_rpm=range(240, 321, 4))
-    assert found == json.loads(told(*words, "--json"))
-    assert str(found) == found.text == told(*words)
-    again = pickle.loads(pickle.dumps(found))
-    assert (again, again.text) == (found, found.text)
+        command += ["--at", f"{name}={value}"]
+    computed = washer_sweep.explain(Plan.from_toml(QUICK), POINT, speeds_rpm=range(240, 321, 4))
+    assert computed == json.loads(standard_output(*command, "--json"))
+    assert str(computed) == computed.text == standard_output(*command)
+    again = pickle.loads(pickle.dumps(computed))
+    assert (again, again.text) == (computed, computed.text)
 
 
-def test_a_fit_is_the_commands(sweep, tmp_path):
+def test_a_fit_is_that_of_the_command(sweep, tmp_path):
     bench = ROOT / "sweeps/bench.toml"
     table = pyarrow.csv.read_csv(ROOT / "crates/sweep/testdata/fit/viscous.csv").slice(0, 250)
     measured = tmp_path / "table"
     pyarrow.csv.write_csv(table, measured)
     free, own = ["damping_n_s_per_m=50:500"], ["unbalance_mass_kg"]
-    words = [sweep, "fit", bench, measured, f"{measured}@spring_stiffness_n_per_m=8350",
+    command = [sweep, "fit", bench, measured, f"{measured}@spring_stiffness_n_per_m=8350",
              "--free", free[0], "--own", own[0], "--draws", "4", "--progress", "none"]
     at = [{}, {"spring_stiffness_n_per_m": 8350}]
-    found = washer_sweep.fit(Plan.from_toml(bench), [table, table], free, own=own, at=at, draws=4)
-    by_command = json.loads(told(*words, "--json"))
+    computed = washer_sweep.fit(Plan.from_toml(bench), [table, table], free, own=own, at=at,
+                                draws=4)
+    by_command = json.loads(standard_output(*command, "--json"))
     # The second table has no name of its own.
-    assert found["files"][1].pop("file") == "table 2"
+    assert computed["files"][1].pop("file") == "table 2"
     assert by_command["files"][1].pop("file") == "table"
-    for report in (found, by_command):
+    for report in (computed, by_command):
         assert report["parameters"][2].pop("file") in ("table", "table 2")
-    assert found.keys() == by_command.keys()
-    for key in found.keys() - {"minima"}:
-        assert found[key] == by_command[key], key
-    assert [fit["name"] for fit in found["parameters"]] == [*free[0].split("=")[:1], *own, *own]
-    assert found["verdict"]["draws"] == 4
+    assert computed.keys() == by_command.keys()
+    for key in computed.keys() - {"minima"}:
+        assert computed[key] == by_command[key], key
+    assert [fit["name"] for fit in computed["parameters"]] == [*free[0].split("=")[:1], *own, *own]
+    assert computed["verdict"]["draws"] == 4
     with pytest.raises(PlanError, match="did you mean `damping_n_s_per_m`"):
         washer_sweep.fit(Plan.from_toml(bench), table, ["dampin_n_s_per_m"])
 
@@ -104,17 +106,17 @@ def test_growth_is_a_metric_of_a_table_too(tmp_path):
     assert not np.isnan(by_table["growth_per_s"]).any()
 
 
-def test_differences_are_read(sweep, tmp_path):
+def test_a_file_of_differences_is_read(sweep, tmp_path):
     old, new, out = (tmp_path / f"{name}.parquet" for name in ("old", "new", "out"))
     Plan(SHORT).run(old, progress=False)
     Plan(SHORT, set={"tub_mass_kg": 20}).run(new, progress=False)
-    told(sweep, "compare", old, new, "--out", out)
-    found = washer_sweep.read(out)
-    assert found.kind == "differences"
-    assert len(found) == 20
+    standard_output(sweep, "compare", old, new, "--out", out)
+    computed = washer_sweep.read(out)
+    assert computed.kind == "differences"
+    assert len(computed) == 20
 
 
-@pytest.mark.parametrize(("work", "said"), [
+@pytest.mark.parametrize(("invalid_call", "expected_text"), [
     (lambda plan: washer_sweep.stability(plan, []), "from 1 to 100000 finite speeds"),
     (lambda plan: washer_sweep.stability(plan, [0.0]), "above 0"),
     (lambda plan: washer_sweep.stability(plan, [100.0, 100.0]), "each above the one before"),
@@ -125,12 +127,12 @@ def test_differences_are_read(sweep, tmp_path):
     (lambda plan: washer_sweep.explain(plan, POINT, threads=0), "expected a number from 1"),
     (lambda plan: washer_sweep.fit(plan, [], ["tub_mass_kg"]), "a table or more"),
 ])
-def test_what_makes_no_sense_is_refused(short, work, said):
-    with pytest.raises(PlanError, match=said):
-        work(short)
+def test_invalid_arguments_are_rejected(short, invalid_call, expected_text):
+    with pytest.raises(PlanError, match=expected_text):
+        invalid_call(short)
 
 
-def test_speeds_replace_those_of_a_profile():
+def test_held_speeds_conflict_with_an_axis_of_the_speed():
     axis = {"parameter": "spin_peak_rpm", "range": {"from": 200, "to": 300, "count": 3}}
     plan = Plan({**SHORT, "axis": [axis]})
     with pytest.raises(PlanError, match="give its range as speeds"):

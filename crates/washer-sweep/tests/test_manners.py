@@ -1,4 +1,4 @@
-"""Signals, threads and forks."""
+"""Tests of signals, threads and forks."""
 
 import ast
 import inspect
@@ -18,22 +18,23 @@ import pytest
 
 import washer_sweep
 
-# Answered in half a second, on a machine that may be busy with other work.
+# The greatest time from Ctrl-C to the exception (s), on a machine that may be busy.
 ANSWERED_S = 0.5
 
-# A point of the grids.
+# A point of the grids of the fixtures.
 AT = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100.0}
 
 
 def table(rows):
-    """Points of the short grid's box."""
+    """Returns random points within the ranges of the short grid."""
     rng = np.random.default_rng(2)
     return {"unbalance_mass_kg": rng.uniform(0.1, 0.9, rows),
             "damping_n_s_per_m": rng.uniform(60.0, 300.0, rows)}
 
 
-def interrupted(work, after_s, ready=lambda: True):
-    """What Ctrl-C makes of a work, and how long it took to answer; sent when `ready` says so."""
+def interrupted(call, after_s, ready=lambda: True):
+    """Interrupts a call by SIGINT after `after_s`, once `ready` returns true. Returns the exception,
+    and the time (s) from the signal to the exception."""
     sent = []
 
     def send():
@@ -45,7 +46,7 @@ def interrupted(work, after_s, ready=lambda: True):
     timer = threading.Timer(after_s, send)
     timer.start()
     with pytest.raises(KeyboardInterrupt) as caught:
-        work()
+        call()
     answered_s = time.perf_counter() - sent[0]
     timer.join()
     return caught.value, answered_s
@@ -65,8 +66,8 @@ def test_ctrl_c_ends_an_evaluation_and_leaves_its_rows(short):
         stopped.result.save("never.parquet")
 
 
-@pytest.mark.parametrize("work", ["run", "evaluate", "boundary", "trace", "stability", "explain"])
-def test_ctrl_c_is_answered_in_half_a_second(long, work):
+@pytest.mark.parametrize("method", ["run", "evaluate", "boundary", "trace", "stability", "explain"])
+def test_ctrl_c_is_answered_in_half_a_second(long, method):
     stopped, answered_s = interrupted({
         "run": lambda: long.run(progress=False),
         "evaluate": lambda: long.evaluate(table(1000)),
@@ -74,28 +75,29 @@ def test_ctrl_c_is_answered_in_half_a_second(long, work):
         "trace": lambda: long.trace(AT, every=1.0),
         "stability": lambda: washer_sweep.stability(long, np.arange(60, 400, 0.1), progress=False),
         "explain": lambda: washer_sweep.explain(long, AT),
-    }[work], 0.3)
+    }[method], 0.3)
     assert answered_s < ANSWERED_S
     assert isinstance(stopped, washer_sweep.Interrupted)
-    # Traces and explanations have nothing before their end.
-    assert stopped.result is None or work not in ("trace", "explain")
+    # Traces and explanations have no result before their end.
+    assert stopped.result is None or method not in ("trace", "explain")
 
 
-def test_ctrl_c_is_told_though_the_work_is_done_before_it_is_looked_for(short):
-    # Work of some hundredths of a second, between two looks; a busy machine may be late.
+def test_ctrl_c_just_before_the_end_of_a_call_raises_the_exception(short):
+    # The call takes some hundredths of a second, less than the interval between two checks of
+    # signals. On a busy machine it may take longer.
     for rows in (200, 400, 800, 1600):
         begun = time.perf_counter()
         short.evaluate(table(rows), threads=1)
-        took_s = time.perf_counter() - begun
-        if took_s > 0.03:
+        duration_s = time.perf_counter() - begun
+        if duration_s > 0.03:
             break
-    stopped, _ = interrupted(lambda: short.evaluate(table(rows), threads=1), 0.3 * took_s)
+    stopped, _ = interrupted(lambda: short.evaluate(table(rows), threads=1), 0.3 * duration_s)
     assert isinstance(stopped, washer_sweep.Interrupted)
     assert 0 < len(pa.table(stopped.result)) <= rows
 
 
 def test_ctrl_c_at_a_speed_that_takes_too_many_steps_is_answered(long):
-    # The slowest drum ends by itself, or is stopped.
+    # At this speed the search ends at once, because a turn would take too many steps.
     begun = time.perf_counter()
     rows = pa.table(washer_sweep.stability(long, [0.01], progress=False))
     assert time.perf_counter() - begun < 5.0
@@ -110,13 +112,13 @@ def test_ctrl_c_ends_the_threads_of_an_explanation(long):
     speeds = np.arange(60, 400, 0.01)
     interrupted(lambda: washer_sweep.explain(long, AT, speeds_rpm=speeds), 0.5)
     end_s = time.perf_counter() + 10.0
-    # The timer's thread has ended by itself.
+    # The threads of the computation and of the timer end by themselves.
     while threads() > before and time.perf_counter() < end_s:
         time.sleep(0.05)
     assert threads() <= before
 
 
-def test_a_run_into_a_file_goes_on_where_ctrl_c_left_it(short, tmp_path):
+def test_a_run_into_a_file_continues_after_ctrl_c(short, tmp_path):
     path, whole = tmp_path / "x.parquet", tmp_path / "whole.parquet"
     grid = short.to_dict()
     grid.pop("machine")
@@ -136,13 +138,13 @@ def test_a_run_into_a_file_goes_on_where_ctrl_c_left_it(short, tmp_path):
     plan.run(path, progress=False)
     plan.run(whole, progress=False)
     assert path.read_bytes() == whole.read_bytes()
-    # Parts are read as the result is: the rows that were done are its rows.
+    # Parts are Parquet files like the result, and their rows are rows of the result.
     result = pq.read_table(whole)
     assert 0 < done.num_rows < result.num_rows
     assert done == result.take(done["point"])
 
 
-def test_the_interpreter_goes_on_meanwhile(short):
+def test_other_python_threads_run_during_a_call(short):
     ticks = []
     done = threading.Event()
 
@@ -154,10 +156,10 @@ def test_the_interpreter_goes_on_meanwhile(short):
     thread.start()
     began = time.perf_counter()
     short.evaluate(table(500), threads=1)
-    took_s = time.perf_counter() - began
+    duration_s = time.perf_counter() - began
     done.set()
     thread.join()
-    assert len(ticks) > took_s / 0.1, "the lock was held"
+    assert len(ticks) > duration_s / 0.1, "the lock was held"
 
 
 def test_two_threads_may_call_at_once(short):
@@ -173,7 +175,7 @@ def test_two_threads_may_call_at_once(short):
 
 
 def child(queue):
-    """A forked process that uses the engine."""
+    """Runs the engine in a forked process, and puts a column of the result into the queue."""
     from conftest_grid import SHORT
 
     queue.put(washer_sweep.Plan(SHORT).evaluate(table(20))["ratio_max"].tolist())
@@ -204,7 +206,7 @@ def test_sigterm_of_a_script_ends_it():
 
 
 def documented(body, owner=washer_sweep):
-    """The functions of the stubs and of their classes with their docstrings, without properties and
+    """Yields the functions and methods of the stubs with their docstrings, without properties and
     special methods."""
     for node in body:
         if isinstance(node, ast.ClassDef):
@@ -216,7 +218,7 @@ def documented(body, owner=washer_sweep):
                     yield getattr(owner, node.name), text
 
 
-def test_help_is_that_of_the_stubs():
+def test_docstrings_are_those_of_the_stubs():
     stubs = pathlib.Path(washer_sweep.__file__).with_suffix(".pyi").read_text()
     found = list(documented(ast.parse(stubs).body))
     assert len(found) > 12

@@ -1,4 +1,4 @@
-"""Plans and results in other processes."""
+"""Tests of plans and results that are pickled for other processes."""
 
 import concurrent.futures
 import multiprocessing
@@ -11,7 +11,8 @@ import washer_sweep
 
 
 def evaluated(plan, masses):
-    """What a worker does: rows of a plan that came by pickle, which go back by pickle."""
+    """Returns the rows of a plan. In a worker process the plan is received, and the rows are
+    returned, by pickle."""
     return plan.evaluate({"unbalance_mass_kg": masses, "damping_n_s_per_m": [100.0] * len(masses)})
 
 
@@ -59,7 +60,7 @@ def test_a_result_that_was_saved_has_the_same_bytes_after_pickling(short, tmp_pa
     assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / "first.parquet").read_bytes()
 
 
-def test_a_plan_whose_file_is_gone_says_so(tmp_path):
+def test_a_pickled_plan_without_its_file_raises_an_error(tmp_path):
     path = tmp_path / "grid.toml"
     path.write_text("spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 50 }\n"
                     "time = { end_s = 0.1 }\n")

@@ -1,4 +1,4 @@
-"""Plans, and what is told of those that are none."""
+"""Tests of plans, and of the errors for invalid plans."""
 
 import importlib.metadata
 import pickle
@@ -12,7 +12,7 @@ import washer_sweep
 from washer_sweep import Plan, PlanError
 
 
-def test_a_file_its_text_and_a_dictionary_are_one_plan():
+def test_a_file_its_text_and_a_dictionary_give_the_same_plan():
     path = ROOT / "sweeps/fig12.toml"
     from_file = Plan.from_toml(path)
     assert Plan.from_toml(str(path)).to_dict() == from_file.to_dict()
@@ -20,7 +20,8 @@ def test_a_file_its_text_and_a_dictionary_are_one_plan():
     assert from_text | {"name": "fig12"} == from_file.to_dict()
     assert len(from_file) == 1287
     assert from_file.axes["damping_n_s_per_m"] == (60.0, 300.0)
-    # What a plan says of itself is a plan again, but for the machine, which a file would hold.
+    # The dictionary of a plan is a valid plan, except for the machine, which a grid names as a
+    # file.
     again = {k: v for k, v in from_file.to_dict().items() if k != "machine"}
     assert Plan(again).to_dict() == from_file.to_dict()
 
@@ -29,7 +30,7 @@ def test_the_package_has_the_engines_version():
     assert washer_sweep.__version__ == importlib.metadata.version("washer-sweep")
 
 
-def test_a_dictionary_takes_what_numpy_and_pathlib_give():
+def test_a_dictionary_may_contain_values_of_numpy_and_pathlib():
     axis = [{"parameter": "unbalance_mass_kg", "values": np.linspace(0.1, 0.9, 3)},
             {"parameter": "damping_n_s_per_m", "values": (np.int64(60), np.float32(80.0))}]
     plan = Plan({**SHORT, "axis": axis})
@@ -39,7 +40,7 @@ def test_a_dictionary_takes_what_numpy_and_pathlib_give():
         Plan({**SHORT, "machine": ROOT / "none.toml"})
 
 
-def test_constants_override():
+def test_constants_replace_values_of_the_machine():
     plan = Plan(SHORT, set={"tub_mass_kg": 20.123456789012345})
     assert plan.to_dict()["machine"]["tub"]["mass_kg"] == 20.123456789012345
     with pytest.raises(PlanError, match="unknown parameter `tub_mass`"):
@@ -48,7 +49,7 @@ def test_constants_override():
         Plan(SHORT, set={"tub_mass_kg": "20"})
 
 
-def test_a_dictionary_without_an_end_is_refused():
+def test_a_dictionary_that_is_nested_too_deep_is_rejected():
     endless = dict(SHORT)
     endless["spin"] = endless
     deep, flat = {}, []
@@ -68,7 +69,7 @@ def test_a_constant_is_a_number(value):
         Plan(SHORT, set={"tub_mass_kg": value})
 
 
-def test_a_mistake_is_data_and_the_commands_text(sweep, tmp_path):
+def test_a_mistake_has_fields_and_the_text_of_the_command(sweep, tmp_path):
     import subprocess
 
     path = tmp_path / "wrong.toml"
@@ -80,9 +81,9 @@ def test_a_mistake_is_data_and_the_commands_text(sweep, tmp_path):
     assert (first["line"], first["column"], first["file"]) == (4, 10, str(path))
     assert first["message"] == "`ramp_s` = -1 is out of range"
     assert second["hint"] == "did you mean `window_s`?"
-    told = subprocess.run([sweep, "check", path], capture_output=True, text=True, check=False)
-    assert told.returncode == 2
-    assert told.stderr.strip() == str(caught.value).strip()
+    printed = subprocess.run([sweep, "check", path], capture_output=True, text=True, check=False)
+    assert printed.returncode == 2
+    assert printed.stderr.strip() == str(caught.value).strip()
     again = pickle.loads(pickle.dumps(caught.value))
     assert again.diagnostics == caught.value.diagnostics
 
@@ -98,17 +99,17 @@ def test_a_mistake_is_data_and_the_commands_text(sweep, tmp_path):
     ({**SHORT, "axis": [3]}, PlanError),
     ({**SHORT, "time": {"end_s": 10**30}}, PlanError),
 ])
-def test_what_is_no_plan_is_refused(grid, error):
+def test_invalid_plans_are_rejected(grid, error):
     with pytest.raises(error):
         Plan(grid)
 
 
-def test_parameters_are_the_commands(sweep):
+def test_parameters_are_those_of_the_command(sweep):
     import json
     import subprocess
 
-    told = subprocess.run([sweep, "parameters", "--json"], capture_output=True, check=True)
-    assert washer_sweep.parameters() == json.loads(told.stdout)
+    printed = subprocess.run([sweep, "parameters", "--json"], capture_output=True, check=True)
+    assert washer_sweep.parameters() == json.loads(printed.stdout)
     heavy = Plan(SHORT, set={"tub_mass_kg": 31})
     value = {entry["name"]: entry["value"] for entry in washer_sweep.parameters(heavy)}
     assert value["tub_mass_kg"] == 31

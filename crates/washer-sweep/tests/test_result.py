@@ -1,4 +1,4 @@
-"""Results: rows without a copy, files with the command's bytes, figures."""
+"""Tests of results: rows that are not copied, files with the bytes of the command, figures."""
 
 import subprocess
 
@@ -16,7 +16,7 @@ QUICK = ROOT / "sweeps/quick.toml"
 
 
 def addresses(table):
-    """Where the buffers of every column lie."""
+    """Returns the addresses of the buffers of every column."""
     return [buffer.address for column in table.columns for chunk in column.chunks
             for buffer in chunk.buffers() if buffer is not None]
 
@@ -25,20 +25,20 @@ def test_rows_are_not_copied(short):
     result = short.run(progress=False)
     first, second = pa.table(result), pa.table(result)
     assert addresses(first) == addresses(second) != []
-    # And from there to NumPy neither.
+    # NumPy arrays of the columns share the same buffers.
     steps = first["steps_nonlinear"].chunk(0)
     assert steps.to_numpy(zero_copy_only=True).ctypes.data == steps.buffers()[1].address
     frame = pl.DataFrame(result)
     assert frame["steps_nonlinear"].to_numpy().ctypes.data == steps.buffers()[1].address
 
 
-def test_what_was_read_is_what_is_saved(short, tmp_path, monkeypatch):
+def test_a_saved_copy_has_the_bytes_that_were_read(short, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     here = tmp_path / "map.parquet"
     short.run("map.parquet", progress=False)
     whole = here.read_bytes()
     result = washer_sweep.read("map.parquet")
-    # Its bytes change, it goes, and the folder is another one.
+    # The result does not depend on the file after it was read, nor on the working folder.
     here.write_bytes(whole[:-1])
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
@@ -57,8 +57,9 @@ def test_rows_outlive_their_result(short):
     assert table.to_pydict() == copy
 
 
-def test_a_table_given_is_not_copied():
-    # A table of 200 MB whose values are all refused: a copy would show in the peak of memory.
+def test_a_table_of_points_is_not_copied():
+    # All values of a table of 200 MB are rejected. A copy of the table would raise the peak of the
+    # memory by as much.
     script = """
 import resource, numpy as np, pyarrow as pa, washer_sweep
 from conftest_grid import SHORT
@@ -74,12 +75,12 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
     import sys
 
-    told = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True,
+    printed = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True,
                           text=True, cwd=ROOT / "crates/washer-sweep/tests")
-    assert int(told.stdout) < 20_000, "kB beside the table"
+    assert int(printed.stdout) < 20_000, "kB beside the table"
 
 
-def test_units_and_descriptions_travel(short):
+def test_units_and_descriptions_are_in_the_schema(short):
     result = short.run(progress=False)
     assert result.units["min_gap_nonlinear_m"] == "m"
     field = pa.table(result).schema.field("min_gap_nonlinear_m")
@@ -91,7 +92,7 @@ def test_units_and_descriptions_travel(short):
         result["nothing"]
 
 
-def test_columns_are_arrays_of_numpys(short):
+def test_columns_are_numpy_arrays(short):
     result = short.run(progress=False)
     frame = pd.DataFrame.from_arrow(result)
     assert result["steps_linear"].dtype == np.uint64
@@ -111,7 +112,7 @@ def test_a_run_writes_the_commands_bytes(sweep, tmp_path):
     plan.run(progress=False).save(saved)
     assert saved.read_bytes() == by_command.read_bytes()
     assert pa.table(result) == pa.table(washer_sweep.read(by_command))
-    # It is there already, and read again.
+    # The file is complete, so that the second run reads it.
     assert pa.table(plan.run(by_run, progress=False)) == pa.table(result)
     with pytest.raises(washer_sweep.PlanError, match="already holds the result of another plan"):
         Plan.from_toml(QUICK, set={"tub_mass_kg": 20}).run(by_run, progress=False)
@@ -121,39 +122,39 @@ def test_traces_boundaries_and_modes_have_the_commands_bytes(sweep, tmp_path):
     def command(*words):
         subprocess.run([sweep, *words], check=True, capture_output=True)
 
-    mine, commands = tmp_path / "mine.parquet", tmp_path / "commands.parquet"
+    by_call, commands = tmp_path / "mine.parquet", tmp_path / "commands.parquet"
     plan = Plan.from_toml(QUICK)
     mass, damping = 0.4, 100.0
     plan.trace({"unbalance_mass_kg": mass, "damping_n_s_per_m": damping}, every=0.05, states=True,
-               forces=True, start={"q5": 0.01}).save(mine)
+               forces=True, start={"q5": 0.01}).save(by_call)
     command("trace", QUICK, "--at", f"unbalance_mass_kg={mass}", "--at",
             f"damping_n_s_per_m={damping}", "--every", "0.05", "--states", "--forces", "--start",
             "q5=0.01", "--out", commands)
-    assert mine.read_bytes() == commands.read_bytes()
-    mine.unlink()
+    assert by_call.read_bytes() == commands.read_bytes()
+    by_call.unlink()
     commands.unlink()
-    found = plan.boundary(tolerance=20.0, lattice=2, progress=False)
-    found.save(mine)
+    computed = plan.boundary(tolerance=20.0, lattice=2, progress=False)
+    computed.save(by_call)
     command("boundary", QUICK, "--tolerance", "20", "--lattice", "2", "--out", commands,
             "--progress", "none")
-    assert mine.read_bytes() == commands.read_bytes()
-    mine.unlink()
-    kept = plan.boundary(tolerance=20.0, lattice=2, out=mine, progress=False)
-    assert mine.read_bytes() == commands.read_bytes()
-    assert pa.table(kept) == pa.table(found)
-    mine.unlink()
+    assert by_call.read_bytes() == commands.read_bytes()
+    by_call.unlink()
+    kept = plan.boundary(tolerance=20.0, lattice=2, out=by_call, progress=False)
+    assert by_call.read_bytes() == commands.read_bytes()
+    assert pa.table(kept) == pa.table(computed)
+    by_call.unlink()
     commands.unlink()
     washer_sweep.modes(plan, speeds_rpm=[0, 100, 200],
-                       at={"unbalance_mass_kg": mass, "damping_n_s_per_m": damping}).save(mine)
+                       at={"unbalance_mass_kg": mass, "damping_n_s_per_m": damping}).save(by_call)
     command("modes", QUICK, "--at", f"unbalance_mass_kg={mass}", "--at",
             f"damping_n_s_per_m={damping}", "--speed", "0:200:100", "--out", commands)
-    assert mine.read_bytes() == commands.read_bytes()
-    assert [washer_sweep.read(mine).kind, found.kind] == ["modes", "boundary"]
+    assert by_call.read_bytes() == commands.read_bytes()
+    assert [washer_sweep.read(by_call).kind, computed.kind] == ["modes", "boundary"]
 
 
-def test_options_that_make_no_sense_are_refused(short):
+def test_invalid_options_are_rejected(short):
     point = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100}
-    for work, said in [
+    for invalid_call, expected_text in [
         (lambda: short.trace({"unbalance_mass_kg": 0.4}), "a point of the grid needs a value of"),
         (lambda: short.trace(point, every=9), "expected from"),
         (lambda: short.trace(point, start={"q11": 1}), "a coordinate q1 to q10"),
@@ -163,16 +164,16 @@ def test_options_that_make_no_sense_are_refused(short):
         (lambda: washer_sweep.modes(speeds_rpm=[100, 0]), "each above the one before"),
         (lambda: washer_sweep.modes(speeds_rpm=[0, float("inf")]), "finite"),
     ]:
-        with pytest.raises(washer_sweep.PlanError, match=said):
-            work()
+        with pytest.raises(washer_sweep.PlanError, match=expected_text):
+            invalid_call()
 
 
-def test_figures_are_the_commands(sweep, short, tmp_path):
-    file, drawn, mine = (tmp_path / name for name in ("m.parquet", "drawn.svg", "mine.svg"))
+def test_figures_have_the_bytes_of_the_command(sweep, short, tmp_path):
+    file, drawn, by_call = (tmp_path / name for name in ("m.parquet", "drawn.svg", "mine.svg"))
     result = short.run(file, progress=False)
     subprocess.run([sweep, "plot", file, "-o", drawn], check=True, capture_output=True)
-    result.save(mine)
-    assert mine.read_bytes() == drawn.read_bytes()
+    result.save(by_call)
+    assert by_call.read_bytes() == drawn.read_bytes()
     assert result._repr_svg_() == drawn.read_text()
     assert short.run(progress=False)._repr_svg_() == drawn.read_text()
     for name in ("mine.png", "mine.html"):
@@ -192,12 +193,12 @@ def test_figures_are_the_commands(sweep, short, tmp_path):
     assert "<svg" in trace._repr_svg_()
 
 
-def test_nothing_of_a_users_is_written_over(short, tmp_path):
+def test_files_of_the_user_are_not_overwritten(short, tmp_path):
     thesis = tmp_path / "thesis.parquet"
     thesis.write_text("my thesis")
-    for work in (lambda: short.run(progress=False).save(thesis), lambda: short.run(thesis)):
+    for invalid_call in (lambda: short.run(progress=False).save(thesis), lambda: short.run(thesis)):
         with pytest.raises(OSError, match="cannot be an output"):
-            work()
+            invalid_call()
     assert thesis.read_text() == "my thesis"
     with pytest.raises(OSError, match="cannot open"):
         washer_sweep.read(tmp_path / "none.parquet")
@@ -205,11 +206,11 @@ def test_nothing_of_a_users_is_written_over(short, tmp_path):
         washer_sweep.read(thesis)
 
 
-def test_what_is_evaluated_can_be_saved_and_read(short, tmp_path):
+def test_an_evaluated_table_can_be_saved_and_read(short, tmp_path):
     file = tmp_path / "points.parquet"
-    found = short.evaluate({"unbalance_mass_kg": [0.11, 0.5], "damping_n_s_per_m": [99, 60]})
-    found.save(file)
+    computed = short.evaluate({"unbalance_mass_kg": [0.11, 0.5], "damping_n_s_per_m": [99, 60]})
+    computed.save(file)
     again = washer_sweep.read(file)
-    assert rows(again) == rows(found)
-    assert again.plan == found.plan
-    assert found.plan["design"]["method"] == "table"
+    assert rows(again) == rows(computed)
+    assert again.plan == computed.plan
+    assert computed.plan["design"]["method"] == "table"

@@ -1,5 +1,5 @@
-"""What a type checker makes of the package: scripts/checks/python.sh runs mypy on this. Each
-`type: ignore` is an error that has to be found, or mypy finds the comment unused."""
+"""Uses of the package that are checked by mypy, which scripts/checks/python.sh runs. Each
+`type: ignore` marks an error that mypy must find; otherwise mypy reports the comment as unused."""
 
 from typing import Any, assert_type
 

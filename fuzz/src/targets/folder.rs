@@ -1,9 +1,9 @@
-//! Any bytes in place of one file of an unfinished run: the run is refused, or goes on and ends in
-//! a result whose bytes are those of the undisturbed one, unless the file is a part that passes for
-//! one.
+//! Fuzz target of the files of an unfinished run. An input replaces one file. The run is then
+//! rejected with an error, or continues to a result with the bytes of an undisturbed run. Only an
+//! input that replaces a part, and is itself a valid part, may change the result.
 //!
-//! The first byte of an input says which file it is for. A part is a sound one whose first or last
-//! bytes are the input's, with the digest of that, so that the fuzzer reaches its rows and its
+//! The first byte of an input selects the file. An input for a part replaces the first or the last
+//! bytes of a valid part, and the digest is computed again, so that the fuzzer reaches rows and
 //! metadata.
 
 use std::fs;
@@ -24,32 +24,32 @@ const NAMES: [&str; 8] = [
     "session-x-1-1.json",
     "shard-1.lock",
     PART,
-    // Beside the folder.
+    // A file beside the folder.
     "../x.run.json",
     PART,
 ];
-/// The name of the only part.
+/// The name of the run's only part.
 const PART: &str = "part-00000000.parquet";
 
-/// Tries one input; a panic is a finding.
+/// Runs the target with an input; a panic is a finding.
 pub(crate) fn run(bytes: &[u8]) {
-    let Some((which, content)) = bytes.split_first() else { return };
-    let home = home();
-    let which = usize::from(*which) % NAMES.len();
-    let name = NAMES[which];
+    let Some((selector, content)) = bytes.split_first() else { return };
+    let undisturbed = undisturbed_run();
+    let file_index = usize::from(*selector) % NAMES.len();
+    let name = NAMES[file_index];
     let content = match name {
-        PART => as_part(content, which + 1 == NAMES.len(), &home.part),
+        PART => replace_part_bytes(content, file_index + 1 == NAMES.len(), &undisturbed.part),
         _ => content.to_vec(),
     };
-    let partial = home.folder.path().join("x.parquet.partial");
-    reset(home, &partial);
+    let partial = undisturbed.folder.path().join("x.parquet.partial");
+    restore(undisturbed, &partial);
     fs::write(partial.join(name), &content).expect("the input is written");
 
-    let job = Job::new(&home.plan);
-    let output = home.folder.path().join("x.parquet");
-    // Looking changes nothing, whatever it finds.
+    let job = Job::new(&undisturbed.plan);
+    let output = undisturbed.folder.path().join("x.parquet");
+    // Reading the status changes no file, even if the status is an error.
     let _ = status(&output, &job);
-    assert_eq!(fs::read(partial.join(name)).expect("the input is there"), content);
+    assert_eq!(fs::read(partial.join(name)).expect("the input is still there"), content);
     let mut opened = match OpenRun::open(&output, &job, options()) {
         Ok(OpenOutcome::Open(opened)) => opened,
         Ok(OpenOutcome::Finished(..)) => panic!("there is no result"),
@@ -60,10 +60,10 @@ pub(crate) fn run(bytes: &[u8]) {
     };
     match opened.join(&job, &|| false) {
         Ok(tally) => {
-            let tally = tally.expect("nobody stops it");
-            assert_eq!(tally.points, home.plan.points());
+            let tally = tally.expect("the run is not stopped");
+            assert_eq!(tally.points, undisturbed.plan.points());
             let result = fs::read(&output).expect("there is a result");
-            assert!(name == PART || result == home.result, "{name} has changed the result");
+            assert!(name == PART || result == undisturbed.result, "{name} has changed the result");
             let _ = opened.complete(&job, &tally, None);
         }
         Err(error) => assert!(name == PART, "{name}: {error}"),
@@ -74,46 +74,47 @@ fn options() -> OpenOptions<'static> {
     OpenOptions { fresh: false, shard: None, environment: &|_| None }
 }
 
-/// Returns a part with the input in place of its first or last bytes, between the magic numbers,
-/// and the digest of that where there is still a place for it.
-fn as_part(input: &[u8], is_at_end: bool, part: &[u8]) -> Vec<u8> {
+/// Returns a part whose first or last bytes between the magic numbers are those of the input, with
+/// the digest of these bytes if the entry of the digest is not overwritten.
+fn replace_part_bytes(input: &[u8], is_at_end: bool, part: &[u8]) -> Vec<u8> {
     /// The number of bytes of the magic number at either end of a Parquet file.
-    const MAGIC: usize = 4;
+    const MAGIC_LEN: usize = 4;
     let mut bytes = part.to_vec();
-    let room = bytes.len() - 2 * MAGIC;
-    let input = &input[..input.len().min(room)];
-    let start = if is_at_end { bytes.len() - MAGIC - input.len() } else { MAGIC };
+    let max_input_len = bytes.len() - 2 * MAGIC_LEN;
+    let input = &input[..input.len().min(max_input_len)];
+    let start = if is_at_end { bytes.len() - MAGIC_LEN - input.len() } else { MAGIC_LEN };
     bytes[start..start + input.len()].copy_from_slice(input);
     let mut file = std::io::Cursor::new(bytes);
     let _ = sweep_files::seal::seal(&mut file);
     file.into_inner()
 }
 
-struct Home {
+/// The folder, the plan and the files of an undisturbed run.
+struct UndisturbedRun {
     folder: TempDir,
     plan: Plan,
-    /// Files of the whole run's folder, before it is joined.
+    /// The names and contents of the files of the run's folder before the parts are joined.
     files: Vec<(String, Vec<u8>)>,
     part: Vec<u8>,
     result: Vec<u8>,
 }
 
-/// Puts everything back as an undisturbed run leaves it before its join.
-fn reset(home: &Home, partial: &Path) {
+/// Restores the files of an undisturbed run before its parts are joined.
+fn restore(run: &UndisturbedRun, partial: &Path) {
     for file in ["x.parquet", "x.run.json"] {
-        let _ = fs::remove_file(home.folder.path().join(file));
+        let _ = fs::remove_file(run.folder.path().join(file));
     }
     let _ = fs::remove_dir_all(partial);
     fs::create_dir(partial).expect("the folder is made");
-    for (name, bytes) in &home.files {
+    for (name, bytes) in &run.files {
         fs::write(partial.join(name), bytes).expect("a file is written");
     }
 }
 
-fn home() -> &'static Home {
-    /// The run, computed once.
-    static HOME: OnceLock<Home> = OnceLock::new();
-    HOME.get_or_init(|| {
+fn undisturbed_run() -> &'static UndisturbedRun {
+    /// The run, which is computed once.
+    static RUN: OnceLock<UndisturbedRun> = OnceLock::new();
+    RUN.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let grid = folder.path().join("g.toml");
         let text = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
@@ -125,7 +126,7 @@ fn home() -> &'static Home {
         fs::write(&grid, text).expect("the grid is written");
         let plan = sweep::load(&grid, &[]).expect("the grid is right");
         let output = folder.path().join("x.parquet");
-        let go = |shard| {
+        let run_shard = |shard| {
             let options = RunOptions {
                 threads: 1,
                 fresh: false,
@@ -139,9 +140,9 @@ fn home() -> &'static Home {
                 .expect("the run ends")
                 .end
         };
-        // A shard of one leaves its folder.
+        // A run of one shard of one does not join its parts, and leaves its folder.
         let shard = Some(ShardRequest::Given(Shard { index: 1, count: 1 }));
-        assert!(matches!(go(shard), RunEnd::Shard(..)));
+        assert!(matches!(run_shard(shard), RunEnd::Shard(..)));
         let partial = folder.path().join("x.parquet.partial");
         let names = fs::read_dir(&partial).expect("the folder is there");
         let files: Vec<(String, Vec<u8>)> = names
@@ -151,9 +152,9 @@ fn home() -> &'static Home {
                 (name.to_owned(), fs::read(&path).expect("a file is read"))
             })
             .collect();
-        assert!(matches!(go(None), RunEnd::Finished(_)));
+        assert!(matches!(run_shard(None), RunEnd::Finished(_)));
         let result = fs::read(&output).expect("there is a result");
         let (_, part) = files.iter().find(|(name, _)| name == PART).expect("there is a part");
-        Home { part: part.clone(), plan, files, result, folder }
+        UndisturbedRun { part: part.clone(), plan, files, result, folder }
     })
 }

@@ -272,6 +272,7 @@ impl DamperCoefficients<f64> {
         // `preparation.rs` replaces the default by the speed amplitude of the linear motion.
         let speed_m_per_s =
             damper.friction_linear_speed_m_per_s.unwrap_or(Damper::INITIAL_LINEAR_SPEED_M_PER_S);
+        let friction_speed_m_per_s = damper.friction_speed_m_per_s;
         let stroke_m = damper.free_stroke_m;
         let softness_m = damper.free_stroke_softness_m;
         let has_stroke = stroke_m != 0.0;
@@ -279,7 +280,7 @@ impl DamperCoefficients<f64> {
             ends: Ends::new(damper.cabinet_m, damper.tub_m),
             damping: N(damper.damping_n_s_per_m),
             friction: N(damper.friction_n),
-            friction_speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
+            friction_speed_squared: N(friction_speed_m_per_s * friction_speed_m_per_s),
             equivalent_damping: N(equivalent_damping(damper.friction_n, speed_m_per_s)),
             outer_damping: N(damper.outer_damping_n_s_per_m),
             rest_length: N(damper.given_length_m()),
