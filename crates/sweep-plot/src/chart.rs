@@ -271,11 +271,11 @@ fn draw_panel(
             (xs[k].is_finite() && ys[k].is_finite()).then(|| panel.pixel(xs[k], ys[k]))
         };
         if let Style::Band(low, high) = &series.style {
-            let edges: Vec<_> = (0..xs.len())
+            let band_edges: Vec<_> = (0..xs.len())
                 .map(|k| pixel_of_sample(low, k).zip(pixel_of_sample(high, k)))
                 .collect();
             let mut outline = Outline::default();
-            for run in edges.split(Option::is_none).filter(|run| !run.is_empty()) {
+            for run in band_edges.split(Option::is_none).filter(|run| !run.is_empty()) {
                 let (mut low_points, mut high_points): (Vec<[f64; 2]>, Vec<[f64; 2]>) =
                     run.iter().flatten().copied().unzip();
                 // The band at an isolated point is as wide as its dot.
@@ -357,7 +357,7 @@ fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
         let candidates = y_offsets.iter().flat_map(|dy| x_candidates.map(|left| [left, y + dy]));
         let text_extent =
             |[left, base]: [f64; 2]| [left, base - TICK_SIZE, left + width, base + 4.0];
-        let is_free = |position: &[f64; 2]| {
+        let is_unobstructed = |position: &[f64; 2]| {
             let [left, top, right, bottom] = text_extent(*position);
             left > panel.x
                 && right < panel.x + panel.width
@@ -371,7 +371,7 @@ fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
                 })
         };
         let position = candidates
-            .filter(is_free)
+            .filter(is_unobstructed)
             .min_by_key(|position| count_curves_through(content, panel, text_extent(*position)));
         let position = position.unwrap_or([x_candidates[1], y + 18.0]);
         occupied.push(text_extent(position));

@@ -54,17 +54,17 @@ impl Cuts {
         let further_axes = axes.get(2..).unwrap_or_default();
         let fixed_values = fixed_values(source, further_axes, requested_values)?;
         // The third axis becomes panels unless it is fixed.
-        let is_free = fixed_values.first() == Some(&None);
+        let is_third_axis_free = fixed_values.first() == Some(&None);
         let mut counts = vec![1; further_axes.len()];
-        if let Some(axis) = further_axes.first().filter(|_| is_free) {
+        if let Some(axis) = further_axes.first().filter(|_| is_third_axis_free) {
             counts[0] = axis.values.len().min(MAX_PANELS);
         }
-        let picks = picks(further_axes, &fixed_values, &counts);
-        let fixed = further_axes.iter().zip(&picks).skip(usize::from(is_free));
+        let picks = pick_values(further_axes, &fixed_values, &counts);
+        let fixed = further_axes.iter().zip(&picks).skip(usize::from(is_third_axis_free));
         let mut notes: Vec<String> =
             fixed.map(|(axis, pick)| axis.format_value(axis.values[pick[0]])).collect();
         let mut cuts = vec![Cut { other_picks: vec![0; further_axes.len()], name: None }];
-        if let Some(axis) = further_axes.first().filter(|_| is_free) {
+        if let Some(axis) = further_axes.first().filter(|_| is_third_axis_free) {
             if picks[0].len() < axis.values.len() {
                 notes.push(omission_note(axis, picks[0].len()));
             }
@@ -112,7 +112,7 @@ impl Cuts {
             let Some(greatest) = counts.iter_mut().max().filter(|count| **count > 1) else { break };
             *greatest -= 1;
         }
-        let picks = picks(further_axes, &fixed_values, &counts);
+        let picks = pick_values(further_axes, &fixed_values, &counts);
         let shortened_axes =
             further_axes.iter().zip(&picks).filter(|(axis, pick)| pick.len() < axis.values.len());
         let notes = shortened_axes.map(|(axis, pick)| omission_note(axis, pick.len())).collect();
@@ -128,7 +128,7 @@ impl Cuts {
 
 /// Returns the indices of the values shown for each axis: the fixed value if not all values fit, or
 /// else `counts` of them, evenly picked.
-fn picks(
+fn pick_values(
     further_axes: &[SweptAxis],
     fixed_values: &[Option<usize>],
     counts: &[usize],
@@ -177,7 +177,7 @@ fn fixed_values(
             })?;
         let values = &further_axes[axis_index].values;
         let value_index =
-            values.iter().position(|&valid_values| SweptAxis::is_same_value(valid_values, *value));
+            values.iter().position(|&axis_value| SweptAxis::is_same_value(axis_value, *value));
         fixed_values[axis_index] = Some(value_index.ok_or_else(|| {
             let format_value = |value: &f64| label::format_significant(*value, 6);
             let valid_values = match &values[..] {

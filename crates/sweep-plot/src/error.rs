@@ -25,14 +25,14 @@ pub enum PlotError {
     #[error("{0}")]
     Unfit(String),
     /// A name that the file does not have.
-    #[error("{refusal}")]
+    #[error("{message}")]
     NotThere {
         /// The message: the requested name, the place that lacks it, and the names that exist.
-        refusal: String,
+        message: String,
         /// The requested name.
-        given: String,
+        requested_name: String,
         /// The names that exist.
-        valid: Vec<String>,
+        valid_names: Vec<String>,
     },
     /// A figure that cannot be laid out or encoded.
     #[error("cannot draw the figure: {0}")]

@@ -111,9 +111,9 @@ impl Panel {
 
     /// Draws the edge, ticks and numbers. An axis shared with the panel below or to the left has no
     /// numbers here.
-    pub(crate) fn draw_frame(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
+    pub(crate) fn draw_frame(&self, scene: &mut Scene, has_x_numbers: bool, has_y_numbers: bool) {
         let numbers = self.x_ticks().into_iter().map(|tick| (self.x_pixel(tick.value), tick.label));
-        self.draw_frame_with(scene, numbers.filter(|_| x_numbers).collect(), y_numbers);
+        self.draw_frame_with(scene, numbers.filter(|_| has_x_numbers).collect(), has_y_numbers);
     }
 
     /// Draws the same as [`Self::draw_frame`] for a panel with close neighbours: numbers that would
@@ -121,14 +121,19 @@ impl Panel {
     pub(crate) fn draw_frame_beside_neighbours(
         &self,
         scene: &mut Scene,
-        x_numbers: bool,
-        y_numbers: bool,
+        has_x_numbers: bool,
+        has_y_numbers: bool,
     ) {
-        let numbers = if x_numbers { self.numbers_that_fit() } else { Vec::new() };
-        self.draw_frame_with(scene, numbers, y_numbers);
+        let numbers = if has_x_numbers { self.numbers_that_fit() } else { Vec::new() };
+        self.draw_frame_with(scene, numbers, has_y_numbers);
     }
 
-    fn draw_frame_with(&self, scene: &mut Scene, x_numbers: Vec<(f64, String)>, y_numbers: bool) {
+    fn draw_frame_with(
+        &self,
+        scene: &mut Scene,
+        x_numbers: Vec<(f64, String)>,
+        has_y_numbers: bool,
+    ) {
         let bottom = self.y + self.height;
         let stroke = Stroke::solid(INK, 1.2);
         scene.line(self.outline(), stroke.clone());
@@ -144,7 +149,7 @@ impl Panel {
         for tick in self.y_ticks() {
             let y = self.y_pixel(tick.value);
             marks.add_line(&[[self.x - 5.0, y], [self.x, y]]);
-            if y_numbers {
+            if has_y_numbers {
                 let position = [self.x - 9.0, y + 0.35 * TICK_SIZE];
                 scene.text(Text::new(tick.label, position, TICK_SIZE).anchor(Anchor::End));
             }
@@ -199,9 +204,9 @@ pub(crate) fn draw_heading(scene: &mut Scene, title: &str, subtitle: &str) {
 pub(crate) const HEADING_HEIGHT: f64 = 72.0;
 
 /// Returns `text`, cut short to fit `max_width` px.
-fn cut_to_fit(text: &str, size: f64, bold: bool, max_width: f64) -> String {
+fn cut_to_fit(text: &str, size: f64, is_bold: bool, max_width: f64) -> String {
     let mut shortened: String = text.to_owned();
-    while text_width(&shortened, size, bold) > max_width {
+    while text_width(&shortened, size, is_bold) > max_width {
         let kept_letters = shortened.trim_end_matches('…').chars().count().saturating_sub(1);
         shortened =
             shortened.chars().take(kept_letters).collect::<String>().trim_end().to_owned() + "…";
@@ -259,9 +264,9 @@ pub(crate) fn draw_legend(
                 scene.line(area, Stroke::solid(MUTED, 1.0));
             }
             LegendSymbol::Undefined => draw_undefined_cells(scene, &[[x, y - 8.0, 28.0, 16.0]]),
-            LegendSymbol::Shape(outline, filled, colour) => {
+            LegendSymbol::Shape(outline, is_filled, colour) => {
                 let outline = outline.translated([x + 14.0, y]);
-                if *filled {
+                if *is_filled {
                     scene.fill(outline, *colour);
                 } else {
                     scene.line(outline, Stroke::solid(*colour, 1.4));

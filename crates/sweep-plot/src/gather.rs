@@ -116,10 +116,10 @@ impl CellMap {
         Ok(Self { table, grid, counts, ranges_and_sides, statuses })
     }
 
-    /// Returns the cell at index `x` of the first axis, `y` of the second and `others` of the
-    /// others, if the file has a point in it.
-    pub(crate) fn cell(&self, x: usize, y: usize, others: &[usize]) -> Option<usize> {
-        Some(self.grid.cell(x, y, others)).filter(|&cell| self.has_points(cell))
+    /// Returns the cell at index `x` of the first axis, `y` of the second and `further_indices` of
+    /// the others, if the file has a point in it.
+    pub(crate) fn cell(&self, x: usize, y: usize, further_indices: &[usize]) -> Option<usize> {
+        Some(self.grid.cell(x, y, further_indices)).filter(|&cell| self.has_points(cell))
     }
 
     /// Returns whether the file has a point in the cell.
@@ -296,10 +296,10 @@ impl<'a> CellCollector<'a> {
     fn count(&mut self, cell: usize, row: FigureRow<'_>, has_failed: bool) -> Result<bool> {
         let axis_count = self.last_values.len();
         let counts = &mut self.counts[cell];
-        let is_full = |points| counts.points as usize >= points;
+        let holds_all = |points| counts.points as usize >= points;
         if counts.points == 0 {
             self.first_rows[cell] = row.index();
-        } else if self.grid.point_count(cell).is_some_and(is_full) {
+        } else if self.grid.point_count(cell).is_some_and(holds_all) {
             return Err(self.repeated_point(cell, row.index()));
         }
         let [is_reliable, sensitive] = [1, 2].map(|k| row.word(axis_count + k));

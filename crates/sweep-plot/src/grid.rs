@@ -200,10 +200,10 @@ impl Grid {
             .fold(0, |index, (axis, cell)| index * axis.values.len() + cell)
     }
 
-    /// Returns the index of the cell at `x` of the first axis, `y` of the second and `others` of
-    /// the others.
-    pub(crate) fn cell(&self, x: usize, y: usize, others: &[usize]) -> usize {
-        self.index([x, y].into_iter().chain(others.iter().copied()))
+    /// Returns the index of the cell at `x` of the first axis, `y` of the second and
+    /// `further_indices` of the others.
+    pub(crate) fn cell(&self, x: usize, y: usize, further_indices: &[usize]) -> usize {
+        self.index([x, y].into_iter().chain(further_indices.iter().copied()))
     }
 
     /// Returns the number of grid points of a cell; `None` if it is not known.
@@ -262,15 +262,16 @@ mod tests {
 
     #[test]
     fn borders_lie_halfway_between_values() {
-        let borders =
-            |values: &[f64], is_log| GridAxis::in_blocks(&axis(values, is_log), 1).borders;
+        let borders = |values: &[f64], log_borders| {
+            GridAxis::in_blocks(&axis(values, log_borders), 1).borders
+        };
         assert_eq!(borders(&[1.0, 2.0, 4.0], false), [0.5, 1.5, 3.0, 5.0]);
         assert_eq!(borders(&[10.0], false), [9.5, 10.5]);
-        let is_log = borders(&[1.0, 100.0], true);
+        let log_borders = borders(&[1.0, 100.0], true);
         assert!(
-            (is_log[0] - 0.1).abs() < 1e-12
-                && (is_log[1] - 10.0).abs() < 1e-9
-                && (is_log[2] - 1000.0).abs() < 1e-6
+            (log_borders[0] - 0.1).abs() < 1e-12
+                && (log_borders[1] - 10.0).abs() < 1e-9
+                && (log_borders[2] - 1000.0).abs() < 1e-6
         );
     }
 
@@ -302,9 +303,9 @@ mod tests {
 
     #[test]
     fn only_picked_values_have_a_cell() {
-        let picked = GridAxis::with_picks(&axis(&[1.0, 2.0, 3.0, 4.0], false), &[0, 3]);
+        let axis_of_picks = GridAxis::with_picks(&axis(&[1.0, 2.0, 3.0, 4.0], false), &[0, 3]);
         assert_eq!(
-            [1.0, 2.0, 3.0, 4.0].map(|value| picked.cell_index(value)),
+            [1.0, 2.0, 3.0, 4.0].map(|value| axis_of_picks.cell_index(value)),
             [Some(0), None, None, Some(1)]
         );
     }

@@ -1,5 +1,5 @@
-//! Self-contained HTML pages: the numbers, and the scripts that draw them. A page opens from a disk
-//! and needs no network.
+//! Self-contained HTML pages, which have the data and the scripts that draw them. A page needs no
+//! server and no network.
 
 mod design;
 pub mod embed;
@@ -363,7 +363,7 @@ fn legend_json(entries: &[(LegendSymbol, String)]) -> Value {
         };
         format!("background:repeating-linear-gradient({lines})")
     };
-    let style = |symbol: &LegendSymbol| match symbol {
+    let to_style = |symbol: &LegendSymbol| match symbol {
         // The line of a boundary is dark between light edges, to show on any ground.
         LegendSymbol::Line(_) => {
             "height:6px;background:#1b1f24;border:solid #ffffff;border-width:1.5px 0".to_owned()
@@ -375,7 +375,7 @@ fn legend_json(entries: &[(LegendSymbol, String)]) -> Value {
               outline:1px solid var(--faint)"
             .to_owned(),
     };
-    entries.iter().map(|(symbol, text)| json!([style(symbol), text])).collect()
+    entries.iter().map(|(symbol, text)| json!([to_style(symbol), text])).collect()
 }
 
 fn layer_json(map: &CellMap, column: &ShownColumn, layer: Layer, max_points: usize) -> Value {
@@ -417,10 +417,13 @@ fn limit_lines_json(
     let row_count = map.grid.axes[1].values.len();
     let cell = |cut: usize, x: usize, y: usize| (x * row_count + y) * cuts + cut;
     let lines = figures::map::limit_lines(map, (layer, limit), cuts, cell, max_points);
-    let flatten = |line: &Vec<[f64; 2]>| -> Vec<f64> {
+    let to_flat_line = |line: &Vec<[f64; 2]>| -> Vec<f64> {
         line.iter().flatten().map(|value| embed::round_to_six_digits(*value)).collect()
     };
-    lines.iter().map(|lines_of_cut| lines_of_cut.iter().map(flatten).collect::<Value>()).collect()
+    lines
+        .iter()
+        .map(|lines_of_cut| lines_of_cut.iter().map(to_flat_line).collect::<Value>())
+        .collect()
 }
 
 /// Encodes a curve's values to seven digits.

@@ -198,13 +198,13 @@ pub(crate) fn all_columns(source: &FigureFile) -> Vec<ShownColumn> {
         !axes.contains(column) && !is_count.iter().any(|prefix| column.name.starts_with(prefix))
     });
     let mut shown_columns: Vec<ShownColumn> = number_columns.map(ShownColumn::new).collect();
-    shown_columns.sort_by_key(|shown_columns| {
-        let is_named = |column| shown_columns.name() == column;
+    shown_columns.sort_by_key(|shown_column| {
+        let is_named = |column| shown_column.name() == column;
         (
             !is_named("ratio_change"),
-            shown_columns.group as usize,
+            shown_column.group as usize,
             !is_named("ratio_max"),
-            shown_columns.channel.is_some(),
+            shown_column.channel.is_some(),
         )
     });
     shown_columns
@@ -216,13 +216,19 @@ impl ShownColumn {
         let split_off_group = |group: &ColumnGroup| {
             Some((*group, name.strip_prefix(group.name())?.strip_prefix('_')?))
         };
-        let group_and_channel =
-            ColumnGroup::ALL.iter().find_map(split_off_group).filter(|(_, rest)| *rest != "change");
+        let group_and_channel = ColumnGroup::ALL
+            .iter()
+            .find_map(split_off_group)
+            .filter(|(_, name_after_group)| *name_after_group != "change");
         let (group, channel) =
-            group_and_channel.map_or((ColumnGroup::Other, None), |(group, rest)| {
+            group_and_channel.map_or((ColumnGroup::Other, None), |(group, name_after_group)| {
                 // Differences of two files have max_a and max_b.
                 let not_channels = ["max", "min", "max_a", "max_b"];
-                (group, (!not_channels.contains(&rest)).then(|| rest.to_owned()))
+                (
+                    group,
+                    (!not_channels.contains(&name_after_group))
+                        .then(|| name_after_group.to_owned()),
+                )
             });
         Self { facts: facts.clone(), group, channel }
     }
@@ -254,7 +260,7 @@ impl ShownColumn {
         let source = &map.table.source;
         let is_ratio = self.group == ColumnGroup::Ratio;
         // A linear model at rest gives an infinite ratio, which has no place on any scale.
-        let or_nan = |value: f64| {
+        let or_nan_if_infinite = |value: f64| {
             if is_ratio && !(value > 0.0 && value.is_finite()) { f64::NAN } else { value }
         };
         let is_less_worse = self.worse() == Some(Worse::Less);
@@ -276,7 +282,7 @@ impl ShownColumn {
                 || label::split_model(self.name()).1 != "linear",
             title,
             label: label::with_unit(&label, unit),
-            values: values.iter().map(|number| or_nan(number * factor)).collect(),
+            values: values.iter().map(|number| or_nan_if_infinite(number * factor)).collect(),
             limit: limit.filter(|_| scale.centre.is_some()),
             scale,
             sides: sides.as_ref().map(|sides| CellSides {

@@ -41,8 +41,8 @@ pub(crate) fn write(scene: &Scene) -> Vec<u8> {
     let font_entries: Vec<String> = page
         .glyphs
         .iter()
-        .map(|(bold, glyphs)| {
-            format!("/{} {} 0 R", font_name(*bold), objects.add_font(*bold, glyphs))
+        .map(|(is_bold, glyphs)| {
+            format!("/{} {} 0 R", font_name(*is_bold), objects.add_font(*is_bold, glyphs))
         })
         .collect();
     let graphics_states = page.alphas.iter().map(|alpha| {
@@ -68,8 +68,8 @@ pub(crate) fn write(scene: &Scene) -> Vec<u8> {
 }
 
 /// Returns the name of the plain or the bold font in the page's resources.
-const fn font_name(bold: bool) -> &'static str {
-    if bold { "F1" } else { "F0" }
+const fn font_name(is_bold: bool) -> &'static str {
+    if is_bold { "F1" } else { "F0" }
 }
 
 /// The content of a page, and the resources that it refers to.
@@ -90,10 +90,10 @@ impl Page {
 
     fn add_item(&mut self, item: &SceneItem) {
         match item {
-            SceneItem::Fill { outline, colour, crisp } => {
+            SceneItem::Fill { outline, colour, is_crisp } => {
                 self.set_colour(*colour);
                 let mut fill_operator = "f";
-                if *crisp && colour.alpha == 255 {
+                if *is_crisp && colour.alpha == 255 {
                     self.add(&format!("[] 0 d {} w", format_pixels(SEAM_WIDTH)));
                     fill_operator = "B";
                 }
@@ -155,15 +155,15 @@ impl Page {
     }
 
     fn add_text(&mut self, text: &Text) {
-        let face = typeface(text.bold);
-        let glyphs = self.glyphs.entry(text.bold).or_default();
+        let face = typeface(text.is_bold);
+        let glyphs = self.glyphs.entry(text.is_bold).or_default();
         let mut glyph_codes = String::new();
         for letter in text.text.chars() {
             let GlyphId(glyph) = face.glyph_index(letter).unwrap_or_default();
             glyphs.insert(glyph, letter);
             let _ = write!(glyph_codes, "{glyph:04X}");
         }
-        let width = text_width(&text.text, text.size, text.bold);
+        let width = text_width(&text.text, text.size, text.is_bold);
         let anchor_offset = match text.anchor {
             Anchor::Start => 0.0,
             Anchor::Middle => width / 2.0,
@@ -176,7 +176,7 @@ impl Page {
             format!("1 0 0 -1 {} {}", format_pixels(x - anchor_offset), format_pixels(y))
         };
         let size = format_pixels(text.size);
-        let font = font_name(text.bold);
+        let font = font_name(text.is_bold);
         let text_operators = format!("/{font} {size} Tf {matrix} Tm <{glyph_codes}> Tj ET");
         if let Some(halo) = text.halo {
             self.set_colour(halo);
@@ -234,13 +234,13 @@ impl Objects {
 
     /// Adds the plain or the bold font with the widths and letters of its glyphs; returns the
     /// number of its object.
-    fn add_font(&mut self, bold: bool, glyphs: &BTreeMap<u16, char>) -> usize {
-        let face = typeface(bold);
+    fn add_font(&mut self, is_bold: bool, glyphs: &BTreeMap<u16, char>) -> usize {
+        let face = typeface(is_bold);
         let units = f64::from(face.units_per_em());
         let thousandths = |value: f64| (1000.0 * value / units).round() as i64;
-        let bytes = if bold { BOLD_FONT } else { REGULAR_FONT };
+        let bytes = if is_bold { BOLD_FONT } else { REGULAR_FONT };
         let file = self.add_stream(&format!("/Length1 {} ", bytes.len()), bytes);
-        let name = if bold { "SWEEPP+NotoSans-Bold" } else { "SWEEPP+NotoSans-Regular" };
+        let name = if is_bold { "SWEEPP+NotoSans-Bold" } else { "SWEEPP+NotoSans-Regular" };
         let bounds = face.global_bounding_box();
         let [left, bottom, right, top] = [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max]
             .map(|value| thousandths(f64::from(value)));
@@ -252,7 +252,7 @@ impl Objects {
             "<< /Type /FontDescriptor /FontName /{name} /Flags 4 /FontBBox [{left} {bottom} \
              {right} {top}] /ItalicAngle 0 /Ascent {ascent} /Descent {descent} /CapHeight \
              {capital_height} /StemV {} /FontFile2 {file} 0 R >>",
-            if bold { 140 } else { 80 }
+            if is_bold { 140 } else { 80 }
         ));
         let mut widths = String::new();
         let mut letters = String::new();

@@ -18,18 +18,18 @@ pub(crate) const REGULAR_FONT: &[u8] = include_bytes!("fonts/NotoSans-Regular.su
 pub(crate) const BOLD_FONT: &[u8] = include_bytes!("fonts/NotoSans-Bold.subset.ttf");
 
 /// Returns the typeface of bold or plain text.
-pub(crate) fn typeface(bold: bool) -> &'static Face<'static> {
+pub(crate) fn typeface(is_bold: bool) -> &'static Face<'static> {
     /// The parsed typefaces, plain and bold.
     static FACES: LazyLock<[Face<'static>; 2]> = LazyLock::new(|| {
         [REGULAR_FONT, BOLD_FONT]
             .map(|font| Face::parse(font, 0).expect("the built-in font is valid"))
     });
-    &FACES[usize::from(bold)]
+    &FACES[usize::from(is_bold)]
 }
 
 /// Returns the width of `text` in type `size` px high, px.
-pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
-    let face = typeface(bold);
+pub(crate) fn text_width(text: &str, size: f64, is_bold: bool) -> f64 {
+    let face = typeface(is_bold);
     let advances: u32 = text.chars().map(|letter| u32::from(glyph_advance(face, letter))).sum();
     f64::from(advances) * size / f64::from(face.units_per_em())
 }
@@ -54,8 +54,8 @@ pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
     };
     for item in &scene.items {
         match item {
-            SceneItem::Fill { outline, colour, crisp } => {
-                canvas.fill_outline(outline, *colour, !crisp)
+            SceneItem::Fill { outline, colour, is_crisp } => {
+                canvas.fill_outline(outline, *colour, !is_crisp)
             }
             SceneItem::Line { outline, stroke } => canvas.draw_line(outline, stroke),
             SceneItem::Text(text) => canvas.draw_text(text),
@@ -118,9 +118,9 @@ impl Canvas {
     }
 
     fn draw_text(&mut self, text: &Text) {
-        let face = typeface(text.bold);
+        let face = typeface(text.is_bold);
         let scale = (text.size / f64::from(face.units_per_em())) as f32;
-        let width = text_width(&text.text, text.size, text.bold) as f32;
+        let width = text_width(&text.text, text.size, text.is_bold) as f32;
         let mut pen = GlyphPen { builder: PathBuilder::new(), x: 0.0, scale };
         pen.x = match text.anchor {
             Anchor::Start => 0.0,

@@ -179,18 +179,19 @@ impl FigureFile {
     pub fn unknown_name(
         &self,
         option: &str,
-        given: impl fmt::Display,
+        requested_name: impl fmt::Display,
         kind_of_name: &str,
-        valid_names: impl fmt::Display,
+        name_list: impl fmt::Display,
     ) -> PlotError {
         let path = self.path.display();
-        let given = given.to_string();
-        let valid_names = valid_names.to_string();
-        let valid = valid_names.split(", ").map(str::to_owned).collect();
-        let refusal = format!(
-            "`{option} {given}`: {path}: there is no such {kind_of_name}; it has {valid_names}"
+        let requested_name = requested_name.to_string();
+        let name_list = name_list.to_string();
+        let valid_names = name_list.split(", ").map(str::to_owned).collect();
+        let message = format!(
+            "`{option} {requested_name}`: {path}: there is no such {kind_of_name}; it has \
+             {name_list}"
         );
-        PlotError::NotThere { refusal, given, valid }
+        PlotError::NotThere { message, requested_name, valid_names }
     }
 
     fn undrawable_error(&self, reason: String) -> PlotError {
@@ -352,18 +353,18 @@ impl<'a> FigureRow<'a> {
 
 /// Greatest magnitude that is drawn; larger numbers are drawn as this. Basis: arithmetic on drawn
 /// numbers, such as borders halfway on a logarithmic axis, must not overflow.
-const GREATEST_DRAWN: f64 = 1e100;
+const MAX_DRAWN_MAGNITUDE: f64 = 1e100;
 /// Least magnitude that is drawn; smaller numbers are drawn as 0, so that arithmetic on drawn
 /// numbers does not underflow.
-const LEAST_DRAWN: f64 = 1e-100;
+const MIN_DRAWN_MAGNITUDE: f64 = 1e-100;
 
 fn clamp_to_drawable(value: f64) -> f64 {
     if value.is_infinite() {
         value
-    } else if value.abs() < LEAST_DRAWN {
+    } else if value.abs() < MIN_DRAWN_MAGNITUDE {
         0.0
     } else {
-        value.clamp(-GREATEST_DRAWN, GREATEST_DRAWN)
+        value.clamp(-MAX_DRAWN_MAGNITUDE, MAX_DRAWN_MAGNITUDE)
     }
 }
 
@@ -437,7 +438,7 @@ mod tests {
             assert_eq!(clamp_to_drawable(value).to_bits(), value.to_bits());
         }
         assert_eq!(clamp_to_drawable(5e-324), 0.0);
-        assert_eq!(clamp_to_drawable(-1e300), -GREATEST_DRAWN);
+        assert_eq!(clamp_to_drawable(-1e300), -MAX_DRAWN_MAGNITUDE);
         assert_eq!(clamp_to_drawable(f64::INFINITY), f64::INFINITY, "it is left out, as it was");
         assert!(clamp_to_drawable(f64::NAN).is_nan());
     }

@@ -32,7 +32,7 @@ impl SampleFile {
         } else {
             HashMap::from([
                 ("unit".to_owned(), unit.to_owned()),
-                ("description".to_owned(), format!("{name}, said")),
+                ("description".to_owned(), format!("{name}, described")),
             ])
         };
         let field = Field::new(name, array.data_type().clone(), true).with_metadata(metadata);
@@ -51,8 +51,8 @@ impl SampleFile {
         self.column(name, unit, Arc::new(values.collect::<Float64Array>()))
     }
 
-    /// Adds the bad direction and the limit to the last column.
-    pub(crate) fn worse(mut self, worse: &str, limit: Option<f64>) -> Self {
+    /// Adds to the last column the direction in which its values are worse, and the limit.
+    pub(crate) fn with_worse(mut self, worse: &str, limit: Option<f64>) -> Self {
         let (field, _) = self.columns.last_mut().unwrap();
         let mut metadata = field.metadata().clone();
         metadata.insert("worse".to_owned(), worse.to_owned());
@@ -279,15 +279,15 @@ impl MapSample<'_> {
                 "m",
                 amplitudes_of_model(0).into_iter().map(|yaw| 0.01 - 0.1 * yaw),
             )
-            .worse("less", Some(0.0))
+            .with_worse("less", Some(0.0))
             .numbers("margin_n", "N", amplitudes_of_model(0).into_iter().map(|yaw| 1.0 - yaw))
-            .worse("less", None)
+            .with_worse("less", None)
             .numbers(
                 "min_gap_linear_m",
                 "m",
                 amplitudes_of_model(1).into_iter().map(|yaw| 0.01 - 0.1 * yaw),
             )
-            .worse("less", Some(0.0))
+            .with_worse("less", Some(0.0))
             .words("status", amplitudes.iter().map(status))
             .numbers("fail_time_s", "s", amplitudes.iter().map(fail_time))
             .counts("steps_nonlinear", points.iter().map(|_| 250_000))

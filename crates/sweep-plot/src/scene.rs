@@ -201,7 +201,7 @@ pub(crate) struct Text {
     pub(crate) position: [f64; 2],
     /// The type size, px.
     pub(crate) size: f64,
-    pub(crate) bold: bool,
+    pub(crate) is_bold: bool,
     pub(crate) colour: Colour,
     pub(crate) anchor: Anchor,
     /// Whether the text reads upwards.
@@ -217,7 +217,7 @@ impl Text {
             text: text.into(),
             position,
             size,
-            bold: false,
+            is_bold: false,
             colour: INK,
             anchor: Anchor::Start,
             is_rotated: false,
@@ -227,7 +227,7 @@ impl Text {
 
     /// Returns the text in bold type.
     pub(crate) fn bold(mut self) -> Self {
-        self.bold = true;
+        self.is_bold = true;
         self
     }
 
@@ -252,7 +252,7 @@ pub(crate) enum SceneItem {
         outline: Outline,
         colour: Colour,
         /// Whether edges lie on whole pixels, so that neighbours leave no seam.
-        crisp: bool,
+        is_crisp: bool,
     },
     /// A drawn outline.
     Line {
@@ -297,12 +297,12 @@ impl Scene {
     }
 
     pub(crate) fn fill(&mut self, outline: Outline, colour: Colour) {
-        self.items.push(SceneItem::Fill { outline, colour, crisp: false });
+        self.items.push(SceneItem::Fill { outline, colour, is_crisp: false });
     }
 
     /// Fills an outline whose edges lie on whole pixels.
     pub(crate) fn fill_crisp(&mut self, outline: Outline, colour: Colour) {
-        self.items.push(SceneItem::Fill { outline, colour, crisp: true });
+        self.items.push(SceneItem::Fill { outline, colour, is_crisp: true });
     }
 
     /// Draws the line of an outline.

@@ -21,8 +21,8 @@ pub(crate) fn write(scene: &Scene) -> String {
     let clips = write_clips(&mut svg, scene);
     for item in &scene.items {
         match item {
-            SceneItem::Fill { outline, colour, crisp } => {
-                let rendering = if *crisp { r#" shape-rendering="crispEdges""# } else { "" };
+            SceneItem::Fill { outline, colour, is_crisp } => {
+                let rendering = if *is_crisp { r#" shape-rendering="crispEdges""# } else { "" };
                 let data = path_data(outline);
                 let fill = paint_attributes("fill", *colour);
                 let _ = writeln!(svg, r#"<path d="{data}"{fill}{rendering}/>"#);
@@ -71,7 +71,7 @@ fn write_text(out: &mut String, text: &Text) {
         Anchor::Middle => r#" text-anchor="middle""#,
         Anchor::End => r#" text-anchor="end""#,
     };
-    let weight = if text.bold { r#" font-weight="bold""# } else { "" };
+    let weight = if text.is_bold { r#" font-weight="bold""# } else { "" };
     let size = format_pixels(text.size);
     let halo = text.halo.map_or(String::new(), |colour| {
         let stroke = paint_attributes("stroke", colour);

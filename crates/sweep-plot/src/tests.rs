@@ -90,7 +90,10 @@ fn columns_have_units_words_and_provenance() {
         "by the name where the file does not say"
     );
     assert_eq!(column("nonlinear_body_yaw").facts.unit(), "rad");
-    assert_eq!(column("nonlinear_body_yaw").facts.metadata.description, "nonlinear_body_yaw, said");
+    assert_eq!(
+        column("nonlinear_body_yaw").facts.metadata.description,
+        "nonlinear_body_yaw, described"
+    );
     assert_eq!(column("ratio_max").facts.unit(), "", "1 is no unit to show");
     let words = |name: &str| column(name).words().unwrap();
     let rows_without_verdict =

@@ -86,8 +86,8 @@ fn collect_differences<'a>(
     mut path: Vec<Step<'a>>,
     differences: &mut Vec<String>,
 ) {
-    let descends = |first: &[Value], second: &[Value]| first.len() == second.len();
-    leaves(sides, descends, &mut path, &mut |path, values| {
+    let have_same_length = |first: &[Value], second: &[Value]| first.len() == second.len();
+    leaves(sides, have_same_length, &mut path, &mut |path, values| {
         let [first, second] = [0, 1].map(|side| value_at_point(values[side], points[side], path));
         if first != second && !is_parameter_of_point([&first, &second], points, path) {
             let [first, second] = [first, second].map(|value| match value {

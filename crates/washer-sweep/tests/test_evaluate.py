@@ -58,7 +58,8 @@ def test_numbers_of_every_format_are_read_and_other_values_are_rejected(short):
     assert expected == rows(short.evaluate({name: list(values) for name, values in table.items()}))
     mass = table["unbalance_mass_kg"]
     for invalid_values in (np.ma.masked_less(mass, 0.3), mass + 0j, mass.astype("c8"), mass > 0.5,
-                           list(mass > 0.5), [True] * len(mass), mass.astype("M8[s]"), mass.astype("U")):
+                           list(mass > 0.5), [True] * len(mass), mass.astype("M8[s]"),
+                           mass.astype("U")):
         with pytest.raises(TypeError, match="column `unbalance_mass_kg`: expected numbers"):
             short.evaluate({**table, "unbalance_mass_kg": invalid_values})
     for invalid_values in (np.ma.masked_less(np.arange(60.0, 63.0), 61), np.arange(60, 62) + 0j,

@@ -33,8 +33,8 @@ def table(rows):
 
 
 def interrupted(call, after_s, ready=lambda: True):
-    """Interrupts a call by SIGINT after `after_s`, once `ready` returns true. Returns the exception,
-    and the time (s) from the signal to the exception."""
+    """Interrupts a call by SIGINT after `after_s`, once `ready` returns true. Returns the
+    exception, and the time (s) from the signal to the exception."""
     sent = []
 
     def send():

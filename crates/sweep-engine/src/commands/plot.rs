@@ -74,10 +74,10 @@ pub fn draw<V: ValueEnum + Send + Sync>(
 
 /// Adds the nearest valid name to the error about an unknown one.
 fn suggest_name(error: PlotError) -> PlotError {
-    let PlotError::NotThere { refusal, given, valid } = &error else { return error };
-    match nearest(given, valid.iter().map(String::as_str)) {
+    let PlotError::NotThere { message, requested_name, valid_names } = &error else { return error };
+    match nearest(requested_name, valid_names.iter().map(String::as_str)) {
         Some(nearest_name) => {
-            PlotError::Unfit(format!("{refusal}\n  = help: is `{nearest_name}` meant?"))
+            PlotError::Unfit(format!("{message}\n  = help: is `{nearest_name}` meant?"))
         }
         None => error,
     }

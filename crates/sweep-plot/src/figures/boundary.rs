@@ -19,8 +19,8 @@ struct BoundaryPoint {
     y: f64,
     low: f64,
     high: f64,
-    /// Whether the quantity exceeds its limit above the point, if the file says so. A curve keeps
-    /// its sides.
+    /// Whether the quantity exceeds its limit above the point, if the file has the quantity on both
+    /// sides. All points of a curve have the same value.
     is_rising: Option<bool>,
 }
 
@@ -41,10 +41,10 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart> {
     let ys = table.numbers(&y_column.facts.name)?;
     let lows = table.numbers(low)?;
     let highs = table.numbers(high)?;
-    let mut grid: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
-    grid.sort_by(f64::total_cmp);
-    grid.dedup();
-    if grid.len() < 2 {
+    let mut x_values: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
+    x_values.sort_by(f64::total_cmp);
+    x_values.dedup();
+    if x_values.len() < 2 {
         return Err(too_few_points());
     }
     let quantities_at_ends = ["quantity_low", "quantity_high"]
@@ -78,11 +78,18 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart> {
             format!("{limit_text}, {further_axes}")
         };
         let colour = DISTINCT[k % DISTINCT.len()];
-        series.extend(join_curves(&grid, points).into_iter().map(|branch| {
-            let pick =
+        series.extend(join_curves(&x_values, points).into_iter().map(|branch| {
+            let collect_values =
                 |value: fn(&BoundaryPoint) -> f64| branch.iter().map(value).collect::<Vec<f64>>();
-            let style = Style::Band(pick(|point| point.low), pick(|point| point.high));
-            Series::new(name.clone(), colour, grid.clone(), pick(|point| point.y), style)
+            let style =
+                Style::Band(collect_values(|point| point.low), collect_values(|point| point.high));
+            Series::new(
+                name.clone(),
+                colour,
+                x_values.clone(),
+                collect_values(|point| point.y),
+                style,
+            )
         }));
     }
     let region_note = upper_region_note(&curves, side_words(table));
@@ -97,9 +104,11 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart> {
                 None => format!("Where {}", limit_in_words(table)),
             },
         },
-        subtitle: table.source.subtitle(&format!("{} values of {x_name}{region_note}", grid.len())),
+        subtitle: table
+            .source
+            .subtitle(&format!("{} values of {x_name}{region_note}", x_values.len())),
         x_label: x_column.label(),
-        is_x_log: is_log_spaced(&grid),
+        is_x_log: is_log_spaced(&x_values),
         panels: vec![ChartPanel { height: 440.0, ..panel }],
         ..Chart::default()
     })
@@ -113,7 +122,7 @@ fn upper_region_note(
     let all_points = curves.iter().flat_map(|(_, points)| points);
     let mut uppermost: Vec<&BoundaryPoint> =
         all_points.filter(|point| point.y.is_finite()).collect();
-    let crossings = uppermost.len();
+    let crossing_count = uppermost.len();
     uppermost.sort_by(|a, b| a.x.total_cmp(&b.x).then(b.y.total_cmp(&a.y)));
     uppermost.dedup_by(|a, b| a.x == b.x);
     let is_rising = uppermost.first().and_then(|point| point.is_rising);
@@ -123,7 +132,7 @@ fn upper_region_note(
             Some(false) => falling_words,
             None => return String::new(),
         };
-    let line = if crossings > uppermost.len() { "highest crossing" } else { "line" };
+    let line = if crossing_count > uppermost.len() { "highest crossing" } else { "line" };
     format!(" · {region_words} above the {line}")
 }
 
@@ -243,7 +252,7 @@ fn further_axes(table: &FigureTable, row: usize) -> String {
 /// Joins the points of a boundary to curves with at most one point for each x. If there are several
 /// points at an x, each continues the curve that has the same sides and whose last point is
 /// nearest.
-fn join_curves(grid: &[f64], points: &[BoundaryPoint]) -> Vec<Vec<BoundaryPoint>> {
+fn join_curves(x_values: &[f64], points: &[BoundaryPoint]) -> Vec<Vec<BoundaryPoint>> {
     /// A gap of a curve.
     const GAP: BoundaryPoint =
         BoundaryPoint { x: f64::NAN, y: f64::NAN, low: f64::NAN, high: f64::NAN, is_rising: None };
@@ -251,7 +260,7 @@ fn join_curves(grid: &[f64], points: &[BoundaryPoint]) -> Vec<Vec<BoundaryPoint>
         if point.y.is_nan() { 0.5 * (point.low + point.high) } else { point.y }
     };
     let mut curves: Vec<Vec<BoundaryPoint>> = Vec::new();
-    for (k, &x) in grid.iter().enumerate() {
+    for (k, &x) in x_values.iter().enumerate() {
         let points_at_x = points.iter().filter(|point| point.x == x && height(point).is_finite());
         let points_at_x: Vec<BoundaryPoint> = points_at_x.copied().collect();
         // Pairs of a curve that had a point at the last x and a point at this one, nearest first.
@@ -273,7 +282,7 @@ fn join_curves(grid: &[f64], points: &[BoundaryPoint]) -> Vec<Vec<BoundaryPoint>
         }
         for (point, curve) in points_at_x.into_iter().zip(curve_of_point) {
             let curve = curve.unwrap_or_else(|| {
-                curves.push(vec![GAP; grid.len()]);
+                curves.push(vec![GAP; x_values.len()]);
                 curves.len() - 1
             });
             curves[curve][k] = point;

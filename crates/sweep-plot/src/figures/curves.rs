@@ -17,8 +17,8 @@ const MAX_MARKS: usize = 400;
 /// Returns the title for the requested columns, with the channel if it is the only one.
 fn title(source: &FigureFile, requested: &[ShownColumn]) -> String {
     let Some(first) = requested.first() else { return RATIOS_TITLE.to_owned() };
-    let is_alone = requested.iter().all(|shown| shown.channel == first.channel);
-    match (first.group, first.channel.as_ref().filter(|_| is_alone)) {
+    let is_single_channel = requested.iter().all(|shown| shown.channel == first.channel);
+    match (first.group, first.channel.as_ref().filter(|_| is_single_channel)) {
         (ColumnGroup::Nonlinear | ColumnGroup::Linear, Some(channel)) => {
             format!("{AMPLITUDES_TITLE}: {}", label::channel_in_words(channel))
         }

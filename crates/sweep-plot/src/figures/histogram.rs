@@ -40,7 +40,7 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
     });
     let series: Vec<Series> = series.collect();
     let greatest = extremes(series.iter().flat_map(|series| series.y.iter().copied()));
-    let top = greatest.map_or(100.0, |(_, greatest)| 1.06 * greatest);
+    let y_top = greatest.map_or(100.0, |(_, greatest)| 1.06 * greatest);
     let limit = shown_limit(scatter);
     let mark = limit.map(|limit| Mark {
         x: limit.value,
@@ -53,7 +53,7 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
         x_label: scatter.label.clone(),
         is_x_log: scatter.is_log,
         panels: vec![ChartPanel {
-            range: Some((0.0, top)),
+            range: Some((0.0, y_top)),
             ..ChartPanel::new("points", Label::new("Share of the points", "%"), series)
         }],
         mark_meaning: limit.map_or(String::new(), |limit| limit.line_name.clone()),

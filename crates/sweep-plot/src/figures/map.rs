@@ -148,13 +148,13 @@ fn overlay_stroke() -> Stroke {
 /// Draws the curve of a boundary file as far as it lies within the panel.
 fn draw_overlay(scene: &mut Scene, panel: &Panel, overlay: &Overlay) {
     let mut outline = Outline::default();
-    let mut isolated = Vec::new();
+    let mut isolated_points = Vec::new();
     for line in &overlay.lines {
-        isolated.extend(outline.add_runs(&curve_pixels(panel, line)));
+        isolated_points.extend(outline.add_runs(&curve_pixels(panel, line)));
     }
     scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
     scene.line(outline, overlay_stroke());
-    for point in isolated {
+    for point in isolated_points {
         scene.fill(Outline::circle(point, 4.5), PAPER);
         scene.fill(Outline::circle(point, 3.5), OVERLAY_COLOUR);
     }

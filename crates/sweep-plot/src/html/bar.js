@@ -28,21 +28,22 @@ function drawBar(context, box, layer, margin) {
   for (const tick of [...layer.ticks].sort((a, b) => isCentre(b) - isCentre(a))) {
     const [value, label] = tick;
     const x = box.left + position(layer.scale, value) * box.width;
-    const half = 0.5 * context.measureText(label).width + 4;
+    const halfWidth = 0.5 * context.measureText(label).width + 4;
     const [from, colour] = isCentre(tick) ? [y, DARK] : [y + thickness, themeColour("ink")];
     drawLine(context, x, from, x, y + thickness + 4, [], colour);
-    if (labelRanges.some(([low, high]) => x + half > low && x - half < high)) continue;
-    labelRanges.push([x - half, x + half]);
-    const room = [box.left - 20 + half, right + margin - half];
-    write(context, label, Math.min(Math.max(x, room[0]), room[1]), y + thickness + 18,
+    if (labelRanges.some(([low, high]) => x + halfWidth > low && x - halfWidth < high)) continue;
+    labelRanges.push([x - halfWidth, x + halfWidth]);
+    const xRange = [box.left - 20 + halfWidth, right + margin - halfWidth];
+    write(context, label, Math.min(Math.max(x, xRange[0]), xRange[1]), y + thickness + 18,
       { bold: isCentre(tick) ? "bold" : "" });
   }
   const middle = box.left + box.width / 2;
   write(context, layer.label, middle, y + thickness + 38, { room: box.width + 50 });
 }
 
-// Draws slanted lines, each of a colour and a width, on a ground of this colour or on what is
-// there. A smaller `side` serves areas that could lie between the lines.
+// Creates a pattern of slanted lines, each of a colour and a width, on a ground of a colour or on
+// a transparent one. `side` is the size of the pattern (px), which must be small enough that no
+// area lies between two lines.
 function createHatchPattern(context, ground, options = {}) {
   const { lines = [[DARK, 1]], falling = false, side = 8 } = options;
   const tile = element("canvas", { width: side, height: side });

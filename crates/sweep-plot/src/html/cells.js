@@ -13,45 +13,47 @@ function createCells(data) {
     codes[name] = { ...coded, values: decode(coded.data) };
   }
   const word = (name, cell) => codes[name]?.words[codes[name].values[cell]] ?? null;
-  // Counts of a cell's points by kind; a cell of one point has them in its words.
-  const counted = (name, isCounted) => (data.counts ? decodeFloats(data.counts[name])
+  // Returns the number of a kind of points in each cell. For cells of one point it follows from the
+  // cell's words.
+  const pointCounts = (name, isCounted) => (data.counts ? decodeFloats(data.counts[name])
     : Uint8Array.from(codes.status.values, (_, cell) => isCounted(cell)));
   const status = (cell) => word("status", cell);
   const counts = {
-    points: counted("points", (cell) => status(cell) !== null),
-    failed: counted("failed", (cell) => status(cell) !== null && status(cell) !== "ok"),
-    reliable: counted("reliable", (cell) => word("reliable", cell) === "true"),
-    unreliable: counted("unreliable", (cell) => word("reliable", cell) === "false"),
-    sensitive: counted("sensitive", (cell) => word("sensitive", cell) === "true"),
+    points: pointCounts("points", (cell) => status(cell) !== null),
+    failed: pointCounts("failed", (cell) => status(cell) !== null && status(cell) !== "ok"),
+    reliable: pointCounts("reliable", (cell) => word("reliable", cell) === "true"),
+    unreliable: pointCounts("unreliable", (cell) => word("reliable", cell) === "false"),
+    sensitive: pointCounts("sensitive", (cell) => word("sensitive", cell) === "true"),
   };
-  // Cells of several points with some on either side of a layer's limit, and cells with some that
-  // did not fail and yet have no value.
+  // Bits of the cells that have points on both sides of a layer's limit, and of those that have
+  // points without a value that did not fail.
   for (const layer of data.layers) {
     for (const name of ["both", "undefined"]) if (layer[name]) layer[name] = decode(layer[name]);
   }
   const wordsOf = (channel) => data.rows.find((row) => row.name === channel)?.words
     ?? channel.replaceAll("_", " ");
-  const bit = (bits, cell) => bits !== undefined && ((bits[cell >> 3] >> (cell & 7)) & 1) === 1;
-  const filled = (cell) => counts.points[cell] > 0;
+  const isBitSet = (bits, cell) => bits !== undefined
+    && ((bits[cell >> 3] >> (cell & 7)) & 1) === 1;
+  const isFilled = (cell) => counts.points[cell] > 0;
   // Returns whether any point of a cell failed.
-  const failed = (cell) => counts.failed[cell] > 0;
+  const hasFailed = (cell) => counts.failed[cell] > 0;
   const hasValue = (layer, cell) => {
     const value = columns[layer.column].values[cell];
     return Number.isFinite(value) && (layer.group !== "ratio" || value > 0);
   };
   // Returns whether a cell has points that failed or have no value beside others with a value.
   const hasMissingValues = (layer, cell) => hasValue(layer, cell)
-    && (failed(cell) || bit(layer.undefined, cell));
+    && (hasFailed(cell) || isBitSet(layer.undefined, cell));
   // Returns whether a cell's colour depends on a chaotic motion.
-  const sensitive = (layer, cell) => layer.nonlinear && counts.sensitive[cell] > 0;
+  const isSensitive = (layer, cell) => layer.nonlinear && counts.sensitive[cell] > 0;
   // Returns the verdict of a cell in words.
   function verdict(cell) {
-    if (!filled(cell)) return "not in the file";
+    if (!isFilled(cell)) return "not in the file";
     const points = counts.points[cell];
-    const [reliable, unreliable, lost] = ["reliable", "unreliable", "failed"]
+    const [reliable, unreliable, failed] = ["reliable", "unreliable", "failed"]
       .map((kind) => counts[kind][cell]);
-    const kinds = [[reliable, "reliable"], [unreliable, "unreliable"], [lost, "failed"],
-      [points - reliable - unreliable - lost, "undefined"]].filter(([count]) => count > 0);
+    const kinds = [[reliable, "reliable"], [unreliable, "unreliable"], [failed, "failed"],
+      [points - reliable - unreliable - failed, "undefined"]].filter(([count]) => count > 0);
     if (kinds.length > 1) return kinds.map(([count, kind]) => `${count} ${kind}`).join(", ");
     const statusNote = points === 1 ? `: ${status(cell)?.replaceAll("_", " ")}` : "";
     const description = { reliable: "linear model reliable", unreliable: "linear model unreliable",
@@ -59,11 +61,11 @@ function createCells(data) {
     return points === 1 ? description : `${description} at all ${points} points`;
   }
 
-  // Returns the places of a cell along all axes.
-  const placesOf = (cell) => data.axes.reduceRight(([left, ...found], { values }) => [
-    Math.floor(left / values.length), left % values.length, ...found], [cell]).slice(1);
+  // Returns the indices of a cell along all axes.
+  const placesOf = (cell) => data.axes.reduceRight(([remaining, ...places], { values }) => [
+    Math.floor(remaining / values.length), remaining % values.length, ...places], [cell]).slice(1);
   const valuesOf = (cell) => placesOf(cell).map((place, k) => data.axes[k].values[place]);
 
-  return { columns, codes, word, counts, wordsOf, bit, filled, failed, hasValue, hasMissingValues,
-    placesOf, sensitive, valuesOf, verdict };
+  return { columns, codes, word, counts, wordsOf, isBitSet, isFilled, hasFailed, hasValue,
+    hasMissingValues, placesOf, isSensitive, valuesOf, verdict };
 }

@@ -1,6 +1,6 @@
 // Curves over a common x axis, in panels one above the other, with a picker of panels.
 
-const CHART = { left: 84, right: 16, top: 12, gap: 14, bottom: 46 };
+const CHART_MARGINS = { left: 84, right: 16, top: 12, gap: 14, bottom: 46 };
 
 // Builders of a line, a panel and a chart for results of the page itself: linear axes, one grid, no
 // marks.
@@ -17,17 +17,17 @@ function plainChart(xWords, xUnit, grid, panels) {
   return { xWords, xUnit, xLog: false, xRange, grids: [grid], panels, marks: [], shades: [] };
 }
 
-// `spec` as the page's data has it, with decoded arrays: { xWords, xUnit, xLog, xRange, xTicks,
-// grids, panels, marks, markMeaning, shades, shadeMeaning }.
-// `pick` is called with the x of a click, and of Enter.
+// Creates a chart in a host element. `spec` is a chart of the page's data with decoded arrays:
+// { xWords, xUnit, xLog, xRange, xTicks, grids, panels, marks, markMeaning, shades, shadeMeaning }.
+// `pick` is called with the x of a click, and of the cursor when Enter is pressed.
 function createChart(host, spec, name, pick = () => {}) {
   const toCoordinate = (x) => (spec.xLog ? Math.log(x) : x);
   const fromCoordinate = (x) => (spec.xLog ? Math.exp(x) : x);
   const fullView = spec.xRange.map(toCoordinate);
   let view = [...fullView];
   let cursor = null;
-  // The height at which the pointer reads, px from the figure's top; null if keys read.
-  let readAt = null;
+  // The height of the pointer, px from the figure's top; null if the cursor was moved by keys.
+  let pointerY = null;
 
   const find = appendTemplate(host, "chart");
   const [picker, figure, tip, legend, announcement] = [".controls", ".figure", ".tip", ".legend",
@@ -46,10 +46,13 @@ function createChart(host, spec, name, pick = () => {}) {
   // Labels of marks stand above the panels, not on the curves.
   const strip = spec.marks.length ? 66 : 0;
   const shown = () => spec.panels.filter((panel) => panel.shown);
-  const heights = () => shown().reduce((sum, panel) => sum + panel.height + CHART.gap, 0);
-  const height = () => CHART.top + strip + heights() + CHART.bottom;
+  const heights = () => shown().reduce((sum, panel) => sum + panel.height + CHART_MARGINS.gap, 0);
+  const height = () => CHART_MARGINS.top + strip + heights() + CHART_MARGINS.bottom;
   const { request, canvas } = createSurface(figure, height, paint);
-  const area = () => ({ left: CHART.left, width: figure.clientWidth - CHART.left - CHART.right });
+  const area = () => ({
+    left: CHART_MARGINS.left,
+    width: figure.clientWidth - CHART_MARGINS.left - CHART_MARGINS.right,
+  });
   const viewFraction = (x) => (toCoordinate(x) - view[0]) / (view[1] - view[0]);
   const atX = (x) => area().left + viewFraction(x) * area().width;
   const toX = (px) => fromCoordinate(
@@ -77,21 +80,21 @@ function createChart(host, spec, name, pick = () => {}) {
   function yRange(panel) {
     if (panel.range) return panel.range;
     let [low, high] = [Infinity, -Infinity];
-    const take = (value) => {
+    const extendRange = (value) => {
       if (!Number.isFinite(value) || (panel.log && value <= 0)) return;
       [low, high] = [Math.min(low, value), Math.max(high, value)];
     };
     for (const series of panel.series) {
       const [from, to] = visible(spec.grids[series.grid]);
       for (const values of [series.y, series.low, series.high]) {
-        values?.subarray(from, to + 1).forEach(take);
+        values?.subarray(from, to + 1).forEach(extendRange);
       }
     }
-    panel.levels.forEach(([value]) => take(value));
+    panel.levels.forEach(([value]) => extendRange(value));
     if (!(low <= high)) [low, high] = panel.log ? [1, 10] : [0, 1];
     if (panel.log) return [low / 1.15, high * 1.15];
-    const room = high > low ? 0.05 * (high - low) : 0.05 * Math.max(Math.abs(high), 1);
-    return [low - room, high + room];
+    const margin = high > low ? 0.05 * (high - low) : 0.05 * Math.max(Math.abs(high), 1);
+    return [low - margin, high + margin];
   }
 
   // Returns whether a panel has a point of a line, a dot or a star.
@@ -102,7 +105,7 @@ function createChart(host, spec, name, pick = () => {}) {
   }
 
   function paint(context) {
-    const box = { ...area(), top: CHART.top + strip };
+    const box = { ...area(), top: CHART_MARGINS.top + strip };
     drawMarkLabels(context, box);
     context.lineJoin = "round";
     const panels = shown();
@@ -151,7 +154,7 @@ function createChart(host, spec, name, pick = () => {}) {
       if (cursor !== null) {
         drawLine(context, atX(cursor), top, atX(cursor), bottom, [], themeColour("accent"));
       }
-      box.top += panel.height + CHART.gap;
+      box.top += panel.height + CHART_MARGINS.gap;
     }
   }
 
@@ -231,11 +234,12 @@ function createChart(host, spec, name, pick = () => {}) {
     for (const panel of shown()) {
       for (const series of panel.series) add(series.name || panel.words, symbolStyle(series));
     }
-    const pair = shown().map((panel) => panel.series.slice(-2))
+    const overlappingPair = shown().map((panel) => panel.series.slice(-2))
       .find((series) => series.at(-1)?.alpha < 1);
-    if (pair) {
-      const [under, over] = [pair[0], pair.at(-1)].map((series) => lineColour(series.colour));
-      const mixed = `${over} ${100 * pair.at(-1).alpha}%, ${under}`;
+    if (overlappingPair) {
+      const [under, over] = [overlappingPair[0], overlappingPair.at(-1)]
+        .map((series) => lineColour(series.colour));
+      const mixed = `${over} ${100 * overlappingPair.at(-1).alpha}%, ${under}`;
       const line = `height:0;border-top:3px solid color-mix(in srgb, ${mixed})`;
       add("both, one over the other", line);
     }
@@ -262,16 +266,16 @@ function createChart(host, spec, name, pick = () => {}) {
     const rows = [];
     const words = [x];
     for (const panel of shown()) {
-      // Two curves of a panel share a row; the legend says which is which.
-      const together = spec.panels.length > 1 && panel.series.length <= 2;
-      for (const group of together ? [panel.series] : panel.series.map((series) => [series])) {
-        const title = together ? panel.words : group[0].name || panel.words;
+      // Two curves of a panel share a row, in which the legend's symbols identify them.
+      const sharesRow = spec.panels.length > 1 && panel.series.length <= 2;
+      for (const group of sharesRow ? [panel.series] : panel.series.map((series) => [series])) {
+        const title = sharesRow ? panel.words : group[0].name || panel.words;
         const cells = group.map((series) => {
           const value = formatSignificant(series.y[nearest(spec.grids[series.grid], cursor)]);
-          const name = together && series.name ? `${title}, ${series.name}` : title;
+          const name = sharesRow && series.name ? `${title}, ${series.name}` : title;
           words.push(`${name}: ${value} ${panel.unit}`.trim());
-          const wide = together && group.length === 1 ? 2 : null;
-          const attributes = { "data-name": name, colspan: wide };
+          const columnSpan = sharesRow && group.length === 1 ? 2 : null;
+          const attributes = { "data-name": name, colspan: columnSpan };
           return element("td", attributes, swatch(symbolStyle(series)), value);
         });
         rows.push(tableRow(title, [...cells, panel.unit]));
@@ -282,12 +286,15 @@ function createChart(host, spec, name, pick = () => {}) {
     announcement.textContent = words.join("; ");
     // The box stays within the visible part of a figure that is higher than the window.
     const bounds = figure.getBoundingClientRect();
-    const seen = [Math.max(0, -bounds.top), Math.min(bounds.height, innerHeight - bounds.top)];
-    placeTip(tip, [atX(cursor) - 12, atX(cursor) + 12], (readAt ?? seen[0]) + 14, seen);
+    const visibleHeights = [
+      Math.max(0, -bounds.top), Math.min(bounds.height, innerHeight - bounds.top),
+    ];
+    placeTip(tip, [atX(cursor) - 12, atX(cursor) + 12], (pointerY ?? visibleHeights[0]) + 14,
+      visibleHeights);
   }
 
   function setCursor(x, y = null) {
-    [cursor, readAt] = [x, y];
+    [cursor, pointerY] = [x, y];
     request();
     showReadout();
   }

@@ -1,6 +1,6 @@
 "use strict";
-// Functions that map and charts share: decoding, numbers, axes, canvases that follow size and
-// theme, pointer and keys.
+// Functions that the map and the charts share: they decode data, format numbers, draw axes, create
+// canvases that are redrawn when size or theme change, and handle pointer and keys.
 
 function decode(text) {
   const raw = atob(text);
@@ -32,7 +32,7 @@ function formatSignificant(value, digits = 4) {
   return String(Number(value.toPrecision(digits)));
 }
 
-// The page's numbers. `ticks` has the steps of ticks, as in the program's own figures.
+// The page's data. `ticks` has the steps between ticks from which the program's own figures choose.
 const DATA = JSON.parse(document.getElementById("data").textContent);
 
 // Returns about `count` ticks from low to high as [value, label]; `sets` are those of a logarithmic
@@ -97,8 +97,10 @@ function table(heads, rows, attributes = {}) {
   return element("table", attributes, ...head, element("tbody", {}, ...rows));
 }
 
-// Return a symbol of a legend, and an entry with a symbol.
+// Returns a symbol of a legend.
 const swatch = (style) => element("i", { style });
+
+// Returns a legend's entry: a symbol, if it has a style, and words.
 const legendEntry = ([style, words]) => element("li", {}, ...(style ? [swatch(style)] : []), words);
 
 // Places a tip beside the range from left to right (px) within a figure; its top at y, within the
@@ -247,7 +249,7 @@ function interact(figure, actions) {
     if (isClick) actions.pick(event);
   });
   on("pointercancel", () => { drag = null; });
-  // After a touch the reading stays.
+  // After a touch the values stay visible, because a finger cannot hover.
   on("pointerleave", (event) => { if (event.pointerType === "mouse") actions.letGo(); });
   on("blur", actions.letGo);
   on("dblclick", actions.reset);

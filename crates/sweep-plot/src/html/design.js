@@ -4,7 +4,7 @@
 // Distance within which the pointer finds a point, px.
 const MAX_POINTER_DISTANCE = 12;
 
-// `panel` is the live panel, which computes the chosen point.
+// Creates the page. `panel` is the live panel, which computes the chosen point.
 function createDesign(main, data, panel) {
   const parts = {
     scatter: (host) => createMatrix(host, data.scatter, panel?.chosen),
@@ -47,7 +47,8 @@ function createMatrix(host, data, choose = () => {}) {
     const [from, to] = one.range.map(coordinate);
     return (coordinate(value) - from) / (to - from);
   };
-  // Returns a panel's directions and its place in the picture: [x, y, [left, top, width, height]].
+  // The panels: the directions along x and y, and the rectangle in the picture, as
+  // [x, y, [left, top, width, height]].
   const panels = data.panels.map(([x, y, ...box]) => [directions[x], directions[y], box]);
   // Points without a value of y lie at the lower edge.
   const at = ([x, y, [left, top, width, height]], k) => {
@@ -57,7 +58,7 @@ function createMatrix(host, data, choose = () => {}) {
       top + (Number.isFinite(yFraction) ? (1 - yFraction) * height : height - 5),
     ];
   };
-  // Returns the picture's units in a pixel of the page.
+  // Returns the length of a pixel of the page in units of the picture.
   const scale = () => data.view[2] / picture.clientWidth;
 
   function showPoint(place) {
@@ -108,7 +109,7 @@ function createMatrix(host, data, choose = () => {}) {
     if (selected === null) return;
     choose(Object.fromEntries(directions.map((one) => [one.name, one.values[selected]])));
   }
-  // After a touch the reading stays.
+  // After a touch the values stay visible, because a finger cannot hover.
   const release = () => {
     selected = null;
     showPoint();

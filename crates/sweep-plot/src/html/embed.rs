@@ -20,10 +20,10 @@ pub fn encode_bytes(values: impl Iterator<Item = u8>) -> String {
 
 /// Encodes flags as bits, the least significant bit of a byte first, in base64.
 pub fn encode_bits(values: &[bool]) -> String {
-    let byte = |values: &[bool]| {
+    let to_byte = |values: &[bool]| {
         values.iter().rev().fold(0, |byte: u8, value| byte << 1 | u8::from(*value))
     };
-    STANDARD.encode(values.chunks(8).map(byte).collect::<Vec<u8>>())
+    STANDARD.encode(values.chunks(8).map(to_byte).collect::<Vec<u8>>())
 }
 
 /// Encodes values as little-endian 16-bit integers in base64, and returns the value of one unit:
@@ -33,9 +33,9 @@ pub fn quantise(values: &[f64]) -> (String, f64) {
     let peak = finite.fold(0.0_f64, |peak, value| peak.max(value.abs()));
     let unit =
         round_to_six_digits(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
-    let integer =
+    let to_integer =
         |value: &f64| if value.is_finite() { (value / unit).round() as i16 } else { i16::MIN };
-    let data = values.iter().flat_map(|value| integer(value).to_le_bytes()).collect::<Vec<u8>>();
+    let data = values.iter().flat_map(|value| to_integer(value).to_le_bytes()).collect::<Vec<u8>>();
     (STANDARD.encode(data), unit)
 }
 
@@ -73,8 +73,8 @@ mod tests {
             .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
             .collect();
         assert_eq!(decoded[4], i16::MIN);
-        for (value, integer) in curve.iter().zip(decoded).take(4) {
-            assert!((f64::from(integer) * unit - value).abs() <= 0.07 / 32_000.0);
+        for (value, decoded_integer) in curve.iter().zip(decoded).take(4) {
+            assert!((f64::from(decoded_integer) * unit - value).abs() <= 0.07 / 32_000.0);
         }
     }
 

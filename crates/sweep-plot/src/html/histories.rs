@@ -44,7 +44,7 @@ pub(crate) fn read_histories(folder: &Path, map: &CellMap, model: &dyn Figures) 
     for file in files {
         let source = FigureFile::open(&file, model_kinds)?;
         let unfit_error =
-            |what: &str| PlotError::Unfit(format!("`--traces`: {}: {what}", file.display()));
+            |reason: &str| PlotError::Unfit(format!("`--traces`: {}: {reason}", file.display()));
         if source.kind != FigureKind::TRACE {
             return Err(unfit_error("not a trace file"));
         }

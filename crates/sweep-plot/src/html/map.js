@@ -1,24 +1,25 @@
-// The map over the first two axes: cells, the dividing line, values under the pointer, time
-// histories on a click. A cell is one point, or a block of points if the file has more than a page
-// carries; then its values are the worst of the block.
+// The map over the first two axes: cells, the dividing line, values under the pointer, and time
+// histories on a click. A cell is one point, or a block of points if the file has more points than
+// a page can carry; the values of a cell are then the worst values of the block.
 
 // Margins around the map, px, with the colour bar below.
 const MARGINS = { left: 70, right: 14, top: 10, bottom: 130 };
 
-// `panel` is the live panel: it paints finer cells and marks its point.
+// Creates the map in a host element. `panel` is the live panel, which paints finer cells and marks
+// the point that it computes.
 function createMap(host, data, panel) {
   const [xAxis, yAxis] = data.axes;
   const extra = data.axes.slice(2);
   const [nx, ny] = [xAxis.values.length, yAxis.values.length];
   const cuts = extra.reduce((product, axis) => product * axis.values.length, 1);
-  const { columns, codes, word, counts, wordsOf, bit, filled, failed, hasValue, hasMissingValues,
-    placesOf, sensitive, valuesOf, verdict } = createCells(data);
+  const { columns, codes, word, counts, wordsOf, isBitSet, isFilled, hasFailed, hasValue,
+    hasMissingValues, placesOf, isSensitive, valuesOf, verdict } = createCells(data);
 
   const toCoordinates = data.axes.map((axis) => (axis.log ? Math.log : (value) => value));
   const [toCoordinateX, toCoordinateY] = toCoordinates;
   const borders = [xAxis.borders.map(toCoordinateX), yAxis.borders.map(toCoordinateY)];
-  const full = borders.map((list) => [list[0], list[list.length - 1]]);
-  let view = full.map((range) => [...range]);
+  const fullView = borders.map((list) => [list[0], list[list.length - 1]]);
+  let view = fullView.map((range) => [...range]);
   let rest = [...data.first.rest];
   const listeners = [];
   let hovered = null;
@@ -55,9 +56,9 @@ function createMap(host, data, panel) {
   });
 
   const height = () => Math.min(Math.max(figure.clientWidth, 470), 640);
-  const cells = createSurface(figure, height, paint);
-  const over = createSurface(figure, height, paintOver);
-  over.canvas.classList.add("over");
+  const cellSurface = createSurface(figure, height, paint);
+  const overlaySurface = createSurface(figure, height, paintOverlay);
+  overlaySurface.canvas.classList.add("over");
 
   const currentLayer = () => data.layers.find((layer) => layer.column === quantity.value) ?? null;
 
@@ -66,8 +67,8 @@ function createMap(host, data, panel) {
     figure.dataset.layer = layer ? layer.column : "status";
     document.getElementById("title").textContent = layer ? layer.title : "How each point ended";
     updateLegend(layer);
-    cells.request();
-    over.request();
+    cellSurface.request();
+    overlaySurface.request();
     showReadout();
     listeners.forEach((listener) => listener());
   }
@@ -76,11 +77,12 @@ function createMap(host, data, panel) {
     view = next.map((range) => [...range]);
     // A finger scrolls the page over a whole map, and moves one that is zoomed.
     figure.style.touchAction = isZoomed() ? "none" : "";
-    cells.request();
-    over.request();
+    cellSurface.request();
+    overlaySurface.request();
   }
 
-  const isZoomed = () => view.some(([low, high], k) => low > full[k][0] || high < full[k][1]);
+  const isZoomed = () => view
+    .some(([low, high], k) => low > fullView[k][0] || high < fullView[k][1]);
 
   // Geometry: the plot's rectangle, and positions within it.
   function area() {
@@ -105,11 +107,11 @@ function createMap(host, data, panel) {
     const { values, factor } = columns[layer.column];
     return (cell) => {
       if (hasValue(layer, cell)) {
-        if (bit(layer.both, cell)) return MIXED;
+        if (isBitSet(layer.both, cell)) return MIXED;
         return colourOf(layer, values[cell] * factor);
       }
-      if (!filled(cell)) return null;
-      return failed(cell) ? "failed" : "undefined";
+      if (!isFilled(cell)) return null;
+      return hasFailed(cell) ? "failed" : "undefined";
     };
   }
 
@@ -153,11 +155,13 @@ function createMap(host, data, panel) {
     }
     panel?.cells(context, layer, (x, y) => [toPx(box, x), toPy(box, y)], colourOf);
     if (layer) {
-      const least = (list) => Math.min(...list.slice(1).map((at, k) => Math.abs(at - list[k])));
-      const side = Math.min(Math.max(Math.round((least(xs) + least(ys)) / 1.5), 3), 8);
+      const minDistance = (list) => Math.min(
+        ...list.slice(1).map((at, k) => Math.abs(at - list[k])),
+      );
+      const side = Math.min(Math.max(Math.round((minDistance(xs) + minDistance(ys)) / 1.5), 3), 8);
       const chaos = { lines: [[DARK, 2.4], [LIGHT, 1]], falling: true, side };
       const marks = [[hasMissingValues, createHatchPattern(context, null, { side })],
-        [sensitive, createHatchPattern(context, null, chaos)]];
+        [isSensitive, createHatchPattern(context, null, chaos)]];
       for (const [marked, hatch] of marks) {
         context.fillStyle = hatch;
         for (const [i, j] of places) {
@@ -188,7 +192,7 @@ function createMap(host, data, panel) {
     figure.dataset.view = view.flat().join(" ");
   }
 
-  function paintOver(context) {
+  function paintOverlay(context) {
     const box = area();
     // The tip of a figure that became narrower is moved.
     if (hovered) placeTipAt(hovered);
@@ -205,14 +209,14 @@ function createMap(host, data, panel) {
       }
     }
     panel?.over(context, (x, y) => [toPx(box, x), toPy(box, y)]);
-    for (const [place, thick] of [[hovered, 2], [pinned, 3.5]]) {
+    for (const [place, lineWidth] of [[hovered, 2], [pinned, 3.5]]) {
       if (!place) continue;
       const [i, j] = place;
       const [left, right] = [toPx(box, borders[0][i]), toPx(box, borders[0][i + 1])];
       const [low, high] = [toPy(box, borders[1][j]), toPy(box, borders[1][j + 1])];
       context.beginPath();
       context.rect(left, high, right - left, low - high);
-      strokeOutlined(context, [thick + 3, thick]);
+      strokeOutlined(context, [lineWidth + 3, lineWidth]);
     }
   }
 
@@ -250,24 +254,25 @@ function createMap(host, data, panel) {
     }
     const point = pointAt(...place);
     const layer = currentLayer();
-    const several = counts.points[point] > 1;
+    const isCellOfSeveral = counts.points[point] > 1;
     figure.dataset.point = shownValue("point", point, 9);
-    readout.append(element("h2", {}, several
+    readout.append(element("h2", {}, isCellOfSeveral
       ? `Cell of ${counts.points[point]} points: worst values` : `Point ${figure.dataset.point}`));
     for (const line of coordinates(place)) readout.append(element("p", {}, line));
     const largest = word("ratio_max_channel", point);
     const channelWords = largest ? ` (${wordsOf(largest)})` : "";
-    const where = several ? ` at point ${figure.dataset.point}` : "";
+    const where = isCellOfSeveral ? ` at point ${figure.dataset.point}` : "";
     readout.append(element("p", { class: "verdict" }, capitalise(verdict(point))),
       // The digits are those of the value if no step of the axis decides on them.
-      ...(counts.sensitive[point] ? [element("p", {}, `The motion is chaotic ${several
+      ...(counts.sensitive[point] ? [element("p", {}, `The motion is chaotic ${isCellOfSeveral
         ? `at ${counts.sensitive[point]} of ${counts.points[point]} points` : "here"}: `
         + "a slightly disturbed trajectory departs exponentially.")] : []),
       element("p", { id: "ratio" },
         `Largest ratio ${shownValue("ratio_max", point)}${channelWords}${where}`));
     if (!Number.isNaN(columns.fail_time_s?.values[point] ?? NaN)) {
       const failedAt = shownValue("fail_time_s", point);
-      readout.append(element("p", {}, `${several ? "First failed" : "Failed"} at ${failedAt} s`));
+      const words = isCellOfSeveral ? "First failed" : "Failed";
+      readout.append(element("p", {}, `${words} at ${failedAt} s`));
     }
     const kinds = ["nonlinear", "linear", "ratio"];
     const cell = (column, k) => element("td", { "data-kind": kinds[k] },
@@ -300,13 +305,13 @@ function createMap(host, data, panel) {
     if (hovered?.[0] === place?.[0] && hovered?.[1] === place?.[1]) return;
     hovered = place;
     if (place) cursor = place;
-    over.request();
+    overlaySurface.request();
     showReadout();
   }
 
   function pin(place) {
     pinned = place;
-    over.request();
+    overlaySurface.request();
     showHistories(place);
     if (place) panel?.pinned(valuesAt(place));
     showReadout();
@@ -336,7 +341,7 @@ function createMap(host, data, panel) {
 
   // The reactions to pointer and keys.
   const pxOf = ({ clientX, clientY }) => {
-    const bounds = cells.canvas.getBoundingClientRect();
+    const bounds = cellSurface.canvas.getBoundingClientRect();
     return [clientX - bounds.left, clientY - bounds.top];
   };
   const cellAt = (event) => {
@@ -349,11 +354,13 @@ function createMap(host, data, panel) {
   const zoomButtons = interact(figure, {
     view: () => view,
     isZoomed,
-    reset: () => setView(full),
+    reset: () => setView(fullView),
     move(from, by) {
       const box = area();
       const shift = [-by[0] / box.width, by[1] / box.height];
-      setView(from.map((range, k) => moveView(range, shift[k] * (range[1] - range[0]), full[k])));
+      setView(from.map((range, k) => moveView(
+        range, shift[k] * (range[1] - range[0]), fullView[k],
+      )));
     },
     zoom(factor, event) {
       const middle = view.map(([low, high]) => 0.5 * (low + high));
@@ -362,7 +369,7 @@ function createMap(host, data, panel) {
         const [box, px] = [area(), pxOf(event)];
         centre = [fromPx(box, px[0]), fromPy(box, px[1])];
       }
-      setView(view.map((range, k) => zoomView(range, factor, centre[k], full[k])));
+      setView(view.map((range, k) => zoomView(range, factor, centre[k], fullView[k])));
       if (event) hover(cellAt(event));
     },
     read: (event) => hover(cellAt(event)),
@@ -373,8 +380,8 @@ function createMap(host, data, panel) {
         ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
       }[event.key];
       if (step) {
-        const reach = event.shiftKey ? 5 : 1;
-        const next = cursor.map((at, k) => at + reach * step[k]);
+        const stride = event.shiftKey ? 5 : 1;
+        const next = cursor.map((at, k) => at + stride * step[k]);
         const within = (at, k) => Math.min(Math.max(at, 0), [nx, ny][k] - 1);
         hover(hovered ? next.map(within) : [...cursor]);
       } else if (event.key === "Enter" || event.key === " ") pin([...cursor]);
@@ -399,18 +406,18 @@ function createMap(host, data, panel) {
       const middle = toCoordinates[k](at[k]);
       return [Math.max(middle - half, low), Math.min(middle + half, high)];
     }),
-    mark: over.request,
+    mark: overlaySurface.request,
     request: () => {
       updateLegend(currentLayer());
-      cells.request();
+      cellSurface.request();
     },
   });
   return {
-    cells: { columns, filled, word, wordsOf, verdict, valuesOf, shownValue },
+    cells: { columns, isFilled, word, wordsOf, verdict, valuesOf, shownValue },
     layer: currentLayer,
     onChange: (listener) => listeners.push(listener),
-    // The layers of the picture, from below.
-    canvases: [cells.canvas, over.canvas],
+    // The canvases of the picture, the lowest first.
+    canvases: [cellSurface.canvas, overlaySurface.canvas],
     title: () => document.getElementById("title").textContent,
     // The pinned point, or the one under the pointer.
     chosen: () => pinned ?? hovered,

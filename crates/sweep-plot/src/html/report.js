@@ -1,13 +1,13 @@
-// The report part of a map's page: all points in a table, the worst of the quantity shown first,
-// and downloads.
+// The report of a map's page: a table of all points, the worst first by the quantity shown, and
+// downloads.
 
 // Number of rows of the table that are added at a time.
 const ROWS_PER_STEP = 20;
 
 function createReport(host, data, map, panel) {
-  const { columns, filled, word, wordsOf, verdict, valuesOf, shownValue } = map.cells;
+  const { columns, isFilled, word, wordsOf, verdict, valuesOf, shownValue } = map.cells;
   const filledCells = Array.from({ length: columns.point.values.length }, (_, cell) => cell)
-    .filter(filled);
+    .filter(isFilled);
 
   const find = appendTemplate(host, "report");
   const message = find("#taken");
@@ -26,7 +26,8 @@ function createReport(host, data, map, panel) {
     more.before(pointTable);
     const body = pointTable.tBodies[0];
     const shownHead = pointTable.rows[0].cells[data.axes.length + 1];
-    // The layer of the quantity shown, which has a column in addition to the ratio's.
+    // The layer of the quantity shown. Unless it is the largest ratio, the table has a column for
+    // it.
     let layer = null;
     function sort() {
       layer = map.layer() ?? data.layers[0];

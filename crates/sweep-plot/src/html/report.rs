@@ -14,9 +14,9 @@ use sweep_files::key;
 pub(crate) fn run_summary(source: &FigureFile, model: &dyn Figures) -> String {
     let plan_lines = |plan: &Value| {
         let common_lines = [
-            ("Time", time(&plan["time"])),
-            ("Method", method(&plan["integrator"])),
-            ("Verdict", verdict(&plan["reliability"])),
+            ("Time", describe_time(&plan["time"])),
+            ("Method", describe_method(&plan["integrator"])),
+            ("Verdict", describe_verdict(&plan["reliability"])),
         ];
         let common_lines =
             common_lines.into_iter().filter_map(|(title, text)| Some((title, text?)));
@@ -27,23 +27,23 @@ pub(crate) fn run_summary(source: &FigureFile, model: &dyn Figures) -> String {
     html_table("What was run", &["", ""], &rows) + &model.tables()
 }
 
-/// Writes the notes on what to be careful about in a map.
+/// Writes the cautions about the results of a map.
 pub(crate) fn cautions(map: &CellMap, model: &dyn Figures) -> String {
     let item_name = if map.grid.merges_points() { "cells" } else { "points" };
     let count = |is_counted: fn(&PointCounts) -> bool| {
         map.counts.iter().filter(|cell| is_counted(cell)).count()
     };
-    let filled = count(|cell| cell.points > 0);
+    let filled_count = count(|cell| cell.points > 0);
     let [sensitive, failed] = [count(|cell| cell.sensitive > 0), count(|cell| cell.failed > 0)];
     let mut notes = Vec::new();
     if sensitive > 0 {
         notes.push(format!(
-            "{sensitive} of {filled} {item_name} are sensitive: the motion is chaotic, and its \
-             digits are those of one trajectory."
+            "{sensitive} of {filled_count} {item_name} are sensitive: the motion is chaotic, and \
+             its digits are those of one trajectory."
         ));
     }
     if failed > 0 {
-        notes.push(format!("{failed} of {filled} {item_name} failed; the map hatches them."));
+        notes.push(format!("{failed} of {filled_count} {item_name} failed; the map hatches them."));
     }
     if map.grid.merges_points() {
         let phrase = "A cell holds several points and shows the worst of them. The file has all.";
@@ -60,13 +60,13 @@ pub(crate) fn cautions(map: &CellMap, model: &dyn Figures) -> String {
 const ASSUMPTIONS_NOTE: &str = "Numbers that nobody gave are assumed. The command sweep \
                                 parameters says of each where it is from.";
 
-fn time(time: &Value) -> Option<String> {
+fn describe_time(time: &Value) -> Option<String> {
     let [from, to] = [time["window_s"][0].as_f64()?, time["window_s"][1].as_f64()?];
     let end = time["end_s"].as_f64()?;
     Some(format!("0 to {end} s; amplitudes are the largest deviations from {from} to {to} s"))
 }
 
-fn method(integrator: &Value) -> Option<String> {
+fn describe_method(integrator: &Value) -> Option<String> {
     let name = integrator["method"].as_str()?;
     let settings = integrator.as_object()?.iter().filter(|(key, _)| *key != "method");
     let settings =
@@ -75,7 +75,7 @@ fn method(integrator: &Value) -> Option<String> {
     Some(phrase.join(", "))
 }
 
-fn verdict(reliability: &Value) -> Option<String> {
+fn describe_verdict(reliability: &Value) -> Option<String> {
     let limit = format_significant(reliability["ratio_limit"].as_f64()?, 4);
     let channels = reliability["channels"].as_array()?.len();
     let lower_limit = reliability["ratio_min"].as_f64();

@@ -41,7 +41,7 @@ fn points_with(count: u32, add_parameters: impl Fn(SampleFile) -> SampleFile) ->
             "m",
             column(&|k| ratio(k).map(|ratio| 0.003 - 0.001 * ratio)),
         )
-        .worse("less", Some(0.0))
+        .with_worse("less", Some(0.0))
         .words("status", (0..count).map(|k| Some(if k + 1 == count { "diverged" } else { "ok" })))
         .with_metadata("sweep.plan", plan)
 }
@@ -64,7 +64,7 @@ pub(super) fn failed(count: u32) -> SampleFile {
         .numbers("ratio_max", "1", missing_values())
         .flags("reliable", (0..count).map(|_| None))
         .numbers("min_gap_nonlinear_m", "m", missing_values())
-        .worse("less", Some(0.0))
+        .with_worse("less", Some(0.0))
         .words("status", (0..count).map(|_| Some("diverged")))
         .with_metadata("sweep.plan", plan)
 }

@@ -10,15 +10,15 @@ fn map_with_metrics() -> SampleFile {
     let rising = |from: f64| (0..90).map(move |k| from + f64::from(k));
     map()
         .numbers("cabinet_force_nonlinear_n", "N", rising(400.0))
-        .worse("greater", None)
+        .with_worse("greater", None)
         .numbers("cabinet_force_linear_n", "N", rising(300.0))
-        .worse("greater", None)
+        .with_worse("greater", None)
         .numbers("stop_2_force_nonlinear_n", "N", rising(0.0))
-        .worse("greater", None)
+        .with_worse("greater", None)
         .numbers("slip_margin_nonlinear_n", "N", rising(-45.0))
-        .worse("less", Some(0.0))
+        .with_worse("less", Some(0.0))
         .numbers("static_sag_m", "m", rising(0.0).map(|k| 0.013 + 1e-5 * k))
-        .worse("greater", None)
+        .with_worse("greater", None)
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn metrics_are_drawn_by_their_column_names() {
 fn a_two_sided_verdict_names_the_ratio_of_each_side() {
     let map_with_two_limits = || {
         let least_ratios = (0..90).map(|k| 0.3 + 0.01 * f64::from(k));
-        map().numbers("ratio_min", "1", least_ratios).worse("less", Some(0.5))
+        map().numbers("ratio_min", "1", least_ratios).with_worse("less", Some(0.5))
     };
     let [figure_of_max, least_ratios] = ["ratio_max", "ratio_min"]
         .map(|name| draw_svg(map_with_two_limits(), &options_for_column(name)));
