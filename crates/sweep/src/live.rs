@@ -130,7 +130,7 @@ pub(crate) fn build_live_part(file: &Path, ranges: &[SliderRange]) -> Result<Liv
 pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
     let middle: Vec<f64> = plan.axes.iter().map(|axis| axis.values.interpolate(0.5)).collect();
     let Washer { machine, spin, .. } = plan.scenario_at(&middle).model;
-    let greatest_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
+    let greatest_rpm = spin.max_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
     let count = (greatest_rpm / MODE_STEP_RPM).ceil() as u32;
     let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODE_STEP_RPM * f64::from(k)).collect();
     let Ok(point) = prepare_point(machine, spin, &timing(plan)) else { return Vec::new() };

@@ -298,7 +298,7 @@ impl TraceRun {
             Some(every_s) => {
                 (0..instant_count(plan.end_s, every_s)).map(|k| k as f64 * every_s).collect()
             }
-            None => spin.whole_turns_s(plan.end_s),
+            None => spin.whole_turn_times_s(plan.end_s),
         };
         Ok(Self { point, spin, start: settings.start, methods, method_json, times_s })
     }

@@ -314,22 +314,22 @@ impl Machine {
         // Tables 2 and 3 list the drum with its 0.4 kg unbalance, so that the point mass is
         // subtracted (model page, section 2).
         let reduced_mass_kg = unbalance_mass_kg * drum_mass_kg / (unbalance_mass_kg + drum_mass_kg);
-        let dx = unbalance.x_m - drum_x_m;
+        let offset_m = unbalance.x_m - drum_x_m;
         let r = unbalance.radius_m;
         let inertia_with_unbalance = [0.196, 0.162, 0.177];
-        let point_inertia = [r * r, dx * dx, r * r + dx * dx];
+        let point_inertia = [r * r, offset_m * offset_m, r * r + offset_m * offset_m];
         let bare_inertia =
             std::array::from_fn(|i| inertia_with_unbalance[i] - reduced_mass_kg * point_inertia[i]);
-        let spring = |x: f64, side: f64| Spring {
-            cabinet_m: [x, 0.3002, side * 0.2506],
-            tub_m: [x, 0.1626, side * 0.1626],
+        let spring = |x: f64, z_sign: f64| Spring {
+            cabinet_m: [x, 0.3002, z_sign * 0.2506],
+            tub_m: [x, 0.1626, z_sign * 0.1626],
             stiffness_n_per_m: 8000.0,
             free_length_m: None,
             cubic_n_per_m3: 0.0,
         };
-        let damper = |side: f64| Damper {
-            cabinet_m: [0.3068, -0.2800, side * 0.2800],
-            tub_m: [0.3068, -0.1626, side * 0.1626],
+        let damper = |z_sign: f64| Damper {
+            cabinet_m: [0.3068, -0.2800, z_sign * 0.2800],
+            tub_m: [0.3068, -0.1626, z_sign * 0.1626],
             damping_n_s_per_m: 140.0,
             friction_n: 0.0,
             friction_speed_m_per_s: Damper::FRICTION_SPEED_M_PER_S,

@@ -40,19 +40,19 @@ pub struct Timing {
 /// less than one.
 const PERTURBATION: f64 = 1e-10;
 
-/// The machine has no static equilibrium, or none that is stable.
+/// The error of a machine without a stable static equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the machine has no stable static equilibrium: {}", self.reason())]
 pub struct NoEquilibrium {
     /// The least stable rigid motion of tub and drum, if its stiffness is negative: its name, its
     /// stiffness and the unit of the stiffness.
-    pub unstable: Option<(&'static str, f64, &'static str)>,
+    pub unstable_motion: Option<(&'static str, f64, &'static str)>,
 }
 
 impl NoEquilibrium {
     /// Returns the reason in words.
     fn reason(&self) -> String {
-        match self.unstable {
+        match self.unstable_motion {
             Some((motion, stiffness, unit)) => format!(
                 "loaded springs push it {motion}, with a stiffness of {stiffness:.4} {unit} there; \
                  give it a spring or a bushing that holds it against that"
@@ -97,7 +97,7 @@ pub(crate) struct PlannedSegment {
     /// The index of the spin segment.
     pub(crate) spin_segment: usize,
     /// Whether the segment is within the window.
-    pub(crate) in_window: bool,
+    pub(crate) is_in_window: bool,
     /// The greatest speed of the drum up to the end of the segment (rad/s).
     pub(crate) max_speed_rad_per_s: f64,
 }
@@ -148,7 +148,7 @@ impl Point {
 
     /// Returns the edges of the window (s).
     pub fn window_s(&self) -> [f64; 2] {
-        let window_segments = || self.segments.iter().filter(|segment| segment.in_window);
+        let window_segments = || self.segments.iter().filter(|segment| segment.is_in_window);
         let start_s = window_segments().next().map_or(0.0, |segment| segment.start_s);
         [start_s, window_segments().next_back().map_or(start_s, |segment| segment.end_s)]
     }
@@ -167,15 +167,15 @@ impl Point {
         let is_compared = |friction_speed: &&FrictionSpeed| {
             model == ModelKind::Linear || !friction_speed.is_from_motion
         };
-        let factor = |friction_speed: &FrictionSpeed| {
+        let speed_factor = |friction_speed: &FrictionSpeed| {
             let speed = speeds_m_per_s
                 .get(friction_speed.damper)?
                 .max(friction_speed.viscous_limit_m_per_s);
-            let quotient =
+            let speed_ratio =
                 friction_speed.speed_m_per_s.max(friction_speed.viscous_limit_m_per_s) / speed;
-            Some(quotient.max(1.0 / quotient))
+            Some(speed_ratio.max(1.0 / speed_ratio))
         };
-        self.friction_speeds.iter().filter(is_compared).filter_map(factor).reduce(f64::max)
+        self.friction_speeds.iter().filter(is_compared).filter_map(speed_factor).reduce(f64::max)
     }
 
     /// Returns the point with other speed amplitudes (m/s) for the dampers whose amplitudes follow
@@ -253,36 +253,37 @@ impl Kernel for PreparationKernel<'_> {
             let mut machines: Vec<_> =
                 group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
             let lanes = copy_to_lanes(zero, &machines);
-            let (q, solved) =
+            let (q, solved_lanes) =
                 zero.0.run_out_of_line(equilibrium::SolveEquilibrium { zero, machine: &lanes });
             for (lane, machine) in machines.iter_mut().enumerate() {
                 machine.elements.centre_free_strokes(&q.map(|q| q.0.get(lane)));
             }
-            let steepest = steepest_tangents(&machines, &q);
-            let viscous: Vec<_> =
+            let steepest_tangents = steepest_tangents(&machines, &q);
+            let viscous_machines: Vec<_> =
                 machines.iter().map(Coefficients::with_viscous_friction).collect();
-            let linear = zero
-                .0
-                .run_out_of_line(Linearise { machine: &copy_to_lanes(zero, &viscous), q: &q });
+            let linear = zero.0.run_out_of_line(Linearise {
+                machine: &copy_to_lanes(zero, &viscous_machines),
+                q: &q,
+            });
             let linear_outputs =
                 zero.0.run_out_of_line(LineariseOutputs { bodies: &lanes.bodies, q: &q });
             let zeros = [zero; COORDINATES];
-            let at_rest = MovingCoordinates { q, u: zeros, a: zeros };
-            let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
-            let rest_channels =
-                Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
-            let models = zip(zip(machines, linear), zip(linear_outputs, steepest));
+            let rest_coordinates = MovingCoordinates { q, u: zeros, a: zeros };
+            let spin_at_rest = SpinState::new((zero, zero.lit(1.0)), zero, zero);
+            let rest_channels = Axes::new(&spin_at_rest, &rest_coordinates)
+                .channels(&lanes.bodies, &rest_coordinates);
+            let models = zip(zip(machines, linear), zip(linear_outputs, steepest_tangents));
             let inputs = zip(group, planned_spins.by_ref());
             for (lane, (model, ((machine, _), planned_spin))) in zip(models, inputs).enumerate() {
-                if solved >> lane & 1 == 0 {
+                if solved_lanes >> lane & 1 == 0 {
                     let q = q.map(|q| q.0.get(lane));
-                    let unstable = equilibrium::unstable_motion(&model.0.0, &q);
-                    prepared.push(Err(NoEquilibrium { unstable }));
+                    let unstable_motion = equilibrium::unstable_motion(&model.0.0, &q);
+                    prepared.push(Err(NoEquilibrium { unstable_motion }));
                     continue;
                 }
-                let ((coefficients, linear), (linear_outputs, steepest)) = model;
-                let steepest =
-                    steepest.map(|tangents| Box::new(linear.with_tub_tangents(tangents)));
+                let ((coefficients, linear), (linear_outputs, steepest_tangents)) = model;
+                let steepest_model =
+                    steepest_tangents.map(|tangents| Box::new(linear.with_tub_tangents(tangents)));
                 let matrices_at = |angle_rad: f64, acceleration_rad_per_s2: f64| {
                     let spin =
                         SpinState::new(N(angle_rad).sin_cos(), N(0.0), N(acceleration_rad_per_s2));
@@ -298,7 +299,7 @@ impl Kernel for PreparationKernel<'_> {
                     linear,
                     linear_outputs,
                     friction_speeds: FrictionSpeed::for_dampers(machine),
-                    steepest_model: steepest,
+                    steepest_model,
                     spin_segments: planned_spin.spin_segments,
                     segments: planned_spin.segments,
                     weight_n: machine.weight_n(),
@@ -347,12 +348,12 @@ struct PlannedSpin {
 fn plan_spins(points: &[(Machine, Spin)], timing: &Timing) -> Vec<PlannedSpin> {
     let mut planned_spins: Vec<PlannedSpin> = Vec::with_capacity(points.len());
     for (k, (_, spin)) in points.iter().enumerate() {
-        let same_spin =
+        let shared_plan =
             if k > 0 && points[k - 1].1 == *spin { planned_spins.last().cloned() } else { None };
-        planned_spins.push(same_spin.unwrap_or_else(|| {
+        planned_spins.push(shared_plan.unwrap_or_else(|| {
             let spin_segments = spin.segments();
             let jumps = Jumps::new(&spin_segments, timing).into();
-            let segments = segments(&spin_segments, timing).into();
+            let segments = plan_segments(&spin_segments, timing).into();
             PlannedSpin { segments, jumps, spin_segments: spin_segments.into() }
         }));
     }
@@ -360,11 +361,12 @@ fn plan_spins(points: &[(Machine, Spin)], timing: &Timing) -> Vec<PlannedSpin> {
 }
 
 /// Divides the run into segments at every kink of the spin, edge of the window and checkpoint.
-pub(crate) fn segments(spin_segments: &[SpinSegment], timing: &Timing) -> Vec<PlannedSegment> {
+pub(crate) fn plan_segments(spin_segments: &[SpinSegment], timing: &Timing) -> Vec<PlannedSegment> {
     let [from, to] = timing.window_s;
     let kinks = spin_segments.iter().map(|s| s.start_s.0).chain([0.0, from, to, timing.end_s]);
-    let parts = f64::from(timing.checkpoints);
-    let kinks = kinks.chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / parts)));
+    let part_count = f64::from(timing.checkpoints);
+    let kinks =
+        kinks.chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / part_count)));
     let mut times: Vec<f64> = kinks.filter(|t| (0.0..=timing.end_s).contains(t)).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
@@ -380,8 +382,8 @@ pub(crate) fn segments(spin_segments: &[SpinSegment], timing: &Timing) -> Vec<Pl
                 max_speed_rad_per_s = max_speed_rad_per_s
                     .max(spin_segments[spin_segment].speed_rad_per_s(time_s).abs());
             }
-            let in_window = from <= start_s && end_s <= to;
-            PlannedSegment { start_s, end_s, spin_segment, in_window, max_speed_rad_per_s }
+            let is_in_window = from <= start_s && end_s <= to;
+            PlannedSegment { start_s, end_s, spin_segment, is_in_window, max_speed_rad_per_s }
         })
         .collect()
 }

@@ -11,7 +11,7 @@
 
 use crate::coordinates::TUB;
 use crate::modes::{highest_rigid_frequency_rad_per_s, modes};
-use crate::point::{self, segments};
+use crate::point::{self, plan_segments};
 use crate::steps::round_down_to_bits;
 use crate::{
     Caps, FrictionSpeed, Gauge, Machine, Method, MethodKind, ModelKind, NoEquilibrium, Point,
@@ -42,7 +42,7 @@ const FINE_STEP_SHARE: f64 = 0.25;
 
 /// The factor of the step after an unstable run. Basis: a compromise between failed runs and
 /// short steps, not measured. Doubling it would lengthen steps.
-const STEP_REDUCTION: f64 = 0.7;
+const STEP_REDUCTION_FACTOR: f64 = 0.7;
 
 /// The shortest step, as a share of the first. Basis: thirteen reductions. Doubling it allows two
 /// fewer.
@@ -86,14 +86,14 @@ impl SpeedAmplitudeSearch {
             .iter()
             .map(|friction_speed| 1.0 / friction_speed.viscous_limit_m_per_s)
             .collect();
-        let first_reciprocal = |(friction_speed, max): (&&FrictionSpeed, &f64)| {
+        let to_first_reciprocal = |(friction_speed, max): (&&FrictionSpeed, &f64)| {
             max.min(1.0 / friction_speed.speed_m_per_s)
         };
         (damper_count > 0).then(|| Self {
             reciprocals: motion_dampers
                 .iter()
                 .zip(&max_reciprocals)
-                .map(first_reciprocal)
+                .map(to_first_reciprocal)
                 .collect(),
             previous: None,
             inverse_jacobian: (0..damper_count)
@@ -235,7 +235,7 @@ pub fn prepare(
     let to_point_search = |(index, point): (usize, &Result<Point, NoEquilibrium>)| {
         let point = point.as_ref().ok()?;
         let search = SpeedAmplitudeSearch::new(point)?;
-        let segments = segments(&point.spin_segments, &timing_to_window).into();
+        let segments = plan_segments(&point.spin_segments, &timing_to_window).into();
         let point =
             Point { segments, ..point.with_motion_friction_speeds(&search.speeds_m_per_s()) };
         let highest_frequency_rad_per_s =
@@ -308,7 +308,7 @@ impl PointSearch {
     fn update(&mut self, speeds_m_per_s: &[f64]) {
         if speeds_m_per_s.is_empty() {
             // A hinge below its cap, or friction at a low speed, is too stiff for the step.
-            self.step_s = round_down_to_bits(STEP_REDUCTION * self.step_s, STEP_BITS);
+            self.step_s = round_down_to_bits(STEP_REDUCTION_FACTOR * self.step_s, STEP_BITS);
             self.is_finished = self.step_s < self.min_step_s;
             return;
         }

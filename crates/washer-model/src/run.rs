@@ -397,7 +397,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         let state = &self.lanes[lane];
         let point = self.points[state.point];
         let segment = &point.segments[state.segment];
-        self.window_indicator.0.set(lane, f64::from(u8::from(segment.in_window)));
+        self.window_indicator.0.set(lane, f64::from(u8::from(segment.is_in_window)));
         start_segment(&mut self.model, lane, self.method, point, segment)
     }
 }

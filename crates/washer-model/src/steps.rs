@@ -61,7 +61,7 @@ struct Frequencies<'a> {
 
 impl<'a> Frequencies<'a> {
     fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, ModesError> {
-        let max_speed_rad_per_s = spin.greatest_speed_rad_per_s(end_s);
+        let max_speed_rad_per_s = spin.max_speed_rad_per_s(end_s);
         let at_rest = mode_roots(point, 0.0, None)?;
         let highest_at_rest = highest_frequency_rad_per_s(point, 0.0)?;
         let highest_at_speed = highest_frequency_rad_per_s(point, max_speed_rad_per_s)?;

@@ -143,7 +143,7 @@ impl Trial {
             1 + numbers.iter().map(|number| number.range_ends.len()).sum::<usize>();
         let mut trial = plan.clone();
         let plateau_rpm =
-            plan.model.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / std::f64::consts::TAU;
+            plan.model.spin.max_speed_rad_per_s(plan.end_s) * 60.0 / std::f64::consts::TAU;
         if !plan.model.measures.metrics.contains(&Metric::Growth) {
             trial.model.measures.metrics.push(Metric::Growth);
         }

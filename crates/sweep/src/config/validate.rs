@@ -266,7 +266,7 @@ fn highest_of_corners_rad_per_s(
             damper.free_stroke_m = 0.0;
             damper.friction_linear_speed_m_per_s.get_or_insert(damper.friction_speed_m_per_s);
         }
-        let speed = spin.greatest_speed_rad_per_s(plan.end_s);
+        let speed = spin.max_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
             // The run reports a machine whose eigenvalues do not converge.
             highest = highest.max(highest_rad_per_s(&point, speed).unwrap_or(0.0));

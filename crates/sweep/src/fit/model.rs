@@ -56,7 +56,7 @@ impl FitCase {
 
     /// Returns the run's greatest speed (rpm).
     pub(crate) fn greatest_rpm(&self) -> f64 {
-        self.spin().greatest_speed_rad_per_s(self.end_s()) * 60.0 / TAU
+        self.spin().max_speed_rad_per_s(self.end_s()) * 60.0 / TAU
     }
 
     /// Returns the number of samples of a signal in a second, on average.

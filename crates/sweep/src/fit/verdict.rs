@@ -154,7 +154,7 @@ impl FittedMap<'_> {
     ) -> Option<(Growth, Option<[f64; 2]>)> {
         let x = self.x;
         let (_, spin) = self.problem.machine(case, x);
-        let step_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU / f64::from(SPEEDS);
+        let step_rpm = spin.max_speed_rad_per_s(plan.end_s) * 60.0 / TAU / f64::from(SPEEDS);
         let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
             .map(|k| step_rpm * f64::from(k))
             .filter(|speed| *speed > 0.0)

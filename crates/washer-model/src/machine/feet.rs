@@ -66,10 +66,10 @@ impl Feet {
         if !(3..=MAX_FEET).contains(&count) {
             return None;
         }
-        let mean = |axis: usize| {
+        let mean_coordinate = |axis: usize| {
             machine.feet.iter().map(|foot| foot.foot_m[axis]).sum::<f64>() / count as f64
         };
-        let [mean_x, mean_y, mean_z] = [mean(0), mean(1), mean(2)];
+        let [mean_x, mean_y, mean_z] = [mean_coordinate(0), mean_coordinate(1), mean_coordinate(2)];
         let positions: Vec<[f64; 2]> = machine
             .feet
             .iter()
@@ -127,7 +127,7 @@ impl Feet {
         let foot_load_n = |k: usize| {
             let loads_per_component = self.distribution.loads_per_component[k].iter().zip(load);
             self.distribution.weight_loads[k].0
-                + loads_per_component.map(|(share, load)| share.0 * load).sum::<f64>()
+                + loads_per_component.map(|(coefficient, load)| coefficient.0 * load).sum::<f64>()
         };
         (0..self.count).map(foot_load_n).collect()
     }
@@ -232,8 +232,8 @@ mod tests {
         let cabinet = machine.cabinet.unwrap();
         let mut forces = vec![(cabinet.centre_m, [0.0, -9.81 * cabinet.mass_kg, 0.0])];
         for (foot, load_n) in machine.feet.iter().zip(feet.loads_n(load)) {
-            let share = 1.0 / machine.feet.len() as f64;
-            forces.push((foot.foot_m, [-share * load[0], load_n, -share * load[2]]));
+            let force_share = 1.0 / machine.feet.len() as f64;
+            forces.push((foot.foot_m, [-force_share * load[0], load_n, -force_share * load[2]]));
         }
         let mut sum = *load;
         for (position, force) in forces {
@@ -286,18 +286,21 @@ mod tests {
                 if loads_n.iter().any(|n| *n < 1.0) {
                     continue;
                 }
-                let mean = |axis: usize| {
+                let mean_coordinate = |axis: usize| {
                     let moments = feet.iter().zip(&loads_n).map(|(foot, n)| foot[axis] * n);
                     moments.sum::<f64>() / total_n
                 };
-                let arms: Vec<[f64; 2]> =
-                    feet.iter().map(|foot| [foot[0] - mean(0), foot[2] - mean(2)]).collect();
+                let arms: Vec<[f64; 2]> = feet
+                    .iter()
+                    .map(|foot| [foot[0] - mean_coordinate(0), foot[2] - mean_coordinate(2)])
+                    .collect();
                 let second_moment: f64 =
                     arms.iter().zip(&loads_n).map(|([x, z], n)| n * (x * x + z * z)).sum();
                 let moment_about = |force: [f64; 2], position: [f64; 2]| {
                     position[1] * force[0] - position[0] * force[1]
                 };
-                let moment = load[4] - moment_about([load[0], load[2]], [mean(0), mean(2)]);
+                let moment = load[4]
+                    - moment_about([load[0], load[2]], [mean_coordinate(0), mean_coordinate(2)]);
                 let mut sum = [0.0; 2];
                 let mut friction_moment = 0.0;
                 let mut max_friction_ratio = 0.0_f64;

@@ -168,10 +168,10 @@ impl MachineParameter {
             return row.target.check_exists(machine, spin).map(|()| Self::from_row(row));
         }
         for list in LISTS {
-            if let Some((number, rest)) = split_numbered(name, list.element) {
+            if let Some((number, name_after_number)) = split_numbered_name(name, list.element) {
                 let row = list
                     .rows()
-                    .find(|row| row.name == rest)
+                    .find(|row| row.name == name_after_number)
                     .ok_or_else(UnknownParameter::in_no_model)?;
                 let count = list.element_count(machine, spin);
                 return match number.checked_sub(list.first) {
@@ -252,15 +252,15 @@ impl MachineParameter {
 
     /// Returns the names of the single numbers that the parameter writes.
     pub fn single_names(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
-        let numbered = |count: usize, element: &str, number: &str| {
+        let numbered_names = |count: usize, element: &str, number: &str| {
             (1..=count).map(|k| format!("{element}_{k}_{number}").into()).collect()
         };
         match self.row.target {
             Target::Bearings(number) => {
                 ["front", "rear"].map(|end| format!("bearing_{end}_{number}").into()).into()
             }
-            Target::Springs(number) => numbered(machine.springs.len(), "spring", number),
-            Target::Dampers(number) => numbered(machine.dampers.len(), "damper", number),
+            Target::Springs(number) => numbered_names(machine.springs.len(), "spring", number),
+            Target::Dampers(number) => numbered_names(machine.dampers.len(), "damper", number),
             Target::Machine | Target::Cabinet | Target::Spin | Target::Window(_) => {
                 vec![self.name.clone()]
             }
@@ -291,11 +291,12 @@ fn table_point_count(spin: &Spin) -> usize {
 
 /// Splits the name of a list's parameter: `"spring_2_tub_x_m"` with `"spring"` gives 2 and
 /// `"tub_x_m"`. It refuses `spring_02_`, so that each number has one name.
-fn split_numbered<'a>(name: &'a str, element: &str) -> Option<(usize, &'a str)> {
-    let (digits, rest) = name.strip_prefix(element)?.strip_prefix('_')?.split_once('_')?;
+fn split_numbered_name<'a>(name: &'a str, element: &str) -> Option<(usize, &'a str)> {
+    let (digits, name_after_number) =
+        name.strip_prefix(element)?.strip_prefix('_')?.split_once('_')?;
     let is_canonical = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
     let number: usize = if is_canonical { digits.parse().ok()? } else { return None };
-    Some((number, rest))
+    Some((number, name_after_number))
 }
 
 /// Returns the value that all items share; `None` if items differ or are missing.

@@ -2,7 +2,7 @@
 
 mod turns;
 
-pub(crate) use turns::whole_turn_times_s;
+pub(crate) use turns::turn_division_times_s;
 
 use crate::lanes::lane_struct;
 use core::f64::consts::TAU;
@@ -149,7 +149,7 @@ impl Spin {
     }
 
     /// Returns the greatest speed from 0 to `end_s`, rad/s.
-    pub fn greatest_speed_rad_per_s(&self, end_s: f64) -> f64 {
+    pub fn max_speed_rad_per_s(&self, end_s: f64) -> f64 {
         let starts: Vec<f64> = self.segments().iter().map(|segment| segment.start_s.0).collect();
         let times_s = starts.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);
         self.speeds_rpm(times_s).map(f64::abs).fold(0.0, f64::max) * TAU / 60.0

@@ -47,10 +47,10 @@ fn feet_title(count: usize, has_cabinet: bool) -> String {
 }
 
 /// Returns the title of the violation of a spin table with different numbers of times and speeds.
-fn table_title(times: usize, speeds: usize) -> String {
-    match (times, speeds) {
+fn table_title(time_count: usize, speed_count: usize) -> String {
+    match (time_count, speed_count) {
         (0, 0) => "the spin table is empty".to_owned(),
-        _ => format!("the spin table has {times} times but {speeds} speeds"),
+        _ => format!("the spin table has {time_count} times but {speed_count} speeds"),
     }
 }
 
@@ -187,7 +187,7 @@ impl Machine {
                     joint_violations.push(Violation::new(
                         format!(
                             "unbalance {number} is on the drum's axis and unbalances nothing, \
-                             beside sum_of_others"
+                             beside others"
                         ),
                         [format!("unbalance_{name_number}radius_m")],
                         "a distance from the axis, negative on the other side; a mass on the axis \

@@ -112,17 +112,17 @@ impl Jumps {
     }
 
     /// Whether the drum stands after a jump and before the window.
-    fn are_before_standstill(&self) -> bool {
+    fn is_any_before_standstill(&self) -> bool {
         let is_before = |group: &JumpGroup| group.standing_s > 0.0 && group.sum_rad_per_s2 > 0.0;
         self.before_window_end.iter().any(is_before)
     }
 
     /// Returns the sum of the jumps before the window's end (rad/s^2), each reduced by the decay of
     /// the swing (1/s) while the drum stands.
-    fn left_in_window_rad_per_s2(&self, decay_per_s: f64) -> f64 {
-        let left =
+    fn reduced_sum_rad_per_s2(&self, decay_per_s: f64) -> f64 {
+        let reduced_jump =
             |group: &JumpGroup| group.sum_rad_per_s2 * libm::exp(-decay_per_s * group.standing_s);
-        self.before_window_end.iter().map(left).sum()
+        self.before_window_end.iter().map(reduced_jump).sum()
     }
 }
 
@@ -133,8 +133,8 @@ pub(crate) struct Ringing {
     /// The rate at which the swing decays while the drum stands (1/s).
     decay_per_s: f64,
     /// The deflections by a jump of [`UNIT_JUMP_RAD_PER_S2`].
-    bearings: FrontDeflection,
-    hinge_and_bearings: FrontDeflection,
+    bearings_deflection: FrontDeflection,
+    hinge_and_bearings_deflection: FrontDeflection,
 }
 
 /// Returns the jump of the drum's acceleration at the start of each segment of the spin (rad/s^2).
@@ -181,8 +181,8 @@ impl Ringing {
         let mut ringing = Self {
             jumps,
             decay_per_s: 0.0,
-            bearings: FrontDeflection::default(),
-            hinge_and_bearings: FrontDeflection::default(),
+            bearings_deflection: FrontDeflection::default(),
+            hinge_and_bearings_deflection: FrontDeflection::default(),
         };
         for angle_rad in ANGLES_RAD {
             let at_rest = matrices_at(angle_rad, 0.0);
@@ -191,21 +191,24 @@ impl Ringing {
                 core::array::from_fn(|i| during_jump.force[i] - at_rest.force[i]);
             // The system has no solution if bearings or hinge have no stiffness; no level is stable
             // for such a machine.
-            let Some(free) = FreeMachine::new(&at_rest) else { continue };
-            let Some(elastic) = free.static_deflection(&load) else { continue };
-            let mut bearings = elastic;
-            bearings[HINGE_YAW] = 0.0;
-            bearings[HINGE_PITCH] = 0.0;
-            ringing.bearings = ringing.bearings.max(free.deflection(machine, &bearings));
-            ringing.hinge_and_bearings =
-                ringing.hinge_and_bearings.max(free.deflection(machine, &elastic));
+            let Some(free_machine) = FreeMachine::new(&at_rest) else { continue };
+            let Some(elastic_deflection) = free_machine.static_deflection(&load) else { continue };
+            let mut bearings_deflection = elastic_deflection;
+            bearings_deflection[HINGE_YAW] = 0.0;
+            bearings_deflection[HINGE_PITCH] = 0.0;
+            ringing.bearings_deflection = ringing
+                .bearings_deflection
+                .max(free_machine.deflection(machine, &bearings_deflection));
+            ringing.hinge_and_bearings_deflection = ringing
+                .hinge_and_bearings_deflection
+                .max(free_machine.deflection(machine, &elastic_deflection));
         }
         ringing
     }
 
     /// Whether the swing in the window depends on its decay.
     pub(crate) fn depends_on_decay(&self) -> bool {
-        self.jumps.are_before_standstill()
+        self.jumps.is_any_before_standstill()
     }
 
     /// Sets the rate at which the swing decays while the drum stands (1/s).
@@ -217,10 +220,10 @@ impl Ringing {
     /// the modes that are not resolved.
     pub(crate) fn swing(&self, unresolved: UnresolvedModes) -> Swing {
         let deflection = match unresolved {
-            UnresolvedModes::HingeAndBearings => self.hinge_and_bearings,
-            UnresolvedModes::Bearings => self.bearings,
+            UnresolvedModes::HingeAndBearings => self.hinge_and_bearings_deflection,
+            UnresolvedModes::Bearings => self.bearings_deflection,
         };
-        let window_jumps_rad_per_s2 = self.jumps.left_in_window_rad_per_s2(self.decay_per_s);
+        let window_jumps_rad_per_s2 = self.jumps.reduced_sum_rad_per_s2(self.decay_per_s);
         let window_factor = SWING_FACTOR * window_jumps_rad_per_s2 / UNIT_JUMP_RAD_PER_S2;
         let run_factor = SWING_FACTOR * self.jumps.sum_rad_per_s2 / UNIT_JUMP_RAD_PER_S2;
         let channels = Channel::ALL.map(|channel| {
@@ -268,12 +271,12 @@ impl<'a> FreeMachine<'a> {
     fn rigid_motion(&self, load: &[f64; COORDINATES]) -> [f64; COORDINATES] {
         let force = RIGID_PAIRS.map(|[tub, shaft]| N(load[tub] + load[shaft]));
         let accelerations = self.rigid_mass.solve(&force);
-        let mut rigid = [0.0; COORDINATES];
+        let mut rigid_acceleration = [0.0; COORDINATES];
         for ([tub, shaft], acceleration) in RIGID_PAIRS.into_iter().zip(accelerations) {
-            rigid[tub] = acceleration.0;
-            rigid[shaft] = acceleration.0;
+            rigid_acceleration[tub] = acceleration.0;
+            rigid_acceleration[shaft] = acceleration.0;
         }
-        rigid
+        rigid_acceleration
     }
 
     /// Returns the static deflection of bearings and hinge under a load (N, N m), relative to the
@@ -291,16 +294,21 @@ impl<'a> FreeMachine<'a> {
         Some(deflection)
     }
 
-    /// Returns the deflections of the free machine if bearings and hinge deflect by `elastic`. The
-    /// tub moves in the opposite direction, so that momentum is conserved.
-    fn deflection(&self, machine: &Machine, elastic: &[f64; COORDINATES]) -> FrontDeflection {
-        let rigid = self.rigid_motion(&self.multiply_mass(elastic));
+    /// Returns the deflections of the free machine if bearings and hinge deflect by
+    /// `elastic_deflection`. The tub moves in the opposite direction, so that momentum is
+    /// conserved.
+    fn deflection(
+        &self,
+        machine: &Machine,
+        elastic_deflection: &[f64; COORDINATES],
+    ) -> FrontDeflection {
+        let rigid_acceleration = self.rigid_motion(&self.multiply_mass(elastic_deflection));
         let drum = &machine.drum;
-        let tub_m = rigid[TUB_Y].hypot(rigid[TUB_Z]);
-        let tub_rad = rigid[TUB_YAW].hypot(rigid[TUB_PITCH]);
-        let bearings_m = elastic[SHAFT_Y].hypot(elastic[SHAFT_Z]);
-        let bearings_rad = elastic[SHAFT_YAW].hypot(elastic[SHAFT_PITCH]);
-        let hinge_rad = elastic[HINGE_YAW].hypot(elastic[HINGE_PITCH]);
+        let tub_m = rigid_acceleration[TUB_Y].hypot(rigid_acceleration[TUB_Z]);
+        let tub_rad = rigid_acceleration[TUB_YAW].hypot(rigid_acceleration[TUB_PITCH]);
+        let bearings_m = elastic_deflection[SHAFT_Y].hypot(elastic_deflection[SHAFT_Z]);
+        let bearings_rad = elastic_deflection[SHAFT_YAW].hypot(elastic_deflection[SHAFT_PITCH]);
+        let hinge_rad = elastic_deflection[HINGE_YAW].hypot(elastic_deflection[HINGE_PITCH]);
         let drum_front_m = bearings_m
             + drum.front_x_m.abs() * bearings_rad
             + (drum.front_x_m - drum.hinge_x_m).abs() * hinge_rad;

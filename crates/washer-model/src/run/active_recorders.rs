@@ -8,7 +8,7 @@ use super::snapshots::Snapshots;
 use super::{Method, MethodKind};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::machine::spin::whole_turn_times_s;
+use crate::machine::spin::turn_division_times_s;
 use crate::nonlinear::outputs::{RADIAL_COMPONENTS, squared_distance};
 use crate::{ModelKind, Point, Reading, Recorders};
 use lane_ode::{IntervalPeaks, Lane, N, OutOfLine, Sample, SquareIntegrals, TimeAbove};
@@ -100,7 +100,7 @@ impl<T: Lane> ActiveRecorders<T> {
         self.clearance_squared.0.set(lane, clearance_m * clearance_m);
         if self.recorders.turns {
             self.turn_peaks
-                .reset(lane, &whole_turn_times_s(&point.spin_segments, point.window_s()));
+                .reset(lane, &turn_division_times_s(&point.spin_segments, point.window_s()));
         }
         if let Some(loads) = &mut self.loads {
             loads.set_point(lane, point);

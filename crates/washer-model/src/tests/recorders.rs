@@ -1,7 +1,7 @@
 //! Tests of the optional recorders against densely sampled time histories.
 
 use super::instruments::{ALL_RECORDERS, paper};
-use crate::machine::spin::whole_turn_times_s;
+use crate::machine::spin::turn_division_times_s;
 use crate::{
     Caps, Channel, Gauge, InitialDeviation, Machine, Method, MethodKind, ModelKind, Point, Profile,
     Recorders, Spin, Timing, history, prepare, simulate, simulate_with,
@@ -30,7 +30,7 @@ struct SampledReadings {
 
 fn sample_readings(point: &Point, model: ModelKind, method: &Method) -> SampledReadings {
     let history = history(model, method, point, &InitialDeviation::default(), INTERVAL_S);
-    let turn_boundaries_s = whole_turn_times_s(&point.spin_segments, TIMING.window_s);
+    let turn_boundaries_s = turn_division_times_s(&point.spin_segments, TIMING.window_s);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
     let mut readings = SampledReadings {
         root_mean_squares: [0.0; 8],

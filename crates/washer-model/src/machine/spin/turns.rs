@@ -31,17 +31,17 @@ impl Spin {
 
     /// Returns the times from 0 to `end_s` at which the drum has made a whole number of turns; the
     /// first is 0.
-    pub fn whole_turns_s(&self, end_s: f64) -> Vec<f64> {
-        whole_turns_s(&self.segments(), [0.0, end_s])
+    pub fn whole_turn_times_s(&self, end_s: f64) -> Vec<f64> {
+        whole_turn_times_s(&self.segments(), [0.0, end_s])
     }
 }
 
-/// Returns the times at which a window is cut into whole turns of the drum, counted from the start
-/// of the run in either direction (at theta = 2 pi k if the drum never reverses). Partial turns at
-/// the window's ends are joined to the adjacent whole turn, so that a window with less than two
-/// whole turns is not cut.
-pub(crate) fn whole_turn_times_s(segments: &[SpinSegment], window_s: [f64; 2]) -> Vec<f64> {
-    let mut times_s = whole_turns_s(segments, window_s);
+/// Returns the times at which a window is divided into whole turns of the drum, counted from the
+/// start of the run in either direction (at theta = 2 pi k if the drum never reverses). Partial
+/// turns at the window's ends are joined to the adjacent whole turn, so that a window with less
+/// than two whole turns is not divided.
+pub(crate) fn turn_division_times_s(segments: &[SpinSegment], window_s: [f64; 2]) -> Vec<f64> {
+    let mut times_s = whole_turn_times_s(segments, window_s);
     times_s.pop();
     if !times_s.is_empty() {
         times_s.remove(0);
@@ -50,24 +50,25 @@ pub(crate) fn whole_turn_times_s(segments: &[SpinSegment], window_s: [f64; 2]) -
 }
 
 /// Returns the times in the closed window at which the drum has made a whole number of turns.
-fn whole_turns_s(segments: &[SpinSegment], window_s: [f64; 2]) -> Vec<f64> {
-    let mut times = Vec::new();
+fn whole_turn_times_s(segments: &[SpinSegment], window_s: [f64; 2]) -> Vec<f64> {
+    let mut times_s = Vec::new();
     let mut turns_before = 0.0_f64;
     let mut next_turn = 0.0;
     for piece in monotone_pieces(segments, window_s) {
         let turns_after = turns_before + piece.turns();
         if piece.start_s() >= window_s[0] {
             next_turn = turns_before.ceil().max(next_turn);
-            let mut earliest = piece.from_s;
+            let mut earliest_s = piece.from_s;
             while next_turn <= turns_after {
-                earliest = piece.time_of_turns(next_turn - turns_before, earliest);
-                times.push((piece.segment.start_s.0 + earliest).clamp(window_s[0], window_s[1]));
+                earliest_s = piece.time_of_turns(next_turn - turns_before, earliest_s);
+                times_s
+                    .push((piece.segment.start_s.0 + earliest_s).clamp(window_s[0], window_s[1]));
                 next_turn += 1.0;
             }
         }
         turns_before = turns_after;
     }
-    times
+    times_s
 }
 
 /// Divides the run up to the window's end at the window's beginning and at reversals of the drum.
@@ -79,15 +80,15 @@ fn monotone_pieces(segments: &[SpinSegment], [from_s, to_s]: [f64; 2]) -> Vec<Mo
             segments.get(k + 1).map_or(to_s, |next_segment| next_segment.start_s.0.min(to_s));
         let length_s = end_s - segment.start_s.0;
         let mut boundaries_s = vec![0.0, length_s];
-        let mut add_edge = |t_s: f64| {
+        let mut add_boundary = |t_s: f64| {
             if 0.0 < t_s && t_s < length_s {
                 boundaries_s.push(t_s);
             }
         };
-        add_edge(from_s - segment.start_s.0);
+        add_boundary(from_s - segment.start_s.0);
         // A cycloidal ramp does not reverse.
         if segment.wave_turns.0 == 0.0 {
-            add_edge(-segment.turns_per_s.0 / (2.0 * segment.turns_per_s2.0));
+            add_boundary(-segment.turns_per_s.0 / (2.0 * segment.turns_per_s2.0));
         }
         boundaries_s.sort_by(f64::total_cmp);
         monotone_pieces.extend(boundaries_s.windows(2).map(|interval| MonotonePiece {
@@ -116,8 +117,8 @@ impl MonotonePiece<'_> {
     }
 
     /// Returns the time at which a number of turns has been made in the piece, not before
-    /// `earliest`.
-    fn time_of_turns(&self, turns: f64, earliest: f64) -> f64 {
+    /// `earliest_s`.
+    fn time_of_turns(&self, turns: f64, earliest_s: f64) -> f64 {
         let segment = self.segment;
         if segment.wave_turns.0 == 0.0 {
             let sign =
@@ -128,9 +129,9 @@ impl MonotonePiece<'_> {
                 .max(0.0)
                 .sqrt();
             let elapsed_s = if turns > 0.0 { 2.0 * turns / (turn_rate + root) } else { 0.0 };
-            return (self.from_s + elapsed_s).clamp(earliest, self.to_s);
+            return (self.from_s + elapsed_s).clamp(earliest_s, self.to_s);
         }
-        let mut low = earliest;
+        let mut low = earliest_s;
         let mut high = self.to_s;
         let mut t = low;
         for _ in 0..MAX_ITERATIONS {
@@ -192,7 +193,7 @@ mod tests {
             },
         ] {
             for window_s in [[0.0, 30.0], [13.3, 29.9]] {
-                let times = whole_turns_s(&spin.segments(), window_s);
+                let times = whole_turn_times_s(&spin.segments(), window_s);
                 let turns = spin.turns_within(window_s);
                 assert!(
                     (times.len() as f64 - turns).abs() <= 1.0,
@@ -212,7 +213,7 @@ mod tests {
     fn partial_turns_are_joined_to_the_adjacent_whole_turn() {
         // The drum makes one turn per second after the first turn, which takes two seconds.
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 2.0 };
-        let turn_times_s = |window_s| whole_turn_times_s(&spin.segments(), window_s);
+        let turn_times_s = |window_s| turn_division_times_s(&spin.segments(), window_s);
         let assert_near = |times: Vec<f64>, expected: &[f64]| {
             assert_eq!(times.len(), expected.len(), "{times:?}");
             assert!(times.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{times:?}");
@@ -224,7 +225,7 @@ mod tests {
         assert_near(turn_times_s([2.5, 3.4]), &[]);
         assert_near(turn_times_s([3.2, 3.4]), &[]);
         let zero_spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 2.0 };
-        assert_near(whole_turn_times_s(&zero_spin.segments(), [0.0, 100.0]), &[]);
+        assert_near(turn_division_times_s(&zero_spin.segments(), [0.0, 100.0]), &[]);
     }
 
     #[test]
@@ -235,7 +236,7 @@ mod tests {
             time_s: vec![0.0, 3.0, 7.0, 8.0],
             speed_rpm: vec![60.0, 60.0, -60.0, -60.0],
         };
-        let times = whole_turns_s(&spin.segments(), [0.0, 10.0]);
+        let times = whole_turn_times_s(&spin.segments(), [0.0, 10.0]);
         let expected = [0.0, 1.0, 2.0, 3.0, 5.0, 7.0, 8.0, 9.0, 10.0];
         assert_eq!(times.len(), expected.len(), "{times:?}");
         assert!(times.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7), "{times:?}");

@@ -14,7 +14,7 @@ fn point(machine: Machine) -> Point {
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }
 
-fn paper() -> &'static [ModeOverSpeed] {
+fn paper_modes() -> &'static [ModeOverSpeed] {
     static MODES: OnceLock<Vec<ModeOverSpeed>> = OnceLock::new();
     MODES.get_or_init(|| {
         let speeds: Vec<f64> = (0..=24).map(|k| 50.0 * f64::from(k)).collect();
@@ -24,7 +24,7 @@ fn paper() -> &'static [ModeOverSpeed] {
 
 #[test]
 fn val_resonances_agree_with_the_paper() {
-    let modes = paper();
+    let modes = paper_modes();
     let references = [
         (99.9, 99.86, Movement::Rocking, MotionPlane::Horizontal),
         (147.6, 147.76, Movement::Rocking, MotionPlane::Vertical),
@@ -98,7 +98,7 @@ fn relative_variation(mode: &ModeAtSpeed) -> f64 {
 fn val_frequencies_hardly_vary_over_a_turn() {
     // The paper gives a variation of less than 0.3 % up to 1200 rpm. The first mode at 1200 rpm
     // exceeds it slightly.
-    for (k, mode) in paper()[..4].iter().enumerate() {
+    for (k, mode) in paper_modes()[..4].iter().enumerate() {
         for (mode_at_speed, step) in mode.at_speed.iter().zip(0..) {
             let speed = 50 * step;
             if (k, speed) == (0, 1200) {
@@ -134,7 +134,7 @@ fn val_frequencies_hardly_vary_over_a_turn() {
 
 #[test]
 fn modes_are_followed_through_crossings() {
-    let modes = paper();
+    let modes = paper_modes();
     // The frequency of pitch crosses that of the horizontal translation, whose damping ratio is
     // several times as great.
     let pitch = &modes[1].at_speed;
