@@ -28,7 +28,7 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use crate::program::set_program;
 use crate::{Error, Exit, Model, check_random_numbers, survive_file_size_limits};
 use cells::{Lines, format_cell, format_number, format_range, format_table, shorten};
-use grid::{GridArgs, ResultArgs, quoted};
+use grid::{GridArgs, ResultArgs, quote_for_shell};
 use run::install_interrupt;
 use sweep_plot::CommonFigures;
 

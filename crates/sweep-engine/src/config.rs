@@ -21,6 +21,7 @@
 //! them a number may be written only once, even under two names, because their order is not
 //! defined.
 
+pub mod arguments;
 pub mod axes;
 mod canonical;
 pub mod design;
@@ -30,6 +31,7 @@ pub mod grid;
 pub mod keys;
 pub mod list;
 pub mod parameters;
+pub mod plan_checks;
 mod plan_to_toml;
 mod points;
 mod render;
@@ -39,22 +41,20 @@ pub mod section;
 pub mod sections;
 pub mod source;
 pub mod syntax;
-pub mod whole;
 pub mod words;
-pub mod written;
 
 use std::marker::PhantomData;
 use std::path::PathBuf;
 
+pub use arguments::NamedArgument;
 pub use draft::Draft;
 pub use form::Form;
 pub use keys::{Key, KeyWalk, Keys};
-pub use points::{check_columns, not_numbers, other_length};
+pub use points::{check_columns, not_numbers_mistake, wrong_length_mistake};
 pub use report::{Diagnostic, Diagnostics, Mistake, Report};
-pub use section::{Field, Section, quoted, refused_number, short, unknown_word, written_twice};
+pub use section::{Field, Section, quote, refused_number, shorten, unknown_word, written_twice};
 pub use sections::parse_name;
 pub use source::{Located, Location, SourceId, Sources};
-pub use written::NamedArgument;
 
 use serde_json::Value;
 
@@ -71,7 +71,7 @@ pub struct GridInput<M> {
     /// The text of the grid, if it is not read from the file.
     text: Option<String>,
     /// The text of the model's own file, if it is not the one that the grid names.
-    pub own_file: Option<String>,
+    pub model_file: Option<String>,
     /// The arguments NAME=VALUE of `--set`.
     sets: Vec<String>,
     /// The arguments NAME=VALUE of `--at`.
@@ -84,9 +84,9 @@ impl<M: Model> GridInput<M> {
     pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
         let name = None;
         let text = None;
-        let own_file = None;
+        let model_file = None;
         let at_arguments = Vec::new();
-        Self { path, name, text, own_file, sets, at_arguments, model: PhantomData }
+        Self { path, name, text, model_file, sets, at_arguments, model: PhantomData }
     }
 
     /// Returns the input of a grid's text. `name` stands in messages, and is the run's name if the
@@ -98,19 +98,19 @@ impl<M: Model> GridInput<M> {
     /// Returns the grid of a result from the plan in it (`Plan::to_json`), without the points of a
     /// design. Axes with tolerances keep the values that the tolerances gave.
     pub fn from_plan(name: &str, plan: &Value) -> Self {
-        let own_key = M::ABOUT.own_file.map(|file| file.key);
+        let model_file_key = M::ABOUT.model_file.map(|file| file.key);
         let is_read = |key: &str| {
-            !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != own_key
+            !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != model_file_key
         };
         let mut plan = plan.clone();
         for axis in plan.get_mut("axis").and_then(Value::as_array_mut).into_iter().flatten() {
             axis.as_object_mut().map(|axis| axis.remove("tolerance"));
         }
         let grid_keys = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
-        let own_file_keys = own_key.and_then(|key| plan.get(key)?.as_object());
+        let own_file_keys = model_file_key.and_then(|key| plan.get(key)?.as_object());
         Self {
             text: Some(plan_to_toml::file(grid_keys)),
-            own_file: own_file_keys.map(plan_to_toml::file),
+            model_file: own_file_keys.map(plan_to_toml::file),
             ..Self::file(name.into(), Vec::new())
         }
     }
@@ -158,9 +158,9 @@ fn resolve<M: Model, T>(
     finish: impl FnOnce(&mut Draft<'_, M>) -> T,
 ) -> Result<(Plan<M>, T), Diagnostics> {
     let report = Report::default();
-    let result = grid::draft(input, &report).map(|mut draft| {
+    let result = grid::read_draft(input, &report).map(|mut draft| {
         let finish_result = finish(&mut draft);
-        whole::steps(&draft);
+        plan_checks::check_steps(&draft);
         M::check(&draft);
         let sources = NumberSources(report.parameter_sources());
         let reading_notes = ReadingNotes { notes: report.take_notes(), ..draft.plan.reading_notes };

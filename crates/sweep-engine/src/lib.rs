@@ -44,7 +44,7 @@ pub use estimate::Estimate;
 pub use execution::{Execution, ExecutionArgs};
 pub use exit::{Error, Exit, print, show, tell};
 pub use interrupt::{Interrupt, check_random_numbers, survive_file_size_limits};
-pub use model::{About, GridTable, OwnFile};
+pub use model::{About, GridTable, ModelFile};
 pub use plan::{Axis, AxisTolerance, AxisValues, Plan, Reliability, Scenario};
 pub use program::program;
 pub use progress::{Progress, ProgressMode, duration};
@@ -59,7 +59,7 @@ use std::fmt;
 use serde_json::{Map, Value};
 use sweep_parameter::{Parameter, UnknownParameter};
 
-use config::{Draft, Keys, schema, whole};
+use config::{Draft, Keys, plan_checks, schema};
 use store::Layout;
 
 /// A parameter of a model.
@@ -103,12 +103,12 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
 
     /// Checks the plan as a whole, after every value is set.
     fn check(draft: &Draft<'_, Self>) {
-        whole::windows(draft);
+        plan_checks::check_windows(draft);
     }
 
     /// Returns the schema of `[set]`.
     fn schema_of_set() -> Value {
-        schema::set(&Self::blank().parameters(), Map::new())
+        schema::set_schema(&Self::blank().parameters(), Map::new())
     }
 
     /// Returns the columns of a result.

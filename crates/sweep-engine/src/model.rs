@@ -26,9 +26,9 @@ pub struct About {
     /// The methods of integration, in the order of messages and pages; the last is the default.
     pub methods: &'static [IntegrationMethod],
     /// The model's own file, which grids may name.
-    pub own_file: Option<OwnFile>,
+    pub model_file: Option<ModelFile>,
     /// The advice for a user without a grid file.
-    pub to_start: Option<&'static str>,
+    pub start_advice: Option<&'static str>,
     /// The settings that optional columns require, each by the prefix of the columns' names (the
     /// part before the first underscore).
     pub needed: &'static [(&'static str, &'static str)],
@@ -38,7 +38,7 @@ pub struct About {
 
 /// A file of a model's own.
 #[derive(Clone, Copy, Debug)]
-pub struct OwnFile {
+pub struct ModelFile {
     /// The key by which a grid file names the model's file.
     pub key: &'static str,
     /// The keys at the top of the file.
@@ -58,8 +58,8 @@ impl About {
             channels,
             default_channels: channels,
             methods,
-            own_file: None,
-            to_start: None,
+            model_file: None,
+            start_advice: None,
             needed: &[],
             further: "",
         }

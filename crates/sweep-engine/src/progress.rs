@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use crate::config::section::counted;
+use crate::config::section::format_count;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sweep_files::panics::lock;
 
@@ -85,7 +85,7 @@ impl Progress {
 
     fn search_line(&self, done: u64, points: u64) -> String {
         let rate = per_second(self.rate(points));
-        let points = format!("{}, {rate}", counted(points as usize, "point"));
+        let points = format!("{}, {rate}", format_count(points as usize, "point"));
         match (self.total, self.noun) {
             (0, _) => points,
             (total, noun) => format!("{done} of {total} {noun}, {points}"),

@@ -19,7 +19,7 @@ use crate::store::provenance::{self, Session};
 use crate::store::read::NameCounts;
 use crate::store::{
     OpenOptions, OpenOutcome, OpenRun, PointRows, ResultFile, Shard, ShardRequest, Tally,
-    idle_shards,
+    note_idle_shards,
 };
 use crate::threads::{self};
 use crate::{Engine, Environment, Interrupt, Job, Progress, ProgressMode, RunContext, StoreError};
@@ -97,10 +97,10 @@ pub fn run(
         }
         OpenOutcome::Open(run) => run,
     };
-    let (points, stored) = run.own_points();
+    let (points, stored) = run.count_own_points();
     if let Some(shard) = run.shard() {
         (options.tell)(&format!("shard {} of {}", shard.index, shard.count));
-        idle_shards(job.points, shard.count).iter().for_each(|note| (options.tell)(note));
+        note_idle_shards(job.points, shard.count).iter().for_each(|note| (options.tell)(note));
     }
     for note in run.take_notes() {
         (options.tell)(&note);
@@ -115,11 +115,11 @@ pub fn run(
     let result = runner.compute_and_join(&mut run);
     progress.finish();
     let wall_s = start_time.elapsed().as_secs_f64();
-    let computed = run.own_points().1.saturating_sub(stored);
+    let computed = run.count_own_points().1.saturating_sub(stored);
     let session = Session {
         started_unix_s,
         wall_s,
-        host: provenance::host(),
+        host: provenance::host_name(),
         pid: std::process::id(),
         cpus: threads::cores(),
         cpu_model: provenance::cpu_model(),
@@ -141,9 +141,9 @@ pub fn run(
             // A failure to record the session affects only the sidecar's list of sessions, not the
             // rows.
             notes.extend(run.record_session(&session).err().map(|error| error.to_string()));
-            let (points, kept) = run.own_points();
+            let (points, kept) = run.count_own_points();
             let end = match (interrupt.signal(), run.shard()) {
-                (None, Some(shard)) => RunEnd::Shard(shard, run.statuses()?),
+                (None, Some(shard)) => RunEnd::Shard(shard, run.count_statuses()?),
                 (signal, _) => {
                     RunEnd::Interrupted { signal: signal.unwrap_or_default(), kept, points }
                 }
@@ -194,7 +194,7 @@ impl Runner<'_> {
         let pool = threads::pool(self.threads)?;
         let stored_rows = |point| run.stored_rows(point);
         let context = RunContext::with_known_rows(self.interrupt, &stored_rows);
-        let (_, start) = run.own_points();
+        let (_, start) = run.count_own_points();
         // A bounded channel makes the engine wait for a slower disk instead of filling memory.
         let (sender, receiver) = sync_channel(self.threads);
         let collector = ChunkCollector::new(self, run, &context, sender);

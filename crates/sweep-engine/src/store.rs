@@ -13,15 +13,16 @@
 //! | `lock`, `shard-<i>.lock` | the processes that work on the run (`lock`) |
 //!
 //! When all parts exist, they are joined into the result, a single Parquet file (`merge`). Then the
-//! folder is deleted, unless it holds files that the run did not write (`own`) or has renamed to
-//! `*.damaged`. The store knows points, axis names and rows, but not the engine that computes them.
+//! folder is deleted, unless it holds files that the run did not write (`own_files`) or has renamed
+//! to `*.damaged`. The store knows points, axis names and rows, but not the engine that computes
+//! them.
 
 mod differences;
 mod error;
 mod lock;
 mod merge;
 mod open;
-mod own;
+mod own_files;
 mod part;
 mod plan_file;
 mod point_parts;
@@ -49,14 +50,14 @@ pub use open::{OpenOptions, OpenOutcome, OpenRun};
 pub use provenance::Session;
 pub use read::{ResultFile, Tally};
 pub use schema::{BATCH_ROWS, CellType, DeclaredColumn, Layout, PointRows, ResultRows, RowCells};
-pub use shard::{Shard, ShardRequest, list as shard_list};
-pub use status::{FolderStatus, RunStage, status};
+pub use shard::{Shard, ShardRequest, format_numbers as format_shard_numbers};
+pub use status::{FolderStatus, RunStage, read_status};
 pub use trials::{TrialColumns, TrialKey, Trials, WRITE_INTERVAL};
-pub use unfinished::{Unfinished, refuse_unfinished, unfinished};
+pub use unfinished::{UnfinishedWork, find_unfinished, refuse_unfinished};
 
 use sweep_parameter::RatioLimits;
 
-use crate::config::section::counted;
+use crate::config::section::format_count;
 use crate::{Axis, Model, Plan};
 use sweep_files::{self as files, FileKind};
 
@@ -134,22 +135,25 @@ pub fn chunk_points(points: u64) -> u64 {
 }
 
 /// Returns a note about shards that get no chunk, if there are any.
-pub fn idle_shards(points: u64, shards: u64) -> Option<String> {
+pub fn note_idle_shards(points: u64, shards: u64) -> Option<String> {
     let points_per_chunk = chunk_points(points);
     let chunks = points.div_ceil(points_per_chunk);
     (shards > chunks).then(|| {
-        let idle = shards - chunks;
-        let size = format!("{} of {points_per_chunk} points", counted(chunks as usize, "chunk"));
-        format!("note: with {size}, the run leaves {idle} of the {shards} shards without work")
+        let idle_count = shards - chunks;
+        let size =
+            format!("{} of {points_per_chunk} points", format_count(chunks as usize, "chunk"));
+        format!(
+            "note: with {size}, the run leaves {idle_count} of the {shards} shards without work"
+        )
     })
 }
 
 /// The name of the file of the plan in a run's folder.
-const PLAN: &str = "plan.json";
+const PLAN_FILE: &str = "plan.json";
 /// The name of the lock of a run's folder.
-const LOCK: &str = "lock";
+const LOCK_FILE: &str = "lock";
 /// The name of the file of the number of shards in a run's folder.
-const SHARDS: &str = "shards.json";
+const SHARDS_FILE: &str = "shards.json";
 
 /// The paths of a run's result and of its folder of unfinished work.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -165,12 +169,12 @@ impl Folder {
     /// sidecar must be of this program.
     pub fn new(output: &Path, layout: &Layout) -> Result<Self, StoreError> {
         let folder = Self::beside(output, layout.kind)?;
-        files::judge(&folder.sidecar(), folder.sidecar_kind())?;
+        files::check_replaceable(&folder.sidecar(), folder.sidecar_kind())?;
         Ok(folder)
     }
 
     fn beside(output: &Path, kind: FileKind<'_>) -> Result<Self, StoreError> {
-        files::judge(output, kind)?;
+        files::check_replaceable(output, kind)?;
         let mut name = output.file_name().unwrap_or_default().to_owned();
         name.push(".partial");
         Ok(Self { output: output.to_path_buf(), path: output.with_file_name(name) })
@@ -189,7 +193,7 @@ impl Folder {
 
     /// Returns the kind of the sidecar.
     fn sidecar_kind(&self) -> FileKind<'_> {
-        FileKind::Account { of: self.output.file_name().unwrap_or_default() }
+        FileKind::Sidecar { result_name: self.output.file_name().unwrap_or_default() }
     }
 }
 

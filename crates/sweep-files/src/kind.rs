@@ -24,8 +24,8 @@ pub enum FileKind<'a> {
     Dwell,
     /// Result of `sweep optimise`.
     Optimise,
-    /// The model's own file: `sweep optimise --best`, `sweep fit --out`.
-    Own,
+    /// A file of the model's parameters: `sweep optimise --best`, `sweep fit --out`.
+    ModelFile,
     /// Curves of `sweep fit`.
     Fit,
     /// Result of `sweep compare --out`.
@@ -35,10 +35,10 @@ pub enum FileKind<'a> {
         /// The ending: `csv` or `xlsx`.
         ending: &'static str,
     },
-    /// The JSON file beside a map that says how the run went.
-    Account {
-        /// The name of the map.
-        of: &'a OsStr,
+    /// The JSON file beside a result with the facts of the run: time, host and speed.
+    Sidecar {
+        /// The name of the result.
+        result_name: &'a OsStr,
     },
     /// An SVG picture without a prologue, as `sweep plot` writes them and drawing programs do not.
     Svg,
@@ -54,7 +54,7 @@ pub enum FileKind<'a> {
 
 /// Results other than maps: for each kind its word, the metadata key that only its files have, and
 /// its name.
-const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
+const RESULT_KINDS: [(FileKind<'static>, &str, &str, &str); 8] = [
     (FileKind::Trace, "trace", key::TRACE, "result of `sweep trace`"),
     (FileKind::Modes, "modes", key::MODES, "result of `sweep modes`"),
     (FileKind::Boundary, "boundary", key::BOUNDARY, "result of `sweep boundary`"),
@@ -65,8 +65,8 @@ const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
     (FileKind::Differences, "differences", key::DIFFERENCES, "result of `sweep compare --out`"),
 ];
 
-/// The beginning of a model's file of parameters that a command wrote.
-pub const OWN_FILE: &str = "# Written by sweep: ";
+/// The beginning of the first line of a model's file of parameters that a command wrote.
+pub const MODEL_FILE_START: &str = "# Written by sweep: ";
 
 /// The first lines of our PDF figures. The second line distinguishes them from other documents.
 pub const PDF_START: &[u8] = b"%PDF-1.7\n%\xe2\xe3\xcf\xd3 sweep plot\n";
@@ -78,15 +78,15 @@ impl FileKind<'_> {
     /// Returns the kind's name, as in "the file there is no NAME".
     pub fn name(self) -> &'static str {
         match self {
-            Self::Own => "file of `sweep optimise --best` or `sweep fit --out`",
+            Self::ModelFile => "file of `sweep optimise --best` or `sweep fit --out`",
             Self::Exported { .. } => "table of `sweep export`",
-            Self::Account { .. } => "account of the run with this --out",
+            Self::Sidecar { .. } => "sidecar of the run with this --out",
             Self::Svg => "SVG picture of `sweep plot`",
             Self::Pdf => "PDF figure of `sweep plot`",
             Self::Png => "PNG picture",
             Self::Html => "HTML page",
             Self::ManPage => "manual page of `sweep man`",
-            _ => self.own().map_or("result of `sweep run`", |(.., name)| name),
+            _ => self.result_kind().map_or("result of `sweep run`", |(.., name)| name),
         }
     }
 
@@ -101,10 +101,12 @@ impl FileKind<'_> {
         };
         let objection = format!("the file there is no {}", self.name());
         let is_ours = match self {
-            Self::Own => begins_with(OWN_FILE.as_bytes())?,
+            Self::ModelFile => begins_with(MODEL_FILE_START.as_bytes())?,
             Self::Exported { ending: "csv" } => begins_with(EXPORTED_CSV.as_bytes())?,
             Self::Exported { .. } => begins_with(b"PK\x03\x04")?,
-            Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
+            Self::Sidecar { result_name } => {
+                is_sidecar(path, result_name).map_err(FileError::io("read", path))?
+            }
             Self::Svg => begins_with(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
             Self::Pdf => begins_with(PDF_START)?,
             Self::Png => begins_with(b"\x89PNG\r\n\x1a\n")?,
@@ -128,20 +130,22 @@ impl FileKind<'_> {
 
     /// Names a kind of result in one word.
     pub fn word(self) -> &'static str {
-        self.own().map_or("map", |(_, word, ..)| word)
+        self.result_kind().map_or("map", |(_, word, ..)| word)
     }
 
     /// Returns the ending of a path if it stands for a format that files of this kind do not have.
     pub(crate) fn other_format(self, path: &Path) -> Option<&'static str> {
         // Endings of formats that are not Parquet.
-        const OTHERS: &str = "csv tsv txt json toml xlsx ods nc h5 svg png pdf html zip";
+        const OTHER_FORMATS: &str = "csv tsv txt json toml xlsx ods nc h5 svg png pdf html zip";
         let ending = path.extension()?;
-        let is_parquet = self == Self::Map || self.own().is_some();
-        OTHERS.split(' ').find(|other| is_parquet && ending.eq_ignore_ascii_case(other))
+        let is_parquet = self == Self::Map || self.result_kind().is_some();
+        OTHER_FORMATS.split(' ').find(|other| is_parquet && ending.eq_ignore_ascii_case(other))
     }
 
-    fn own(self) -> Option<&'static (FileKind<'static>, &'static str, &'static str, &'static str)> {
-        OWN.iter().find(|(kind, ..)| *kind == self)
+    fn result_kind(
+        self,
+    ) -> Option<&'static (FileKind<'static>, &'static str, &'static str, &'static str)> {
+        RESULT_KINDS.iter().find(|(kind, ..)| *kind == self)
     }
 }
 
@@ -149,8 +153,9 @@ impl ParquetFile {
     /// Returns the kind of result that the metadata tells, if the file is a result.
     pub fn kind(&self) -> Option<FileKind<'static>> {
         let has_key = |key: &str| self.value(key).is_some();
-        let own_kind = OWN.iter().find(|(_, _, key, _)| has_key(key)).map(|(kind, ..)| *kind);
-        own_kind.or_else(|| has_key(key::PLAN).then_some(FileKind::Map))
+        let result_kind =
+            RESULT_KINDS.iter().find(|(_, _, key, _)| has_key(key)).map(|(kind, ..)| *kind);
+        result_kind.or_else(|| has_key(key::PLAN).then_some(FileKind::Map))
     }
 }
 
@@ -168,15 +173,15 @@ pub fn beside(output: &Path, ending: &str) -> PathBuf {
     output.with_file_name(name)
 }
 
-/// Whether the file at `path` is a run's summary (`run.json`) that may be overwritten: that of the
-/// result `of`, or one that was renamed together with its result and still names the old file. The
-/// summary of another result that has the same path is kept.
-fn is_account(path: &Path, of: &OsStr) -> std::io::Result<bool> {
+/// Returns whether the file at `path` is a sidecar (`run.json`) that may be overwritten: that of
+/// the result `result_name`, or one that was renamed together with its result and still contains
+/// the result's old name. The sidecar of another result that has the same path is kept.
+fn is_sidecar(path: &Path, result_name: &OsStr) -> std::io::Result<bool> {
     let text = regular::read_json(path)?;
-    let provenance: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
-    let can_be_replaced = |named: &str| {
-        named == of.to_string_lossy() || beside(&path.with_file_name(named), "run.json") != path
+    let sidecar: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
+    let can_be_replaced = |stored_name: &str| {
+        stored_name == result_name.to_string_lossy()
+            || beside(&path.with_file_name(stored_name), "run.json") != path
     };
-    Ok(provenance["plan_hash"].is_string()
-        && provenance["file"].as_str().is_some_and(can_be_replaced))
+    Ok(sidecar["plan_hash"].is_string() && sidecar["file"].as_str().is_some_and(can_be_replaced))
 }

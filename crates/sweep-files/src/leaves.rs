@@ -10,7 +10,7 @@ pub enum Step<'a> {
     /// The name of a value in an object.
     Name(&'a str),
     /// The index of an element in a list, from 0.
-    Place(usize),
+    Index(usize),
 }
 
 impl fmt::Display for Step<'_> {
@@ -18,7 +18,7 @@ impl fmt::Display for Step<'_> {
         match self {
             Self::Name(name) => formatter.write_str(name),
             // People count from 1.
-            Self::Place(place) => write!(formatter, "{}", place + 1),
+            Self::Index(index) => write!(formatter, "{}", index + 1),
         }
     }
 }
@@ -28,9 +28,9 @@ pub fn dotted(path: &[Step<'_>]) -> String {
     path.iter().map(Step::to_string).collect::<Vec<_>>().join(".")
 }
 
-/// Calls `take` with each pair of leaves of two values and the path to them; `None` stands for a
-/// value that one side lacks. Two lists are leaves unless `opens` returns true for them.
-pub fn leaves<'a>(
+/// Calls `visit_leaf` with each pair of leaves of two values and the path to them; `None` stands
+/// for a value that one side lacks. Two lists are leaves unless `opens` returns true for them.
+pub fn visit_leaves<'a>(
     sides: [Option<&'a Value>; 2],
     opens: fn(&[Value], &[Value]) -> bool,
     path: &mut Vec<Step<'a>>,
@@ -38,7 +38,7 @@ pub fn leaves<'a>(
 ) {
     let mut visit = |step: Step<'a>, sides| {
         path.push(step);
-        leaves(sides, opens, path, visit_leaf);
+        visit_leaves(sides, opens, path, visit_leaf);
         path.pop();
     };
     match sides {
@@ -49,8 +49,8 @@ pub fn leaves<'a>(
             }
         }
         [Some(Value::Array(first)), Some(Value::Array(second))] if opens(first, second) => {
-            for place in 0..first.len().max(second.len()) {
-                visit(Step::Place(place), [first.get(place), second.get(place)]);
+            for index in 0..first.len().max(second.len()) {
+                visit(Step::Index(index), [first.get(index), second.get(index)]);
             }
         }
         sides => visit_leaf(path, sides),

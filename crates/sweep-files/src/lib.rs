@@ -38,9 +38,9 @@ mod writer;
 
 pub use columns::{CellKind, Column, ColumnMetadata, columns};
 pub use error::FileError;
-pub use kind::{EXPORTED_CSV, FileKind, OWN_FILE, PDF_START, beside};
-pub use leaves::{Step, dotted, leaves};
-pub use output::{Output, judge, ready, write};
+pub use kind::{EXPORTED_CSV, FileKind, MODEL_FILE_START, PDF_START, beside};
+pub use leaves::{Step, dotted, visit_leaves};
+pub use output::{Output, check_replaceable, prepare_folder, write};
 pub use parquet::{CREATED_BY, ParquetFile};
 pub use rows::{Cell, ResultTable, Row, Rows, ratio_limits};
 pub use writer::Writer;

@@ -24,9 +24,9 @@ impl<'a> Output<'a> {
     /// # Errors
     /// [`FileError::Refused`] for what must not be overwritten, [`FileError::Io`].
     pub fn begin(path: &'a Path, kind: FileKind<'a>) -> Result<Self, FileError> {
-        judge(path, kind)?;
+        check_replaceable(path, kind)?;
         let folder = atomic::parent(path);
-        ready(folder)?;
+        prepare_folder(folder)?;
         Ok(Self { path, kind, temporary: atomic::create_temporary(folder)? })
     }
 
@@ -44,17 +44,17 @@ impl<'a> Output<'a> {
     /// The errors of [`Output::begin`], also for a file that has appeared at the path meanwhile.
     pub fn finish(mut self, bytes: &[u8]) -> Result<(), FileError> {
         self.write(bytes)?;
-        judge(self.path, self.kind)?;
+        check_replaceable(self.path, self.kind)?;
         atomic::publish(self.temporary, self.path)
     }
 }
 
-/// Writes a file of this kind into a folder that [`ready`] has prepared.
+/// Writes a file of this kind into a folder that [`prepare_folder`] has prepared.
 ///
 /// # Errors
 /// Those of [`Output::begin`].
 pub fn write(path: &Path, kind: FileKind<'_>, bytes: &[u8]) -> Result<(), FileError> {
-    judge(path, kind)?;
+    check_replaceable(path, kind)?;
     let output = Output { path, kind, temporary: atomic::create_temporary(atomic::parent(path))? };
     output.finish(bytes)
 }
@@ -63,7 +63,7 @@ pub fn write(path: &Path, kind: FileKind<'_>, bytes: &[u8]) -> Result<(), FileEr
 ///
 /// # Errors
 /// [`FileError::Io`].
-pub fn ready(folder: &Path) -> Result<(), FileError> {
+pub fn prepare_folder(folder: &Path) -> Result<(), FileError> {
     fs::create_dir_all(folder).map_err(FileError::io("make the folder", folder))?;
     atomic::clear_leftovers(folder);
     Ok(())
@@ -74,7 +74,7 @@ pub fn ready(folder: &Path) -> Result<(), FileError> {
 /// # Errors
 /// [`FileError::Refused`] for what must not be overwritten, [`FileError::Io`],
 /// [`FileError::Damaged`].
-pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
+pub fn check_replaceable(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
     let refuse = |reason: &str, help| {
         Err(FileError::Refused { path: path.to_path_buf(), reason: reason.to_owned(), help })
     };
@@ -152,14 +152,16 @@ mod tests {
             FileKind::Dwell => key::DWELL,
             FileKind::Optimise => key::OPTIMISE,
             FileKind::Fit => key::FIT,
-            FileKind::Own => return format!("{}x\n", crate::OWN_FILE).into_bytes(),
+            FileKind::ModelFile => return format!("{}x\n", crate::MODEL_FILE_START).into_bytes(),
             FileKind::Differences => key::DIFFERENCES,
             FileKind::Exported { ending: "csv" } => {
                 return format!("{}x\n", crate::EXPORTED_CSV).into_bytes();
             }
             FileKind::Exported { .. } => return b"PK\x03\x04...".to_vec(),
-            FileKind::Account { of } => {
-                return json!({ "file": of.to_str(), "plan_hash": "00" }).to_string().into_bytes();
+            FileKind::Sidecar { result_name } => {
+                return json!({ "file": result_name.to_str(), "plan_hash": "00" })
+                    .to_string()
+                    .into_bytes();
             }
             FileKind::Svg => {
                 return b"<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1\"/>".to_vec();
@@ -190,10 +192,10 @@ mod tests {
     }
 
     fn kinds() -> impl Iterator<Item = FileKind<'static>> {
-        let provenance = FileKind::Account { of: OsStr::new("x.parquet") };
+        let sidecar = FileKind::Sidecar { result_name: OsStr::new("x.parquet") };
         PARQUET.into_iter().chain([
-            provenance,
-            FileKind::Own,
+            sidecar,
+            FileKind::ModelFile,
             FileKind::Svg,
             FileKind::Pdf,
             FileKind::Png,

@@ -131,7 +131,7 @@ pub fn render(
 ) -> Result<(), PlotError> {
     let format = format_from_ending(output)?;
     // This check comes first, so that a figure that cannot be drawn creates no folder.
-    files::judge(output, format)?;
+    files::check_replaceable(output, format)?;
     let source = open_source(input, options, model)?;
     check_options(&source, options, format)?;
     model.check(&source, format == Format::Html)?;

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use serde_json::Value;
-use sweep_files::{Step, dotted, key, leaves};
+use sweep_files::{Step, dotted, key, visit_leaves};
 
 use crate::error::{PlotError, Result};
 use crate::read::{FigureFile, ModelKinds};
@@ -87,7 +87,7 @@ fn collect_differences<'a>(
     differences: &mut Vec<String>,
 ) {
     let have_same_length = |first: &[Value], second: &[Value]| first.len() == second.len();
-    leaves(sides, have_same_length, &mut path, &mut |path, values| {
+    visit_leaves(sides, have_same_length, &mut path, &mut |path, values| {
         let [first, second] = [0, 1].map(|side| value_at_point(values[side], points[side], path));
         if first != second && !is_parameter_of_point([&first, &second], points, path) {
             let [first, second] = [first, second].map(|value| match value {
@@ -121,7 +121,7 @@ fn is_set_by(parameter: &str, path: &[Step<'_>]) -> bool {
     };
     let last_key = last_key.to_string();
     let singular = first_key.strip_suffix('s').unwrap_or(first_key);
-    let index = inner_path.get(1).filter(|index| matches!(index, Step::Place(_)));
+    let index = inner_path.get(1).filter(|index| matches!(index, Step::Index(_)));
     parameter == last_key
         || parameter == format!("{singular}_{last_key}")
         || index.is_some_and(|index| parameter == format!("{singular}_{index}_{last_key}"))

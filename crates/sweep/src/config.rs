@@ -24,7 +24,7 @@ use crate::plan::Plan;
 
 pub(crate) use machine::{to_json as machine_json, to_toml as machine_file};
 pub use sweep_engine::config::{Diagnostics, Mistake};
-pub(crate) use sweep_engine::config::{check_columns, not_numbers, other_length};
+pub(crate) use sweep_engine::config::{check_columns, not_numbers_mistake, wrong_length_mistake};
 
 /// A grid of washing machines as a user gives it.
 pub type WasherGridInput = sweep_engine::GridInput<Washer>;

@@ -218,8 +218,10 @@ fn free_parameter(
             let parameters = MachineParameter::all(machine, spin);
             let title = format!("`{name}` cannot be fitted: {error}");
             let refusal = Diagnostic::new(title).at_location(location, "expected a parameter");
-            mistakes
-                .push(refusal.nearest(name, parameters.iter().map(|parameter| parameter.name())));
+            mistakes.push(
+                refusal
+                    .with_nearest_name(name, parameters.iter().map(|parameter| parameter.name())),
+            );
             return None;
         }
     };

@@ -76,11 +76,11 @@ pub use map_row::MapRow;
 pub use method::{Integrator, rk4, rk4_mass_scaled};
 pub use model::Washer;
 pub use plan::Plan;
-pub use sweep_engine::config::section::counted;
+pub use sweep_engine::config::section::format_count;
 pub use sweep_engine::progress::ProgressMode;
 pub use sweep_engine::run::{RunEnd, RunOptions, run};
 pub use sweep_engine::store::{
-    Job, OpenOptions, OpenOutcome, OpenRun, RunStage, Shard, ShardRequest, StoreError, status,
+    Job, OpenOptions, OpenOutcome, OpenRun, RunStage, Shard, ShardRequest, StoreError, read_status,
 };
 pub use sweep_engine::{
     Error, Exit, Interrupt, RunContext, check_random_numbers, survive_file_size_limits, tell,

@@ -18,7 +18,7 @@ use crate::plan::{
     Axis, Plan, axis_between, compared_channels, corners_of_forces, prepare_point, timing,
 };
 use sweep_engine::method::ACCURACY;
-use sweep_engine::store::read::overview;
+use sweep_engine::store::read::read_overview;
 use sweep_engine::{Error, Model as _};
 
 /// Parameters with sliders besides the axes, if the machine has them.
@@ -173,7 +173,7 @@ fn plan_from_map(file: &Path) -> Result<Plan, Error> {
     // ranges of the file's columns.
     let axes = json["axis"].take();
     let mut plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
-    let columns = overview(&map)?.columns;
+    let columns = read_overview(&map)?.columns;
     for axis in axes.as_array().into_iter().flatten() {
         let name = axis["parameter"].as_str().unwrap_or_default();
         let parameter = plan.model.find(name);

@@ -3,7 +3,7 @@
 use serde_json::Value;
 use sweep_engine::config::{Draft, Keys};
 use sweep_engine::store::{Layout, axis_columns};
-use sweep_engine::{About, Engine, Error, Estimate, GridTable, Model, ModelParameter, OwnFile};
+use sweep_engine::{About, Engine, Error, Estimate, GridTable, Model, ModelFile, ModelParameter};
 use washer_model::{Channel, Machine, MachineParameter, UnknownParameter};
 use washer_row::{Measures, Metric};
 
@@ -42,8 +42,8 @@ impl Model for Washer {
 
     const ABOUT: About = About {
         default_channels: &DEFAULT_CHANNELS,
-        own_file: Some(OwnFile { key: "machine", keys: &read::MACHINE_KEYS }),
-        to_start: Some("`sweep init FILE` writes a grid file to start from"),
+        model_file: Some(ModelFile { key: "machine", keys: &read::MACHINE_KEYS }),
+        start_advice: Some("`sweep init FILE` writes a grid file to start from"),
         needed: &[
             ("growth", HELD_SPEEDS),
             ("dwell", HELD_SPEEDS),

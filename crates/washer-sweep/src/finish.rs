@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sweep::{Error, EvaluationTask, FileRunEnd, MemoryTable, counted};
+use sweep::{Error, EvaluationTask, FileRunEnd, MemoryTable, format_count};
 
 use crate::computation::{ComputationOptions, Supervised, supervise};
 use crate::errors;
@@ -18,7 +18,7 @@ pub(crate) fn rows_or_raise(
     let table = evaluated.value_or_raise(py, |evaluated| match evaluated {
         Err(error) => errors::to_exception(py, &error),
         Ok(table) => {
-            let rows = counted(table.rows(), "row");
+            let rows = format_count(table.rows(), "row");
             let text = format!("interrupted; `result` of this exception holds {rows}");
             interruption(py, text, Some(table))
         }
@@ -51,9 +51,9 @@ pub(crate) fn rows_or_file(
             let text = format!("interrupted after {} was complete", out.display());
             interruption(py, text, Some(table))
         }
-        Ok(FileRunEnd::Interrupted { stored, points }) => {
+        Ok(FileRunEnd::Interrupted { stored_rows, points }) => {
             let text = format!(
-                "interrupted with {stored} of {points} points kept beside {}; the same call \
+                "interrupted with {stored_rows} of {points} points kept beside {}; the same call \
                  continues with the others",
                 out.display()
             );
@@ -62,8 +62,8 @@ pub(crate) fn rows_or_file(
     })?;
     match result {
         FileRunEnd::Complete(table) => Ok(PyResultTable::new(table)),
-        FileRunEnd::Interrupted { stored, points } => Err(PyValueError::new_err(format!(
-            "stopped with {stored} of {points} points without an interruption"
+        FileRunEnd::Interrupted { stored_rows, points } => Err(PyValueError::new_err(format!(
+            "stopped with {stored_rows} of {points} points without an interruption"
         ))),
     }
 }

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
-use sweep::{BoundaryOptions, PlanEvaluator, TraceExtras, TraceOptions, WasherGridInput, counted};
+use sweep::{
+    BoundaryOptions, PlanEvaluator, TraceExtras, TraceOptions, WasherGridInput, format_count,
+};
 
 use crate::computation::{ComputationOptions, supervise, supervise_abandonable};
 use crate::mappings::{self, assignments};
@@ -285,7 +287,7 @@ impl PyPlan {
         let plan = self.evaluator.plan();
         let axes: Vec<&str> = plan.axes.iter().map(|axis| &*axis.parameter.name).collect();
         let axes = if axes.is_empty() { "no axes".to_owned() } else { axes.join(", ") };
-        let points = counted(plan.points() as usize, "point");
+        let points = format_count(plan.points() as usize, "point");
         format!("<washer_sweep.Plan {}: {points} over {axes}>", plan.name)
     }
 }

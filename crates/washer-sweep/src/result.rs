@@ -11,7 +11,7 @@ use arrow_schema::{DataType, Field};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyCapsule, PyDict, PyList};
-use sweep::{MemoryTable, counted};
+use sweep::{MemoryTable, format_count};
 use sweep_files::{FileKind, cells};
 
 use crate::arrow;
@@ -210,8 +210,8 @@ impl PyResultTable {
     fn __repr__(&self) -> String {
         let name = self.0.plan()["name"].as_str().unwrap_or("unnamed");
         let kind = self.0.kind().word();
-        let rows = counted(self.0.rows(), "row");
-        let columns = counted(self.0.schema().fields().len(), "column");
+        let rows = format_count(self.0.rows(), "row");
+        let columns = format_count(self.0.schema().fields().len(), "column");
         format!("<washer_sweep.Result: {kind} of {name}, {rows}, {columns}>")
     }
 }

@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 
 use sweep::{
     Interrupt, Job, ModelEngine, OpenOptions, OpenOutcome, OpenRun, Plan, ProgressMode, RunEnd,
-    RunOptions, Shard, ShardRequest, status,
+    RunOptions, Shard, ShardRequest, read_status,
 };
 use tempfile::TempDir;
 
@@ -48,7 +48,7 @@ pub(crate) fn run(bytes: &[u8]) {
     let job = Job::new(&undisturbed.plan);
     let output = undisturbed.folder.path().join("x.parquet");
     // Reading the status changes no file, even if the status is an error.
-    let _ = status(&output, &job);
+    let _ = read_status(&output, &job);
     assert_eq!(fs::read(partial.join(name)).expect("the input is still there"), content);
     let mut opened = match OpenRun::open(&output, &job, options()) {
         Ok(OpenOutcome::Open(opened)) => opened,

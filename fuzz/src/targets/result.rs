@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::Parser as _;
-use sweep::{Job, OpenRun, Plan, RunStage, WasherCli, status};
+use sweep::{Job, OpenRun, Plan, RunStage, WasherCli, read_status};
 use tempfile::TempDir;
 
 /// Runs the target with an input; a panic is a finding.
@@ -19,7 +19,7 @@ pub(crate) fn run(bytes: &[u8]) {
     let bytes = bytes.as_slice();
     fs::write(&files.result, bytes).expect("the input is written");
     let job = Job::new(&files.plan);
-    match status(&files.result, &job) {
+    match read_status(&files.result, &job) {
         // An empty file is treated like a missing one.
         Ok(status) => {
             assert!(status.state == RunStage::NotStarted && bytes.is_empty(), "{status:?}")

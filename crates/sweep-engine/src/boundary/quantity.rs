@@ -150,7 +150,7 @@ pub fn derive_quantity<M: Model>(
             let mistake = if limit.is_some() { number_mistake } else { mistake };
             let location = Location::new(report.add("--quantity", text), mistake.span.clone());
             let mistake = Diagnostic::from_expression(mistake, &location);
-            report.push(mistake.help("`--quantity` without a name lists the columns"));
+            report.push(mistake.with_help("`--quantity` without a name lists the columns"));
             report.finish(None::<()>)?;
             return Err(Error::option("--quantity", text, "an expression of columns"));
         }

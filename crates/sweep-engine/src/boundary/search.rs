@@ -3,7 +3,7 @@
 use super::lattice::{columns, lattice_ranks};
 use super::quantity::{DerivedQuantity, derive_quantity, find_quantity, is_name, margin};
 use super::{BoundaryTrial, SearchRange, TracedQuantity};
-use crate::config::written::finite;
+use crate::config::arguments::parse_finite;
 use crate::evaluator::{CachedEvaluator, RequestValues, SearchStop};
 use crate::optimise::search::defect;
 use crate::store::{
@@ -34,7 +34,7 @@ pub struct BoundaryOptions {
     #[arg(num_args = 0..=1, default_missing_value = "")]
     pub quantity: String,
     /// Limit in the column's unit [default: the column's own; of ratios that of the grid file]
-    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = parse_finite)]
     pub limit: Option<f64>,
     /// Width of the final brackets, in the second axis's unit; if that axis is logarithmic, as a
     /// fraction of its value [default: 1/480 of the range]

@@ -11,7 +11,7 @@ use crate::boundary::quantity::traceable_columns;
 use crate::boundary::{
     BoundaryOptions, BoundaryRow, BoundaryTask, EdgeKind, TracedBoundary, trace,
 };
-use crate::config::section::counted;
+use crate::config::section::format_count;
 use crate::evaluator::{CachedEvaluator, SearchStop};
 use crate::store::{DeclaredColumn, OpenOutcome, Trials};
 use crate::{Error, Execution, ExecutionArgs, Exit, Model, Plan, Progress, duration, show, tell};
@@ -76,13 +76,13 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
     trials.take_notes().iter().for_each(|note| tell(note));
     let stored_points = trials.count() as u64;
     if stored_points > 0 {
-        tell(&format!("going on: {} there", counted(stored_points as usize, "point")));
+        tell(&format!("going on: {} there", format_count(stored_points as usize, "point")));
     }
     let start = Instant::now();
     let execution = args.execution.with(&interrupt);
     let (traced, trials) = search(&task, Some(trials), execution)?;
     let Some(traced) = traced else {
-        let stored_points = counted(trials.map_or(0, |trials| trials.count()), "point");
+        let stored_points = format_count(trials.map_or(0, |trials| trials.count()), "point");
         let wall = duration(start.elapsed().as_secs_f64());
         let mut text =
             format!("{}: interrupted with {stored_points} kept, after {wall}\n", plan.name);
@@ -138,8 +138,8 @@ fn summary<M: Model>(task: &BoundaryTask<M>, traced: &TracedBoundary, wall_s: f6
         "{}: {} traced with {} (the grid has {grid_points}) in {}, {}\n",
         plan.name,
         limit_in_words(&quantity.name, quantity.limit),
-        counted(traced.trials, "point"),
-        counted(traced.rounds, "round"),
+        format_count(traced.trials, "point"),
+        format_count(traced.rounds, "round"),
         duration(wall_s)
     );
     let rows = || traced.curves.iter().flatten();
@@ -148,12 +148,12 @@ fn summary<M: Model>(task: &BoundaryTask<M>, traced: &TracedBoundary, wall_s: f6
     let edge_counts = EdgeKind::ALL.into_iter().filter_map(|kind| {
         let count: usize = rows().map(|row| count_kind(row, kind)).sum();
         let [noun, qualifier] = noun_and_qualifier(kind);
-        (count > 0).then(|| counted(count, noun) + qualifier)
+        (count > 0).then(|| format_count(count, noun) + qualifier)
     });
     text.line("found", edge_counts.collect::<Vec<_>>().join(", "));
     let folded_values = rows().filter(|row| count_kind(row, EdgeKind::Crossing) > 1).count();
     if folded_values > 0 {
-        let value_count = counted(folded_values, "value");
+        let value_count = format_count(folded_values, "value");
         text.line("folds", format!("several crossings at {value_count} of the first axis"));
     }
     let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);

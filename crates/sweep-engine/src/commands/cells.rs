@@ -3,7 +3,7 @@
 use std::fmt::{Display, Write as _};
 use std::path::Path;
 
-use super::grid::quoted;
+use super::grid::quote_for_shell;
 use crate::program::program;
 use sweep_results::Cell;
 
@@ -14,7 +14,7 @@ pub trait Lines {
 
     /// Adds a line with the command that the user may run next on a file.
     fn suggest_command(&mut self, verb: &str, file: &Path) {
-        let file = quoted(&file.display().to_string());
+        let file = quote_for_shell(&file.display().to_string());
         self.line("next", format!("{} {verb} {file}", program()));
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::run::describe_failures;
 use super::{GridArgs, format_number, format_range};
-use crate::config::section::counted;
+use crate::config::section::format_count;
 use crate::design::{Design, Distribution};
 use crate::estimate::size;
 use crate::method::Steps;
@@ -72,9 +72,9 @@ fn summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     line("verdict", format!("reliable where every ratio is below {upper}{lower_limit}{criterion}"));
     line("output", format!("results/{}.parquet", plan.name));
     let Estimate { threads, simd, .. } = estimate;
-    let threads = counted(*threads, "thread");
+    let threads = format_count(*threads, "thread");
     line("runs on", format!("{threads}, instruction set {simd}"));
-    let sampled_points = counted(estimate.sampled.values().sum::<u64>() as usize, "point");
+    let sampled_points = format_count(estimate.sampled.values().sum::<u64>() as usize, "point");
     line("takes", describe_time(plan, estimate, &sampled_points));
     let [memory, disk, result] =
         [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
@@ -115,7 +115,7 @@ fn is_failed_throughout(estimate: &Estimate) -> bool {
 
 fn describe_axis<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> String {
     let name = &axis.parameter.name;
-    let count = counted(axis.values.len() as usize, "value");
+    let count = format_count(axis.values.len() as usize, "value");
     let value_count = if design.is_some() { String::new() } else { format!("{count} ") };
     match &axis.values {
         AxisValues::Linear { from, to, .. } => {

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::{Lines as _, format_number, format_range, format_table, quoted};
-use crate::config::section::{counted, cut};
+use super::{Lines as _, format_number, format_range, format_table, quote_for_shell};
+use crate::config::section::{format_count, truncate};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, Model, show, tell};
 use fail_on::FailOn;
@@ -113,7 +113,7 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
         )?;
         if let Some(out) = &args.out {
             let out = out.display();
-            tell(&format!("wrote {out}: sweep plot {}", quoted(&out.to_string())));
+            tell(&format!("wrote {out}: sweep plot {}", quote_for_shell(&out.to_string())));
         }
     }
     Ok(if violations.is_empty() { Exit::Done } else { Exit::NotHeld })
@@ -125,7 +125,7 @@ fn format_plan_value(value: &Value) -> String {
         Value::Null => "absent".to_owned(),
         Value::String(text) => text.clone(),
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), format_number),
-        other => cut(&other.to_string(), 48),
+        other => truncate(&other.to_string(), 48),
     }
 }
 
@@ -314,7 +314,7 @@ fn summary_lines(
 /// Describes the shift of the boundary.
 fn describe_shift(shift: &BoundaryShift) -> String {
     let BoundaryShift { axis, unit, crossings, .. } = shift;
-    let count = counted(crossings.len(), "crossing");
+    let count = format_count(crossings.len(), "crossing");
     let mut description = match (shift.most_shifted(), shift.mean_shift_range()) {
         (Some(_), _) if crossings.iter().all(|crossing| crossing.shift_range() == [0.0; 2]) => {
             format!("{count} along {axis}, none moved")
@@ -342,7 +342,7 @@ fn describe_shift(shift: &BoundaryShift) -> String {
         _ => "no crossing in both".to_owned(),
     };
     if !shift.unmatched_lines.is_empty() {
-        let lines = counted(shift.unmatched_lines.len(), "line");
+        let lines = format_count(shift.unmatched_lines.len(), "line");
         let _ = write!(description, "; other numbers of crossings in {lines}");
     }
     description

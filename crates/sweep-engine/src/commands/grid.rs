@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::config::written::name_of;
+use crate::config::arguments::argument_name;
 use crate::config::{self, NamedValues};
 use crate::{Diagnostics, GridInput, Model, Plan, program, tell};
 
@@ -68,7 +68,7 @@ impl GridArgs {
     /// window unchanged.
     fn show_notes<M: Model>(&self, plan: &Plan<M>) {
         plan.reading_notes.notes.iter().for_each(|note| tell(note));
-        let is_set = |name| self.sets.iter().any(|set| name_of(set) == name);
+        let is_set = |name| self.sets.iter().any(|set| argument_name(set) == name);
         let ([from, to], end_s) = (plan.window_s, plan.end_s);
         if is_set("end_s") && !is_set("window_to_s") && to < end_s {
             tell(&format!(
@@ -104,21 +104,22 @@ impl ResultArgs {
         let other_options =
             other_options.chain(grid.name.iter().map(|name| ("name", name.clone())));
         let other_options = other_options.chain(self.out.iter().map(|out| ("out", path_text(out))));
-        let line = format!("{} {verb} {}", program(), quoted(&path_text(&grid.grid)));
-        sets.chain(other_options)
-            .fold(line, |line, (name, value)| line + &format!(" --{name} {}", quoted(&value)))
+        let line = format!("{} {verb} {}", program(), quote_for_shell(&path_text(&grid.grid)));
+        sets.chain(other_options).fold(line, |line, (name, value)| {
+            line + &format!(" --{name} {}", quote_for_shell(&value))
+        })
     }
 }
 
 /// Returns the command line of this process without `--fresh`, for the user to resume it.
 pub fn resume_command() -> String {
     let arguments = std::env::args_os().skip(1).filter(|word| word != "--fresh");
-    let arguments = arguments.map(|word| quoted(&word.to_string_lossy()));
+    let arguments = arguments.map(|word| quote_for_shell(&word.to_string_lossy()));
     std::iter::once(program().to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
 /// Quotes a word for the shell, if it needs quotes.
-pub fn quoted(word: &str) -> String {
+pub fn quote_for_shell(word: &str) -> String {
     let is_unquoted = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);
     if !word.is_empty() && word.chars().all(is_unquoted) {
         word.to_owned()

@@ -2,7 +2,7 @@
 
 use super::run::{count_lines, exit_code_by_status};
 use super::{Lines as _, ResultArgs, install_interrupt};
-use crate::config::section::counted;
+use crate::config::section::format_count;
 use crate::store::{OpenOutcome, OpenRun, Tally};
 use crate::{Error, Exit, Job, Model, Plan, tell};
 use std::path::Path;
@@ -56,7 +56,7 @@ pub fn merge_job(
         return Ok(Exit::interrupted(interrupt.signal()));
     };
     run.complete(job, &tally, None)?.iter().for_each(|note| tell(note));
-    let mut text = format!("{name}: joined {}\n", counted(tally.points as usize, "point"));
+    let mut text = format!("{name}: joined {}\n", format_count(tally.points as usize, "point"));
     text += &content(&tally)?;
     text.line("file", output.display());
     tell(text.trim_end());

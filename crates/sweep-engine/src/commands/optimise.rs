@@ -6,13 +6,13 @@ use std::time::Instant;
 use super::cells::format_table;
 use super::grid::resume_command;
 use super::{Lines as _, format_cell, format_number, install_interrupt};
-use crate::config::section::counted;
+use crate::config::section::format_count;
 use crate::optimise::file::{own_file, parameters, table, trial_columns};
 use crate::optimise::search::{search, slacks};
 use crate::optimise::study::{Objective, SearchedParameter, Study};
 use crate::store::{OpenOutcome, Trials};
 use crate::{Error, Execution, ExecutionArgs, Exit, Model, duration, tell};
-use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
+use sweep_files::{FileKind, MODEL_FILE_START, Output, atomic, key};
 use sweep_results::{Cell, ResultTable, Slack};
 
 /// Arguments of `sweep optimise`.
@@ -110,7 +110,7 @@ pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
     let rows = study.rows();
     let search_note = format!(
         "{candidate_count} candidates of {} in {}, {:.0} points/s",
-        counted(rows as usize, "point"),
+        format_count(rows as usize, "point"),
         duration(wall_s),
         (candidate_count * rows) as f64 / wall_s
     );
@@ -198,7 +198,7 @@ fn claim_own_file<'a, M: Model>(
 ) -> Result<Option<(&'a Path, Output<'a>)>, Error> {
     let Some(path) = args.best.as_deref() else { return Ok(None) };
     let refuse = |expected: &str| Err(Error::option("--best", path.display(), expected));
-    if M::ABOUT.own_file.is_none() {
+    if M::ABOUT.model_file.is_none() {
         return refuse("a model with a file of its own");
     }
     let candidates = study.evolution.candidates;
@@ -206,7 +206,7 @@ fn claim_own_file<'a, M: Model>(
         let expected = format!("a number from 0 to {}", candidates - 1);
         return Err(Error::option("--candidate", candidate, expected));
     }
-    let own_file_output = Output::begin(path, FileKind::Own)?;
+    let own_file_output = Output::begin(path, FileKind::ModelFile)?;
     // The files may not exist yet, so the paths of their folders are compared.
     let resolved_path =
         |path: &Path| Some(atomic::parent(path).canonicalize().ok()?.join(path.file_name()?));
@@ -345,7 +345,7 @@ fn summarise<M: Model>(
         match chosen_candidate.zip(own_text) {
             Some((chosen_candidate, own_text)) => {
                 let origin = format!("candidate {chosen_candidate} of {}", study.name);
-                file.finish(format!("{OWN_FILE}{origin}\n{own_text}").as_bytes())?;
+                file.finish(format!("{MODEL_FILE_START}{origin}\n{own_text}").as_bytes())?;
                 text.line("wrote", path.display());
             }
             None => {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use crate::config::written::finite;
+use crate::config::arguments::parse_finite;
 use crate::exit::{Error, Exit, tell};
 use crate::store::refuse_unfinished;
 use sweep_files::beside;
@@ -85,5 +85,5 @@ fn suggest_name(error: PlotError) -> PlotError {
 
 fn parse_assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, as in mass_kg=3.5")?;
-    Ok((name.trim().to_owned(), finite(value)?))
+    Ok((name.trim().to_owned(), parse_finite(value)?))
 }

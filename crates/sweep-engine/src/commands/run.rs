@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Lines as _, ResultArgs, format_number};
-use crate::config::section::counted;
+use crate::config::section::format_count;
 use crate::progress::per_second;
 use crate::run::{self as runner, RunEnd, RunOptions, RunReport};
 use crate::store::read::{ColumnExtreme, NameCounts, count_failed, failure_counts};
@@ -218,8 +218,8 @@ fn describe_work(session: &Session) -> String {
     let Session { simd, .. } = session;
     let wall = duration(session.wall_s);
     let rate = per_second(session.points_per_s);
-    let points = counted(session.points as usize, "point");
-    let threads = counted(session.threads, "thread");
+    let points = format_count(session.points as usize, "point");
+    let threads = format_count(session.threads, "thread");
     format!("{points} in {wall}, {rate} on {threads} ({simd})")
 }
 
@@ -349,7 +349,7 @@ pub fn count_lines_at(
         let Some(worst) = worst else { continue };
         let mut words = format!("{column} {}{}", format_number(worst.value), location(worst.point));
         if let Some(limit) = limit.filter(|_| *rows_beyond > 0) {
-            let rows = counted(*rows_beyond as usize, "row");
+            let rows = format_count(*rows_beyond as usize, "row");
             words += &format!("; {rows} {} {}", worse.bad_side(), format_number(limit));
         }
         text.line(worse.extreme(), words);
@@ -361,7 +361,7 @@ pub fn count_lines_at(
 fn motionless_line(tally: &Tally, axis_values: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
     let Some(first) = tally.first_motionless else { return text };
-    let rows = counted(tally.motionless as usize, "row");
+    let rows = format_count(tally.motionless as usize, "row");
     let location = match axis_values(first) {
         values if values.is_empty() => values,
         values => format!(", the first at {values}"),

@@ -1,6 +1,6 @@
 //! `schema`: the JSON Schema of grid files.
 
-use crate::config::schema::grid;
+use crate::config::schema::grid_schema;
 use crate::{Error, Exit, Model, print};
 
 /// Arguments of `schema`.
@@ -12,5 +12,5 @@ pub struct SchemaArgs {}
 /// # Errors
 /// When standard output cannot be written.
 pub fn run<M: Model>(_: &SchemaArgs) -> Result<Exit, Error> {
-    print(&format!("{:#}\n", grid::<M>()))
+    print(&format!("{:#}\n", grid_schema::<M>()))
 }

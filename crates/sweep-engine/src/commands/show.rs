@@ -10,8 +10,8 @@ use super::run::{count_lines_at, format_named_values};
 use super::{
     Lines as _, conditions, format_cell, format_number, format_range, format_table, shorten,
 };
-use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, overview, tally};
-use crate::store::{Holder, Unfinished, refuse_unfinished, unfinished};
+use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, read_overview, tally};
+use crate::store::{Holder, UnfinishedWork, find_unfinished, refuse_unfinished};
 use crate::{Error, Exit, show};
 use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
@@ -105,7 +105,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
         refuse_unfinished(&args.file)?;
         return show_rows(args);
     }
-    if let Some(unfinished_work) = unfinished(&args.file)? {
+    if let Some(unfinished_work) = find_unfinished(&args.file)? {
         return show(&if args.json {
             format!("{:#}\n", json!(unfinished_work))
         } else {
@@ -113,15 +113,15 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
         });
     }
     let parquet_file = ParquetFile::open(&args.file)?;
-    let overview = overview(&parquet_file)?;
+    let read_overview = read_overview(&parquet_file)?;
     if args.json {
-        let mut json = to_json(args, &parquet_file, &overview)?;
+        let mut json = to_json(args, &parquet_file, &read_overview)?;
         json["lines"] = json!((model_summary.lines)(&parquet_file)?);
         return show(&format!("{json:#}\n"));
     }
     let mut text = String::new();
     text.line("file", args.file.display());
-    match &overview.result {
+    match &read_overview.result {
         Some(result) => {
             provenance(&mut text, result);
             if parquet_file.is_copy() {
@@ -156,15 +156,15 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
     }
     add_columns(
         &mut text,
-        &overview,
-        args.all || overview.result.is_none(),
+        &read_overview,
+        args.all || read_overview.result.is_none(),
         model_summary.is_metric_column,
     );
     show(&text)
 }
 
 /// Formats the progress of a run or a search that has no result yet.
-fn progress(unfinished_work: &Unfinished) -> String {
+fn progress(unfinished_work: &UnfinishedWork) -> String {
     let mut text = String::new();
     text.line("file", unfinished_work.output.display());
     text.line("state", format!("unfinished: {}", unfinished_work.progress()));
@@ -239,7 +239,7 @@ fn shown_columns(args: &ShowArgs, file: &ResultTable, filter: Option<&Condition>
 /// Returns the content of the text as JSON, with the whole plan.
 fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
     let column = |column: &ColumnRange| {
-        let counts = || column.names.iter().cloned().collect::<Value>();
+        let counts = || column.word_counts.iter().cloned().collect::<Value>();
         json!({
             "name": column.name,
             "unit": Some(&column.metadata.unit).filter(|unit| !unit.is_empty()),
@@ -247,7 +247,7 @@ fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Val
             "nulls": column.nulls,
             "least": column.range.map(|(least, _)| Cell::Number(least)),
             "greatest": column.range.map(|(_, greatest)| Cell::Number(greatest)),
-            "counts": (!column.names.is_empty()).then(counts),
+            "counts": (!column.word_counts.is_empty()).then(counts),
         })
     };
     let mut json = json!({
@@ -376,7 +376,7 @@ fn describe_range(column: &ColumnRange) -> String {
             unit => format!("{range} {unit}"),
         });
     }
-    let names = column.names.iter();
+    let names = column.word_counts.iter();
     parts.extend(names.map(|(name, count)| format!("{count} {}", shorten(name))));
     if column.nulls > 0 {
         parts.push(format!("{} null", column.nulls));

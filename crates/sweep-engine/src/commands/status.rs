@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{Lines as _, ResultArgs};
-use crate::store::{FolderStatus, RunStage, shard_list, status};
+use crate::store::{FolderStatus, RunStage, format_shard_numbers, read_status};
 use crate::{Error, Exit, Job, Model, Plan, show};
 
 /// Arguments of `sweep status`.
@@ -39,7 +39,7 @@ pub fn show_job(
     output: &Path,
     continuation: [&str; 3],
 ) -> Result<Exit, Error> {
-    let folder_status = status(output, job)?;
+    let folder_status = read_status(output, job)?;
     show(&if args.json {
         format!("{:#}\n", json!(folder_status))
     } else {
@@ -86,7 +86,7 @@ fn summary(
     }
     if let Some(shards) = folder_status.shards {
         text.line("shards", shards);
-        let missing = shard_list(folder_status.missing_shard_numbers.iter().copied());
+        let missing = format_shard_numbers(folder_status.missing_shard_numbers.iter().copied());
         if !missing.is_empty() {
             let run = format!("{}{run_options} --shard I/{shards}", args.target.command(verb));
             text.line("again", format!("{run}, for I = {missing}"));

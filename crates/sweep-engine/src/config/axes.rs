@@ -4,11 +4,11 @@ use sweep_parameter::{Range, decimal};
 use sweep_results::nearest;
 
 use super::draft::ClaimedNumbers;
-use super::list::{self, List};
+use super::list::{self, PointList};
 use super::parameters::{MAX_COMPARED_NAMES, find};
 use super::report::{Diagnostic, Report};
 use super::section::check_number;
-use super::{Draft, Field, Located, Location, Section, quoted, refused_number, short};
+use super::{Draft, Field, Located, Location, Section, quote, refused_number, shorten};
 use crate::Model;
 use crate::design::{DesignRule, DistributionShape, MAX_AXES, TAIL_DEVIATIONS};
 use crate::plan::MAX_POINTS;
@@ -16,7 +16,7 @@ use crate::{Axis, AxisTolerance, AxisValues, Design, Distribution, ModelParamete
 
 /// Claims the numbers that an axis writes. Returns false, after a report, if another axis writes
 /// one of them. `has_tolerance` is true for an axis with a tolerance about the model's own number.
-fn claim<M: Model>(
+fn claim_numbers<M: Model>(
     name: &Located<&str>,
     parameter: &ModelParameter<M>,
     claimed: &mut ClaimedNumbers,
@@ -51,7 +51,7 @@ fn is_fixed<M: Model>(swept_parameter: &ModelParameter<M>, draft: &Draft<'_, M>)
 }
 
 /// Reads every `[[axis]]`: the values of a grid, or the ranges of a design.
-pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
+pub fn read_axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
     let report = root.report;
     let mut claimed = ClaimedNumbers::default();
     let sections = root.tables("axis");
@@ -75,11 +75,13 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
         let field = section.text("parameter");
         let name = section.require(field, "parameter", "the name of a parameter");
         let parameter = name.as_ref().and_then(|name| find(name, draft));
-        let swept = parameter.as_ref().map(|parameter| SweptParameter::new(parameter, draft));
-        let swept = swept.unwrap_or(SweptParameter { name: "", range: Range::Any, value: None });
+        let swept_parameter =
+            parameter.as_ref().map(|parameter| SweptParameter::new(parameter, draft));
+        let swept_parameter =
+            swept_parameter.unwrap_or(SweptParameter { name: "", range: Range::Any, value: None });
         let values = match &design {
-            Some(design) => read_design_values(&section, &swept, design.points()),
-            None => values(&section, &swept),
+            Some(design) => read_design_values(&section, &swept_parameter, design.points()),
+            None => read_values(&section, &swept_parameter),
         };
         let has_tolerance = section.key_location("tolerance").is_some()
             || section.has_inner_key("distribution", "tolerance");
@@ -100,11 +102,11 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
             points = product;
         }
         if let (Some(name), Some(parameter)) = (name, parameter)
-            && claim(&name, &parameter, &mut claimed, has_tolerance, draft)
+            && claim_numbers(&name, &parameter, &mut claimed, has_tolerance, draft)
             && let (Some(Located { value, location }), Some(_)) = (values, points)
         {
-            let SpreadValues { values, tolerance } = value;
-            add(Axis { parameter, values, tolerance }, location, draft);
+            let ValuesWithTolerance { values, tolerance } = value;
+            add_axis(Axis { parameter, values, tolerance }, location, draft);
         }
     }
     // A plan whose axes are all fixed is a single point.
@@ -113,13 +115,13 @@ pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Dr
 }
 
 /// Adds an axis to the plan.
-pub fn add<M: Model>(axis: Axis<M>, location: Location, draft: &mut Draft<'_, M>) {
+pub fn add_axis<M: Model>(axis: Axis<M>, location: Location, draft: &mut Draft<'_, M>) {
     draft.report.record_location(format!("axis[{}]", draft.plan.axes.len()), location);
     draft.plan.axes.push(axis);
 }
 
 /// Makes the columns of a list the plan's axes.
-pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Draft<'_, M>) {
+pub fn add_list_axes<M: Model>(root: &Section<'_>, mut list: PointList, draft: &mut Draft<'_, M>) {
     let report = root.report;
     for section in root.tables("axis") {
         let expected = "the columns of the list are the axes; remove this";
@@ -140,11 +142,11 @@ pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Dra
             column.values.iter().enumerate().filter(|(_, value)| !range.contains(**value))
         {
             is_valid = false;
-            if list.table.is_refused(value) {
+            if list.table.is_rejected(value) {
                 continue;
             }
             report.push_with(|sources| {
-                let description = format!("value {} of {}", row + 1, quoted(name.value));
+                let description = format!("value {} of {}", row + 1, quote(name.value));
                 refused_number(
                     &description,
                     value,
@@ -153,15 +155,15 @@ pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Dra
                 )
             });
         }
-        if claim(&name, &parameter, &mut claimed, false, draft) && is_valid {
+        if claim_numbers(&name, &parameter, &mut claimed, false, draft) && is_valid {
             let values = AxisValues::List(column.values);
             let axis = Axis { parameter, values, tolerance: None };
-            add(axis, name.location.clone(), draft);
+            add_axis(axis, name.location.clone(), draft);
         }
     }
     if draft.plan.axes.is_empty() && report.is_clean() {
         let refusal = Diagnostic::new("the list of points has no column of a parameter")
-            .help("`[columns]` in the grid file may name what its columns hold");
+            .with_help("`[columns]` in the grid file may name what its columns hold");
         let expected = "expected a file whose header names parameters";
         let location = report.location("design.file");
         report.push(
@@ -222,7 +224,7 @@ impl<'p> SweptParameter<'p> {
             let percent = text.strip_suffix('%').map(str::trim_end);
             let number = percent.unwrap_or(text).parse().ok();
             let Some(number) = number.filter(|number| Range::Positive.contains(*number)) else {
-                let title = format!("`tolerance` = \"{}\" is no tolerance", short(text));
+                let title = format!("`tolerance` = \"{}\" is no tolerance", shorten(text));
                 let expected = "expected a positive number in the parameter's unit, or percent of \
                     its value as in \"5 %\"";
                 return report.refuse(&location, title, expected);
@@ -244,7 +246,7 @@ impl<'p> SweptParameter<'p> {
             };
             let [from, to] = [from.min(to), from.max(to)];
             for end in [from, to] {
-                check_number(&quoted(self.name), end, location.clone(), self.range, report)?;
+                check_number(&quote(self.name), end, location.clone(), self.range, report)?;
             }
             if from == to {
                 let title = format!("`{}` is 0, and so is every percentage of it", self.name);
@@ -264,13 +266,13 @@ impl<'p> SweptParameter<'p> {
 }
 
 /// The values of an axis, with the tolerance from which they follow.
-struct SpreadValues {
+struct ValuesWithTolerance {
     values: AxisValues,
     tolerance: Option<AxisTolerance>,
 }
 
-fn without_tolerance(found: Located<AxisValues>) -> Located<SpreadValues> {
-    let value = SpreadValues { values: found.value, tolerance: None };
+fn without_tolerance(found: Located<AxisValues>) -> Located<ValuesWithTolerance> {
+    let value = ValuesWithTolerance { values: found.value, tolerance: None };
     Located { value, location: found.location }
 }
 
@@ -290,9 +292,9 @@ const TOLERANCE_DEVIATIONS: f64 = 3.0;
 
 impl ToleranceRange {
     /// Returns evenly spaced values with both ends.
-    const fn values(self, count: u64) -> SpreadValues {
+    const fn read_values(self, count: u64) -> ValuesWithTolerance {
         let values = AxisValues::Linear { from: self.from, to: self.to, count };
-        SpreadValues { values, tolerance: Some(self.tolerance) }
+        ValuesWithTolerance { values, tolerance: Some(self.tolerance) }
     }
 
     /// Returns the shape of a distribution within the tolerance, by its index in [`DISTRIBUTIONS`];
@@ -315,21 +317,21 @@ impl ToleranceRange {
 /// Reads a distribution truncated at `from` and `to`.
 fn read_distribution(
     section: Section<'_>,
-    swept: &SweptParameter<'_>,
+    swept_parameter: &SweptParameter<'_>,
     points: u64,
-) -> Option<Located<SpreadValues>> {
+) -> Option<Located<ValuesWithTolerance>> {
     let location = section.location().clone();
     let report = section.report;
-    let range = swept.range;
+    let range = swept_parameter.range;
     let field = section.choice("kind", &DISTRIBUTIONS.map(|(kind, _)| kind));
     let kind = section.require(field, "kind", "`normal`, `lognormal` or `uniform`");
     let kind = kind.map(|kind| kind.value);
     let number = |key, range, is_required: bool| {
         let field = section.number(key, range);
-        let field = section.expect(field, key, is_required.then_some("a number"));
+        let field = section.report_if_missing(field, key, is_required.then_some("a number"));
         field.into_located().map(|number| number.value)
     };
-    let field = swept.tolerance(&section);
+    let field = swept_parameter.tolerance(&section);
     let mut tolerance = None;
     let (shape, bounds) = if let Field::Absent = field {
         // The keys of an unknown kind are unknown, so that the keys of all kinds are read with
@@ -409,34 +411,35 @@ fn read_distribution(
             AxisValues::Distributed(Distribution { shape, from, to })
         }
     };
-    Some(Located { value: SpreadValues { values, tolerance }, location })
+    Some(Located { value: ValuesWithTolerance { values, tolerance }, location })
 }
 
 /// Reads the range or distribution over which a design spreads `points` points.
 fn read_design_values(
     section: &Section<'_>,
-    swept: &SweptParameter<'_>,
+    swept_parameter: &SweptParameter<'_>,
     points: u64,
-) -> Option<Located<SpreadValues>> {
+) -> Option<Located<ValuesWithTolerance>> {
     let reason = "a design spreads its points over `range = { from = ..., to = ... }`";
     section.misplace(&["values"], reason);
-    let tolerance = swept.tolerance(section);
+    let tolerance = swept_parameter.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
         section.misplace(&["range", "distribution"], TOLERANCE_EXCLUDES);
         section.misplace(&["count"], "the number of points belongs in [design], as `points`");
         let Located { value: range, location } = tolerance.into_located()?;
-        return Some(Located { value: range.values(2), location });
+        return Some(Located { value: range.read_values(2), location });
     }
     match section.table("distribution", "distribution = { kind, ... }").into_located() {
         Some(distributed) => {
             section.misplace(&["range"], "the distribution has its own `from` and `to`");
-            read_distribution(distributed.value, swept, points)
+            read_distribution(distributed.value, swept_parameter, points)
         }
         None => {
             let field = section.table("range", "range = { from, to }");
             let range_section =
                 section.require(field, "range", "`range = { from = ..., to = ... }`")?;
-            spacing(range_section.value, swept.range, Some(points)).map(without_tolerance)
+            read_range(range_section.value, swept_parameter.range, Some(points))
+                .map(without_tolerance)
         }
     }
 }
@@ -457,9 +460,12 @@ fn max_distinct_values(from: f64, to: f64) -> Option<u64> {
 }
 
 /// Reads the values of an axis: listed, or as a range.
-fn values(section: &Section<'_>, swept: &SweptParameter<'_>) -> Option<Located<SpreadValues>> {
-    let range = swept.range;
-    let tolerance = swept.tolerance(section);
+fn read_values(
+    section: &Section<'_>,
+    swept_parameter: &SweptParameter<'_>,
+) -> Option<Located<ValuesWithTolerance>> {
+    let range = swept_parameter.range;
+    let tolerance = swept_parameter.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
         section.misplace(&["values", "range"], TOLERANCE_EXCLUDES);
         let expected = "the number of values, both ends included";
@@ -477,7 +483,7 @@ fn values(section: &Section<'_>, swept: &SweptParameter<'_>) -> Option<Located<S
                 format!("expected at most {max_count}"),
             );
         }
-        return Some(Located { value: range.values(count), location });
+        return Some(Located { value: range.read_values(count), location });
     }
     let value_list = section.valid_numbers("values", range);
     let range_section = section.table("range", "range = { from, to, count }");
@@ -490,10 +496,10 @@ fn values(section: &Section<'_>, swept: &SweptParameter<'_>) -> Option<Located<S
             None
         }
         (Field::Present(value_list), Field::Absent) => {
-            list(value_list, section.report).map(without_tolerance)
+            check_value_list(value_list, section.report).map(without_tolerance)
         }
         (Field::Absent, Field::Present(range_section)) => {
-            spacing(range_section.value, range, None).map(without_tolerance)
+            read_range(range_section.value, range, None).map(without_tolerance)
         }
         (Field::Present(value_list), Field::Present(range_section)) => {
             let diagnostic = Diagnostic::new("an axis has both `values` and `range`");
@@ -508,7 +514,7 @@ fn values(section: &Section<'_>, swept: &SweptParameter<'_>) -> Option<Located<S
     }
 }
 
-fn list(
+fn check_value_list(
     value_list: Located<(Vec<Located<f64>>, bool)>,
     report: &Report,
 ) -> Option<Located<AxisValues>> {
@@ -538,7 +544,7 @@ fn list(
 }
 
 /// Reads a range with a count, or one for the `points` points of a design.
-pub fn spacing(
+pub fn read_range(
     section: Section<'_>,
     range: Range,
     points: Option<u64>,
@@ -558,12 +564,12 @@ pub fn spacing(
             Some(Located { value, location: location.clone() })
         }
     };
-    let logarithmic = section.choice("spacing", &["linear", "log"]).or_default(0);
+    let is_logarithmic = section.choice("spacing", &["linear", "log"]).or_default(0);
     section.finish();
     let from = from?;
     let to = to?;
     let count = count?;
-    let logarithmic = logarithmic? == 1;
+    let is_logarithmic = is_logarithmic? == 1;
     let is_point = from.value == to.value;
     let is_design = points.is_some();
     let [low, high] = [from.value, to.value].map(decimal);
@@ -579,7 +585,7 @@ pub fn spacing(
         let title = "one value cannot be both ends of a range";
         return report.refuse(&count.location, title, "expected at least 2");
     }
-    if logarithmic && !(from.value > 0.0 && to.value > 0.0) {
+    if is_logarithmic && !(from.value > 0.0 && to.value > 0.0) {
         let end = if from.value > 0.0 { &to } else { &from };
         let title = format!("{} has no logarithm", decimal(end.value));
         let expected = "expected a number greater than 0, or spacing = \"linear\"";
@@ -600,7 +606,7 @@ pub fn spacing(
     let from = from.value;
     let to = to.value;
     let count = if is_design { 2 } else { count.value };
-    let value = if logarithmic {
+    let value = if is_logarithmic {
         AxisValues::Log { from, to, count }
     } else {
         AxisValues::Linear { from, to, count }

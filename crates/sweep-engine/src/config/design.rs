@@ -16,7 +16,7 @@ const MAX_SOBOL_POINTS: u64 = 1 << 32;
 
 /// Walks over the section. After reading, a list has no points yet.
 pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
-    keys.table(Key::new("design", ""), |keys| {
+    keys.walk_table(Key::new("design", ""), |keys| {
         let rules = DesignRule::ALL.map(|(_, name, description)| (name, description));
         let words = [&rules[..], &[("list", "points as listed")]].concat();
         let current_rule = design.as_ref().map(Design::method);
@@ -24,11 +24,12 @@ pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
         let key =
             Key::new("method", "").required("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
         let variants = Variants { words, default: None, settable_count: 0 };
-        let selected_rule =
-            keys.variants(key, &variants, current_rule, |keys, k| match DesignRule::ALL.get(k) {
+        let selected_rule = keys.walk_variants(key, &variants, current_rule, |keys, k| {
+            match DesignRule::ALL.get(k) {
                 Some((rule, ..)) => walk_spread(*rule, design, keys),
                 None => walk_list(design, keys),
-            });
+            }
+        });
         // A placeholder for a rejected design lets the axes be read.
         if selected_rule.is_none() && keys.section().is_some() && design.is_none() {
             *design = Some(Design::Spread {
@@ -54,7 +55,7 @@ fn walk_list(design: &mut Option<Design>, keys: &mut Keys<'_>) {
         _ => Default::default(),
     };
     let key = key.required("a CSV or Parquet file, relative to this file");
-    let field = keys.key(key, &Form::Text, &mut file);
+    let field = keys.walk_key(key, &Form::Text, &mut file);
     keys.write("points", points.into());
     keys.write("hash", hash.as_str().into());
     if field.into_located().is_some() || keys.section().is_none() {
@@ -73,9 +74,9 @@ fn walk_spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_
     let max_points = if rule == DesignRule::Sobol { MAX_SOBOL_POINTS } else { MAX_POINTS };
     let key =
         Key::new("points", "the number of points").required("the number of points").settable();
-    let points_field = keys.key(key, &Form::Whole(1..=max_points), &mut points);
+    let points_field = keys.walk_key(key, &Form::Whole(1..=max_points), &mut points);
     let key = Key::new("seed", "the seed of the random positions").settable();
-    let seed_field = keys.key(key, &Form::Whole(0..=MAX_SEED), &mut seed);
+    let seed_field = keys.walk_key(key, &Form::Whole(0..=MAX_SEED), &mut seed);
     for (name, field) in [("points", points_field), ("seed", seed_field)] {
         if let (None, Field::Present(_)) = (numbers, field) {
             let title =

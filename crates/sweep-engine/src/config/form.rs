@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use serde_json::{Value, json};
 use sweep_parameter::{Parameter, Range};
 
-use super::words::names;
+use super::words::read_words;
 use super::{Diagnostic, Field, Located, NamedArgument, Section};
 
 /// A kind of value.
@@ -22,14 +22,14 @@ pub enum Form<'k> {
     /// Some words of a list, each once. The first field names them in messages.
     Words(&'static str, &'k [&'static str]),
     /// An array of numbers.
-    Numbers(Numbers),
+    Numbers(NumberArray),
     /// A value with a reader and a schema of its own, which no option sets.
-    Own(&'k dyn Fn(&Section<'_>, &'static str) -> Field<Value>, Value),
+    Custom(&'k dyn Fn(&Section<'_>, &'static str) -> Field<Value>, Value),
 }
 
 /// An array of numbers.
 #[derive(Clone)]
-pub struct Numbers {
+pub struct NumberArray {
     /// The range of each number in the schema.
     pub range: Range,
     /// The range of each number when it is read, if it is checked later.
@@ -60,27 +60,27 @@ impl Form<'_> {
             }
             Self::Text => section.text(key).map(|found| found.value.into()),
             Self::Word(all) => section.choice(key, all).map(|found| all[found.value].into()),
-            Self::Words(noun, all) => names(section, key, noun, all),
+            Self::Words(noun, all) => read_words(section, key, noun, all),
             Self::Numbers(numbers) => numbers.read(section, key, location_key),
-            Self::Own(read, _) => read(section, key),
+            Self::Custom(read, _) => read(section, key),
         }
     }
 
     /// Reads the value from an option.
-    pub fn read_option(&self, written: &NamedArgument<'_>) -> Option<Value> {
+    pub fn read_option(&self, argument: &NamedArgument<'_>) -> Option<Value> {
         Some(match self {
-            Self::Number(range) => written.number(*range)?.value.into(),
-            Self::Whole(bounds) => written.whole_number(bounds)?.into(),
-            Self::Word(all) => all[written.choice(all)?].into(),
-            Self::Words(noun, all) => written.list(noun, all)?.into(),
-            Self::Text | Self::Numbers(_) | Self::Own(..) => return None,
+            Self::Number(range) => argument.number(*range)?.value.into(),
+            Self::Whole(bounds) => argument.whole_number(bounds)?.into(),
+            Self::Word(all) => all[argument.choice(all)?].into(),
+            Self::Words(noun, all) => argument.list(noun, all)?.into(),
+            Self::Text | Self::Numbers(_) | Self::Custom(..) => return None,
         })
     }
 
     /// Returns the schema of the value.
     pub fn schema(&self) -> Value {
         match self {
-            Self::Number(range) => number(*range),
+            Self::Number(range) => number_schema(*range),
             Self::Whole(bounds) => {
                 json!({ "type": "integer", "minimum": bounds.start(), "maximum": bounds.end() })
             }
@@ -89,18 +89,18 @@ impl Form<'_> {
             Self::Words(_, all) => json!({
                 "type": "array", "items": { "enum": all }, "minItems": 1, "uniqueItems": true,
             }),
-            Self::Numbers(Numbers { range, count, .. }) => json!({
+            Self::Numbers(NumberArray { range, count, .. }) => json!({
                 "type": "array",
-                "items": number(*range),
+                "items": number_schema(*range),
                 "minItems": count.start().max(&1),
                 "maxItems": count.end(),
             }),
-            Self::Own(_, schema) => schema.clone(),
+            Self::Custom(_, schema) => schema.clone(),
         }
     }
 }
 
-impl Numbers {
+impl NumberArray {
     /// Returns an array of numbers in a range.
     pub fn new(range: Range, count: RangeInclusive<usize>, expected: impl Into<String>) -> Self {
         Self {
@@ -119,13 +119,13 @@ impl Numbers {
                 let title = format!("`{key}` has {} numbers", found.value.len());
                 let refusal =
                     Diagnostic::new(title).at_location(&found.location, self.expected.as_str());
-                section.report.push(self.help.into_iter().fold(refusal, Diagnostic::help));
+                section.report.push(self.help.into_iter().fold(refusal, Diagnostic::with_help));
                 return None;
             }
             let record = |(k, number): (usize, Located<f64>)| {
-                let own_key = self.location_keys.get(k).cloned();
+                let model_file_key = self.location_keys.get(k).cloned();
                 section.report.record_location(
-                    own_key.unwrap_or_else(|| format!("{location_key}[{k}]")),
+                    model_file_key.unwrap_or_else(|| format!("{location_key}[{k}]")),
                     number.location,
                 );
                 number.value
@@ -137,7 +137,7 @@ impl Numbers {
 }
 
 /// Returns the schema of a number in a range.
-pub fn number(range: Range) -> Value {
+pub fn number_schema(range: Range) -> Value {
     let largest = Range::LARGEST;
     match range {
         Range::Any => json!({ "type": "number", "minimum": -largest, "maximum": largest }),

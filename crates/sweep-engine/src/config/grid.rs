@@ -1,11 +1,11 @@
 //! Reading of grid files with the constants and options of the command line.
 
+use super::arguments::argument_name;
 use super::draft::Draft;
 use super::keys::Options;
 use super::sections::{describe_keys, walk, walk_sections};
 use super::source::{Location, SourceId, is_blank};
-use super::syntax::{self, parse};
-use super::written::name_of;
+use super::syntax::{self, parse_toml};
 use super::{
     Diagnostic, Field, GridInput, KeyWalk, Keys, Located, Report, Section, axes, design, list,
     parameters,
@@ -15,22 +15,22 @@ use crate::{Design, Plan, program};
 use toml::de::DeTable;
 
 /// Reads the grid file and applies the constants. Returns `None` if the file has no text.
-pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
+pub fn read_draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
     let GridInput { path, text, sets, at_arguments, .. } = input;
     let path_text = path.display();
     let (text, source) = match text {
         Some(text) => (text.clone(), report.add(path_text.to_string(), text.as_str())),
-        None => syntax::text(path, "grid", M::ABOUT.to_start, report)?,
+        None => syntax::read_text(path, "grid", M::ABOUT.start_advice, report)?,
     };
     if is_blank(&text) {
         let location = Location::new(source, 0..0);
         let refusal = Diagnostic::new(format!("the grid file {path_text} is empty"))
             .at_location(&location, "expected a grid");
-        report.push(M::ABOUT.to_start.into_iter().fold(refusal, Diagnostic::help));
+        report.push(M::ABOUT.start_advice.into_iter().fold(refusal, Diagnostic::with_help));
         return None;
     }
-    let table = parse(&text, source, report);
-    if is_another::<M>("grid", table.get_ref(), source, report) {
+    let table = parse_toml(&text, source, report);
+    if refuse_other_kind::<M>("grid", table.get_ref(), source, report) {
         return None;
     }
     let root = Section::new("the grid file", Location::new(source, 0..0), table.get_ref(), report);
@@ -40,9 +40,9 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
     walk_sections(&mut draft.plan, &mut keys, Some(input));
     let names = describe_keys::<M>().settable_keys;
     let (options, sets): (Vec<&String>, _) =
-        sets.iter().partition(|set| set.contains('=') && names.contains(&name_of(set)));
+        sets.iter().partition(|set| set.contains('=') && names.contains(&argument_name(set)));
     parameters::set_constants(keys.section()?, sets, at_arguments, &mut draft);
-    draft.plan.reading_notes.columns = columns(keys.section()?);
+    draft.plan.reading_notes.columns = read_columns(keys.section()?);
     let design_field = design::walk(&mut draft.plan.design, &mut keys);
     let root = keys.section()?;
     match (design_field, draft.plan.design.take()) {
@@ -52,15 +52,16 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
                 let parameter = model.find(name).ok()?;
                 Some((parameter.name.into_owned(), parameter.unit.to_owned()))
             };
-            let names = list::Names { known: &known, renamed: &draft.plan.reading_notes.columns };
+            let names =
+                list::ColumnNames { known: &known, renamed: &draft.plan.reading_notes.columns };
             match list::read(&file, path, &names, report) {
-                Some(list) => axes::listed_axes(root, list, &mut draft),
+                Some(list) => axes::add_list_axes(root, list, &mut draft),
                 None => drop(root.tables("axis")),
             }
         }
         // If [design] is no table, it is unknown whether the axes are those of a grid or a design.
         (Field::Rejected, None) => drop(root.tables("axis")),
-        (_, design) => axes::axes(root, design, &mut draft),
+        (_, design) => axes::read_axes(root, design, &mut draft),
     }
     keys.finish();
     let options = Options::read(options, report);
@@ -70,7 +71,7 @@ pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<D
 }
 
 /// Reads `[columns]`: headers of lists and measurements with the names that they stand for.
-fn columns(root: &Section<'_>) -> Vec<(String, String)> {
+fn read_columns(root: &Section<'_>) -> Vec<(String, String)> {
     let Some(section) = root.table("columns", "[columns]").into_located() else {
         return Vec::new();
     };
@@ -88,8 +89,8 @@ pub const STUDY_KEYS: [&str; 8] =
 
 /// Rejects a file of another kind: most of its keys are those of the other kind, and no key is only
 /// of the expected kind. Returns whether the file was rejected.
-pub fn is_another<M: Model>(
-    own: &str,
+pub fn refuse_other_kind<M: Model>(
+    expected_kind: &str,
     table: &DeTable<'_>,
     source: SourceId,
     report: &Report,
@@ -100,17 +101,17 @@ pub fn is_another<M: Model>(
             ["set", "axis", "columns"].contains(&key) || grid["properties"].get(key).is_some()
         }
         "study" => STUDY_KEYS.contains(&key),
-        _ => M::ABOUT.own_file.is_some_and(|file| file.keys.contains(&key)),
+        _ => M::ABOUT.model_file.is_some_and(|file| file.keys.contains(&key)),
     };
     let keys: Vec<&str> = table.keys().map(|key| &**key.get_ref()).collect();
     let is_kind = |kind: &&str| {
         let keys_of_kind = keys.iter().filter(|key| has_key(kind, key)).count();
         2 * keys_of_kind > keys.len()
-            && keys.iter().all(|key| has_key(kind, key) || !has_key(own, key))
+            && keys.iter().all(|key| has_key(kind, key) || !has_key(expected_kind, key))
     };
-    let own_key = M::ABOUT.own_file.map_or("", |file| file.key);
-    let kinds = [own, "grid", "study", own_key];
-    let Some(kind) = kinds.into_iter().find(is_kind).filter(|kind| *kind != own) else {
+    let model_file_key = M::ABOUT.model_file.map_or("", |file| file.key);
+    let kinds = [expected_kind, "grid", "study", model_file_key];
+    let Some(kind) = kinds.into_iter().find(is_kind).filter(|kind| *kind != expected_kind) else {
         return false;
     };
     report.push_with(|sources| {
@@ -124,8 +125,8 @@ pub fn is_another<M: Model>(
             _ => format!("a grid file names it: {kind} = {name:?}"),
         };
         Diagnostic::new(format!("this is a {kind} file"))
-            .at_location(&Location::new(source, 0..0), format!("expected a {own} file"))
-            .help(help)
+            .at_location(&Location::new(source, 0..0), format!("expected a {expected_kind} file"))
+            .with_help(help)
     });
     true
 }

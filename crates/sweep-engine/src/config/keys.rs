@@ -139,7 +139,7 @@ impl Description {
         match (self.is_schema, self.variants.is_empty()) {
             (false, _) => self.entries.into(),
             (true, false) => json!({ "oneOf": self.variants }),
-            (true, true) => table(self.entries, &self.required),
+            (true, true) => object_schema(self.entries, &self.required),
         }
     }
 }
@@ -221,7 +221,7 @@ impl<'a> Keys<'a> {
 
     /// Walks over a key with its value. A wrong or missing value is reported, and the old value
     /// stays.
-    pub fn key<T: Serialize + DeserializeOwned>(
+    pub fn walk_key<T: Serialize + DeserializeOwned>(
         &mut self,
         key: Key<'_>,
         kind: &Form<'_>,
@@ -237,7 +237,11 @@ impl<'a> Keys<'a> {
             }
             KeyWalk::Read(section) => {
                 let read_field = kind.read(section, key.name, &location_key);
-                section.expect(read_field, key.name, key.expected.filter(|_| !self.is_lenient))
+                section.report_if_missing(
+                    read_field,
+                    key.name,
+                    key.expected.filter(|_| !self.is_lenient),
+                )
             }
             KeyWalk::Set(options) if key.can_be_set => options.value(key.name, kind, &old_value),
             KeyWalk::Describe(description) if description.is_schema => {
@@ -262,7 +266,7 @@ impl<'a> Keys<'a> {
     }
 
     /// Walks over a key with some of `all`, by their names; `noun` names them in messages.
-    pub fn words<T: Copy>(
+    pub fn walk_words<T: Copy>(
         &mut self,
         key: Key<'_>,
         noun: &'static str,
@@ -272,19 +276,19 @@ impl<'a> Keys<'a> {
     ) -> Field<()> {
         let names: Vec<&str> = all.iter().copied().map(name).collect();
         let mut words: Vec<String> = value.iter().map(|item| name(*item).to_owned()).collect();
-        let field = self.key(key, &Form::Words(noun, &names), &mut words);
+        let field = self.walk_key(key, &Form::Words(noun, &names), &mut words);
         let find = |word: &String| all.iter().copied().find(|item| name(*item) == word);
         *value = words.iter().filter_map(find).collect();
         field
     }
 
     /// Walks over a table under a key.
-    pub fn table(&mut self, key: Key<'_>, walk: impl FnOnce(&mut Keys<'a>)) -> Field<()> {
+    pub fn walk_table(&mut self, key: Key<'_>, walk: impl FnOnce(&mut Keys<'a>)) -> Field<()> {
         let name = key.name;
         let keys = |inner| Keys { location_prefix: format!("{name}."), ..Keys::new(inner) };
         match &mut self.walk {
             KeyWalk::Read(root) => root
-                .expect(root.table(name, &format!("[{name}]")), name, key.expected)
+                .report_if_missing(root.table(name, &format!("[{name}]")), name, key.expected)
                 .map(|section| {
                     root.report.record_location(name, section.location);
                     let mut keys = keys(KeyWalk::Read(section.value));
@@ -307,7 +311,7 @@ impl<'a> Keys<'a> {
 
     /// Walks over an array of tables under a key: the tables in `read`, or `count` described ones.
     /// `walk` takes the index of a table.
-    pub fn tables(
+    pub fn walk_tables(
         &mut self,
         key: Key<'_>,
         read: Vec<Section<'a>>,
@@ -343,7 +347,7 @@ impl<'a> Keys<'a> {
     /// Walks over a key whose word decides which other keys the table has. `walk` takes the index
     /// of a word and walks over its keys; `current` is the current word. Returns the index of the
     /// selected word.
-    pub fn variants(
+    pub fn walk_variants(
         &mut self,
         key: Key<'_>,
         variants: &Variants,
@@ -373,7 +377,7 @@ impl<'a> Keys<'a> {
             if let KeyWalk::Set(_) = self.walk { variants.settable_count } else { names.len() };
         let mut word = current.map(|current| names[current].to_owned());
         let field =
-            self.key(Key { expected, ..key }, &Form::Word(&names[..allowed_count]), &mut word);
+            self.walk_key(Key { expected, ..key }, &Form::Word(&names[..allowed_count]), &mut word);
         if let (KeyWalk::Set(options), Field::Present(field)) = (&self.walk, &field) {
             // The word decides on the whole table, so that its location is that of the table.
             options.report.record_location(
@@ -408,7 +412,7 @@ pub struct Variants {
 }
 
 /// Returns the schema of an object with these properties and no others.
-pub fn table(
+pub fn object_schema(
     properties: impl IntoIterator<Item = (impl Into<String>, Value)>,
     required: &[&str],
 ) -> Value {

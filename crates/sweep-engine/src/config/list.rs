@@ -16,13 +16,13 @@ use std::io::Read as _;
 use std::path::Path;
 
 use super::report::{Diagnostic, Report};
-use super::section::{counted, cut, quoted};
-use super::source::{Located, Location, SourceId, Sources, beside};
+use super::section::{format_count, quote, truncate};
+use super::source::{Located, Location, SourceId, Sources, resolve_beside};
 use crate::design::Design;
 use layout::TextLine;
 use sweep_files::regular;
 
-pub use names::{ANY_UNIT, Names};
+pub use names::{ANY_UNIT, ColumnNames};
 
 /// Maximum size of a list, bytes. Basis: it holds the maximum number of values. Doubling it doubles
 /// the memory of a list.
@@ -47,7 +47,7 @@ const TIME_COLUMN: &str = "time_s";
 const INDEX_COLUMNS: [&str; 3] = ["__index_level_0__", "Unnamed: 0", "index"];
 
 /// Returns whether a column of this name only numbers rows.
-pub fn is_index(name: &str) -> bool {
+pub fn is_index_column(name: &str) -> bool {
     name.is_empty() || INDEX_COLUMNS.contains(&name)
 }
 
@@ -55,22 +55,22 @@ pub fn is_index(name: &str) -> bool {
 pub struct NumberTable {
     /// The columns: known columns of equal length, and ignored columns.
     pub columns: Vec<ListColumn>,
-    rows: RowLocations,
+    row_locations: RowLocations,
     /// The number of lines before the line of names.
     preamble_lines: usize,
 }
 
 impl NumberTable {
     /// Reads a CSV or Parquet file of numbers; `None` after mistakes, which are reported.
-    pub fn read(path: &Path, names: &Names<'_>, report: &Report) -> Option<Self> {
-        let path_text = show_path(path);
+    pub fn read(path: &Path, names: &ColumnNames<'_>, report: &Report) -> Option<Self> {
+        let path_text = shorten_path(path);
         let file = Location::new(report.add(path_text.as_str(), String::new()), 0..0);
         match read_table(path, &file, true, names, report) {
             Ok((table, _)) => report.is_clean().then_some(table),
             Err(reason) => {
                 let title = format!("cannot read {path_text}: {reason}");
                 let help = "expected a CSV or Parquet file of numbers under a line of names";
-                report.push(Diagnostic::new(title).help(help));
+                report.push(Diagnostic::new(title).with_help(help));
                 None
             }
         }
@@ -80,7 +80,7 @@ impl NumberTable {
     pub fn from_columns(
         name: &str,
         columns: Vec<(String, Vec<f64>)>,
-        names: &Names<'_>,
+        names: &ColumnNames<'_>,
         report: &Report,
     ) -> Self {
         let headers: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
@@ -105,23 +105,23 @@ impl NumberTable {
         }
         Self {
             columns: table,
-            rows: RowLocations::Binary(Location::new(source, 0..0)),
+            row_locations: RowLocations::Binary(Location::new(source, 0..0)),
             preamble_lines: 0,
         }
     }
 
     /// Returns whether a value was rejected when it was read.
-    pub fn is_refused(&self, value: f64) -> bool {
-        matches!(self.rows, RowLocations::Lines { .. }) && value.is_nan()
+    pub fn is_rejected(&self, value: f64) -> bool {
+        matches!(self.row_locations, RowLocations::Lines { .. }) && value.is_nan()
     }
 
     /// Returns the location of a value. `column` is the index of the column in the file, and `row`
     /// the index of the row, both from 0.
     pub fn locate(&self, sources: &Sources, column: usize, row: usize) -> Location {
-        match &self.rows {
+        match &self.row_locations {
             RowLocations::Binary(location) => location.clone(),
-            RowLocations::Lines { source, starts, separator } => {
-                let start = starts.get(row).map_or(0, |&start| start as usize);
+            RowLocations::Lines { source, row_starts, separator } => {
+                let start = row_starts.get(row).map_or(0, |&start| start as usize);
                 let line = TextLine::at(sources.text(*source), start);
                 let span = line.cells(*separator).nth(column).map(|(_, location)| location);
                 Location::new(*source, span.unwrap_or(start..start))
@@ -131,7 +131,7 @@ impl NumberTable {
 
     /// Returns the text of a value in a file of text; the indices are those of [`Self::locate`].
     pub fn cell(&self, report: &Report, column: usize, row: usize) -> Option<String> {
-        let RowLocations::Lines { source, .. } = &self.rows else { return None };
+        let RowLocations::Lines { source, .. } = &self.row_locations else { return None };
         let sources = report.sources();
         let cell = sources.text(*source).get(self.locate(&sources, column, row).span)?;
         Some(cell.trim_matches('"').to_owned())
@@ -143,14 +143,14 @@ impl NumberTable {
         if self.preamble_lines > 0 {
             notes.push(format!(
                 "{} before the names left out",
-                counted(self.preamble_lines, "line")
+                format_count(self.preamble_lines, "line")
             ));
         }
         let ignored: Vec<String> = self
             .columns
             .iter()
             .filter(|column| !column.is_known)
-            .map(|column| quoted(&column.header))
+            .map(|column| quote(&column.header))
             .collect();
         if !ignored.is_empty() {
             let (named, ellipsis) = ignored.split_at(ignored.len().min(MAX_NAMED_COLUMNS));
@@ -163,7 +163,7 @@ impl NumberTable {
             .iter()
             .filter(|column| column.is_known && column.header != column.name.value);
         let renamed_columns = renamed_columns
-            .map(|column| format!("{} is {}", quoted(&column.header), column.name.value));
+            .map(|column| format!("{} is {}", quote(&column.header), column.name.value));
         let renamed_columns: Vec<String> = renamed_columns.collect();
         if !renamed_columns.is_empty() {
             notes.push(renamed_columns.join(", "));
@@ -177,7 +177,7 @@ impl NumberTable {
 const MAX_NAMED_COLUMNS: usize = 8;
 
 /// A list of points.
-pub struct List {
+pub struct PointList {
     /// The design of the plan.
     pub design: Design,
     /// The parameters with their values.
@@ -204,14 +204,17 @@ impl ListColumn {
     /// Returns a value as a clock time, if the column holds instants or times of day in a file
     /// without text.
     pub fn clock_time(&self, row: usize) -> Option<String> {
-        self.values.get(row).filter(|_| self.is_clock).map(|seconds| clock::text(*seconds))
+        self.values
+            .get(row)
+            .filter(|_| self.is_clock)
+            .map(|seconds| clock::format_clock_time(*seconds))
     }
 }
 
 /// The locations of rows.
 enum RowLocations {
     /// Lines of a text that begin at these bytes.
-    Lines { source: SourceId, starts: Vec<u32>, separator: char },
+    Lines { source: SourceId, row_starts: Vec<u32>, separator: char },
     /// Rows without a text; messages name the file.
     Binary(Location),
 }
@@ -220,8 +223,8 @@ enum RowLocations {
 type ListError = String;
 
 /// Returns a path as messages show it.
-fn show_path(path: &Path) -> String {
-    cut(&path.display().to_string(), MAX_PATH_CHARACTERS)
+fn shorten_path(path: &Path) -> String {
+    truncate(&path.display().to_string(), MAX_PATH_CHARACTERS)
 }
 
 /// Reads the table of a file and the hash of its bytes; mistakes are reported at `file`. With
@@ -230,7 +233,7 @@ fn read_table(
     path: &Path,
     file: &Location,
     allows_missing: bool,
-    names: &Names<'_>,
+    names: &ColumnNames<'_>,
     report: &Report,
 ) -> Result<(NumberTable, String), ListError> {
     let bytes = read_bytes(path)?;
@@ -238,7 +241,7 @@ fn read_table(
     if bytes.starts_with(b"PAR1") {
         let mut columns = Vec::new();
         for (index, parquet_column) in
-            parquet::columns(bytes, allows_missing, names)?.into_iter().enumerate()
+            parquet::read_columns(bytes, allows_missing, names)?.into_iter().enumerate()
         {
             let parquet::ParquetColumn { name, header, values, is_clock } = parquet_column;
             let name = Located { value: name, location: file.clone() };
@@ -247,31 +250,40 @@ fn read_table(
             columns.push(ListColumn { name, header, index, is_known, values, is_clock });
         }
         return Ok((
-            NumberTable { columns, rows: RowLocations::Binary(file.clone()), preamble_lines: 0 },
+            NumberTable {
+                columns,
+                row_locations: RowLocations::Binary(file.clone()),
+                preamble_lines: 0,
+            },
             hash,
         ));
     }
-    let text = text::text(bytes)?;
+    let text = text::decode_text(bytes)?;
     // The report gets the text after it is read, because this function borrows it until then.
-    let source = report.add(show_path(path), String::new());
+    let source = report.add(shorten_path(path), String::new());
     let text_table = csv::read(&text, source, allows_missing, names, report);
     report.set_text(source, text);
-    let csv::TextTable { columns, starts, separator, preamble } = text_table?;
+    let csv::TextTable { columns, row_starts, separator, preamble_lines } = text_table?;
     Ok((
         NumberTable {
             columns,
-            rows: RowLocations::Lines { source, starts, separator },
-            preamble_lines: preamble,
+            row_locations: RowLocations::Lines { source, row_starts, separator },
+            preamble_lines,
         },
         hash,
     ))
 }
 
 /// Reads a list of points.
-pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) -> Option<List> {
-    let path = beside(grid, file);
+pub(super) fn read(
+    file: &str,
+    grid: &Path,
+    names: &ColumnNames<'_>,
+    report: &Report,
+) -> Option<PointList> {
+    let path = resolve_beside(grid, file);
     let location = report.location("design.file")?;
-    let path_text = show_path(&path);
+    let path_text = shorten_path(&path);
     let (table, hash) = match read_table(&path, &location, false, names, report) {
         Ok(table_and_hash) => table_and_hash,
         Err(reason) => {
@@ -299,7 +311,7 @@ pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) 
         return report.refuse(&location, title, "expected a column of a parameter");
     }
     let design = Design::List { file: file.to_owned(), points: points as u64, hash };
-    Some(List { design, table })
+    Some(PointList { design, table })
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, ListError> {

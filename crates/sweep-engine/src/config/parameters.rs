@@ -2,10 +2,10 @@
 
 use sweep_parameter::{Range, UnknownParameter};
 
+use super::arguments::argument_name;
 use super::draft::{ClaimedNumbers, Draft, SetConstant};
-use super::written::name_of;
 use super::{
-    Diagnostic, Located, NamedArgument, NamedValues, Section, quoted, sections::describe_keys,
+    Diagnostic, Located, NamedArgument, NamedValues, Section, quote, sections::describe_keys,
 };
 use crate::Model;
 use crate::{ModelParameter, Plan, program};
@@ -51,7 +51,7 @@ pub fn set_constants<M: Model>(
 /// several values, and may have arguments for other parameters.
 pub fn fix_point<M: Model>(at_arguments: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
     let constants = read_arguments("--at", at_arguments, draft);
-    let is_given = |name: &str| at_arguments.iter().any(|argument| name_of(argument) == name);
+    let is_given = |name: &str| at_arguments.iter().any(|argument| argument_name(argument) == name);
     for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
         if is_given(&axis.parameter.name) {
             continue;
@@ -110,7 +110,7 @@ pub fn unknown_parameter<M: Model>(
     UnknownParameter { reason, is_in_no_model }: &UnknownParameter,
     model: &M,
 ) -> Diagnostic {
-    let title = format!("unknown parameter {}", quoted(name.value));
+    let title = format!("unknown parameter {}", quote(name.value));
     let diagnostic = Diagnostic::new(title).at_location(&name.location, reason.as_str());
     let tables = ["time", "integrator", "reliability"];
     let table =
@@ -118,18 +118,18 @@ pub fn unknown_parameter<M: Model>(
     match (is_in_no_model, table) {
         (true, Some(table)) => {
             let set = format!("`{}` is set in [{table}] of the grid file", name.value);
-            diagnostic.help(match name.value {
+            diagnostic.with_help(match name.value {
                 "window_s" => format!("{set}; `window_from_s` and `window_to_s` are its ends here"),
                 _ => format!("{set} and is the same at every point"),
             })
         }
         (true, None) => {
             let parameters = model.parameters();
-            let with_suggestion = diagnostic.nearest(
+            let with_suggestion = diagnostic.with_nearest_name(
                 name.value,
                 parameters.iter().take(MAX_COMPARED_NAMES).map(|parameter| &*parameter.name),
             );
-            with_suggestion.help(format!("`{} parameters` lists every name", program()))
+            with_suggestion.with_help(format!("`{} parameters` lists every name", program()))
         }
         (false, _) => diagnostic,
     }

@@ -1,7 +1,7 @@
 //! Checks of a table whose columns are the axes of a plan, in place of its grid.
 
 use super::parameters::unknown_parameter;
-use super::{Diagnostic, Diagnostics, Located, Location, Report, quoted, refused_number};
+use super::{Diagnostic, Diagnostics, Located, Location, Report, quote, refused_number};
 use crate::Model;
 use crate::{Axis, Plan};
 
@@ -22,9 +22,9 @@ where
     V: Iterator<Item = Option<f64>>,
 {
     let report = Report::default();
-    let (source, places) = report.add_header("table", names);
+    let (source, header_locations) = report.add_header("table", names);
     let mut axis_columns: Vec<Option<usize>> = vec![None; plan.axes.len()];
-    for (k, (&value, location)) in names.iter().zip(&places).enumerate() {
+    for (k, (&value, location)) in names.iter().zip(&header_locations).enumerate() {
         let name = Located { value, location: location.clone() };
         let axis_index = plan.axes.iter().position(|axis| axis.parameter.name == name.value);
         let Some(axis_index) = axis_index else {
@@ -32,10 +32,10 @@ where
             continue;
         };
         if let Some(first) = axis_columns[axis_index] {
-            let title = format!("the column {} is given twice", quoted(name.value));
+            let title = format!("the column {} is given twice", quote(name.value));
             let diagnostic =
                 Diagnostic::new(title).at_location(&name.location, "expected each axis once");
-            report.push(diagnostic.at_location(&places[first], "first given here"));
+            report.push(diagnostic.at_location(&header_locations[first], "first given here"));
             continue;
         }
         axis_columns[axis_index] = Some(k);
@@ -52,9 +52,9 @@ where
     for (axis, column) in plan.axes.iter().zip(&axis_columns) {
         if column.is_none() && axis.values.len() > 1 {
             let name = &axis.parameter.name;
-            let title = format!("the table has no column {}", quoted(name));
+            let title = format!("the table has no column {}", quote(name));
             let whole_header =
-                Location::new(source, 0..places.last().map_or(0, |last| last.span.end));
+                Location::new(source, 0..header_locations.last().map_or(0, |last| last.span.end));
             let expected = "expected a column for every axis of the plan";
             report.push(Diagnostic::new(title).at_location(&whole_header, expected));
         }
@@ -63,22 +63,27 @@ where
 }
 
 /// Returns the mistake of a column that holds no numbers.
-pub fn not_numbers(names: &[String], column: usize, found: &str) -> Diagnostics {
-    let title = format!("the column {} holds no numbers", quoted(&names[column]));
+pub fn not_numbers_mistake(names: &[String], column: usize, found: &str) -> Diagnostics {
+    let title = format!("the column {} holds no numbers", quote(&names[column]));
     column_mistake(names, column, title, format!("expected numbers, found {found}"))
 }
 
 /// Returns the mistake of a column whose length differs from that of the first column.
-pub fn other_length(names: &[String], column: usize, length: usize, first: usize) -> Diagnostics {
-    let title = format!("the column {} has {length} values", quoted(&names[column]));
+pub fn wrong_length_mistake(
+    names: &[String],
+    column: usize,
+    length: usize,
+    first: usize,
+) -> Diagnostics {
+    let title = format!("the column {} has {length} values", quote(&names[column]));
     column_mistake(names, column, title, format!("expected {first}, as the first column has"))
 }
 
 fn column_mistake(names: &[String], column: usize, title: String, expected: String) -> Diagnostics {
     let report = Report::default();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let (_, places) = report.add_header("table", &names);
-    report.push(Diagnostic::new(title).at_location(&places[column], expected));
+    let (_, header_locations) = report.add_header("table", &names);
+    report.push(Diagnostic::new(title).at_location(&header_locations[column], expected));
     report.into_diagnostics()
 }
 
@@ -90,7 +95,7 @@ fn value_off_axis<M: Model>(
     [least, greatest]: [f64; 2],
     name: &Located<&str>,
 ) -> Diagnostic {
-    let description = format!("row {} of {}", row + 1, quoted(name.value));
+    let description = format!("row {} of {}", row + 1, quote(name.value));
     let range = axis.parameter.range;
     match value {
         None => Diagnostic::new(format!("{description} has no value"))
@@ -104,7 +109,7 @@ fn value_off_axis<M: Model>(
             let axis = &axis.parameter.name;
             Diagnostic::new(title)
                 .at_location(&name.location, expected)
-                .help(format!("give `{axis}` a wider range in the plan's [[axis]]"))
+                .with_help(format!("give `{axis}` a wider range in the plan's [[axis]]"))
         }
     }
 }
@@ -114,13 +119,13 @@ fn column_without_axis<M: Model>(name: &Located<&str>, plan: &Plan<M>) -> Diagno
     if let Err(error) = plan.model.find(name.value) {
         return unknown_parameter(name, &error, &plan.model);
     }
-    let axes: Vec<String> = plan.axes.iter().map(|axis| quoted(&axis.parameter.name)).collect();
+    let axes: Vec<String> = plan.axes.iter().map(|axis| quote(&axis.parameter.name)).collect();
     let expected = match axes.as_slice() {
         [] => "this plan has no [[axis]]".to_owned(),
         axes => format!("expected the plan's axes: {}", axes.join(", ")),
     };
-    let title = format!("{} is no axis of this plan", quoted(name.value));
-    Diagnostic::new(title).at_location(&name.location, expected).help(format!(
+    let title = format!("{} is no axis of this plan", quote(name.value));
+    Diagnostic::new(title).at_location(&name.location, expected).with_help(format!(
         "add [[axis]] with parameter = \"{}\" and the range that the table may cover",
         name.value
     ))

@@ -6,7 +6,7 @@ use std::ops::Range;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 
 use super::report::{Diagnostic, Diagnostics};
-use super::section::counted;
+use super::section::format_count;
 use super::source::{Location, SourceLine, Sources, floor_char_boundary};
 
 /// Maximum length of a line that is shown whole, bytes; of a longer line, the part around the
@@ -84,7 +84,7 @@ fn window(line: &SourceLine<'_>) -> Range<usize> {
 
 /// Returns the last line, which counts the mistakes.
 fn render_summary(count: usize, beyond: usize, colour: bool) -> String {
-    let mistakes = counted(count, "mistake");
+    let mistakes = format_count(count, "mistake");
     let shown_note =
         if beyond == 0 { String::new() } else { format!(" ({} shown)", count - beyond) };
     let title = format!("{mistakes}{shown_note}, nothing was done");
@@ -99,11 +99,11 @@ impl Diagnostics {
 
     fn text(&self, colour: bool) -> String {
         let mut text = String::new();
-        for diagnostic in &self.kept {
+        for diagnostic in &self.shown {
             text.push_str(&render_diagnostic(diagnostic, &self.sources, colour));
             text.push_str("\n\n");
         }
-        text.push_str(&render_summary(self.count(), self.omitted, colour));
+        text.push_str(&render_summary(self.count(), self.omitted_count, colour));
         text
     }
 }

@@ -33,7 +33,9 @@ impl Diagnostic {
     pub fn from_expression(mistake: sweep_results::ExpressionError, location: &Location) -> Self {
         let (typed, names) = mistake.candidates.unwrap_or_default();
         let names = names.iter().map(String::as_str);
-        Self::new(mistake.title).at_location(location, mistake.expected).nearest(&typed, names)
+        Self::new(mistake.title)
+            .at_location(location, mistake.expected)
+            .with_nearest_name(&typed, names)
     }
 
     /// Adds a location, with the text that is expected at it.
@@ -43,15 +45,19 @@ impl Diagnostic {
     }
 
     /// Adds advice.
-    pub fn help(mut self, help: impl Into<String>) -> Self {
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help.push(help.into());
         self
     }
 
     /// Adds the nearest valid name, if one is near.
-    pub fn nearest<'a>(self, typed: &str, valid: impl IntoIterator<Item = &'a str>) -> Self {
+    pub fn with_nearest_name<'a>(
+        self,
+        typed: &str,
+        valid: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
         match nearest(typed, valid) {
-            Some(name) => self.help(format!("did you mean `{name}`?")),
+            Some(name) => self.with_help(format!("did you mean `{name}`?")),
             None => self,
         }
     }
@@ -75,9 +81,9 @@ pub struct Report {
 #[derive(Debug, Default)]
 struct Mistakes {
     /// The mistakes that are shown.
-    kept: Vec<Diagnostic>,
+    shown: Vec<Diagnostic>,
     /// The number of further mistakes.
-    omitted: usize,
+    omitted_count: usize,
     /// The lines that are not TOML. Other mistakes on them may come from the parser's recovery, so
     /// they are dropped.
     malformed_lines: BTreeMap<SourceId, BTreeSet<usize>>,
@@ -87,10 +93,10 @@ struct Mistakes {
 
 impl Mistakes {
     fn add(&mut self, diagnostic: Diagnostic) {
-        if self.kept.len() >= MAX_MISTAKES {
-            self.omitted += 1;
+        if self.shown.len() >= MAX_MISTAKES {
+            self.omitted_count += 1;
         } else {
-            self.kept.push(diagnostic);
+            self.shown.push(diagnostic);
         }
     }
 }
@@ -177,9 +183,9 @@ impl Report {
         self.push_with(|_| diagnostic);
     }
 
-    /// Adds help to the mistake that was kept last, if there is one.
+    /// Adds help to the last mistake that is shown, if there is one.
     pub fn add_help(&self, help: &str) {
-        if let Some(last) = self.mistakes.borrow_mut().kept.last_mut() {
+        if let Some(last) = self.mistakes.borrow_mut().shown.last_mut() {
             last.help.push(help.to_owned());
         }
     }
@@ -195,11 +201,11 @@ impl Report {
         None
     }
 
-    /// Adds a mistake, which is created only if it is kept: finding the line or the nearest name of
-    /// a million mistakes would take minutes.
+    /// Adds a mistake, which is created only if it will be shown: finding the line or the nearest
+    /// name of a million mistakes would take minutes.
     pub fn push_with(&self, diagnose: impl FnOnce(&Sources) -> Diagnostic) {
         if self.is_full() {
-            self.mistakes.borrow_mut().omitted += 1;
+            self.mistakes.borrow_mut().omitted_count += 1;
             return;
         }
         let sources = self.sources.borrow();
@@ -222,7 +228,7 @@ impl Report {
     /// Adds a mistake of syntax, the first of each line.
     pub fn push_syntax(&self, diagnostic: Diagnostic) {
         let mut mistakes = self.mistakes.borrow_mut();
-        let is_first_of_line = mistakes.kept.len() >= MAX_MISTAKES
+        let is_first_of_line = mistakes.shown.len() >= MAX_MISTAKES
             || diagnostic.locations.first().is_none_or(|(location, _)| {
                 let number = self.sources.borrow().line(location).number;
                 mistakes.malformed_lines.entry(location.source).or_default().insert(number)
@@ -251,12 +257,12 @@ impl Report {
 
     /// Returns whether further mistakes are only counted.
     pub fn is_full(&self) -> bool {
-        self.mistakes.borrow().kept.len() >= MAX_MISTAKES
+        self.mistakes.borrow().shown.len() >= MAX_MISTAKES
     }
 
     /// Returns whether there are no mistakes so far.
     pub fn is_clean(&self) -> bool {
-        self.mistakes.borrow().kept.is_empty()
+        self.mistakes.borrow().shown.is_empty()
     }
 
     /// Returns the value if there is one and there are no mistakes.
@@ -266,11 +272,11 @@ impl Report {
 
     /// Returns all mistakes.
     pub fn into_diagnostics(self) -> Diagnostics {
-        let Mistakes { mut kept, omitted, .. } = self.mistakes.into_inner();
-        kept.sort_by_key(|diagnostic| {
+        let Mistakes { mut shown, omitted_count, .. } = self.mistakes.into_inner();
+        shown.sort_by_key(|diagnostic| {
             diagnostic.locations.first().map(|(location, _)| (location.source, location.span.start))
         });
-        Diagnostics { sources: self.sources.into_inner(), kept, omitted }
+        Diagnostics { sources: self.sources.into_inner(), shown, omitted_count }
     }
 }
 
@@ -282,15 +288,15 @@ impl Report {
 pub struct Diagnostics {
     pub(super) sources: Sources,
     /// The mistakes that are shown.
-    pub(super) kept: Vec<Diagnostic>,
+    pub(super) shown: Vec<Diagnostic>,
     /// The number of further mistakes.
-    pub(super) omitted: usize,
+    pub(super) omitted_count: usize,
 }
 
 impl Diagnostics {
     /// Returns the number of mistakes, at least 1.
     pub fn count(&self) -> usize {
-        self.kept.len() + self.omitted
+        self.shown.len() + self.omitted_count
     }
 
     /// Returns the mistakes that are kept, in the order of the text.
@@ -308,7 +314,7 @@ impl Diagnostics {
                 hints: help.clone(),
             }
         };
-        self.kept.iter().map(mistake).collect()
+        self.shown.iter().map(mistake).collect()
     }
 }
 
@@ -340,7 +346,7 @@ mod tests {
             report.push(Diagnostic::new("wrong"));
         }
         let diagnostics = report.into_diagnostics();
-        assert_eq!((diagnostics.count(), diagnostics.kept.len()), (1000, MAX_MISTAKES));
+        assert_eq!((diagnostics.count(), diagnostics.shown.len()), (1000, MAX_MISTAKES));
         assert!(diagnostics.to_string().contains("1000 mistakes"));
     }
 }

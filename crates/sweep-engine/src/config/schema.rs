@@ -5,8 +5,8 @@ use serde_json::{Map, Value, json};
 use sweep_parameter::{Parameter, Range};
 
 use super::axes::DISTRIBUTIONS;
-use super::form::{describe_parameter, number};
-use super::keys::table;
+use super::form::{describe_parameter, number_schema};
+use super::keys::object_schema;
 use super::sections::describe_keys;
 use super::{Form, Key};
 use crate::Model;
@@ -16,19 +16,19 @@ use crate::plan::MAX_POINTS;
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 /// Returns the schema of a model's grid files.
-pub fn grid<M: Model>() -> Value {
-    let mut described = describe_keys::<M>();
+pub fn grid_schema<M: Model>() -> Value {
+    let mut description = describe_keys::<M>();
     let key = Key::new("set", "constants, by the names of `sweep parameters`");
-    described.add(key, M::schema_of_set());
+    description.add(key, M::schema_of_set());
     let axis_description = "headers of lists and measurements with the names of what they hold";
     let names = json!({ "type": "object", "additionalProperties": { "type": "string" } });
-    described.add(Key::new("columns", axis_description), names);
-    let axes = json!({ "type": "array", "items": axis() });
+    description.add(Key::new("columns", axis_description), names);
+    let axes = json!({ "type": "array", "items": axis_schema() });
     let axis_description = "swept parameters; the first varies slowest. With [design] each has \
                  a range \
                  without a count";
-    described.add(Key::new("axis", axis_description), axes);
-    let mut schema = described.finish();
+    description.add(Key::new("axis", axis_description), axes);
+    let mut schema = description.finish();
     // Only a design has distributions, and its ranges have no count.
     schema["if"] = json!({ "required": ["design"] });
     let range_with_count = json!({ "range": { "required": ["count"] } });
@@ -50,13 +50,13 @@ pub fn document(title: &str, mut schema: Value) -> Value {
 
 /// Returns the schema of a parameter's number.
 pub fn parameter_schema(parameter: &Parameter<impl Sized>) -> Value {
-    let mut schema = number(parameter.range);
+    let mut schema = number_schema(parameter.range);
     schema["description"] = describe_parameter(parameter).into();
     schema
 }
 
 /// Returns the schema of `[set]`: parameters by name, and numbered elements as patterns.
-pub fn set(parameters: &[Parameter<impl Sized>], patterns: Map<String, Value>) -> Value {
+pub fn set_schema(parameters: &[Parameter<impl Sized>], patterns: Map<String, Value>) -> Value {
     let properties: Map<String, Value> = parameters
         .iter()
         .map(|parameter| (parameter.name.to_string(), parameter_schema(parameter)))
@@ -69,18 +69,20 @@ pub fn set(parameters: &[Parameter<impl Sized>], patterns: Map<String, Value>) -
     })
 }
 
-fn distribution() -> Value {
+fn distribution_schema() -> Value {
     let distribution_schema = |&(kind, numbers): &(&'static str, &[(&'static str, Range)])| {
-        let shape_numbers = numbers.iter().map(|(key, range)| (*key, number(*range)));
-        let ends = ["from", "to"].map(|key| (key, number(Range::Any)));
+        let shape_numbers = numbers.iter().map(|(key, range)| (*key, number_schema(*range)));
+        let ends = ["from", "to"].map(|key| (key, number_schema(Range::Any)));
         let mut required = vec!["kind"];
         match numbers {
             [] => required.extend(["from", "to"]),
             numbers => required.extend(numbers.iter().map(|(key, _)| *key)),
         }
         let kind = || ("kind", json!({ "const": kind }));
-        let with_numbers = table([kind()].into_iter().chain(shape_numbers).chain(ends), &required);
-        let with_tolerance = table([kind(), ("tolerance", tolerance())], &["kind", "tolerance"]);
+        let with_numbers =
+            object_schema([kind()].into_iter().chain(shape_numbers).chain(ends), &required);
+        let with_tolerance =
+            object_schema([kind(), ("tolerance", tolerance_schema())], &["kind", "tolerance"]);
         [with_numbers, with_tolerance]
     };
     json!({
@@ -90,7 +92,7 @@ fn distribution() -> Value {
     })
 }
 
-fn tolerance() -> Value {
+fn tolerance_schema() -> Value {
     json!({
         "description": "about the machine's own number: a number in its unit, or as \"5 %\"",
         "anyOf": [
@@ -100,25 +102,28 @@ fn tolerance() -> Value {
     })
 }
 
-fn axis() -> Value {
+fn axis_schema() -> Value {
     let parameter = json!({ "type": "string", "description": "a name of `sweep parameters`" });
     let mut count = Form::Whole(1..=MAX_POINTS).schema();
     count["description"] = "the number of values, both ends included".into();
     let spacing = json!({ "enum": ["linear", "log"], "default": "linear" });
-    let ends = ["from", "to"].map(|key| (key, number(Range::Any)));
+    let ends = ["from", "to"].map(|key| (key, number_schema(Range::Any)));
     let count_and_spacing = [("count", count.clone()), ("spacing", spacing)];
-    let range = table(ends.into_iter().chain(count_and_spacing), &["from", "to"]);
+    let range = object_schema(ends.into_iter().chain(count_and_spacing), &["from", "to"]);
     let tolerance_schema = json!({
         "type": "object",
-        "properties": { "parameter": parameter, "tolerance": tolerance(), "count": count },
+        "properties": { "parameter": parameter, "tolerance": tolerance_schema(), "count": count },
         "required": ["parameter", "tolerance"],
         "additionalProperties": false,
     });
-    let values =
-        json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
-    let with_parameter =
-        |(key, value)| table([("parameter", parameter.clone()), (key, value)], &["parameter", key]);
-    let axis_forms = [("values", values), ("range", range), ("distribution", distribution())];
+    let values = json!({
+        "type": "array", "items": number_schema(Range::Any), "minItems": 1, "uniqueItems": true,
+    });
+    let with_parameter = |(key, value)| {
+        object_schema([("parameter", parameter.clone()), (key, value)], &["parameter", key])
+    };
+    let axis_forms =
+        [("values", values), ("range", range), ("distribution", distribution_schema())];
     let axis_forms: Vec<Value> =
         axis_forms.map(with_parameter).into_iter().chain([tolerance_schema]).collect();
     json!({ "oneOf": axis_forms })

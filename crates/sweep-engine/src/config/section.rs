@@ -98,7 +98,7 @@ impl<'a> Section<'a> {
     }
 
     /// Returns the value of a key, which counts as read.
-    fn get(&self, key: &'static str) -> Option<&'a Value<'a>> {
+    fn read_value(&self, key: &'static str) -> Option<&'a Value<'a>> {
         // A key that may be a number or a word is read twice.
         if !self.has_read(key) {
             self.read_keys.borrow_mut().push(key);
@@ -133,11 +133,16 @@ impl<'a> Section<'a> {
 
     /// Returns a required value; a missing one is reported.
     pub fn require<T>(&self, field: Field<T>, key: &str, expected: &str) -> Option<Located<T>> {
-        self.expect(field, key, Some(expected)).into_located()
+        self.report_if_missing(field, key, Some(expected)).into_located()
     }
 
     /// Returns the field; a missing one is reported if a value is expected.
-    pub fn expect<T>(&self, field: Field<T>, key: &str, expected: Option<&str>) -> Field<T> {
+    pub fn report_if_missing<T>(
+        &self,
+        field: Field<T>,
+        key: &str,
+        expected: Option<&str>,
+    ) -> Field<T> {
         if let (Field::Absent, Some(expected)) = (&field, expected) {
             self.report_missing(key, expected);
         }
@@ -158,7 +163,7 @@ impl<'a> Section<'a> {
         key: &'static str,
         read: impl FnOnce(&'a Value<'a>, &Location) -> Option<T>,
     ) -> Field<T> {
-        let Some(value) = self.get(key) else { return Field::Absent };
+        let Some(value) = self.read_value(key) else { return Field::Absent };
         let location = self.locate(value.span());
         let value_read = read(value, &location);
         value_read.map_or(Field::Rejected, |value| Field::Present(Located { value, location }))
@@ -187,20 +192,20 @@ impl<'a> Section<'a> {
             &self.locate(value.span()),
             format!("expected {expected}, found {type_name}"),
         );
-        self.report.push(help.into_iter().fold(refusal, Diagnostic::help));
+        self.report.push(help.into_iter().fold(refusal, Diagnostic::with_help));
         None
     }
 
     /// Reads a finite number in a range.
     pub fn number(&self, key: &'static str, range: Range) -> Field<f64> {
-        self.read(key, |value, _| Some(self.expect_number(&quoted(key), value, range)?.value))
+        self.read(key, |value, _| Some(self.parse_number(&quote(key), value, range)?.value))
     }
 
     /// Reads a whole number within bounds.
     pub fn whole_number(&self, key: &'static str, bounds: &RangeInclusive<u64>) -> Field<u64> {
         self.read(key, |value, location| {
             let DeValue::Integer(integer) = value.get_ref() else {
-                return self.report_wrong_type(&quoted(key), value, "a whole number");
+                return self.report_wrong_type(&quote(key), value, "a whole number");
             };
             let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
             count.filter(|count| bounds.contains(count)).or_else(|| {
@@ -215,7 +220,7 @@ impl<'a> Section<'a> {
 
     /// Reads a string.
     pub fn text(&self, key: &'static str) -> Field<&'a str> {
-        self.read(key, |value, _| Some(self.expect_text(&quoted(key), value)?.value))
+        self.read(key, |value, _| Some(self.parse_text(&quote(key), value)?.value))
     }
 
     /// Reads a string, or the text of a number.
@@ -223,13 +228,13 @@ impl<'a> Section<'a> {
         self.read(key, |value, _| match value.get_ref() {
             DeValue::Integer(integer) if integer.radix() == 10 => Some(integer.as_str()),
             DeValue::Float(float) => Some(float.as_str()),
-            _ => Some(self.expect_text(&quoted(key), value)?.value),
+            _ => Some(self.parse_text(&quote(key), value)?.value),
         })
     }
 
     /// Returns whether the value is a string.
     pub fn is_text(&self, key: &'static str) -> bool {
-        self.get(key).is_some_and(|value| value.get_ref().is_str())
+        self.read_value(key).is_some_and(|value| value.get_ref().is_str())
     }
 
     /// Reads a word, as its index in `choices`.
@@ -258,7 +263,7 @@ impl<'a> Section<'a> {
         range: Range,
     ) -> Field<(Vec<Located<f64>>, bool)> {
         self.items(key, "an array of numbers").map(|items| {
-            let number = |item| self.expect_number(&entry(key), item, range);
+            let number = |item| self.parse_number(&array_entry(key), item, range);
             let numbers: Vec<_> = items.value.iter().filter_map(number).collect();
             let are_all_valid = numbers.len() == items.value.len();
             (numbers, are_all_valid)
@@ -268,14 +273,14 @@ impl<'a> Section<'a> {
     /// Reads the valid strings of an array; others are reported.
     pub fn texts(&self, key: &'static str) -> Field<Vec<Located<&'a str>>> {
         self.items(key, "an array of strings").map(|items| {
-            items.value.iter().filter_map(|item| self.expect_text(&entry(key), item)).collect()
+            items.value.iter().filter_map(|item| self.parse_text(&array_entry(key), item)).collect()
         })
     }
 
     fn items(&self, key: &'static str, kind: &str) -> Field<&'a [Value<'a>]> {
         self.read(key, |value, _| match value.get_ref() {
             DeValue::Array(items) => Some(&items[..]),
-            _ => self.report_wrong_type(&quoted(key), value, kind),
+            _ => self.report_wrong_type(&quote(key), value, kind),
         })
     }
 
@@ -285,7 +290,7 @@ impl<'a> Section<'a> {
             DeValue::Table(table) => {
                 Some(Section::new(title, location.clone(), table, self.report))
             }
-            _ => self.report_wrong_type(&quoted(key), value, &format!("a table, {title}")),
+            _ => self.report_wrong_type(&quote(key), value, &format!("a table, {title}")),
         })
     }
 
@@ -295,7 +300,7 @@ impl<'a> Section<'a> {
         let items = self.items(key, &kind).into_located().map_or(&[][..], |items| items.value);
         let section = |(k, item): (usize, &'a Value<'a>)| {
             let DeValue::Table(table) = item.get_ref() else {
-                return self.report_wrong_type(&entry(key), item, &kind);
+                return self.report_wrong_type(&array_entry(key), item, &kind);
             };
             let title = format!("[[{key}]] number {}", k + 1);
             Some(Section::new(title, self.locate(item.span()), table, self.report))
@@ -312,15 +317,15 @@ impl<'a> Section<'a> {
 
     /// Reads the number under a name from [`Section::names`].
     pub fn number_named(&self, name: &str, range: Range) -> Option<Located<f64>> {
-        self.expect_number(&quoted(name), self.table.get(name)?, range)
+        self.parse_number(&quote(name), self.table.get(name)?, range)
     }
 
     /// Reads the string under a name from [`Section::names`].
     pub fn text_named(&self, name: &str) -> Option<Located<&'a str>> {
-        self.expect_text(&quoted(name), self.table.get(name)?)
+        self.parse_text(&quote(name), self.table.get(name)?)
     }
 
-    fn expect_text(&self, description: &str, value: &'a Value<'a>) -> Option<Located<&'a str>> {
+    fn parse_text(&self, description: &str, value: &'a Value<'a>) -> Option<Located<&'a str>> {
         match value.get_ref() {
             DeValue::String(text) => {
                 Some(Located { value: text, location: self.locate(value.span()) })
@@ -329,7 +334,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn expect_number(
+    fn parse_number(
         &self,
         description: &str,
         value: &Value<'_>,
@@ -363,14 +368,13 @@ impl<'a> Section<'a> {
                         Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
                             .at_location(&location, reason.as_str())
                     }
-                    None => {
-                        Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
-                            .at_location(
-                                &location,
-                                format!("expected {}", list_choices(&read_keys)),
-                            )
-                            .nearest(name, read_keys.iter().copied())
-                    }
+                    None => Diagnostic::new(format!(
+                        "unknown key `{}` in {}",
+                        shorten(name),
+                        self.title
+                    ))
+                    .at_location(&location, format!("expected {}", list_choices(&read_keys)))
+                    .with_nearest_name(name, read_keys.iter().copied()),
                 }
             });
         }
@@ -416,13 +420,13 @@ pub fn unknown_word(description: &str, found: &Located<&str>, choices: &[&str]) 
             && removed_word.word == found.value
             && choices.contains(&removed_word.successor)
     });
-    let refusal = Diagnostic::new(format!("unknown {description} \"{}\"", short(found.value)))
+    let refusal = Diagnostic::new(format!("unknown {description} \"{}\"", shorten(found.value)))
         .at_location(&found.location, format!("expected {}", list_choices(choices)));
     match removed_word {
-        Some(RemovedWord { key, word, successor, reason }) => refusal.help(format!(
+        Some(RemovedWord { key, word, successor, reason }) => refusal.with_help(format!(
             "\"{word}\" was removed: write {key} = \"{successor}\" in its place; {reason}"
         )),
-        None => refusal.nearest(found.value, choices.iter().copied()),
+        None => refusal.with_nearest_name(found.value, choices.iter().copied()),
     }
 }
 
@@ -437,27 +441,27 @@ pub fn list_choices(choices: &[&str]) -> String {
 }
 
 /// Returns a count with its noun, whose plural ends in s.
-pub fn counted(count: usize, description: &str) -> String {
+pub fn format_count(count: usize, description: &str) -> String {
     if count == 1 { format!("1 {description}") } else { format!("{count} {description}s") }
 }
 
 /// Returns a key as messages show it.
-pub fn quoted(key: &str) -> String {
-    format!("`{}`", short(key))
+pub fn quote(key: &str) -> String {
+    format!("`{}`", shorten(key))
 }
 
 /// Returns an entry of an array as messages show it.
-fn entry(key: &str) -> String {
+fn array_entry(key: &str) -> String {
     format!("an entry of `{key}`")
 }
 
 /// Shortens a user's text to fit a title.
-pub fn short(typed: &str) -> String {
-    cut(typed, 60)
+pub fn shorten(typed: &str) -> String {
+    truncate(typed, 60)
 }
 
 /// Returns at most `max` characters of a text, with an ellipsis if it is shortened.
-pub fn cut(text: &str, max: usize) -> String {
+pub fn truncate(text: &str, max: usize) -> String {
     match text.char_indices().nth(max) {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text.to_owned(),

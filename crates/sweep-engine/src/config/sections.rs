@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::json;
 use sweep_parameter::{Range, decimal};
 
-use super::form::Numbers;
+use super::form::NumberArray;
 use super::keys::{Description, Variants};
 use super::{
     Diagnostic, Field, Form, GridInput, Key, KeyWalk, Keys, Located, Location, Report, Section,
@@ -67,25 +67,27 @@ pub(super) fn walk_sections<M: Model>(
             self::read_name(root, path, overriding_name, "add `name = \"...\"`, or pass `--name`");
         Field::Present(Located { value: name.into(), location: root.location().clone() })
     };
-    keys.key(Key::new("name", description), &Form::Own(&read_run_name, schema), name);
+    keys.walk_key(Key::new("name", description), &Form::Custom(&read_run_name, schema), name);
     model.walk(GridTable::Top, keys, input);
-    keys.table(Key::new("time", "").required("a section [time]"), |keys| {
+    keys.walk_table(Key::new("time", "").required("a section [time]"), |keys| {
         walk_time(end_s, window_s, keys)
     });
-    keys.table(Key::new("integrator", ""), |keys| walk_method(M::ABOUT.methods, integrator, keys));
-    keys.table(Key::new("reliability", ""), |keys| {
+    keys.walk_table(Key::new("integrator", ""), |keys| {
+        walk_method(M::ABOUT.methods, integrator, keys)
+    });
+    keys.walk_table(Key::new("reliability", ""), |keys| {
         model.walk(GridTable::Reliability, keys, input);
         let Reliability { limits, channels } = reliability;
         let key = Key::new("ratio_limit", "a point is reliable where every ratio is below this");
-        keys.key(key.settable(), &Form::Number(Range::Positive), &mut limits.upper);
+        keys.walk_key(key.settable(), &Form::Number(Range::Positive), &mut limits.upper);
         let description = "if given, a point is reliable where every ratio is above this too";
-        keys.key(
+        keys.walk_key(
             Key::new("ratio_min", description).settable(),
             &Form::Number(RATIO_MIN),
             &mut limits.lower,
         );
         let key = Key::new("channels", "channels that are compared").settable();
-        keys.words(key, "channel", M::ABOUT.channels, |channel| channel.name, channels);
+        keys.walk_words(key, "channel", M::ABOUT.channels, |channel| channel.name, channels);
     });
 }
 
@@ -131,7 +133,7 @@ pub fn read_name(
             let title = "`name` is missing, and the file's own name cannot replace it";
             let refusal = Diagnostic::new(title)
                 .at_location(root.location(), format!("expected {FILE_NAME_RULE}"));
-            root.report.push_missing(refusal.help(help));
+            root.report.push_missing(refusal.with_help(help));
         }
     }
     String::new()
@@ -145,11 +147,11 @@ fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     let (kind, expected) = match &keys.walk {
         KeyWalk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
         KeyWalk::Set(_) => (Form::Number(Range::Positive), ""),
-        _ => (Form::Own(&|_, _| Field::Absent, described), ""),
+        _ => (Form::Custom(&|_, _| Field::Absent, described), ""),
     };
     let mut value = *end_s;
-    let end =
-        keys.key(key, &kind, &mut value).into_located().and_then(|Located { location, .. }| {
+    let end = keys.walk_key(key, &kind, &mut value).into_located().and_then(
+        |Located { location, .. }| {
             if 0.0 < value && value <= MAX_END_S {
                 return Some(Located { value, location });
             }
@@ -159,7 +161,8 @@ fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
                 title,
                 format!("expected {expected}at most {MAX_END_S:e} s"),
             )
-        });
+        },
+    );
     let is_window_written = |report: &Report| report.location(WINDOW_PARAMETERS[1]).is_some();
     if let Some(end) = &end {
         *end_s = end.value;
@@ -172,12 +175,12 @@ fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
                  if left \
                  out";
     let expected = "expected two, [from, to], in s";
-    let kind = Form::Numbers(Numbers {
+    let kind = Form::Numbers(NumberArray {
         location_keys: WINDOW_PARAMETERS.map(str::to_owned).to_vec(),
-        ..Numbers::new(Range::NonNegative, 2..=2, expected)
+        ..NumberArray::new(Range::NonNegative, 2..=2, expected)
     });
     let mut edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
-    let window_field = keys.key(Key::new("window_s", description), &kind, &mut edges);
+    let window_field = keys.walk_key(Key::new("window_s", description), &kind, &mut edges);
     if let (Field::Present(window_field), Some(report)) = (window_field, keys.report())
         && let Some(window) = check_window(&window_field.location, &edges, end.as_ref(), report)
         && end.is_some()
@@ -227,47 +230,56 @@ fn walk_method(
         settable_count: all.len(),
     };
     let current_method = all.iter().position(|method| method.name == integrator.name());
-    keys.variants(Key::new("method", "").settable(), &variants, current_method, |keys, index| {
-        let method = &all[index];
-        let name = method.name;
-        let others = all.iter().flat_map(|other| other.settings).map(|setting| setting.key);
-        for key in others.filter(|key| !method.has_setting(key)).collect::<BTreeSet<_>>() {
-            let methods_with_key =
-                all.iter().filter(|other| other.has_setting(key)).map(|other| other.name);
-            let methods_with_key: Vec<&str> = methods_with_key.collect();
-            let (noun, verb) =
-                if methods_with_key.len() == 1 { ("method", "has") } else { ("methods", "have") };
-            let owners_list = methods_with_key.join("\" and \"");
-            keys.misplace(
-                &[key],
-                &format!("only the {noun} \"{owners_list}\" {verb} it, not \"{name}\""),
-            );
-            let title = format!("the method \"{name}\" has no `{key}`");
-            keys.refuse(
-                key,
-                &title,
-                &format!("`{key}` belongs to \"{}\"", methods_with_key.join("\", \"")),
-            );
-        }
-        // Settings that the old and the new method share keep their values.
-        let old_settings = integrator.settings();
-        *integrator =
-            method.with_settings(|&Setting { key, range, default, description, help }| {
-                let old_settings = old_settings.iter().find(|(known, _)| *known == key);
-                let mut number = old_settings.map_or(default, |(_, number)| *number);
-                let setting = Key::new(key, description).settable();
-                let field = keys.key(setting, &Form::Number(range), &mut number);
-                if let (Field::Rejected, false, Some(report)) =
-                    (field, help.is_empty(), keys.report())
-                {
-                    report.add_help(help);
-                }
-                if let Some((section, location)) =
-                    keys.section().and_then(|section| Some((section, section.key_location(key)?)))
-                {
-                    section.report.record_location(format!("integrator.{key}"), location);
-                }
-                number
-            });
-    });
+    keys.walk_variants(
+        Key::new("method", "").settable(),
+        &variants,
+        current_method,
+        |keys, index| {
+            let method = &all[index];
+            let name = method.name;
+            let others = all.iter().flat_map(|other| other.settings).map(|setting| setting.key);
+            for key in others.filter(|key| !method.has_setting(key)).collect::<BTreeSet<_>>() {
+                let methods_with_key =
+                    all.iter().filter(|other| other.has_setting(key)).map(|other| other.name);
+                let methods_with_key: Vec<&str> = methods_with_key.collect();
+                let (noun, verb) = if methods_with_key.len() == 1 {
+                    ("method", "has")
+                } else {
+                    ("methods", "have")
+                };
+                let owners_list = methods_with_key.join("\" and \"");
+                keys.misplace(
+                    &[key],
+                    &format!("only the {noun} \"{owners_list}\" {verb} it, not \"{name}\""),
+                );
+                let title = format!("the method \"{name}\" has no `{key}`");
+                keys.refuse(
+                    key,
+                    &title,
+                    &format!("`{key}` belongs to \"{}\"", methods_with_key.join("\", \"")),
+                );
+            }
+            // Settings that the old and the new method share keep their values.
+            let old_settings = integrator.settings();
+            *integrator =
+                method.with_settings(|&Setting { key, range, default, description, help }| {
+                    let old_settings = old_settings.iter().find(|(known, _)| *known == key);
+                    let mut number = old_settings.map_or(default, |(_, number)| *number);
+                    let setting = Key::new(key, description).settable();
+                    let field = keys.walk_key(setting, &Form::Number(range), &mut number);
+                    if let (Field::Rejected, false, Some(report)) =
+                        (field, help.is_empty(), keys.report())
+                    {
+                        report.add_help(help);
+                    }
+                    if let Some((section, location)) = keys
+                        .section()
+                        .and_then(|section| Some((section, section.key_location(key)?)))
+                    {
+                        section.report.record_location(format!("integrator.{key}"), location);
+                    }
+                    number
+                });
+        },
+    );
 }

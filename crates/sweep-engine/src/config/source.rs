@@ -12,7 +12,7 @@ use sweep_files::regular;
 pub const MAX_TEXT_BYTES: u64 = 896 << 10;
 
 /// Resolves a path in a file, relative to the file's folder.
-pub fn beside(file: &Path, relative_path: &str) -> std::path::PathBuf {
+pub fn resolve_beside(file: &Path, relative_path: &str) -> std::path::PathBuf {
     file.parent().unwrap_or(Path::new("")).join(relative_path)
 }
 

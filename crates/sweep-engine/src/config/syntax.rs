@@ -7,14 +7,14 @@ use toml::Spanned;
 use toml::de::{DeTable, Error};
 
 use super::source::read;
-use super::{Diagnostic, Location, Report, SourceId, quoted};
+use super::{Diagnostic, Location, Report, SourceId, quote};
 
 /// Reads the text of a file and adds it to the report. A file that cannot be read is reported:
-/// `kind` is its kind in words, and `to_start` the advice if it does not exist.
-pub fn text(
+/// `kind` is its kind in words, and `start_advice` the advice if it does not exist.
+pub fn read_text(
     path: &Path,
-    what: &str,
-    to_start: Option<&str>,
+    kind: &str,
+    start_advice: Option<&str>,
     report: &Report,
 ) -> Option<(String, SourceId)> {
     let path_text = path.display();
@@ -26,15 +26,16 @@ pub fn text(
         Err(error) => error,
     };
     let is_missing = error.kind() == ErrorKind::NotFound;
-    let refusal = Diagnostic::new(format!("cannot read the {what} file {path_text}: {error}"));
-    report.push(to_start.filter(|_| is_missing).into_iter().fold(refusal, Diagnostic::help));
+    let refusal = Diagnostic::new(format!("cannot read the {kind} file {path_text}: {error}"));
+    report
+        .push(start_advice.filter(|_| is_missing).into_iter().fold(refusal, Diagnostic::with_help));
     None
 }
 
 /// Parses a text as TOML. Mistakes of syntax are reported, and the rest of the table is returned.
-pub fn parse<'a>(text: &'a str, source: SourceId, report: &Report) -> Spanned<DeTable<'a>> {
+pub fn parse_toml<'a>(text: &'a str, source: SourceId, report: &Report) -> Spanned<DeTable<'a>> {
     let (table, mut errors) = DeTable::parse_recoverable(text);
-    errors.sort_by_key(start);
+    errors.sort_by_key(error_start);
     // The text after an array that is never closed gives many mistakes, of which only the first is
     // meaningful.
     let unclosed = errors.iter().any(|error| error.message().starts_with("unclosed array"));
@@ -55,7 +56,7 @@ pub fn parse<'a>(text: &'a str, source: SourceId, report: &Report) -> Spanned<De
     table
 }
 
-fn start(error: &Error) -> usize {
+fn error_start(error: &Error) -> usize {
     error.span().map_or(0, |span| span.start)
 }
 
@@ -64,21 +65,19 @@ fn describe_error(error: &Error, text: &str, source: SourceId) -> Diagnostic {
     let wrong_text = text.get(span.clone()).unwrap_or_default();
     let location = Location::new(source, span);
     // If the parser states an expectation, it follows the first comma of the message.
-    let (what, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
-    match what {
-        "duplicate key" => {
-            Diagnostic::new(format!("the key {} is given twice", quoted(wrong_text)))
-                .at_location(&location, "expected each key once")
-        }
+    let (message, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
+    match message {
+        "duplicate key" => Diagnostic::new(format!("the key {} is given twice", quote(wrong_text)))
+            .at_location(&location, "expected each key once"),
         "string values must be quoted" => {
             let title = if wrong_text.is_empty() {
                 "a value is missing".to_owned()
             } else {
-                format!("{} is no value", quoted(wrong_text))
+                format!("{} is no value", quote(wrong_text))
             };
             Diagnostic::new(title)
                 .at_location(&location, "expected a number, a string in quotes, or an array")
         }
-        what => Diagnostic::new(what).at_location(&location, expected),
+        message => Diagnostic::new(message).at_location(&location, expected),
     }
 }

@@ -5,18 +5,23 @@ use serde_json::Value;
 use super::{Diagnostic, Field, Located, Report, Section, unknown_word};
 
 /// Reads a list of words of `all`, each once; an empty list is a mistake.
-pub fn names(section: &Section<'_>, key: &'static str, noun: &str, all: &[&str]) -> Field<Value> {
+pub fn read_words(
+    section: &Section<'_>,
+    key: &'static str,
+    noun: &str,
+    all: &[&str],
+) -> Field<Value> {
     section.texts(key).map(|list| {
         if list.value.is_empty() {
             let expected = format!("expected at least one of `{}`", all.join("`, `"));
             section.report.refuse::<()>(&list.location, format!("`{key}` is empty"), expected);
         }
-        known_words(list.value, noun, all, section.report).0.into()
+        check_words(list.value, noun, all, section.report).0.into()
     })
 }
 
 /// Returns the words that are in `all`, each once, and whether all words were valid.
-pub fn known_words<'t>(
+pub fn check_words<'t>(
     found: impl IntoIterator<Item = Located<&'t str>>,
     noun: &str,
     all: &[&str],

@@ -117,5 +117,5 @@ pub fn own_file<M: Model>(study: &Study<M>, values: &[f64]) -> Option<String> {
         scenario.write(&axis.parameter, value);
     }
     plan.model = scenario.model;
-    GridInput::<M>::from_plan(&study.name, &plan.to_json()).own_file
+    GridInput::<M>::from_plan(&study.name, &plan.to_json()).model_file
 }

@@ -8,16 +8,16 @@ use sweep_parameter::Range;
 use sweep_results::{Column, ExpressionError, Goal, columns};
 
 use super::Evolution;
-use crate::config::axes::{add, spacing};
+use crate::config::axes::{add_axis, read_range};
 use crate::config::design::{DEFAULT_SEED, MAX_SEED};
-use crate::config::grid::{STUDY_KEYS, draft, is_another};
+use crate::config::grid::{STUDY_KEYS, read_draft, refuse_other_kind};
 use crate::config::parameters::find;
 use crate::config::section::list_choices;
 use crate::config::sections::read_name;
-use crate::config::source::beside;
-use crate::config::syntax::{self, parse};
+use crate::config::source::resolve_beside;
+use crate::config::syntax::{self, parse_toml};
 use crate::config::{
-    Diagnostic, Draft, Field, Located, Location, Report, Section, whole, written_twice,
+    Diagnostic, Draft, Field, Located, Location, Report, Section, plan_checks, written_twice,
 };
 use crate::design::{DesignRule, MAX_AXES};
 use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, ModelParameter, Plan};
@@ -88,9 +88,9 @@ impl<M: Model> Study<M> {
 
     fn read(path: &Path, sets: &[String], report: &Report) -> Option<Self> {
         let help = "docs/optimise.md has one to start from";
-        let (text, source) = syntax::text(path, "study", Some(help), report)?;
-        let table = parse(&text, source, report);
-        if is_another::<M>("study", table.get_ref(), source, report) {
+        let (text, source) = syntax::read_text(path, "study", Some(help), report)?;
+        let table = parse_toml(&text, source, report);
+        if refuse_other_kind::<M>("study", table.get_ref(), source, report) {
             return None;
         }
         let root =
@@ -98,8 +98,9 @@ impl<M: Model> Study<M> {
         let name = read_name(&root, path, None, "add `name = \"...\"`, or rename the file");
         let [_, grid, parameter, population, candidates, seed, objective, conditions] = STUDY_KEYS;
         let grid = root.require(root.text(grid), grid, "a grid file, relative to this file");
-        let input = grid.map(|grid| GridInput::file(beside(path, grid.value), sets.to_vec()));
-        let mut draft = input.and_then(|input| draft::<M>(&input, report));
+        let input =
+            grid.map(|grid| GridInput::file(resolve_beside(path, grid.value), sets.to_vec()));
+        let mut draft = input.and_then(|input| read_draft::<M>(&input, report));
         let grid = draft.as_ref().map(|draft| draft.plan.clone());
         if let Some(draft) = &mut draft {
             flatten(&mut draft.plan);
@@ -115,7 +116,7 @@ impl<M: Model> Study<M> {
         let candidates =
             candidates.filter(|&count| count > 0).unwrap_or(DEFAULT_GENERATIONS * population);
         if let Some(draft) = &draft {
-            whole::steps(draft);
+            plan_checks::check_steps(draft);
             M::check(draft);
         }
         let plan = draft.map(|draft| draft.plan);
@@ -243,7 +244,7 @@ fn parameters<M: Model>(
             name.as_ref().zip(draft.as_ref()).and_then(|(name, draft)| find(name, draft));
         let range = expression.as_ref().map_or(Range::Any, |parameter| parameter.range);
         section.misplace(&["count"], "the study has `candidates`, and finds the values itself");
-        let bounds = spacing(section, range, Some(2));
+        let bounds = read_range(section, range, Some(2));
         let spread_tolerance = match tolerance {
             Field::Present(part) if part.value >= 1.0 => {
                 let title = "a tolerance of the whole value or more";
@@ -293,7 +294,7 @@ fn parameters<M: Model>(
             *low -= tolerance * low.abs();
             *high += tolerance * high.abs();
         }
-        add(axis, location, draft);
+        add_axis(axis, location, draft);
         searched.push(SearchedParameter { bounds: bounds.value, tolerance });
     }
     searched

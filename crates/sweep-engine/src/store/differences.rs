@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde_json::Value;
 
-use crate::config::section::cut;
-use sweep_files::{Step, leaves};
+use crate::config::section::truncate;
+use sweep_files::{Step, visit_leaves};
 
 /// A value that differs between two plans.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,33 +33,32 @@ impl fmt::Display for PlanDifference {
 }
 
 /// Returns every leaf at which two JSON values differ.
-pub(super) fn differences(older: &Value, present: &Value) -> Vec<PlanDifference> {
+pub(super) fn find_differences(older: &Value, present: &Value) -> Vec<PlanDifference> {
     let mut found_differences = Vec::new();
-    leaves(
-        [Some(older), Some(present)],
-        |_, _| true,
-        &mut Vec::new(),
-        &mut |path, [older, present]| {
-            if older != present {
-                let pointer_step = |step: &Step<'_>| match step {
-                    Step::Name(name) => format!("/{}", name.replace('~', "~0").replace('/', "~1")),
-                    Step::Place(place) => format!("/{place}"),
-                };
-                let pointer = path.iter().map(pointer_step).collect();
-                found_differences.push(PlanDifference {
-                    pointer,
-                    older: older.map(format_value),
-                    present: present.map(format_value),
-                });
-            }
-        },
-    );
+    visit_leaves([Some(older), Some(present)], |_, _| true, &mut Vec::new(), &mut |path,
+                                                                                   [
+        older,
+        present,
+    ]| {
+        if older != present {
+            let pointer_step = |step: &Step<'_>| match step {
+                Step::Name(name) => format!("/{}", name.replace('~', "~0").replace('/', "~1")),
+                Step::Index(index) => format!("/{index}"),
+            };
+            let pointer = path.iter().map(pointer_step).collect();
+            found_differences.push(PlanDifference {
+                pointer,
+                older: older.map(format_value),
+                present: present.map(format_value),
+            });
+        }
+    });
     found_differences
 }
 
 /// Formats a value on one line, and shortens it if it is long.
 fn format_value(value: &Value) -> String {
-    cut(&value.to_string(), 60)
+    truncate(&value.to_string(), 60)
 }
 
 #[cfg(test)]
@@ -74,7 +73,7 @@ mod tests {
         let present =
             json!({ "axes": [{ "count": 40 }, { "count": 33 }], "new": true, "a/b": [1] });
         let lines: Vec<String> =
-            differences(&older, &present).iter().map(ToString::to_string).collect();
+            find_differences(&older, &present).iter().map(ToString::to_string).collect();
         assert_eq!(
             lines,
             [
@@ -84,13 +83,13 @@ mod tests {
                 "/new: was absent, is true",
             ]
         );
-        assert!(differences(&older, &older).is_empty());
+        assert!(find_differences(&older, &older).is_empty());
     }
 
     #[test]
     fn long_values_are_cut_on_a_character() {
         let older = json!({ "name": "ä".repeat(100) });
-        let formatted = differences(&older, &json!({}))[0].older.clone().unwrap();
+        let formatted = find_differences(&older, &json!({}))[0].older.clone().unwrap();
         assert!(formatted.ends_with("...") && formatted.chars().count() == 63, "{formatted}");
     }
 }

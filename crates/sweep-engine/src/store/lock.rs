@@ -13,7 +13,7 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Folder, Holder, LOCK, StoreError};
+use super::{Folder, Holder, LOCK_FILE, StoreError};
 use sweep_files::{FileError, atomic, regular};
 
 /// The maximum length of a lock file, bytes. Basis: a process id and the longest name of a host.
@@ -31,9 +31,9 @@ const ATTEMPT_INTERVAL: Duration = Duration::from_millis(40);
 #[derive(Debug)]
 pub struct Lock {
     /// The locked file `lock`; `None` if the file system has no locks.
-    _run: Option<File>,
+    _run_file: Option<File>,
     /// The locked file of the shard, if there is one and no other process has locked it.
-    _shard: Option<File>,
+    _shard_file: Option<File>,
     /// The path of the file `lock`.
     path: PathBuf,
     /// Whether the file system has no locks, so that the run goes on without one.
@@ -43,7 +43,7 @@ pub struct Lock {
 impl Lock {
     /// Creates the folder if it does not exist, and locks it: for the whole run, or for one shard.
     pub fn acquire(folder: &Folder, shard: Option<u64>) -> Result<Self, StoreError> {
-        let path = folder.file(LOCK);
+        let path = folder.file(LOCK_FILE);
         for attempt in 0..MAX_ATTEMPTS {
             if attempt > 0 {
                 std::thread::sleep(ATTEMPT_INTERVAL);
@@ -61,7 +61,7 @@ impl Lock {
                 }
                 Err(error) => return Err(StoreError::io("open the lock", &path)(error)),
             };
-            refuse_foreign(&mut file, &path)?;
+            refuse_other_file(&mut file, &path)?;
             let lock_result =
                 if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
             match lock_result {
@@ -72,22 +72,27 @@ impl Lock {
                         None => write_holder(&mut file, &path).map(|()| None)?,
                     };
                     return Ok(Self {
-                        _run: Some(file),
-                        _shard: shard,
+                        _run_file: Some(file),
+                        _shard_file: shard,
                         path,
                         is_unsupported: false,
                     });
                 }
                 Err(TryLockError::WouldBlock) => {}
                 Err(TryLockError::Error(error)) if is_unsupported(&error) => {
-                    return Ok(Self { _run: None, _shard: None, path, is_unsupported: true });
+                    return Ok(Self {
+                        _run_file: None,
+                        _shard_file: None,
+                        path,
+                        is_unsupported: true,
+                    });
                 }
                 Err(TryLockError::Error(error)) => {
                     return Err(StoreError::io("lock", &path)(error));
                 }
             }
         }
-        Err(StoreError::Busy { output: folder.output.clone(), holders: holders(folder) })
+        Err(StoreError::Busy { output: folder.output.clone(), holders: find_holders(folder) })
     }
 
     /// Returns a note for the user if the file system has no locks.
@@ -105,23 +110,23 @@ impl Lock {
 }
 
 /// Returns the processes that work in the folder now, as far as their names can be read.
-pub(super) fn holders(folder: &Folder) -> Vec<Holder> {
+pub(super) fn find_holders(folder: &Folder) -> Vec<Holder> {
     let names = regular::names(&folder.path).unwrap_or_default().into_iter();
     let lock = |name: OsString| Some((shard_from_name(name.to_str()?)?, folder.file(name)));
     let mut locks: Vec<(u64, PathBuf)> = names.filter_map(lock).collect();
     locks.sort_unstable();
     let mut holders: Vec<Holder> =
-        locks.iter().filter_map(|(shard, path)| holder(path, Some(*shard))).collect();
+        locks.iter().filter_map(|(shard, path)| read_holder(path, Some(*shard))).collect();
     // While shards share the folder's lock, the lock's file names the last process that held the
     // lock alone.
     if holders.is_empty() {
-        holders.extend(holder(&folder.file(LOCK), None));
+        holders.extend(read_holder(&folder.file(LOCK_FILE), None));
     }
     holders
 }
 
 /// Refuses a file that is not a lock: one that is not empty and has no name by [`write_holder`].
-fn refuse_foreign(file: &mut File, path: &Path) -> Result<(), StoreError> {
+fn refuse_other_file(file: &mut File, path: &Path) -> Result<(), StoreError> {
     if is_lock(file).map_err(StoreError::io("read", path))? {
         return Ok(());
     }
@@ -154,7 +159,7 @@ fn lock_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
     let path = folder.file(shard_name(shard));
     let mut file =
         regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
-    refuse_foreign(&mut file, &path)?;
+    refuse_other_file(&mut file, &path)?;
     if file.try_lock().is_err() {
         return Ok(None);
     }
@@ -164,7 +169,7 @@ fn lock_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
 
 /// Writes the id and the host of this process into a locked file.
 fn write_holder(file: &mut File, path: &Path) -> Result<(), StoreError> {
-    let name = format!("{} {}\n", std::process::id(), super::provenance::host());
+    let name = format!("{} {}\n", std::process::id(), super::provenance::host_name());
     file.set_len(0)
         .and_then(|()| file.rewind())
         .and_then(|()| file.write_all(name.as_bytes()))
@@ -191,7 +196,7 @@ fn shard_name(shard: u64) -> String {
 }
 
 /// Returns the process that is named in a lock file, if the file is locked.
-fn holder(path: &Path, shard: Option<u64>) -> Option<Holder> {
+fn read_holder(path: &Path, shard: Option<u64>) -> Option<Holder> {
     let file = regular::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
         return None;
@@ -255,7 +260,7 @@ mod tests {
         let run_lock = Lock::acquire(&folder, None).unwrap();
         busy_holders(Lock::acquire(&folder, Some(1)));
         drop(run_lock);
-        assert!(super::holders(&folder).is_empty());
+        assert!(super::find_holders(&folder).is_empty());
     }
 
     #[cfg(unix)]
@@ -266,7 +271,9 @@ mod tests {
         fs::create_dir_all(&folder.path).unwrap();
         let foreign_file = home.path().join("thesis.tex");
         fs::write(&foreign_file, "my thesis").unwrap();
-        for (name, shard) in [(folder.file(LOCK), None), (folder.file("shard-3.lock"), Some(3))] {
+        for (name, shard) in
+            [(folder.file(LOCK_FILE), None), (folder.file("shard-3.lock"), Some(3))]
+        {
             std::os::unix::fs::symlink(&foreign_file, &name).unwrap();
             let error = Lock::acquire(&folder, shard).unwrap_err().to_string();
             assert!(error.contains("it is a symbolic link"), "{error}");
@@ -279,12 +286,12 @@ mod tests {
         }
         assert_eq!(fs::read_to_string(&foreign_file).unwrap(), "my thesis");
         for text in [" my thesis", "2026 pages", "2026", "12 a\nnotes\n", "12 a\n\n"] {
-            fs::write(folder.file(LOCK), text).unwrap();
+            fs::write(folder.file(LOCK_FILE), text).unwrap();
             let error = Lock::acquire(&folder, None).unwrap_err();
             assert!(error.to_string().contains("is no lock of `sweep run`"), "{text}: {error}");
-            assert_eq!(fs::read_to_string(folder.file(LOCK)).unwrap(), text);
+            assert_eq!(fs::read_to_string(folder.file(LOCK_FILE)).unwrap(), text);
         }
-        fs::write(folder.file(LOCK), "12 node-7.example\n").unwrap();
+        fs::write(folder.file(LOCK_FILE), "12 node-7.example\n").unwrap();
         Lock::acquire(&folder, Some(3)).unwrap();
     }
 
@@ -293,10 +300,10 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         let first = Lock::acquire(&folder, None).unwrap();
-        let deleted_file = regular::open_or_create(&folder.file(LOCK)).unwrap();
+        let deleted_file = regular::open_or_create(&folder.file(LOCK_FILE)).unwrap();
         first.delete().unwrap();
         deleted_file.try_lock().unwrap();
-        assert!(!atomic::is_named(&deleted_file, &folder.file(LOCK)));
+        assert!(!atomic::is_named(&deleted_file, &folder.file(LOCK_FILE)));
         Lock::acquire(&folder, None).unwrap();
     }
 }

@@ -10,7 +10,7 @@ use arrow_schema::SchemaRef;
 use parquet::errors::ParquetError;
 use tempfile::NamedTempFile;
 
-use super::open::remove;
+use super::open::remove_folder;
 use super::{Job, OpenRun, Session, StoreError, Tally};
 use super::{provenance, read, schema};
 use sweep_files::batches::from_arrow;
@@ -80,13 +80,13 @@ fn write_to<T>(
 /// # Errors
 /// [`StoreError::File`].
 pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Result<(), StoreError> {
-    files::judge(output, job.layout.kind)?;
+    files::check_replaceable(output, job.layout.kind)?;
     let folder = atomic::parent(output);
-    files::ready(folder)?;
+    files::prepare_folder(folder)?;
     let mut writer = MapWriter::begin(job, atomic::create_temporary(folder)?, output)?;
     batches.iter().try_for_each(|batch| writer.write(batch))?;
     let file = writer.finish()?;
-    files::judge(output, job.layout.kind)?;
+    files::check_replaceable(output, job.layout.kind)?;
     Ok(atomic::publish(file, output)?)
 }
 
@@ -113,7 +113,7 @@ impl OpenRun {
             if stop() {
                 return Ok(None);
             }
-            let Some(batches) = self.read_whole(chunk, |part| part.result_batches())? else {
+            let Some(batches) = self.read_complete(chunk, |part| part.result_batches())? else {
                 self.rescan()?;
                 return Err(self.incomplete_error()?);
             };
@@ -123,7 +123,7 @@ impl OpenRun {
         // The file is read before it is moved to the output, because an unreadable file must not
         // replace another one.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
-        files::judge(&output, job.layout.kind)?;
+        files::check_replaceable(&output, job.layout.kind)?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
     }
@@ -141,10 +141,10 @@ impl OpenRun {
     ) -> Result<Vec<String>, StoreError> {
         let sidecar = provenance::sidecar(&self.folder, job, tally, session)?;
         let path = self.folder.sidecar();
-        files::judge(&path, self.folder.sidecar_kind())?;
+        files::check_replaceable(&path, self.folder.sidecar_kind())?;
         atomic::write(&self.folder.path, &path, &sidecar)?;
         let mut notes = self.take_notes();
-        notes.extend(remove(&self.folder, self.lock));
+        notes.extend(remove_folder(&self.folder, self.lock));
         Ok(notes)
     }
 }

@@ -14,15 +14,15 @@ use serde_json::json;
 
 use super::differences::PlanDifference;
 use super::lock::Lock;
-use super::own;
+use super::own_files;
 use super::part::{Damage, PartError};
-use super::plan_file::{PlanFile, StoredPlan, pretty, rename_damaged};
+use super::plan_file::{PlanFile, StoredPlan, format_json, rename_damaged};
 use super::point_parts::{PointPart, PointParts};
 use super::provenance::Session;
 use super::read::{self, NameCounts, ResultFile, Tally};
 use super::schema::PointRows;
 use super::shard::{self, Shard, ShardLayout, ShardRequest};
-use super::{Folder, Job, PLAN, part_index, part_name};
+use super::{Folder, Job, PLAN_FILE, part_index, part_name};
 use crate::{Environment, StoreError};
 use sweep_files::panics::lock;
 use sweep_files::{FileError, ParquetFile, atomic, regular};
@@ -62,7 +62,7 @@ pub struct OpenRun {
     /// while the writer adds to it.
     complete_chunks: Mutex<BTreeSet<u64>>,
     /// The rows of this process's incomplete chunks, until [`OpenRun::take_incomplete`].
-    incomplete: Mutex<BTreeMap<u64, Vec<PointRows>>>,
+    incomplete_chunks: Mutex<BTreeMap<u64, Vec<PointRows>>>,
     notes: Vec<String>,
 }
 
@@ -111,7 +111,7 @@ impl OpenRun {
             parts: PointParts::new(job),
             shard,
             complete_chunks: Mutex::default(),
-            incomplete: Mutex::default(),
+            incomplete_chunks: Mutex::default(),
             notes,
         };
         run.rescan()?;
@@ -140,7 +140,7 @@ impl OpenRun {
     /// [`StoreError::File`].
     pub fn rescan(&mut self) -> Result<(), StoreError> {
         let mut complete_chunks = BTreeSet::new();
-        let mut incomplete = BTreeMap::new();
+        let mut incomplete_chunks = BTreeMap::new();
         for chunk in part_indices(&self.folder)? {
             if chunk >= self.chunks() || !self.owns(chunk) {
                 continue;
@@ -154,19 +154,19 @@ impl OpenRun {
                     complete_chunks.insert(chunk);
                 }
                 Some(Some(outcomes)) => {
-                    incomplete.insert(chunk, outcomes);
+                    incomplete_chunks.insert(chunk, outcomes);
                 }
                 None => {}
             }
         }
         *self.complete_chunks() = complete_chunks;
-        *lock(&self.incomplete) = incomplete;
+        *lock(&self.incomplete_chunks) = incomplete_chunks;
         Ok(())
     }
 
     /// Reads the part of a complete chunk. Returns `None` if there is none, or if it is damaged; a
     /// damaged part is renamed and noted.
-    pub(super) fn read_whole<T>(
+    pub(super) fn read_complete<T>(
         &mut self,
         chunk: u64,
         read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
@@ -185,7 +185,7 @@ impl OpenRun {
     /// Returns the stored rows of a point, whichever process has computed them.
     pub fn stored_rows(&self, point: u64) -> Option<PointRows> {
         let part = self.parts.open(&self.folder, self.chunk_of(point)).ok()??;
-        part.outcomes().ok()?.into_iter().find(|done| done.point == point)
+        part.outcomes().ok()?.into_iter().find(|rows| rows.point == point)
     }
 
     /// Reads the part of a chunk, if there is one. A damaged part is renamed and noted.
@@ -231,7 +231,7 @@ impl OpenRun {
         if is_complete {
             self.complete_chunks().insert(chunk);
         } else {
-            lock(&self.incomplete).insert(chunk, outcomes);
+            lock(&self.incomplete_chunks).insert(chunk, outcomes);
         }
         Ok(())
     }
@@ -240,18 +240,18 @@ impl OpenRun {
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn statuses(&mut self) -> Result<NameCounts, StoreError> {
+    pub fn count_statuses(&mut self) -> Result<NameCounts, StoreError> {
         let mut counts = NameCounts::new();
         let chunks = self.complete_chunks().clone();
         for chunk in chunks {
-            self.read_whole(chunk, |part| part.add_statuses(&mut counts))?;
+            self.read_complete(chunk, |part| part.add_statuses(&mut counts))?;
         }
         Ok(counts)
     }
 
     /// Takes the stored rows of incomplete chunks, from which this process resumes them.
     pub fn take_incomplete(&self) -> BTreeMap<u64, Vec<PointRows>> {
-        std::mem::take(&mut *lock(&self.incomplete))
+        std::mem::take(&mut *lock(&self.incomplete_chunks))
     }
 
     /// Returns the number of chunks of the whole run.
@@ -295,9 +295,9 @@ impl OpenRun {
 
     /// Returns the number of points that this process has to compute, and how many of them are
     /// stored.
-    pub fn own_points(&self) -> (u64, u64) {
+    pub fn count_own_points(&self) -> (u64, u64) {
         let chunks = self.chunks();
-        let own_chunks = self.shard().map_or(chunks, |shard| shard.chunks(chunks));
+        let own_chunks = self.shard().map_or(chunks, |shard| shard.count_chunks(chunks));
         let full_chunk_points = self.chunk_length(0);
         // Every chunk of a run is full, except perhaps the last.
         let missing_in_last = match chunks.checked_sub(1) {
@@ -306,7 +306,7 @@ impl OpenRun {
         };
         let mut stored: u64 =
             self.complete_chunks().iter().map(|&chunk| self.chunk_length(chunk)).sum();
-        for rows in lock(&self.incomplete).values() {
+        for rows in lock(&self.incomplete_chunks).values() {
             stored += rows.len() as u64;
         }
         (own_chunks.saturating_mul(full_chunk_points).saturating_sub(missing_in_last), stored)
@@ -326,7 +326,7 @@ impl OpenRun {
         let name =
             format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
         let path = self.folder.file(name.replace(['/', '\0'], "_"));
-        Ok(atomic::write(&self.folder.path, &path, &pretty(&json!(session)))?)
+        Ok(atomic::write(&self.folder.path, &path, &format_json(&json!(session)))?)
     }
 
     /// Returns the error about the missing chunks and the shards to which they belong.
@@ -339,7 +339,7 @@ impl OpenRun {
             missing: chunks - complete_chunks.len() as u64,
             chunks,
             missing_shards: layout
-                .map(|layout| shard::list(layout.incomplete(chunks, &complete_chunks))),
+                .map(|layout| shard::format_numbers(layout.incomplete(chunks, &complete_chunks))),
         })
     }
 }
@@ -466,21 +466,21 @@ pub(super) fn claim_folder<T>(
     let lock = Lock::acquire(folder, shard()?)?;
     let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
     if fresh {
-        own::delete_own_files(folder)?;
+        own_files::delete_own_files(folder)?;
     }
     atomic::clear_leftovers(&folder.path);
     let job_plan = PlanFile::new(job);
     match PlanFile::read(folder)? {
         StoredPlan::Plan(stored_plan) => refuse_other_plan(folder, &stored_plan, &job_plan)?,
         StoredPlan::Damaged => {
-            let new_path = rename_damaged(&folder.file(PLAN))?;
+            let new_path = rename_damaged(&folder.file(PLAN_FILE))?;
             notes.push(format!("the frozen plan was damaged; kept as {}", new_path.display()));
             job_plan.write_if_absent(folder)?;
         }
         StoredPlan::Nothing => {
             if !fresh && let Some(result) = find_finished()? {
                 // A process that was killed after publishing its result has left the folder.
-                remove(folder, lock);
+                remove_folder(folder, lock);
                 return Ok(OpenOutcome::Finished(result));
             }
             job_plan.write_if_absent(folder)?;
@@ -511,9 +511,9 @@ pub(super) fn refuse_other_plan(
 /// Removes the folder of a finished run. Files that the run has not written, or has renamed as
 /// damaged, stay, and the folder with them. The result does not depend on the folder, so a failure
 /// is returned as a note.
-pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
+pub(super) fn remove_folder(folder: &Folder, lock: Lock) -> Option<String> {
     let path = folder.path.display();
-    let removal = own::delete_own_files(folder).and_then(|remaining_files| {
+    let removal = own_files::delete_own_files(folder).and_then(|remaining_files| {
         lock.delete()?;
         if remaining_files.is_empty() {
             let removal = regular::if_there(fs::remove_dir(&folder.path));

@@ -34,7 +34,7 @@ use sweep_files::{CREATED_BY, FileError, ParquetFile, Writer, key, panics, seal}
 pub(super) enum Damage {
     #[error("it is not as it was written")]
     Bytes,
-    #[error("it belongs to another plan, place or version")]
+    #[error("it belongs to another plan, index or version")]
     Foreign,
     #[error("its rows make no sense")]
     Rows,
@@ -148,7 +148,7 @@ impl PartSchema {
     }
 
     /// Returns the number of columns.
-    pub(super) const fn width(&self) -> usize {
+    pub(super) const fn column_count(&self) -> usize {
         self.columns.len()
     }
 }

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::differences::differences;
-use super::{Folder, Job, PLAN, PlanDifference, StoreError};
+use super::differences::find_differences;
+use super::{Folder, Job, PLAN_FILE, PlanDifference, StoreError};
 use sweep_files::{atomic, regular};
 
 /// The version of the format of `plan.json`. Folders of other formats are refused as of another
@@ -62,7 +62,7 @@ impl PlanFile {
 
     /// Reads the plan of a run folder.
     pub(super) fn read(folder: &Folder) -> Result<StoredPlan, StoreError> {
-        let path = folder.file(PLAN);
+        let path = folder.file(PLAN_FILE);
         let text = regular::if_there(regular::read_json(&path));
         let Some(text) = text.map_err(StoreError::io("read", &path))? else {
             return Ok(StoredPlan::Nothing);
@@ -81,7 +81,7 @@ impl PlanFile {
 
     /// Writes the plan, unless another process has written one.
     pub(super) fn write_if_absent(&self, folder: &Folder) -> Result<(), StoreError> {
-        let text = pretty(&json!(self));
+        let text = format_json(&json!(self));
         if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
             return Err(StoreError::Refused(format!(
                 "the plan is too long for {}: written out, it has more than {} MiB\n  = help: \
@@ -90,7 +90,7 @@ impl PlanFile {
                 regular::LONGEST_JSON_BYTES >> 20
             )));
         }
-        atomic::create(&folder.path, &folder.file(PLAN), &text)?;
+        atomic::create(&folder.path, &folder.file(PLAN_FILE), &text)?;
         Ok(())
     }
 
@@ -99,12 +99,12 @@ impl PlanFile {
         if self == other {
             return Vec::new();
         }
-        differences(&comparable(self), &comparable(other))
+        find_differences(&plan_with_versions(self), &plan_with_versions(other))
     }
 }
 
 /// Formats JSON with indentation and a final newline, for files that people may read.
-pub(super) fn pretty(value: &Value) -> Vec<u8> {
+pub(super) fn format_json(value: &Value) -> Vec<u8> {
     format!("{value:#}\n").into_bytes()
 }
 
@@ -115,7 +115,7 @@ pub(super) fn plan_hash(version: &str, numerics: u32, plan: &Value) -> blake3::H
 
 /// Returns the plan with the other entries of the file added, so that differences of either have a
 /// path.
-fn comparable(file: &PlanFile) -> Value {
+fn plan_with_versions(file: &PlanFile) -> Value {
     let mut value = file.plan.clone();
     if let Value::Object(map) = &mut value {
         map.insert("sweep_version".into(), file.version.clone().into());

@@ -29,7 +29,7 @@ pub(super) struct PointParts {
     parts: PartSchema,
     layout: Layout,
     /// The position of each of the model's columns in a part.
-    positions: Vec<usize>,
+    column_positions: Vec<usize>,
     points: u64,
     chunk_points: u64,
 }
@@ -42,10 +42,10 @@ impl PointParts {
         let mut columns: Vec<DeclaredColumn> = layout.all_columns().cloned().collect();
         let mut next_in_result = 1 + layout.axes.len();
         let mut next_kept = columns.len();
-        let mut positions = Vec::with_capacity(layout.columns.len());
+        let mut column_positions = Vec::with_capacity(layout.columns.len());
         for column in &layout.columns {
             let next_position = if is_kept(&column) { &mut next_kept } else { &mut next_in_result };
-            positions.push(*next_position);
+            column_positions.push(*next_position);
             *next_position += 1;
         }
         columns.extend(layout.columns.iter().filter(is_kept).cloned());
@@ -55,7 +55,7 @@ impl PointParts {
         }
         let parts = PartSchema::new(job, columns);
         let chunk_points = chunk_points(job.points);
-        Self { parts, layout, positions, points: job.points, chunk_points }
+        Self { parts, layout, column_positions, points: job.points, chunk_points }
     }
 
     /// Returns the number of chunks of the whole run.
@@ -122,16 +122,16 @@ impl PointParts {
 
     /// Returns a row with a cell for each column of a part.
     fn part_row(&self, point: u64, axes: &[f64], cells: &RowCells) -> RowCells {
-        let mut row: RowCells = vec![None; self.parts.width()];
+        let mut row: RowCells = vec![None; self.parts.column_count()];
         row[0] = Some(point / self.layout.tasks_per_point);
         for (cell, value) in row[1..].iter_mut().zip(axes).take(self.layout.axes.len()) {
             *cell = Some(value.to_bits());
         }
-        for (position, cell) in self.positions.iter().zip(cells) {
+        for (position, cell) in self.column_positions.iter().zip(cells) {
             row[*position] = *cell;
         }
         if self.layout.tasks_per_point > 1 {
-            row[self.number_position()] = Some(point);
+            row[self.number_column_position()] = Some(point);
         }
         row
     }
@@ -149,7 +149,7 @@ impl PointParts {
         if part.rows() > max_rows {
             return Err(Damage::Rows.into());
         }
-        let numbers = part.cells(&[self.number_position()])?;
+        let numbers = part.cells(&[self.number_column_position()])?;
         let mut points: Vec<u64> = numbers.into_iter().filter_map(|row| row[0]).collect();
         if self.layout.has_several_rows {
             points.dedup();
@@ -161,8 +161,8 @@ impl PointParts {
     }
 
     /// Returns the position of the column of the numbers by which the engine identifies rows.
-    const fn number_position(&self) -> usize {
-        if self.layout.tasks_per_point > 1 { self.parts.width() - 1 } else { 0 }
+    const fn number_column_position(&self) -> usize {
+        if self.layout.tasks_per_point > 1 { self.parts.column_count() - 1 } else { 0 }
     }
 }
 
@@ -188,9 +188,10 @@ impl PointPart<'_> {
 
     /// Reads the points with their rows.
     pub(super) fn outcomes(&self) -> Result<Vec<PointRows>, PartError> {
-        let positions = [&[self.parts.number_position()], &self.parts.positions[..]].concat();
+        let column_positions =
+            [&[self.parts.number_column_position()], &self.parts.column_positions[..]].concat();
         let mut outcomes: Vec<PointRows> = Vec::with_capacity(self.points.len());
-        for mut row in self.part.cells(&positions)? {
+        for mut row in self.part.cells(&column_positions)? {
             let cells = row.split_off(1);
             let point = row[0].unwrap_or_default();
             match outcomes.last_mut() {
@@ -203,10 +204,10 @@ impl PointPart<'_> {
 
     /// Counts rows by status.
     pub(super) fn add_statuses(&self, counts: &mut NameCounts) -> Result<(), PartError> {
-        let PointParts { layout, positions, .. } = self.parts;
+        let PointParts { layout, column_positions, .. } = self.parts;
         let Some(status) = layout.position("status") else { return Ok(()) };
         let CellType::Name(names) = &layout.columns[status].kind else { return Ok(()) };
-        for row in self.part.cells(&[positions[status]])? {
+        for row in self.part.cells(&[column_positions[status]])? {
             let name = row[0].and_then(|name| names.get(name as usize));
             name.into_iter().for_each(|name| count_name(counts, name));
         }

@@ -7,7 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::plan_file::pretty;
+use super::plan_file::format_json;
 use super::{Folder, Job, StoreError, Tally};
 use sweep_files::regular;
 
@@ -71,14 +71,14 @@ pub fn sidecar(
     for key in ["host", "cpus", "cpu_model", "simd", "threads"] {
         sidecar[key] = last_session[key].clone();
     }
-    Ok(pretty(&sidecar))
+    Ok(format_json(&sidecar))
 }
 
 /// Reads the recorded sessions, without those that cannot be read.
 fn recorded_sessions(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     let mut sessions = Vec::new();
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        if name.to_str().is_some_and(is_session) {
+        if name.to_str().is_some_and(is_session_name) {
             let text = regular::read_json(&folder.path.join(name)).unwrap_or_default();
             sessions.extend(serde_json::from_slice::<Session>(&text).ok());
         }
@@ -86,13 +86,13 @@ fn recorded_sessions(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     Ok(sessions)
 }
 
-/// Returns whether a name is that of a file that `OpenRun::record` writes.
-pub(super) fn is_session(name: &str) -> bool {
+/// Returns whether a name is that of a file that `OpenRun::record_session` writes.
+pub(super) fn is_session_name(name: &str) -> bool {
     name.starts_with("session-") && name.ends_with(".json")
 }
 
 /// Returns the name of this host.
-pub fn host() -> String {
+pub fn host_name() -> String {
     #[cfg(unix)]
     let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
     #[cfg(not(unix))]

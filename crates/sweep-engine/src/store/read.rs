@@ -265,13 +265,13 @@ pub struct ColumnRange {
     /// The least and the greatest value, if there are numbers.
     pub range: Option<(f64, f64)>,
     /// The values of a text or bool column with their numbers of occurrences: the first
-    /// `MAX_NAMES` that appear.
-    pub names: Vec<(String, u64)>,
+    /// `MAX_COUNTED_WORDS` that appear.
+    pub word_counts: Vec<(String, u64)>,
 }
 
 /// The maximum number of distinct texts of a column that are counted. Basis: columns of names have
 /// fewer. Doubling it counts texts of columns that are not names.
-const MAX_NAMES: usize = 16;
+const MAX_COUNTED_WORDS: usize = 16;
 
 /// The content of any Parquet file in short.
 #[derive(Clone, Debug, PartialEq)]
@@ -288,13 +288,13 @@ pub struct Overview {
 ///
 /// # Errors
 /// [`StoreError::File`].
-pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
+pub fn read_overview(file: &ParquetFile) -> Result<Overview, StoreError> {
     let empty_range = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
         name: field.name().clone(),
         metadata: ColumnMetadata::from_field(field),
         nulls: 0,
         range: None,
-        names: Vec::new(),
+        word_counts: Vec::new(),
     };
     let mut ranges: Vec<ColumnRange> = file.schema().fields().iter().map(empty_range).collect();
     // Columns of types that files of this program do not have are not read.
@@ -325,10 +325,10 @@ impl ColumnRange {
             self.nulls += 1;
             return;
         };
-        if let Some((_, count)) = self.names.iter_mut().find(|(known, _)| known == word) {
+        if let Some((_, count)) = self.word_counts.iter_mut().find(|(known, _)| known == word) {
             *count += 1;
-        } else if self.names.len() < MAX_NAMES {
-            self.names.push((word.to_owned(), 1));
+        } else if self.word_counts.len() < MAX_COUNTED_WORDS {
+            self.word_counts.push((word.to_owned(), 1));
         }
     }
 }

@@ -12,8 +12,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::plan_file::{pretty, rename_damaged};
-use super::{Folder, SHARDS, StoreError};
+use super::plan_file::{format_json, rename_damaged};
+use super::{Folder, SHARDS_FILE, StoreError};
 use crate::Environment;
 use sweep_files::{atomic, regular};
 
@@ -36,8 +36,8 @@ impl Shard {
         chunk % self.count == self.index - 1
     }
 
-    /// Returns how many chunks of a run belong to this shard.
-    pub const fn chunks(self, chunks: u64) -> u64 {
+    /// Returns the number of chunks that belong to this shard, of a run with `chunks` chunks.
+    pub const fn count_chunks(self, chunks: u64) -> u64 {
         chunks.saturating_sub(self.index - 1).div_ceil(self.count)
     }
 }
@@ -89,7 +89,7 @@ impl ShardLayout {
     /// Reads the division of a run folder; `None` if no shard has started, or if the file is not
     /// readable. It decides which process computes a chunk, but not its content.
     pub(super) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
-        let path = folder.file(SHARDS);
+        let path = folder.file(SHARDS_FILE);
         let text = regular::if_there(regular::read_json(&path));
         let text = text.map_err(StoreError::io("read", &path))?;
         let layout = text.and_then(|text| serde_json::from_slice(&text).ok());
@@ -103,7 +103,7 @@ impl ShardLayout {
             *chunks_done.entry(chunk % self.shards + 1).or_default() += 1;
         }
         let lacks_chunk = |index: &u64| {
-            let own_chunks = Shard { index: *index, count: self.shards }.chunks(chunks);
+            let own_chunks = Shard { index: *index, count: self.shards }.count_chunks(chunks);
             chunks_done.get(index).copied().unwrap_or(0) < own_chunks
         };
         (1..=self.shards).filter(lacks_chunk).collect()
@@ -111,8 +111,8 @@ impl ShardLayout {
 
     /// Writes the division, unless another shard has written one. Returns the division in the file.
     pub(super) fn write_if_absent(self, folder: &Folder) -> Result<Self, StoreError> {
-        let text = pretty(&json!(self));
-        let path = folder.file(SHARDS);
+        let text = format_json(&json!(self));
+        let path = folder.file(SHARDS_FILE);
         if atomic::create(&folder.path, &path, &text)? {
             return Ok(self);
         }
@@ -161,36 +161,36 @@ pub(super) fn resolve_shard(
         return match requested {
             None => Ok(None),
             Some(count) => refuse(format!(
-                "--shard auto/{count} takes its place from SLURM_ARRAY_TASK_ID or \
+                "--shard auto/{count} takes its number from SLURM_ARRAY_TASK_ID or \
                  JOB_COMPLETION_INDEX, and neither is set\n  = help: give it as --shard I/{count}"
             )),
         };
     };
-    let layout = match (stored_layout, requested.or(scheduler.count)) {
+    let layout = match (stored_layout, requested.or(scheduler.task_count)) {
         (Some(ShardLayout { shards, .. }), Some(count))
             if requested.is_some() && count != shards =>
         {
             return refuse_count(shards, count, format!("auto/{shards}"));
         }
         (Some(layout), _) => layout,
-        (None, Some(shards)) => ShardLayout { shards, first_array_id: scheduler.first },
+        (None, Some(shards)) => ShardLayout { shards, first_array_id: scheduler.first_task_id },
         (None, None) => {
             return refuse(format!(
                 "{} is set, but not how many shards there are\n  = help: give --shard auto/N, or \
                  --shard 1/1 to run it whole",
-                scheduler.name
+                scheduler.variable
             ));
         }
     };
-    match scheduler.id.checked_sub(layout.first_array_id) {
+    match scheduler.task_id.checked_sub(layout.first_array_id) {
         Some(offset) if offset < layout.shards => {
             Ok(Some((Shard { index: offset + 1, count: layout.shards }, layout)))
         }
         _ => refuse(format!(
             "{} is {}, but this run's {} shards are numbered {} to {}\n  = help: submit those \
              numbers, or give --shard I/N",
-            scheduler.name,
-            scheduler.id,
+            scheduler.variable,
+            scheduler.task_id,
             layout.shards,
             layout.first_array_id,
             layout.first_array_id.saturating_add(layout.shards - 1)
@@ -201,41 +201,53 @@ pub(super) fn resolve_shard(
 /// The environment variables of a scheduler about this task.
 struct Scheduler {
     /// The name of the variable with the task's number.
-    name: &'static str,
+    variable: &'static str,
     /// The task's number in the array.
-    id: u64,
+    task_id: u64,
     /// The least number of the array.
-    first: u64,
+    first_task_id: u64,
     /// The number of tasks, if the scheduler gives it.
-    count: Option<u64>,
+    task_count: Option<u64>,
 }
 
 impl Scheduler {
     fn read(environment: Environment<'_>) -> Result<Option<Self>, StoreError> {
-        let number = |name: &'static str| match environment(name) {
+        let parse_variable = |name: &'static str| match environment(name) {
             None => Ok(None),
             Some(text) => text.parse::<u64>().map(Some).map_err(|_| {
                 StoreError::Refused(format!("{name} is `{text}`, which is not a number"))
             }),
         };
-        if let Some(id) = number("SLURM_ARRAY_TASK_ID")? {
-            let first = number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(id);
-            let count =
-                number("SLURM_ARRAY_TASK_COUNT")?.filter(|count| (1..=MAX_SHARDS).contains(count));
-            return Ok(Some(Self { name: "SLURM_ARRAY_TASK_ID", id, first, count }));
+        if let Some(task_id) = parse_variable("SLURM_ARRAY_TASK_ID")? {
+            let first_task_id = parse_variable("SLURM_ARRAY_TASK_MIN")?.unwrap_or(task_id);
+            let task_count = parse_variable("SLURM_ARRAY_TASK_COUNT")?
+                .filter(|count| (1..=MAX_SHARDS).contains(count));
+            return Ok(Some(Self {
+                variable: "SLURM_ARRAY_TASK_ID",
+                task_id,
+                first_task_id,
+                task_count,
+            }));
         }
-        let index = number("JOB_COMPLETION_INDEX")?;
-        Ok(index.map(|id| Self { name: "JOB_COMPLETION_INDEX", id, first: 0, count: None }))
+        let index = parse_variable("JOB_COMPLETION_INDEX")?;
+        Ok(index.map(|task_id| Self {
+            variable: "JOB_COMPLETION_INDEX",
+            task_id,
+            first_task_id: 0,
+            task_count: None,
+        }))
     }
 }
 
 /// Formats numbers for `sbatch --array=`: `2,5-7`.
-pub fn list(numbers: impl IntoIterator<Item = u64>) -> String {
+pub fn format_numbers(numbers: impl IntoIterator<Item = u64>) -> String {
     let numbers: Vec<u64> = numbers.into_iter().collect();
-    let ranges = numbers.chunk_by(|number, next| number + 1 == *next).map(|range| match range {
-        [first, .., last] => format!("{first}-{last}"),
-        _ => range[0].to_string(),
-    });
+    let ranges = numbers.chunk_by(|parse_variable, next| parse_variable + 1 == *next).map(
+        |range| match range {
+            [first, .., last] => format!("{first}-{last}"),
+            _ => range[0].to_string(),
+        },
+    );
     ranges.collect::<Vec<_>>().join(",")
 }
 
@@ -279,7 +291,7 @@ mod tests {
             for index in 1..=7 {
                 let shard = Shard { index, count: 7 };
                 assert_eq!(
-                    shard.chunks(chunks),
+                    shard.count_chunks(chunks),
                     (0..chunks).filter(|&chunk| shard.owns(chunk)).count() as u64
                 );
             }
@@ -373,7 +385,7 @@ mod tests {
 
     #[test]
     fn numbers_are_formatted_for_sbatch() {
-        assert_eq!(list([2, 5, 6, 7, 9]), "2,5-7,9");
-        assert_eq!(list([]), "");
+        assert_eq!(format_numbers([2, 5, 6, 7, 9]), "2,5-7,9");
+        assert_eq!(format_numbers([]), "");
     }
 }

@@ -72,7 +72,7 @@ pub(super) fn serialize_path<S: Serializer>(path: &Path, serializer: S) -> Resul
 ///
 /// # Errors
 /// The errors of [`super::OpenRun::open`] except [`StoreError::Busy`].
-pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
+pub fn read_status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
     let folder = Folder::new(output, &job.layout)?;
     let parts = PointParts::new(job);
     let chunks = parts.chunks();
@@ -128,7 +128,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     status.chunks_missing = chunks - status.chunks_done;
     status.state =
         if status.chunks_missing == 0 { RunStage::Complete } else { RunStage::Unfinished };
-    status.running = lock::holders(&folder);
+    status.running = lock::find_holders(&folder);
     if let Some(layout) = ShardLayout::read(&folder)? {
         let is_running =
             |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
@@ -139,7 +139,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         status.missing_shard_numbers = missing_shards.collect();
         let array_ids =
             status.missing_shard_numbers.iter().map(|shard| shard - 1 + layout.first_array_id);
-        status.missing_shards = shard::list(array_ids);
+        status.missing_shards = shard::format_numbers(array_ids);
         status.shards = Some(layout.shards);
     }
     Ok(status)

@@ -51,7 +51,7 @@ pub struct Trials {
     /// The index of the last part.
     last_part: u64,
     /// The rows of the last part.
-    rows: Vec<RowCells>,
+    last_part_rows: Vec<RowCells>,
     /// Whether the last part has rows that are not written.
     is_dirty: bool,
     last_write: Instant,
@@ -76,8 +76,8 @@ impl Trials {
     ) -> Result<OpenOutcome<(), Self>, StoreError> {
         let folder = Folder::beside(output, job.layout.kind)?;
         let find_finished = || match job.layout.kind {
-            // The model's own file does not record the search that made it.
-            FileKind::Own => Ok(None),
+            // A file of the model's parameters does not record the search that made it.
+            FileKind::ModelFile => Ok(None),
             _ => Ok(open::result_of_same_plan(&folder, job)?.map(drop)),
         };
         let (lock, notes) =
@@ -94,7 +94,7 @@ impl Trials {
             parts: PartSchema::new(job, columns),
             responses: BTreeMap::new(),
             last_part: 0,
-            rows: Vec::new(),
+            last_part_rows: Vec::new(),
             is_dirty: false,
             last_write: Instant::now(),
             notes,
@@ -114,7 +114,7 @@ impl Trials {
                         self.responses.insert(key, response.to_vec());
                     }
                     self.last_part = index;
-                    self.rows = rows;
+                    self.last_part_rows = rows;
                 }
                 Err(damage) => {
                     let note = open::rename_damaged_part(&self.folder, index, damage)?;
@@ -140,12 +140,13 @@ impl Trials {
     /// # Errors
     /// [`StoreError::File`], if the last part is full and has to be written.
     pub fn add(&mut self, key: TrialKey, response: RowCells) -> Result<(), StoreError> {
-        if self.rows.len() >= PART_ROWS {
+        if self.last_part_rows.len() >= PART_ROWS {
             self.write()?;
             self.last_part += 1;
-            self.rows.clear();
+            self.last_part_rows.clear();
         }
-        self.rows.push(key.iter().copied().map(Some).chain(response.iter().copied()).collect());
+        self.last_part_rows
+            .push(key.iter().copied().map(Some).chain(response.iter().copied()).collect());
         self.responses.insert(key, response);
         self.is_dirty = true;
         Ok(())
@@ -167,7 +168,7 @@ impl Trials {
             return Ok(());
         }
         let path = self.folder.file(part_name(self.last_part));
-        let bytes = self.parts.encode(&part_entry(self.last_part), &self.rows);
+        let bytes = self.parts.encode(&part_entry(self.last_part), &self.last_part_rows);
         let bytes = bytes.map_err(StoreError::parquet("write", &path))?;
         atomic::write(&self.folder.path, &path, &bytes)?;
         self.is_dirty = false;
@@ -182,7 +183,7 @@ impl Trials {
 
     /// Removes the folder of a search whose result is complete. A failure is returned as a note.
     pub fn complete(self) -> Option<String> {
-        open::remove(&self.folder, self.lock)
+        open::remove_folder(&self.folder, self.lock)
     }
 }
 

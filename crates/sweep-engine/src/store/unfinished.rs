@@ -17,7 +17,7 @@ use sweep_files::ParquetFile;
 
 /// The progress of a run or a search that has no result yet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Unfinished {
+pub struct UnfinishedWork {
     /// The path that the result will have.
     #[serde(serialize_with = "super::status::serialize_path")]
     pub output: PathBuf,
@@ -40,7 +40,7 @@ pub struct Unfinished {
 ///
 /// # Errors
 /// [`StoreError::File`].
-pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
+pub fn find_unfinished(path: &Path) -> Result<Option<UnfinishedWork>, StoreError> {
     let is_folder =
         path.is_dir() && path.extension().is_some_and(|extension| extension == "partial");
     let output = if is_folder { path.with_extension("") } else { path.to_path_buf() };
@@ -66,11 +66,11 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
             points_done += part.rows();
         }
     }
-    Ok(Some(Unfinished {
+    Ok(Some(UnfinishedWork {
         name: stored_plan.plan["name"].as_str().unwrap_or_default().to_owned(),
         points: (!is_search).then_some(stored_plan.points),
         points_done,
-        running: lock::holders(&folder),
+        running: lock::find_holders(&folder),
         output: folder.output,
         folder: folder.path,
     }))
@@ -97,9 +97,9 @@ fn count_points(part: &ParquetFile) -> u64 {
 /// Refuses a result that is unfinished, with its progress.
 ///
 /// # Errors
-/// [`StoreError::Unfinished`], and the errors of [`unfinished`].
+/// [`StoreError::Unfinished`], and the errors of [`find_unfinished`].
 pub fn refuse_unfinished(path: &Path) -> Result<(), StoreError> {
-    match unfinished(path)? {
+    match find_unfinished(path)? {
         Some(unfinished_work) => Err(StoreError::Unfinished {
             progress: unfinished_work.progress(),
             output: unfinished_work.output,
@@ -109,7 +109,7 @@ pub fn refuse_unfinished(path: &Path) -> Result<(), StoreError> {
     }
 }
 
-impl Unfinished {
+impl UnfinishedWork {
     /// Returns the progress in words.
     pub fn progress(&self) -> String {
         let points_done = self.points_done;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use serde_json::{Map, Value};
-use sweep_files::{ParquetFile, dotted, key, leaves};
+use sweep_files::{ParquetFile, dotted, key, visit_leaves};
 
 /// A value that differs between the plans of two files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -49,7 +49,7 @@ pub fn plan_changes(first: &Value, second: &Value) -> Vec<PlanChange> {
         first.len() == second.len() && first.iter().any(Value::is_object)
     };
     let mut changes = Vec::new();
-    leaves([Some(first), Some(second)], descends, &mut Vec::new(), &mut |path, values| {
+    visit_leaves([Some(first), Some(second)], descends, &mut Vec::new(), &mut |path, values| {
         let [first, second] = values.map(|value| value.cloned().unwrap_or_default());
         if first != second {
             changes.push(PlanChange { path: dotted(path), first, second });

@@ -5,7 +5,7 @@ use rust_xlsxwriter::{
     DocProperties, ExcelDateTime, Format as Style, Workbook, Worksheet, XlsxError,
 };
 use serde_json::Value;
-use sweep_files::{Cell, Column, ResultTable, dotted, key, leaves, panics};
+use sweep_files::{Cell, Column, ResultTable, dotted, key, panics, visit_leaves};
 
 use super::{ExportFormat, column_names, export_error};
 use crate::error::ResultsError;
@@ -187,7 +187,7 @@ fn write_plan(workbook: &mut Workbook, table: &ResultTable) -> Result<(), XlsxEr
 /// Collects the values of a plan with their paths. A list of numbers is one value.
 fn collect_leaves(plan: &Value, settings: &mut Vec<(String, Value)>) {
     let descends = |values: &[Value], _: &[Value]| values.iter().any(Value::is_object);
-    leaves([Some(plan); 2], descends, &mut Vec::new(), &mut |path, [value, _]| {
+    visit_leaves([Some(plan); 2], descends, &mut Vec::new(), &mut |path, [value, _]| {
         settings.extend(value.map(|value| (dotted(path), value.clone())));
     });
 }

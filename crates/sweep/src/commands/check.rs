@@ -3,7 +3,7 @@
 
 use arrow_array::Array;
 use sweep_engine::commands::check as engine_check;
-use sweep_engine::config::section::counted;
+use sweep_engine::config::section::format_count;
 use sweep_engine::{
     AxisValues, Design, Error, Estimate, Execution, Exit, Interrupt, ProgressMode, duration, show,
     tell, threads,
@@ -183,8 +183,8 @@ impl Trial {
     /// Describes the number of rows and the time that they take, with advice that shortens a long
     /// time.
     fn describe_work(&self, estimate: &Estimate) -> String {
-        let points = counted(self.rows() as usize / self.rows_per_point, "point");
-        let threads = counted(estimate.threads, "thread");
+        let points = format_count(self.rows() as usize / self.rows_per_point, "point");
+        let threads = format_count(estimate.threads, "thread");
         let time = duration(estimate.wall_s);
         let rows = self.rows();
         let mut text = format!(
@@ -282,7 +282,7 @@ impl Trial {
             .collect();
         text + &match decisive.as_slice() {
             [] => {
-                let points = counted(points, "point");
+                let points = format_count(points, "point");
                 format!("none of them changes a verdict at {points} of the plan\n")
             }
             [one] => format!("measure {one}: it changes verdicts\n"),

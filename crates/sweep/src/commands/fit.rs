@@ -8,7 +8,7 @@ use crate::fit::{self, Evaluations, FitContext, FitOptions, Measurement};
 use lane_ode::Cancel;
 use sweep_engine::commands::grid::{GridArgs, resume_command};
 use sweep_engine::{Error, ExecutionArgs, Exit, Interrupt, Progress, show, tell, threads};
-use sweep_files::{FileKind, OWN_FILE, Output};
+use sweep_files::{FileKind, MODEL_FILE_START, Output};
 
 /// Arguments of `sweep fit`.
 #[derive(Debug, clap::Args)]
@@ -81,7 +81,8 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
             return Err(Error::option("--column", header, expected));
         }
     }
-    let out = args.out.as_deref().map(|path| Output::begin(path, FileKind::Own)).transpose()?;
+    let out =
+        args.out.as_deref().map(|path| Output::begin(path, FileKind::ModelFile)).transpose()?;
     let case_count = cases.len();
     let paths =
         |path: &PathBuf| (0..case_count).map(|k| add_case_number(path, k)).collect::<Vec<_>>();
@@ -109,7 +110,8 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
         let (machine, _) = fit_result.problem.machine(0, &fit_result.x);
         let text = config::machine_file(&machine, &fit_result.problem.written());
         out.finish(
-            format!("{OWN_FILE}fitted to {:?}\n{text}", args.measurement.join(" ")).as_bytes(),
+            format!("{MODEL_FILE_START}fitted to {:?}\n{text}", args.measurement.join(" "))
+                .as_bytes(),
         )?;
         tell(&format!("wrote {}", path.display()));
         if let Some(note) = fit_result.evaluations.take().and_then(Evaluations::complete) {

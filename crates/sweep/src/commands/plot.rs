@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::live::{SliderRange, build_live_part, parse_slider_range};
 use sweep_engine::commands::plot;
-use sweep_engine::config::written::finite;
+use sweep_engine::config::arguments::parse_finite;
 use sweep_engine::{Error, Exit};
 use sweep_plot::PlotOptions;
 use washer_plot::{FigureView, WasherFigures};
@@ -77,7 +77,7 @@ pub(crate) fn run(args: &WasherPlotArgs) -> Result<Exit, Error> {
 }
 
 fn parse_speed(text: &str) -> Result<f64, String> {
-    let speed = finite(text)?;
+    let speed = parse_finite(text)?;
     if speed > 0.0 { Ok(speed) } else { Err("expected a speed above 0 rpm".to_owned()) }
 }
 

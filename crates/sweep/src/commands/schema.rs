@@ -19,7 +19,7 @@ pub(crate) fn run(args: &WasherSchemaArgs) -> Result<Exit, Error> {
     let schema = if args.machine {
         machine::schema()
     } else {
-        sweep_engine::config::schema::grid::<crate::Washer>()
+        sweep_engine::config::schema::grid_schema::<crate::Washer>()
     };
     print(&format!("{schema:#}\n"))
 }

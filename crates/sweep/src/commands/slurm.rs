@@ -4,8 +4,8 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use crate::plan::Plan;
-use sweep_engine::commands::grid::{ResultArgs, quoted};
-use sweep_engine::store::{ShardRequest, idle_shards};
+use sweep_engine::commands::grid::{ResultArgs, quote_for_shell};
+use sweep_engine::store::{ShardRequest, note_idle_shards};
 use sweep_engine::{Error, Exit, print, tell};
 
 /// Maximum number of tasks of a Slurm array, above which a note is printed. Basis: Slurm's default
@@ -69,7 +69,7 @@ pub(crate) fn run(args: &SlurmArgs) -> Result<Exit, Error> {
     let folder = std::env::current_dir().map_err(path_error("the working folder"))?;
     let program = std::env::current_exe().map_err(path_error("this program"))?;
     check_names(args, &folder, &program)?;
-    idle_shards(plan.points(), args.shards).iter().for_each(|note| tell(note));
+    note_idle_shards(plan.points(), args.shards).iter().for_each(|note| tell(note));
     if args.shards > MAX_ARRAY_TASKS {
         tell(
             "note: many clusters allow arrays of 1000 tasks (scontrol show config | grep \
@@ -117,7 +117,7 @@ fn format_script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -
         quoted_pattern(&format!("{stem}.slurm-{field}.log"))
     };
     // `command` begins with the program's bare name; on a node only its path is sure to be found.
-    let program = quoted(&program.display().to_string());
+    let program = quote_for_shell(&program.display().to_string());
     let command = |verb: &str| args.target.command(verb).replacen("sweep", &program, 1);
     let SlurmArgs { time, partition, account, mem, .. } = args;
     let named_options =
@@ -125,14 +125,14 @@ fn format_script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -
     let named_options =
         named_options.into_iter().filter_map(|(option, value)| Some((option, value.as_ref()?)));
     let named_options =
-        named_options.map(|(option, value)| format!(" --{option}={}", quoted(value)));
-    let further_options = args.sbatch.iter().map(|option| format!(" {}", quoted(option)));
+        named_options.map(|(option, value)| format!(" --{option}={}", quote_for_shell(value)));
+    let further_options = args.sbatch.iter().map(|option| format!(" {}", quote_for_shell(option)));
     let common: String = named_options.chain(further_options).collect();
     format!(
         include_str!("slurm.sh"),
-        name = quoted(&plan.name),
-        folder = quoted(&folder.display().to_string()),
-        results = quoted(&results.display().to_string()),
+        name = quote_for_shell(&plan.name),
+        folder = quote_for_shell(&folder.display().to_string()),
+        results = quote_for_shell(&results.display().to_string()),
         shards = args.shards,
         cpus = args.cpus_per_task,
         array_log = log_pattern("%A_%a"),
@@ -146,7 +146,7 @@ fn format_script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -
 /// Returns a pattern of file names, quoted for a shell if another character than `%` needs it.
 fn quoted_pattern(pattern: &str) -> String {
     let rest = pattern.replace('%', "");
-    if quoted(&rest) == rest { pattern.to_owned() } else { quoted(pattern) }
+    if quote_for_shell(&rest) == rest { pattern.to_owned() } else { quote_for_shell(pattern) }
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use crate::trace::{
 use lane_ode::Cancel;
 use sweep_engine::columns::MODELS;
 use sweep_engine::commands::cells::{Lines as _, format_number, format_range, format_table};
-use sweep_engine::commands::grid::quoted;
+use sweep_engine::commands::grid::quote_for_shell;
 use sweep_engine::{Error, Exit, Interrupt, Job, tell};
 use sweep_files::{FileKind, Output, key};
 use sweep_parameter::Worse;
@@ -132,7 +132,8 @@ fn find_worst(args: &TraceArgs, plan: &Plan, column: &str) -> Result<(u64, Worse
     let path = args.result.clone().unwrap_or_else(default_path);
     let refuse = |expected: String| Error::option("--worst", column, expected);
     if !path.exists() {
-        let run_command = format!("`sweep run {}`", quoted(&args.grid.grid.display().to_string()));
+        let run_command =
+            format!("`sweep run {}`", quote_for_shell(&args.grid.grid.display().to_string()));
         let expected = format!("a result at {} (--result); {run_command} makes it", path.display());
         return Err(refuse(expected));
     }

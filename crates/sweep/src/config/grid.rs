@@ -2,10 +2,10 @@
 //! `[reliability]`, `[stability]`.
 
 use serde_json::json;
-use sweep_engine::config::grid::is_another;
-use sweep_engine::config::section::cut;
-use sweep_engine::config::source::{beside, read};
-use sweep_engine::config::syntax::parse;
+use sweep_engine::config::grid::refuse_other_kind;
+use sweep_engine::config::section::truncate;
+use sweep_engine::config::source::{read, resolve_beside};
+use sweep_engine::config::syntax::parse_toml;
 use sweep_engine::config::{
     Diagnostic, Field, Form, Key, KeyWalk, Keys, Location, Report, Section,
 };
@@ -46,23 +46,23 @@ pub(super) fn walk_machine(
 /// Returns the machine that a grid names, or the one that was given with the input.
 fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
     let report = root.report;
-    if let Some(text) = &input.own_file {
+    if let Some(text) = &input.model_file {
         return parse_machine(text, "its machine", report);
     }
     let Some(name) = root.text("machine").into_located() else { return Machine::paper() };
     if name.value == DEFAULT_MACHINE {
         return Machine::paper();
     }
-    let path = beside(&input.path, name.value);
+    let path = resolve_beside(&input.path, name.value);
     match read(&path) {
         Ok(text) => parse_machine(&text, &path.display().to_string(), report),
         Err(error) => {
-            let short_path = cut(&path.display().to_string(), MAX_PATH_CHARS);
+            let short_path = truncate(&path.display().to_string(), MAX_PATH_CHARS);
             let title = format!("cannot read the machine file {short_path}: {error}");
             let expected =
                 format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
             let refusal = Diagnostic::new(title).at_location(&name.location, expected);
-            report.push(refusal.nearest(name.value, BUILT_IN_MACHINES));
+            report.push(refusal.with_nearest_name(name.value, BUILT_IN_MACHINES));
             Machine::paper()
         }
     }
@@ -71,8 +71,8 @@ fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
 /// Parses the text of a machine file.
 fn parse_machine(text: &str, name: &str, report: &Report) -> Machine {
     let source = report.add(name, text);
-    let table = parse(text, source, report);
-    if is_another::<Washer>("machine", table.get_ref(), source, report) {
+    let table = parse_toml(text, source, report);
+    if refuse_other_kind::<Washer>("machine", table.get_ref(), source, report) {
         return Machine::paper();
     }
     let location = Location::new(source, 0..0);
@@ -102,13 +102,13 @@ pub(super) fn walk_stability(
                  of the metrics `growth` and `dwell`";
     let expected = "constant speeds in rpm, as 250, \"240,305\" or \"60:400:1\"";
     let mut text = speeds.as_ref().map(ToString::to_string);
-    let field = keys.table(Key::new("stability", ""), |keys| {
+    let field = keys.walk_table(Key::new("stability", ""), |keys| {
         let read = |section: &Section<'_>, key| {
             section.text_or_number(key).map(|found| found.value.into())
         };
-        let kind = Form::Own(&read, json!({ "type": ["string", "number"] }));
+        let kind = Form::Custom(&read, json!({ "type": ["string", "number"] }));
         let field =
-            keys.key(Key::new("speed_rpm", description).required(expected), &kind, &mut text);
+            keys.walk_key(Key::new("speed_rpm", description).required(expected), &kind, &mut text);
         let (Field::Present(found), Some(text), Some(report)) = (field, text, keys.report()) else {
             return;
         };

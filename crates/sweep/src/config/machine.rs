@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use serde_json::{Value, json};
 use washer_model::{Cabinet, ElementList, Machine, MachineParameter, Spin, Target};
 
-use sweep_engine::config::form::{Numbers, describe_parameter};
+use sweep_engine::config::form::{NumberArray, describe_parameter};
 use sweep_engine::config::keys;
 use sweep_engine::config::schema::{document, parameter_schema};
 use sweep_engine::config::source::is_blank;
@@ -311,8 +311,9 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 let is_assumed = section_keys.iter().all(|key| key.is_assumed(section, machine));
                 let is_needed = !(is_assumed && (sheet.is_given || keys.is_schema()));
                 let table = if is_needed { table.required(&expected) } else { table };
-                let field = keys
-                    .table(table, |keys| section.walk(section_keys, 0, machine, &mut sheet, keys));
+                let field = keys.walk_table(table, |keys| {
+                    section.walk(section_keys, 0, machine, &mut sheet, keys)
+                });
                 if !is_needed && matches!(field, Field::Absent) && keys.section().is_some() {
                     let names = section_keys.iter().flat_map(|key| key.names(&section.prefix));
                     sheet
@@ -328,7 +329,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                         .for_each(|key| mark_doubtful(key.names(&section.prefix), report));
                 }
             }
-            Occurrence::AtMostOnce => drop(keys.table(table, |keys| {
+            Occurrence::AtMostOnce => drop(keys.walk_table(table, |keys| {
                 if keys.section().is_some() {
                     (section.fill)(machine, 1);
                 }
@@ -346,7 +347,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 // the same.
                 let count = (section.count)(machine);
                 if count > 0 || ["springs", "dampers"].contains(&section.name) {
-                    keys.tables(table, sections, count, |keys, k| {
+                    keys.walk_tables(table, sections, count, |keys, k| {
                         section.walk(section_keys, k, machine, &mut sheet, keys);
                     });
                 }
@@ -403,9 +404,9 @@ impl MachineKey {
         };
         let (kind, description, expected) = match self.if_omitted {
             _ if self.is_vector() => {
-                let three = Numbers::new(first.range(), 3..=3, "expected three numbers");
+                let three = NumberArray::new(first.range(), 3..=3, "expected three numbers");
                 (
-                    Form::Numbers(Numbers { location_keys: names.clone(), ..three }),
+                    Form::Numbers(NumberArray { location_keys: names.clone(), ..three }),
                     String::new(),
                     "an array of three numbers".to_owned(),
                 )
@@ -414,7 +415,7 @@ impl MachineKey {
                 let schema =
                     parameter_schema(&engine_parameter(first.clone(), machine, &no_spin()));
                 let schema = json!({ "anyOf": [schema, { "const": AUTO }] });
-                (Form::Own(&read_number_or_auto, schema), String::new(), String::new())
+                (Form::Custom(&read_number_or_auto, schema), String::new(), String::new())
             }
             _ => {
                 let expected = format!("{}: {}", first.description(), first.range());
@@ -439,7 +440,7 @@ impl MachineKey {
             IfOmitted::Default(default) if !self.is_vector() => default.into(),
             _ => Value::Null,
         };
-        let field = keys.key(key, &kind, &mut value);
+        let field = keys.walk_key(key, &kind, &mut value);
         let Some(report) = keys.section().map(|section| section.report) else { return };
         let numbers = value.as_array().map_or(slice::from_ref(&value), Vec::as_slice);
         match field {

@@ -19,7 +19,7 @@ pub(crate) fn walk_top(washer: &mut Washer, keys: &mut Keys<'_>, input: Option<&
     spin::walk(spin, path, keys);
     let key = Key::new("metrics", "further columns of the result").settable();
     let metrics_field =
-        keys.words(key, "metric", &Metric::ALL, Metric::name, &mut measures.metrics);
+        keys.walk_words(key, "metric", &Metric::ALL, Metric::name, &mut measures.metrics);
     measures.stops = machine.stops.len();
     measures.feet = machine.feet.len();
     measures.dampers = machine.dampers.len();
@@ -43,7 +43,7 @@ pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
     {
         let key = Key::new("criterion", description).settable();
         let mut word = criterion.name().to_owned();
-        keys.key(key, &Form::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
+        keys.walk_key(key, &Form::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
         *criterion = Criterion::named(&word).unwrap_or_default();
     }
 }

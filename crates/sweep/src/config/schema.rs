@@ -2,7 +2,7 @@
 
 use crate::model::engine_parameter;
 use serde_json::{Map, Value};
-use sweep_engine::config::schema::{parameter_schema, set as set_schema};
+use sweep_engine::config::schema::{parameter_schema, set_schema};
 use washer_model::{ElementList, MachineParameter, Profile, Spin};
 
 use super::machine::with_one_of_each;

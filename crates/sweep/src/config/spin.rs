@@ -5,9 +5,9 @@ mod cycle;
 use crate::model::engine_parameter;
 use std::path::Path;
 
-use sweep_engine::config::form::{Numbers, describe_parameter};
+use sweep_engine::config::form::{NumberArray, describe_parameter};
 use sweep_engine::config::keys::Variants;
-use sweep_engine::config::source::beside;
+use sweep_engine::config::source::resolve_beside;
 use sweep_engine::config::{Field, Form, Key, Keys};
 use washer_model::{Machine, MachineParameter, Profile, Range, Spin};
 
@@ -41,7 +41,7 @@ const NEEDS_FILE_PROFILE: &str = "only the profile \"file\" has it, which needs 
 
 /// Walks over the section of the grid file at `path`.
 pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
-    keys.table(Key::new("spin", "").required("a section [spin]"), |keys| {
+    keys.walk_table(Key::new("spin", "").required("a section [spin]"), |keys| {
         keys.location_prefix = "spin_".to_owned();
         let table_variant = (
             TABLE_PROFILE,
@@ -69,12 +69,13 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
             Spin::Table { .. } => table_index,
         };
         let key = Key::new("profile", "").settable();
-        let chosen_variant =
-            keys.variants(key, &variants, Some(current), |keys, k| match Profile::ALL.get(k) {
+        let chosen_variant = keys.walk_variants(key, &variants, Some(current), |keys, k| {
+            match Profile::ALL.get(k) {
                 Some(&profile) => walk_ramp(profile, spin, keys),
                 None if k == table_index => walk_table(spin, keys),
                 None => walk_file(spin, path, keys),
-            });
+            }
+        });
         if chosen_variant.is_none() && keys.section().is_some() {
             *spin = PLACEHOLDER;
         }
@@ -91,11 +92,11 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     let mut file_name = String::new();
     let key =
         Key::new(FILE_PROFILE, description).required("a CSV or Parquet file of times and speeds");
-    let file_field = keys.key(key, &Form::Text, &mut file_name);
+    let file_field = keys.walk_key(key, &Form::Text, &mut file_name);
     let description = "straight lines between the rows, or monotone cubics";
     let names = JointKind::ALL.map(|(_, name)| name);
     let mut word = names[0].to_owned();
-    keys.key(Key::new("joints", description), &Form::Word(&names), &mut word);
+    keys.walk_key(Key::new("joints", description), &Form::Word(&names), &mut word);
     let (Field::Present(location), Some(report)) = (file_field, keys.report()) else {
         if keys.section().is_some() {
             *spin = PLACEHOLDER;
@@ -104,7 +105,8 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     };
     let joints = JointKind::ALL.into_iter().find(|(_, name)| *name == word);
     let joints = joints.map_or(JointKind::Straight, |(joints, _)| joints);
-    *spin = match cycle::read(&beside(path, &file_name), joints, &location.location, report) {
+    *spin = match cycle::read(&resolve_beside(path, &file_name), joints, &location.location, report)
+    {
         Some((time_s, speed_rpm)) => {
             for (column, values) in [("time_s", &time_s), ("speed_rpm", &speed_rpm)] {
                 for k in 0..values.len() {
@@ -138,7 +140,7 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
             let description =
                 describe_parameter(&engine_parameter(parameter, &Machine::paper(), &PLACEHOLDER));
             let key = Key::new(key, &description).required(expected);
-            let field = keys.key(key, &Form::Number(range), value);
+            let field = keys.walk_key(key, &Form::Number(range), value);
             is_valid &= matches!(field, Field::Present(_)) || keys.section().is_none();
         }
     }
@@ -156,9 +158,9 @@ fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
         Spin::Table { time_s, speed_rpm } => (time_s, speed_rpm),
         _ => Default::default(),
     };
-    let times = Numbers {
+    let times = NumberArray {
         help: Some("leave out rows between which the speed is linear"),
-        ..Numbers::new(
+        ..NumberArray::new(
             Range::NonNegative,
             0..=MAX_TABLE_ROWS,
             format!("expected at most {MAX_TABLE_ROWS}"),
@@ -166,11 +168,11 @@ fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
     };
     // The range of the speeds is checked with the whole table.
     let speeds =
-        Numbers { range: Range::Within(-1e5, 1e5), read_range: Range::Any, ..times.clone() };
+        NumberArray { range: Range::Within(-1e5, 1e5), read_range: Range::Any, ..times.clone() };
     let mut column =
         |key: &'static str, description: &'static str, numbers, column: &mut Vec<f64>| {
             let key = Key::new(key, description).required("an array of numbers");
-            matches!(keys.key(key, &Form::Numbers(numbers), column), Field::Present(_))
+            matches!(keys.walk_key(key, &Form::Numbers(numbers), column), Field::Present(_))
         };
     let are_given = [
         column("time_s", "increasing times from 0, s", times, &mut time_s),

@@ -13,7 +13,7 @@ use washer_row::{Criterion, MethodKind};
 use crate::method::{REFERENCE_SHARE, direct};
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, timing};
-use sweep_engine::config::whole::{refuse, refuse_step, window};
+use sweep_engine::config::plan_checks::{check_window, refuse, refuse_step};
 use sweep_engine::config::{Diagnostic, Draft};
 use sweep_engine::method::Steps;
 use sweep_engine::plan::{MAX_STEPS, shortest_step_s};
@@ -139,7 +139,7 @@ impl CornerCheck<'_> {
             self.report_violations(violations);
         }
         if changed.window {
-            window(self.draft, scenario, &mut self.reported);
+            check_window(self.draft, scenario, &mut self.reported);
         }
         if (changed.spin || changed.window) && self.is_spin_valid {
             check_turns(self.draft, scenario, &mut self.reported);
@@ -220,7 +220,7 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         } else {
             ", or use method = \"additive\", which takes stiff bearings in long steps"
         };
-        draft.report.push(refusal.help(format!(
+        draft.report.push(refusal.with_help(format!(
             "its highest natural frequency is {frequency:.1e} rad/s{at_corner}: look for a \
              mistaken mass, \
              moment of inertia or stiffness{hint}"
@@ -236,7 +236,7 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         } else {
             "; method = \"additive\" takes stiff bearings in longer steps"
         };
-        draft.report.push(refuse_step(draft, title, &expected).help(format!(
+        draft.report.push(refuse_step(draft, title, &expected).with_help(format!(
             "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural \
              frequency{at_corner}{hint}"
         )));

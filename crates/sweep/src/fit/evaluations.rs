@@ -165,7 +165,7 @@ fn job<'a>(problem: &'a Problem<'_>) -> Job<'a> {
     }
     let Problem { free, model, fits_shift, method, .. } = problem;
     let mut job = Job::new(&problem.cases[0].plan);
-    job.layout.kind = FileKind::Own;
+    job.layout.kind = FileKind::ModelFile;
     let plans = problem.cases.iter().map(|case| case.plan.to_json());
     job.plan["fit"] = json!({
         "cases": plans.collect::<Vec<_>>(),

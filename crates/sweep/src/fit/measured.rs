@@ -6,9 +6,9 @@ use super::algebra::{centred, quantile};
 use super::pulses::{PulseError, PulseSignal, Pulses};
 use super::speed::{self, SmoothedSpin};
 use sweep_engine::Diagnostics;
-use sweep_engine::config::list::{ANY_UNIT, ListColumn, Names, NumberTable};
+use sweep_engine::config::list::{ANY_UNIT, ColumnNames, ListColumn, NumberTable};
 use sweep_engine::config::report::{Diagnostic, Report};
-use sweep_engine::config::section::counted;
+use sweep_engine::config::section::format_count;
 use sweep_results::nearest;
 use washer_model::Channel;
 
@@ -147,7 +147,7 @@ impl Measurement {
     pub(crate) fn read(path: &Path, new_names: &[(String, String)]) -> Result<Self, Diagnostics> {
         let report = Report::default();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let names = Names { known: &known_name, renamed: new_names };
+        let names = ColumnNames { known: &known_name, renamed: new_names };
         let table = NumberTable::read(path, &names, &report);
         let measurement = table.map(|table| check_table(name, table, &report));
         report.finish(measurement)
@@ -162,7 +162,7 @@ impl Measurement {
         new_names: &[(String, String)],
     ) -> Result<Self, Diagnostics> {
         let report = Report::default();
-        let names = Names { known: &known_name, renamed: new_names };
+        let names = ColumnNames { known: &known_name, renamed: new_names };
         let table = NumberTable::from_columns("table", columns, &names, &report);
         let measurement = check_table("table".to_owned(), table, &report);
         report.finish(Some(measurement))
@@ -250,7 +250,7 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
     let expected = "expected a channel of `sweep trace` with its unit, as in \
                     tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";
     let refusal = Diagnostic::new(title).at_location(&column.name.location, expected);
-    Some(refusal.nearest(&column.header, names.iter().map(String::as_str)))
+    Some(refusal.with_nearest_name(&column.header, names.iter().map(String::as_str)))
 }
 
 /// Reads the table as a measurement and reports what is wrong with it.
@@ -333,7 +333,7 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
             let title = format!("{} has no column of {name}", measurement.name);
             let help = "expected time_s, and channels of `sweep trace` with their units, as in \
                         tub_front_y_m_per_s2";
-            let refusal = Diagnostic::new(title).help(help);
+            let refusal = Diagnostic::new(title).with_help(help);
             let unknown = table.columns.iter().find(|column| !column.is_known);
             let naming = unknown.map(|column| {
                 format!(
@@ -342,7 +342,7 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
                     column.header
                 )
             });
-            report.push(naming.into_iter().fold(refusal, Diagnostic::help));
+            report.push(naming.into_iter().fold(refusal, Diagnostic::with_help));
         }
     }
     for (column, kind) in pulse_columns {
@@ -395,7 +395,7 @@ fn leave_out_drop_outs(
     let Some(first_row) = rows.first() else { return };
     let first_time =
         clock_time(*first_row).unwrap_or_else(|| format!("{} s", measurement.time_s[*first_row]));
-    let samples = counted(rows.len(), "sample");
+    let samples = format_count(rows.len(), "sample");
     let [verb, prefix] = if rows.len() == 1 { ["drops", ""] } else { ["drop", "the first "] };
     let note = format!("{samples} of speed_rpm {verb} to zero, {prefix}at {first_time}: left out");
     measurement.notes.push(note);
@@ -446,7 +446,7 @@ fn read_pulses(
                 return;
             }
             Err(PulseError::FewPulses(count)) => (
-                format!("the column `{name}` has {}", counted(count, "pulse")),
+                format!("the column `{name}` has {}", format_count(count, "pulse")),
                 format!(
                     "expected three at least: a signal that rises through half of its range once \
                      a pulse; the column of a counter is `{counted_name}`"
@@ -454,7 +454,7 @@ fn read_pulses(
                 None,
             ),
             Err(PulseError::FewReadings(count)) => (
-                format!("the count `{name}` tells the turns at {}", counted(count, "time")),
+                format!("the count `{name}` tells the turns at {}", format_count(count, "time")),
                 "expected three at least, so far apart that the speed between them is known to 1 %"
                     .to_owned(),
                 None,

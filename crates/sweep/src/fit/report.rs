@@ -15,7 +15,7 @@ use super::verdict::{FittedMap, FittedVerdict};
 use crate::config;
 use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, format_range, format_table};
-use sweep_engine::config::section::counted;
+use sweep_engine::config::section::format_count;
 
 /// The greatest factor between a signal's size and the model's size in another unit at which the
 /// signal is reported to be in that unit. Basis: models of the test data differ from their records
@@ -350,7 +350,7 @@ impl ReportData<'_> {
                 ));
             }
             if measurement.early > 0 {
-                let rows = counted(measurement.early, "row");
+                let rows = format_count(measurement.early, "row");
                 notes.push(format!("{}: {rows} before time 0 left out", measurement.name));
             }
             for [from, to] in &measurement.gaps_s {
@@ -427,7 +427,7 @@ impl FitReport {
                 error.trim_end(),
                 format_short(fixed.moves_by.abs()),
                 fit.unit,
-                counted(self.fixed_numbers, "fixed number"),
+                format_count(self.fixed_numbers, "fixed number"),
             );
             let noise = fit.noise_error.map_or_else(|| "-".to_owned(), format_short);
             push_line(

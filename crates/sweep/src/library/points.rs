@@ -5,9 +5,9 @@ use arrow_array::types::Float64Type;
 use arrow_array::{Array, Float64Array, RecordBatch};
 use arrow_schema::Schema;
 
-use crate::config::{Diagnostics, check_columns, not_numbers};
+use crate::config::{Diagnostics, check_columns, not_numbers_mistake};
 use crate::plan::Plan;
-use sweep_engine::config::list::is_index;
+use sweep_engine::config::list::is_index_column;
 use sweep_files::cells;
 
 /// A table of points, column by column.
@@ -25,7 +25,7 @@ impl PointTable {
     /// Returns [`Diagnostics`] for a column that has no numbers.
     pub fn new(schema: &Schema, batches: &[RecordBatch]) -> Result<Self, Diagnostics> {
         // Filtered or sorted data frames have an index column, which is ignored.
-        let is_data = |k: &usize| !is_index(schema.field(*k).name());
+        let is_data = |k: &usize| !is_index_column(schema.field(*k).name());
         let data_columns: Vec<usize> = (0..schema.fields().len()).filter(is_data).collect();
         let names: Vec<String> =
             data_columns.iter().map(|k| schema.field(*k).name().clone()).collect();
@@ -33,7 +33,7 @@ impl PointTable {
         for (position, k) in data_columns.into_iter().enumerate() {
             let field = schema.field(k);
             let not_numbers_error =
-                || not_numbers(&names, position, &field.data_type().to_string());
+                || not_numbers_mistake(&names, position, &field.data_type().to_string());
             if !cells::is_number(field.data_type()) {
                 return Err(not_numbers_error());
             }
@@ -62,7 +62,7 @@ impl PointTable {
         let rows = columns.first().map_or(0, |(_, values)| values.len());
         let names: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
         if let Some(k) = columns.iter().position(|(_, values)| values.len() != rows) {
-            return Err(crate::config::other_length(&names, k, columns[k].1.len(), rows));
+            return Err(crate::config::wrong_length_mistake(&names, k, columns[k].1.len(), rows));
         }
         let columns = columns.into_iter().map(|(_, values)| values.into()).collect();
         Ok(Self { names, columns, rows })

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use crate::places;
 use sweep_engine::commands::cells::format_number;
-use sweep_engine::config::section::counted;
+use sweep_engine::config::section::format_count;
 use sweep_files::{FileError, ParquetFile};
 
 /// The columns of a row that the summary uses.
@@ -124,10 +124,10 @@ impl StabilitySummary {
                     - self.unstable_rows
                     - self.rows_without_response
                     - self.rows_beyond_limits,
-                counted(self.rows as usize, "row"),
+                format_count(self.rows as usize, "row"),
                 self.unstable_rows,
                 self.rows_without_response,
-                counted(self.points as usize, "point")
+                format_count(self.points as usize, "point")
             ),
         )];
         if self.rows_above_tongue > 0 {
@@ -136,18 +136,18 @@ impl StabilitySummary {
             lines[0].1.push_str(&format!("; {} {text}", self.rows_above_tongue));
         }
         if self.rows_beyond_limits > 0 {
-            let rows = counted(self.rows_beyond_limits as usize, "row");
+            let rows = format_count(self.rows_beyond_limits as usize, "row");
             let description = "beyond the machine's geometry (column beyond), counted as neither";
             lines.push(("beyond", format!("{rows} {description}")));
         }
         if self.rows_off_curve > 0 {
-            let rows = counted(self.rows_off_curve as usize, "row");
+            let rows = format_count(self.rows_off_curve as usize, "row");
             let text = "off the curve (column on_curve): a machine that runs up may be in another \
                          motion at these speeds (`sweep dwell`)";
             lines.push(("off curve", format!("{rows} {text}")));
         }
         if self.coexisting_rows > 0 {
-            let rows = counted(self.coexisting_rows as usize, "further row");
+            let rows = format_count(self.coexisting_rows as usize, "further row");
             let description = "other responses at the same speeds (column branch)";
             lines.push(("others", format!("{rows}: {description}")));
         }

@@ -40,7 +40,7 @@ pub(crate) fn write_point_traces(
     on_point: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
     let plan = engine.plan();
-    files::ready(folder)?;
+    files::prepare_folder(folder)?;
     remove_point_traces(folder)?;
     let methods = read::read_methods(result)?;
     threads::pool(threads)?.install(|| {

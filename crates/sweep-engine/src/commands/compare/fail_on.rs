@@ -90,21 +90,22 @@ impl FailOn {
     /// Describes the forbidden differences between the files; `None` if there are none.
     pub(super) fn violation(&self, comparison: &Comparison) -> Option<String> {
         let insensitive_rows = || comparison.shared.iter().filter(|row| !row.sensitive);
-        let counted = |noun: &str, count: usize| (count > 0).then(|| format!("{noun}: {count}"));
+        let format_count =
+            |noun: &str, count: usize| (count > 0).then(|| format!("{noun}: {count}"));
         match self {
             Self::Any => (!comparison.is_empty()).then(|| "the files differ".to_owned()),
-            Self::Plan => counted("differences of the plans", comparison.plan.len()),
-            Self::Rows => counted(
+            Self::Plan => format_count("differences of the plans", comparison.plan.len()),
+            Self::Rows => format_count(
                 "rows of one file alone",
                 comparison.unmatched_rows.iter().sum::<u64>() as usize,
             ),
-            Self::Flips => counted("verdicts that flipped", comparison.flips(false).count()),
+            Self::Flips => format_count("verdicts that flipped", comparison.flips(false).count()),
             Self::Lost => {
                 let lost_rows = comparison.flips(false).filter(|row| row.is_lost).count();
-                counted("rows that are no longer reliable", lost_rows)
+                format_count("rows that are no longer reliable", lost_rows)
             }
             Self::Sensitive => {
-                counted("sensitive verdicts that flipped", comparison.flips(true).count())
+                format_count("sensitive verdicts that flipped", comparison.flips(true).count())
             }
             Self::Column(name, max_change) => {
                 let column = comparison.columns.iter().find(|column| column.name == *name)?;
@@ -121,7 +122,7 @@ impl FailOn {
             Self::Ratio(max_change) => {
                 let percent = format_number(100.0 * max_change);
                 let noun = format!("ratios that changed by more than {percent} %, came or went");
-                counted(
+                format_count(
                     &noun,
                     insensitive_rows().filter(|row| row.ratio_deviation() > *max_change).count(),
                 )
@@ -129,7 +130,7 @@ impl FailOn {
             Self::Gap(max_change) => {
                 let max_change_m = format_number(*max_change);
                 let noun = format!("gaps that changed by more than {max_change_m} m, came or went");
-                counted(
+                format_count(
                     &noun,
                     insensitive_rows().filter(|row| row.gap_deviation_m() > *max_change).count(),
                 )
@@ -145,7 +146,7 @@ impl FailOn {
                     format_number(*max_change),
                     shift.unit
                 );
-                counted(noun.trim_end(), shifted.count() + shift.unmatched_lines.len())
+                format_count(noun.trim_end(), shifted.count() + shift.unmatched_lines.len())
             }
         }
     }

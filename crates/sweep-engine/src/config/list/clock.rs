@@ -6,13 +6,13 @@ use chrono::{DateTime, NaiveDate};
 const DAY_S: f64 = 86_400.0;
 
 /// Returns the seconds since midnight of a time of day, or since 1970 if it has a date.
-pub(super) fn seconds(cell: &str) -> Option<f64> {
+pub(super) fn parse_clock_time(cell: &str) -> Option<f64> {
     let cell = cell.trim().trim_end_matches('Z');
     let (date, time) = match cell.rsplit_once([' ', 'T']) {
         Some((date, time)) => (Some(date.trim()), time),
         None => (None, cell),
     };
-    let days = date.map_or(Some(0.0), days)?;
+    let days = date.map_or(Some(0.0), days_since_1970)?;
     let mut parts = time.split(':');
     let hours = parse_whole(parts.next()?, 24)?;
     let minutes = parse_whole(parts.next()?, 59)?;
@@ -26,7 +26,7 @@ pub(super) fn seconds(cell: &str) -> Option<f64> {
 /// Returns the clock time of the seconds since 1970, with its date, or of the seconds since
 /// midnight, to a millisecond. A time whose date has no year of the calendar is returned in
 /// seconds.
-pub(super) fn text(seconds: f64) -> String {
+pub(super) fn format_clock_time(seconds: f64) -> String {
     let milliseconds = (1e3 * seconds).round() as i64;
     let format = match milliseconds.div_euclid(86_400_000) {
         0 => "%H:%M:%S%.3f",
@@ -45,7 +45,7 @@ fn parse_whole(text: &str, max: u32) -> Option<f64> {
 
 /// Returns the days since 1970 of a date: year, month, day with `-` or `/`, or day, month, year
 /// with points. A date that can be read in two ways gives `None`.
-fn days(date: &str) -> Option<f64> {
+fn days_since_1970(date: &str) -> Option<f64> {
     let parts: Vec<&str> = date.split(['-', '/', '.']).collect();
     let [first, month, last] = parts.as_slice() else { return None };
     let (year, day) = match (first.len(), last.len(), date.contains('.')) {
@@ -74,7 +74,7 @@ mod tests {
             ("01.03.2000 00:00:00", 951_868_800.0),
             ("2026/11/29 10:30:45.125", 1_795_948_245.125),
         ] {
-            assert_eq!(seconds(cell), Some(expected), "{cell}");
+            assert_eq!(parse_clock_time(cell), Some(expected), "{cell}");
         }
     }
 
@@ -88,11 +88,19 @@ mod tests {
             "2100-03-01 07:05:00.250",
             "1969-12-31 23:00:00.000",
         ] {
-            assert_eq!(seconds(expected).map(text).as_deref(), Some(expected));
+            assert_eq!(
+                parse_clock_time(expected).map(format_clock_time).as_deref(),
+                Some(expected)
+            );
         }
         for day in (-200_000..200_000).step_by(7).filter(|day| *day != 0) {
             let midnight_s = f64::from(day) * DAY_S;
-            assert_eq!(seconds(&text(midnight_s)), Some(midnight_s), "{}", text(midnight_s));
+            assert_eq!(
+                parse_clock_time(&format_clock_time(midnight_s)),
+                Some(midnight_s),
+                "{}",
+                format_clock_time(midnight_s)
+            );
         }
     }
 
@@ -110,7 +118,7 @@ mod tests {
             "1:+2",
             "2026-02-29 1:00",
         ] {
-            assert_eq!(seconds(cell), None, "{cell}");
+            assert_eq!(parse_clock_time(cell), None, "{cell}");
         }
     }
 }

@@ -3,14 +3,14 @@
 //! lines and lines that begin with `#` are skipped.
 
 use super::super::report::{Diagnostic, Report};
-use super::super::section::{counted, short};
+use super::super::section::{format_count, shorten};
 use super::super::source::{Located, Location, SourceId};
 use super::clock;
-use super::layout::{TableLayout, TextLine, lines, separator_words};
-use super::names::Names;
-use super::notation::{Evidence, Notation, NotationEvidence, Unclear};
+use super::layout::{TableLayout, TextLine, data_lines, separator_words};
+use super::names::ColumnNames;
+use super::notation::{Evidence, Notation, NotationEvidence, UnclearNotation};
 use super::units::UnitScale;
-use super::{ID_COLUMN, ListColumn, ListError, TIME_COLUMN, check_size, is_index};
+use super::{ID_COLUMN, ListColumn, ListError, TIME_COLUMN, check_size, is_index_column};
 
 /// A table that is read from text.
 #[derive(Default)]
@@ -18,11 +18,11 @@ pub(super) struct TextTable {
     /// The columns, with NaN for rejected values.
     pub(super) columns: Vec<ListColumn>,
     /// The byte at which each row's line begins.
-    pub(super) starts: Vec<u32>,
+    pub(super) row_starts: Vec<u32>,
     /// The separator of cells.
     pub(super) separator: char,
     /// The number of lines before the line of names.
-    pub(super) preamble: usize,
+    pub(super) preamble_lines: usize,
 }
 
 /// Texts of cells without a value, in lower case.
@@ -33,29 +33,36 @@ pub(super) fn read(
     text: &str,
     source: SourceId,
     allows_missing: bool,
-    names: &Names<'_>,
+    names: &ColumnNames<'_>,
     report: &Report,
 ) -> Result<TextTable, ListError> {
     let Some(layout) = TableLayout::find(text, names)? else {
         return Ok(TextTable { separator: ',', ..TextTable::default() });
     };
     let separator = layout.separator;
-    let headers = headers(&layout)?;
+    let headers = find_headers(&layout)?;
     let width = headers.len();
-    let mut table = TextTable { separator, preamble: layout.preamble, ..TextTable::default() };
+    let mut table =
+        TextTable { separator, preamble_lines: layout.preamble_lines, ..TextTable::default() };
     let mut scales: Vec<Option<UnitScale>> = Vec::new();
-    for (place, (header, location)) in headers.into_iter().enumerate() {
-        let unit = layout.units.get(place).map(String::as_str);
-        let (column, scale) =
-            column(header, place, unit, Location::new(source, location), names, report);
+    for (column_index, (header, location)) in headers.into_iter().enumerate() {
+        let unit = layout.units.get(column_index).map(String::as_str);
+        let (column, scale) = create_column(
+            header,
+            column_index,
+            unit,
+            Location::new(source, location),
+            names,
+            report,
+        );
         table.columns.push(column);
         scales.push(scale);
     }
-    let rows = lines(text, layout.rows);
-    let notation = match layout.notation.map_or_else(|| notation(rows.clone(), &table), Ok) {
+    let rows = data_lines(text, layout.rows_start);
+    let notation = match layout.notation.map_or_else(|| detect_notation(rows.clone(), &table), Ok) {
         Ok(notation) => notation,
         Err(unclear) => {
-            report.push(refusal(&unclear, source));
+            report.push(notation_mistake(&unclear, source));
             return Ok(table);
         }
     };
@@ -73,9 +80,9 @@ pub(super) fn read(
             report.push_with(|_| wrong_row_length(line, count, width, separator, source));
             continue;
         }
-        check_size(table.starts.len() as u64 + 1, width)?;
+        check_size(table.row_starts.len() as u64 + 1, width)?;
         // The cast loses nothing, because a list is smaller than 4 GiB.
-        table.starts.push(line.start as u32);
+        table.row_starts.push(line.start as u32);
         for (((cell, location), column), scale) in cells.zip(&mut table.columns).zip(&scales) {
             let Some(scale) = scale else { continue };
             if allows_missing && is_missing(cell) {
@@ -83,8 +90,8 @@ pub(super) fn read(
                 continue;
             }
             let is_time = column.name.value == TIME_COLUMN;
-            let clock = || clock::seconds(cell).filter(|_| is_time);
-            if let Some(value) = notation.number(cell).or_else(clock)
+            let clock = || clock::parse_clock_time(cell).filter(|_| is_time);
+            if let Some(value) = notation.parse_number(cell).or_else(clock)
                 && (allows_missing || !value.is_nan())
             {
                 column.values.push(scale.apply(value));
@@ -92,25 +99,25 @@ pub(super) fn read(
             }
             column.values.push(f64::NAN);
             report.push_with(|_| {
-                let title = format!("`{}` is not a number", short(cell));
+                let title = format!("`{}` is not a number", shorten(cell));
                 let expected = "expected a number such as 0.25, 80 or 1e7";
                 Diagnostic::new(title).at_location(&Location::new(source, location), expected)
             });
         }
     }
-    let rows = table.starts.len();
+    let rows = table.row_starts.len();
     for (column, scale) in table.columns.iter_mut().zip(&scales) {
         // A column of row identifiers has no numbers, so zeros fill it.
         if scale.is_none() && column.name.value == ID_COLUMN {
             column.values = vec![0.0; rows];
         }
     }
-    table.columns.retain(|column| column.is_known || !is_index(&column.name.value));
+    table.columns.retain(|column| column.is_known || !is_index_column(&column.name.value));
     Ok(table)
 }
 
 /// Returns the names in the line of names with their positions; empty names at its end are dropped.
-fn headers<'t>(
+fn find_headers<'t>(
     layout: &TableLayout<'t>,
 ) -> Result<Vec<(&'t str, std::ops::Range<usize>)>, ListError> {
     let cells = layout.header.cells(layout.separator);
@@ -132,12 +139,12 @@ fn headers<'t>(
 
 /// Returns a column without its numbers, and the factor to the unit of its name; `None` instead of
 /// the factor for an ignored column.
-fn column(
+fn create_column(
     header: &str,
     index: usize,
     unit: Option<&str>,
     location: Location,
-    names: &Names<'_>,
+    names: &ColumnNames<'_>,
     report: &Report,
 ) -> (ListColumn, Option<UnitScale>) {
     let named_column = |name: String, is_known| ListColumn {
@@ -175,45 +182,46 @@ fn wrong_row_length(
     source: SourceId,
 ) -> Diagnostic {
     let location = Location::new(source, line.offset..line.offset + line.text.len());
-    let [names, numbers] = ["name", "number"].map(|noun| counted(width, noun));
-    let title = format!("a row of {} under {names}", counted(count, "number"));
+    let [names, numbers] = ["name", "number"].map(|noun| format_count(width, noun));
+    let title = format!("a row of {} under {names}", format_count(count, "number"));
     let expected = format!("expected {numbers}, separated by {}", separator_words(separator));
-    let refusal = Diagnostic::new(title).at_location(&location, expected);
+    let mistake = Diagnostic::new(title).at_location(&location, expected);
     let help = "commas separate cells here: if they separate decimals or thousands too, write the \
                 file with semicolons or tabs between cells";
-    if separator == ',' && count > width { refusal.help(help) } else { refusal }
+    if separator == ',' && count > width { mistake.with_help(help) } else { mistake }
 }
 
 /// Returns the notation of the numbers in these lines.
-fn notation<'t>(
+fn detect_notation<'t>(
     rows: impl Iterator<Item = TextLine<'t>> + Clone,
     table: &TextTable,
-) -> Result<Notation, Unclear> {
+) -> Result<Notation, UnclearNotation> {
     // If commas separate cells, a mark within a cell is a decimal point.
     let has_comma_separator = table.separator == ',' && table.columns.len() > 1;
-    let mut seen = NotationEvidence::default();
+    let mut evidence = NotationEvidence::default();
     if has_comma_separator && !rows.clone().any(|line| line.text.contains('"')) {
         return Ok(Notation::POINT);
     }
     for line in rows {
         for ((cell, location), column) in line.cells(table.separator).zip(&table.columns) {
             if column.name.value != ID_COLUMN {
-                seen.note(cell, location);
+                evidence.add_cell(cell, location);
             }
         }
     }
-    seen.notation(has_comma_separator)
+    evidence.decide(has_comma_separator)
 }
 
 /// Returns the mistake of numbers that can be read in two ways.
-fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
-    let evidence_location = |evidence: &Evidence| Location::new(source, evidence.location.clone());
+fn notation_mistake(unclear: &UnclearNotation, source: SourceId) -> Diagnostic {
+    let evidence_location =
+        |evidence: &Evidence| Location::new(source, evidence.byte_range.clone());
     match unclear {
-        Unclear::TwoNotations(point, comma) => {
+        UnclearNotation::TwoNotations(point, comma) => {
             let title = format!(
                 "the file has decimal points, as in `{}`, and decimal commas, as in `{}`",
-                short(&point.cell),
-                short(&comma.cell)
+                shorten(&point.cell),
+                shorten(&comma.cell)
             );
             Diagnostic::new(title)
                 .at_location(
@@ -221,17 +229,19 @@ fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
                     "expected one decimal mark in the whole file",
                 )
                 .at_location(&evidence_location(point), "the other one")
-                .help("write every number of the file with the same decimal mark")
+                .with_help("write every number of the file with the same decimal mark")
         }
-        Unclear::OneCell(evidence) => {
+        UnclearNotation::OneCell(evidence) => {
             let [thousands, decimals] = evidence.readings();
-            let title = format!("`{}` may be {thousands} or {decimals}", short(&evidence.cell));
+            let title = format!("`{}` may be {thousands} or {decimals}", shorten(&evidence.cell));
             let help = format!(
                 "no other number of the file shows its decimal mark: write {thousands}, or \
                  {decimals}0"
             );
             let expected = "expected a number without separators of thousands";
-            Diagnostic::new(title).at_location(&evidence_location(evidence), expected).help(help)
+            Diagnostic::new(title)
+                .at_location(&evidence_location(evidence), expected)
+                .with_help(help)
         }
     }
 }

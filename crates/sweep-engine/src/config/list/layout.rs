@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use super::names::Names;
+use super::names::ColumnNames;
 use super::notation::Notation;
 use super::units::is_unit;
 use super::{ListError, MAX_COLUMNS};
 
-/// Number of lines among which the line of names is searched. Basis: no logger writes a preamble of
-/// that length. Doubling it accepts longer preambles.
-const MAX_HEADER_LINE: usize = 200;
+/// Maximum number of lines among which the line of names is searched. Basis: no logger writes a
+/// preamble of that length. Doubling it accepts longer preambles.
+const MAX_HEADER_SEARCH_LINES: usize = 200;
 
 /// The separator of cells that are separated by white space.
 pub(super) const WHITE_SPACE: char = ' ';
@@ -52,7 +52,7 @@ impl<'t> TextLine<'t> {
 }
 
 /// Yields the lines of a text from a byte on, without empty lines and comments.
-pub(super) fn lines(text: &str, from: usize) -> impl Iterator<Item = TextLine<'_>> + Clone {
+pub(super) fn data_lines(text: &str, from: usize) -> impl Iterator<Item = TextLine<'_>> + Clone {
     let mut next = from;
     let all_lines = text[from..].split_inclusive('\n').map(move |line| {
         let start = next;
@@ -93,8 +93,8 @@ impl<'t> Iterator for LineCells<'t> {
         let cell = &rest[..end];
         let start = self.line.offset + from + (cell.len() - cell.trim_start().len());
         let trimmed = cell.trim();
-        let quoted = trimmed.len() >= 2 && trimmed.starts_with('"') && trimmed.ends_with('"');
-        let unquoted = if quoted { &trimmed[1..trimmed.len() - 1] } else { trimmed };
+        let is_quoted = trimmed.len() >= 2 && trimmed.starts_with('"') && trimmed.ends_with('"');
+        let unquoted = if is_quoted { &trimmed[1..trimmed.len() - 1] } else { trimmed };
         Some((unquoted, start..start + trimmed.len()))
     }
 }
@@ -127,12 +127,12 @@ pub(super) struct TableLayout<'t> {
     /// The decimal mark that the file states.
     pub(super) notation: Option<Notation>,
     /// The byte at which the rows begin.
-    pub(super) rows: usize,
+    pub(super) rows_start: usize,
     /// Whether it is a LabVIEW file: the first column is the time, and the last one holds remarks,
     /// which rows may leave out.
     pub(super) is_labview: bool,
     /// The number of ignored lines before the line of names.
-    pub(super) preamble: usize,
+    pub(super) preamble_lines: usize,
 }
 
 impl<'t> TableLayout<'t> {
@@ -140,19 +140,21 @@ impl<'t> TableLayout<'t> {
     ///
     /// # Errors
     /// A kind of LabVIEW file that is not supported.
-    pub(super) fn find(text: &'t str, names: &Names<'_>) -> Result<Option<Self>, ListError> {
-        let mut first_lines: Vec<TextLine<'_>> = lines(text, 0).take(MAX_HEADER_LINE).collect();
+    pub(super) fn find(text: &'t str, names: &ColumnNames<'_>) -> Result<Option<Self>, ListError> {
+        let mut first_lines: Vec<TextLine<'_>> =
+            data_lines(text, 0).take(MAX_HEADER_SEARCH_LINES).collect();
         let Some(first_line) = first_lines.first().copied() else { return Ok(None) };
         if first_line.text.starts_with("LabVIEW Measurement") {
-            return Self::labview(text, &first_lines).map(Some);
+            return Self::find_labview(text, &first_lines).map(Some);
         }
         let stated_separator_char = stated_separator(first_line.text);
         if stated_separator_char.is_some() {
             first_lines.remove(0);
         }
         let Some(first_line) = first_lines.first().copied() else { return Ok(None) };
-        let line_separator =
-            |line: &TextLine<'_>| stated_separator_char.unwrap_or_else(|| separator(line.text));
+        let line_separator = |line: &TextLine<'_>| {
+            stated_separator_char.unwrap_or_else(|| detect_separator(line.text))
+        };
         let words = |line: &TextLine<'_>| line.cells(WHITE_SPACE).count();
         // A single name may have several words, whereas cells that spaces separate are separated so
         // in every row.
@@ -164,12 +166,14 @@ impl<'t> TableLayout<'t> {
         // a line with one of these properties is taken.
         let rank = |k: usize| {
             let separator = separator_at(k);
-            let Some(cells) = texts(first_lines[k], separator) else { return (0, false, 0) };
-            let known_count =
-                cells.into_iter().filter(|cell| !is_number(cell) && names.has(cell)).count();
+            let Some(cells) = split_cells(first_lines[k], separator) else { return (0, false, 0) };
+            let known_count = cells
+                .into_iter()
+                .filter(|cell| !is_number(cell) && names.is_known_header(cell))
+                .count();
             (known_count.min(1), is_above_rows(&first_lines[k..], separator), known_count)
         };
-        let mut place = 0;
+        let mut header_index = 0;
         let mut best_rank = rank(0);
         for k in 1..first_lines.len() {
             // Rows follow this line, and a line of names cannot come after rows.
@@ -178,17 +182,17 @@ impl<'t> TableLayout<'t> {
             }
             let next = rank(k);
             if next > best_rank {
-                (place, best_rank) = (k, next);
+                (header_index, best_rank) = (k, next);
             }
         }
-        let header = first_lines.get(place).copied().unwrap_or(first_line);
-        if let Some(commented) = commented_header(text, header, &line_separator) {
+        let header = first_lines.get(header_index).copied().unwrap_or(first_line);
+        if let Some(commented) = find_commented_header(text, header, &line_separator) {
             return Ok(Some(commented));
         }
-        let separator = separator_at(place);
-        let next_line = first_lines.get(place + 1);
-        let count = texts(header, separator).map_or(0, |names| names.len());
-        let units = next_line.and_then(|line| units(*line, separator, count));
+        let separator = separator_at(header_index);
+        let next_line = first_lines.get(header_index + 1);
+        let count = split_cells(header, separator).map_or(0, |names| names.len());
+        let units = next_line.and_then(|line| parse_units(*line, separator, count));
         let last_header_line =
             if units.is_some() { next_line.copied().unwrap_or(header) } else { header };
         Ok(Some(Self {
@@ -196,19 +200,19 @@ impl<'t> TableLayout<'t> {
             header,
             units: units.unwrap_or_default(),
             notation: None,
-            rows: end_of_line(text, last_header_line),
+            rows_start: end_of_line(text, last_header_line),
             is_labview: false,
-            preamble: place,
+            preamble_lines: header_index,
         }))
     }
 
     /// Finds the layout of a LabVIEW measurement file (.lvm).
-    fn labview(text: &'t str, first: &[TextLine<'t>]) -> Result<Self, ListError> {
+    fn find_labview(text: &'t str, first_lines: &[TextLine<'t>]) -> Result<Self, ListError> {
         /// The text of the line that ends a header.
         const HEADER_END: &str = "***End_of_Header***";
         let is_header_end = |line: &TextLine<'_>| line.text.starts_with(HEADER_END);
         let value = |key: &str| {
-            let key_value = first.iter().find_map(|line| line.text.strip_prefix(key));
+            let key_value = first_lines.iter().find_map(|line| line.text.strip_prefix(key));
             key_value.map(|key_value| key_value.trim_matches([',', '\t', ';']).to_owned())
         };
         let separator = match value("Separator").as_deref() {
@@ -231,15 +235,15 @@ impl<'t> TableLayout<'t> {
         /// The message about a file of several segments.
         const SEVERAL_SEGMENTS: &str =
             "it is a LabVIEW file of several segments: export one of them";
-        let header_ends: Vec<usize> =
-            (0..first.len()).filter(|k| is_header_end(&first[*k])).collect();
+        let header_end_lines: Vec<usize> =
+            (0..first_lines.len()).filter(|k| is_header_end(&first_lines[*k])).collect();
         // A file has two headers: its own and that of its segment.
-        let end = match header_ends.as_slice() {
+        let end = match header_end_lines.as_slice() {
             [] => return Err("it is a LabVIEW file whose header has no end".to_owned()),
             [end] | [_, end] => *end,
             _ => return Err(SEVERAL_SEGMENTS.to_owned()),
         };
-        let Some(header) = first.get(end + 1).copied() else {
+        let Some(header) = first_lines.get(end + 1).copied() else {
             return Err("it is a LabVIEW file without signals".to_owned());
         };
         let rows = end_of_line(text, header);
@@ -247,7 +251,7 @@ impl<'t> TableLayout<'t> {
             return Err(SEVERAL_SEGMENTS.to_owned());
         }
         let mut units = vec!["s".to_owned()];
-        let unit_labels = first.iter().find(|line| line.text.starts_with("Y_Unit_Label"));
+        let unit_labels = first_lines.iter().find(|line| line.text.starts_with("Y_Unit_Label"));
         let unit_labels = unit_labels.into_iter().flat_map(|line| line.cells(separator).skip(1));
         units.extend(unit_labels.map(|(unit, _)| unit.to_owned()));
         Ok(Self {
@@ -255,16 +259,16 @@ impl<'t> TableLayout<'t> {
             header,
             units,
             notation: Some(notation),
-            rows,
+            rows_start: rows,
             is_labview: true,
-            preamble: end + 1,
+            preamble_lines: end + 1,
         })
     }
 }
 
 /// Returns the layout of a table whose line of names is a comment above its first row, as NumPy
 /// writes it.
-fn commented_header<'t>(
+fn find_commented_header<'t>(
     text: &'t str,
     row: TextLine<'t>,
     separator: &dyn Fn(&TextLine<'_>) -> char,
@@ -276,22 +280,22 @@ fn commented_header<'t>(
     let offset = line.offset + line.text.len() - names.len();
     let header = TextLine { start, text: names, offset };
     let separator = separator(&header);
-    let count = texts(header, separator)?.len();
-    let numbers = texts(row, separator)?;
+    let count = split_cells(header, separator)?.len();
+    let numbers = split_cells(row, separator)?;
     let is_row = numbers.len() == count && numbers.into_iter().all(is_number);
     is_row.then_some(TableLayout {
         separator,
         header,
         units: Vec::new(),
         notation: None,
-        rows: row.start,
+        rows_start: row.start,
         is_labview: false,
-        preamble: 0,
+        preamble_lines: 0,
     })
 }
 
 /// Returns the cells of a line; `None` if there are more than a table may have.
-fn texts(line: TextLine<'_>, separator: char) -> Option<Vec<&str>> {
+fn split_cells(line: TextLine<'_>, separator: char) -> Option<Vec<&str>> {
     let cells = line.cells(separator).take(MAX_COLUMNS + 2).map(|(cell, _)| cell);
     let cells: Vec<&str> = cells.collect();
     (cells.len() <= MAX_COLUMNS + 1).then_some(cells)
@@ -312,7 +316,7 @@ fn stated_separator(line: &str) -> Option<char> {
 }
 
 /// Returns the separator of a line of names.
-fn separator(line: &str) -> char {
+fn detect_separator(line: &str) -> char {
     let occurs = |wanted: &char| {
         let mut is_quoted = false;
         line.chars().any(|letter| {
@@ -330,24 +334,24 @@ fn is_number(cell: &str) -> bool {
     cell.contains(|letter: char| letter.is_ascii_digit())
         && [Notation::POINT, Notation::COMMA]
             .into_iter()
-            .any(|notation| notation.number(cell).is_some())
+            .any(|notation| notation.parse_number(cell).is_some())
 }
 
 /// Returns whether the first of these lines has as many names as the next row has numbers.
 fn is_above_rows(lines: &[TextLine<'_>], separator: char) -> bool {
     let [header, following_lines @ ..] = lines else { return false };
-    let Some(names) = texts(*header, separator) else { return false };
+    let Some(names) = split_cells(*header, separator) else { return false };
     if names.iter().any(|name| is_number(name)) {
         return false;
     }
-    let has_units = |line: &&TextLine<'_>| units(**line, separator, names.len()).is_some();
+    let has_units = |line: &&TextLine<'_>| parse_units(**line, separator, names.len()).is_some();
     let following_lines = if following_lines.first().as_ref().is_some_and(has_units) {
         &following_lines[1..]
     } else {
         following_lines
     };
     let Some(row) = following_lines.first() else { return false };
-    let Some(row) = texts(*row, separator) else { return false };
+    let Some(row) = split_cells(*row, separator) else { return false };
     let names = names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
     row.len() >= names
         && row[names..].iter().all(|cell| cell.is_empty())
@@ -356,9 +360,10 @@ fn is_above_rows(lines: &[TextLine<'_>], separator: char) -> bool {
 
 /// Returns the units in a row of units: units and empty cells, with or without brackets. Returns
 /// `None` if the line is no such row.
-fn units(line: TextLine<'_>, separator: char, columns: usize) -> Option<Vec<String>> {
+fn parse_units(line: TextLine<'_>, separator: char, columns: usize) -> Option<Vec<String>> {
     let strip_brackets = |cell: &str| cell.trim_matches(['[', ']', '(', ')', ' ']).to_owned();
-    let cells: Vec<String> = texts(line, separator)?.into_iter().map(strip_brackets).collect();
+    let cells: Vec<String> =
+        split_cells(line, separator)?.into_iter().map(strip_brackets).collect();
     let is_empty = |cell: &String| ["", "-", "1"].contains(&cell.as_str());
     let is_row = cells.len() == columns
         && cells.iter().all(|cell| is_empty(cell) || !is_number(cell))

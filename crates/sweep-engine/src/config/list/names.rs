@@ -1,15 +1,15 @@
 //! The names of a table's columns. A column is recognised by the name that the user gives its
 //! header, and by its unit in brackets, in a row of units or at the end of the header.
 
-use super::super::section::short;
-use super::units::{UnitScale, is_unit, scale, unit_from_suffix, unit_suffixes};
+use super::super::section::shorten;
+use super::units::{UnitScale, is_unit, unit_from_suffix, unit_scale, unit_suffixes};
 
 /// The unit of a quantity whose scale does not matter, such as a signal of pulses. Its column may
 /// have any unit, and is not converted.
 pub const ANY_UNIT: &str = "any unit";
 
 /// The column names that the reader of a table knows.
-pub struct Names<'a> {
+pub struct ColumnNames<'a> {
     /// The function that returns the name and the unit of the quantity that a text names, if the
     /// reader knows it.
     pub known: &'a dyn Fn(&str) -> Option<(String, String)>,
@@ -27,9 +27,9 @@ pub(super) struct KnownName {
 }
 
 /// The mistake of a header with two units, or with a unit of another kind: title and expectation.
-pub(super) type Contradiction = [String; 2];
+pub(super) type UnitContradiction = [String; 2];
 
-impl Names<'_> {
+impl ColumnNames<'_> {
     /// Finds the quantity of a column, if it is known. `unit` is the column's unit in the row of
     /// units, if there is one.
     ///
@@ -39,7 +39,7 @@ impl Names<'_> {
         &self,
         header: &str,
         unit: Option<&str>,
-    ) -> Result<Option<KnownName>, Contradiction> {
+    ) -> Result<Option<KnownName>, UnitContradiction> {
         let (stem, bracketed) = split_bracketed(header);
         let unit = bracketed.or(unit).filter(|unit| !unit.is_empty());
         let is_renamed = |(header_text, _): &&(String, String)| {
@@ -48,7 +48,8 @@ impl Names<'_> {
         };
         if let Some((_, name)) = self.renamed.iter().find(is_renamed) {
             let Some((name, unit_of_name)) = (self.known)(name) else {
-                let title = format!("the column `{}` is called `{}`", short(header), short(name));
+                let title =
+                    format!("the column `{}` is called `{}`", shorten(header), shorten(name));
                 return Err([title, "expected a name of what is read here".to_owned()]);
             };
             return match_with_scale(header, name, unit, &unit_of_name).map(Some);
@@ -73,7 +74,7 @@ impl Names<'_> {
                 }
                 (Err(contradiction), _) => Err(contradiction),
                 (Ok(match_result), _) => Err([
-                    format!("the column `{}` names two units", short(header)),
+                    format!("the column `{}` names two units", shorten(header)),
                     format!(
                         "expected {unit_of_name}, which the name `{}` ends with",
                         match_result.name
@@ -101,7 +102,7 @@ impl Names<'_> {
     }
 
     /// Returns whether a header is that of a known column.
-    pub(super) fn has(&self, header: &str) -> bool {
+    pub(super) fn is_known_header(&self, header: &str) -> bool {
         !matches!(self.find(header, None), Ok(None))
     }
 }
@@ -112,18 +113,18 @@ fn match_with_scale(
     name: String,
     unit: Option<&str>,
     unit_of_name: &str,
-) -> Result<KnownName, Contradiction> {
+) -> Result<KnownName, UnitContradiction> {
     let Some(unit) = unit else { return Ok(KnownName { name, scale: UnitScale::ONE }) };
     if unit == unit_of_name || unit_of_name == ANY_UNIT {
         return Ok(KnownName { name, scale: UnitScale::ONE });
     }
-    match scale(unit, unit_of_name) {
+    match unit_scale(unit, unit_of_name) {
         Some(scale) => Ok(KnownName { name, scale }),
         None => {
             let title = format!(
                 "the column `{}` is in `{}`, not in {unit_of_name}",
-                short(header),
-                short(unit)
+                shorten(header),
+                shorten(unit)
             );
             let kind =
                 if is_unit(unit) { "a unit of the same kind as" } else { "a known unit, as" };
@@ -169,13 +170,13 @@ mod tests {
         ("unbalance_mass_kg", "kg"),
     ];
 
-    fn find(header: &str, unit: Option<&str>) -> Result<Option<(String, f64)>, Contradiction> {
+    fn find(header: &str, unit: Option<&str>) -> Result<Option<(String, f64)>, UnitContradiction> {
         let known = |name: &str| {
             let found = KNOWN.iter().find(|(known, _)| *known == name);
             found.map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
         };
         let renamed = [("Acc front".to_owned(), "arm_end_y_m_per_s2".to_owned())];
-        let names = Names { known: &known, renamed: &renamed };
+        let names = ColumnNames { known: &known, renamed: &renamed };
         let found = names.find(header, unit)?;
         Ok(found.map(|found| (found.name, found.scale.apply(1.0))))
     }

@@ -32,7 +32,7 @@ pub(super) struct Evidence {
     /// The text of the cell.
     pub(super) cell: String,
     /// The range of the cell in the file, in bytes.
-    pub(super) location: Range<usize>,
+    pub(super) byte_range: Range<usize>,
 }
 
 /// The evidence so far: the first cell of each kind for each mark.
@@ -45,7 +45,7 @@ pub(super) struct NotationEvidence {
 
 /// The reason why the notation of a file is unclear.
 #[derive(Debug)]
-pub(super) enum Unclear {
+pub(super) enum UnclearNotation {
     /// Two cells have decimals with different marks.
     TwoNotations(Evidence, Evidence),
     /// The cell can be two numbers, and no other cell decides.
@@ -66,7 +66,7 @@ impl Notation {
     pub(super) const COMMA: Self = Self { decimal: ',' };
 
     /// Parses the number in a cell.
-    pub(super) fn number(self, cell: &str) -> Option<f64> {
+    pub(super) fn parse_number(self, cell: &str) -> Option<f64> {
         if self == Self::POINT && !cell.contains(',') && !cell.contains(GROUP_MARKS) {
             return cell.parse().ok();
         }
@@ -83,7 +83,7 @@ impl Notation {
 
 impl NotationEvidence {
     /// Adds the evidence of a cell.
-    pub(super) fn note(&mut self, cell: &str, location: Range<usize>) {
+    pub(super) fn add_cell(&mut self, cell: &str, byte_range: Range<usize>) {
         if !cell.contains(MARKS) {
             return;
         }
@@ -94,7 +94,8 @@ impl NotationEvidence {
             MarkEvidence::Thousands(mark) => (&mut self.thousands, mark),
             MarkEvidence::Either(mark) => (&mut self.either, mark),
         };
-        kinds[mark_index(mark)].get_or_insert_with(|| Evidence { cell: cell.to_owned(), location });
+        kinds[mark_index(mark)]
+            .get_or_insert_with(|| Evidence { cell: cell.to_owned(), byte_range });
     }
 
     /// Returns the notation in which every cell is a number. `has_commas` says that commas separate
@@ -102,20 +103,20 @@ impl NotationEvidence {
     ///
     /// # Errors
     /// Cells that contradict each other, or one that may be two numbers.
-    pub(super) fn notation(self, has_commas: bool) -> Result<Notation, Unclear> {
+    pub(super) fn decide(self, has_commas: bool) -> Result<Notation, UnclearNotation> {
         let [decimal_point, decimal_comma] = self.decimal;
         let [thousands_point, thousands_comma] = self.thousands;
         let [either_point, either_comma] = self.either;
         let points = decimal_point.or(thousands_comma);
         let commas = decimal_comma.or(thousands_point);
         match (points, commas) {
-            (Some(point), Some(comma)) => Err(Unclear::TwoNotations(point, comma)),
+            (Some(point), Some(comma)) => Err(UnclearNotation::TwoNotations(point, comma)),
             (Some(_), None) => Ok(Notation::POINT),
             (None, Some(_)) => Ok(Notation::COMMA),
             (None, None) => match (either_point, either_comma) {
                 (None, None) => Ok(Notation::POINT),
                 (Some(_), None) if has_commas => Ok(Notation::POINT),
-                (Some(one), _) | (None, Some(one)) => Err(Unclear::OneCell(one)),
+                (Some(one), _) | (None, Some(one)) => Err(UnclearNotation::OneCell(one)),
             },
         }
     }
@@ -198,11 +199,11 @@ fn remove_groups(cell: &str) -> Cow<'_, str> {
 mod tests {
     use super::*;
 
-    fn read(cells: &[&str], has_commas: bool) -> Result<Vec<Option<f64>>, Unclear> {
-        let mut seen = NotationEvidence::default();
-        cells.iter().for_each(|cell| seen.note(cell, 0..cell.len()));
-        let notation = seen.notation(has_commas)?;
-        Ok(cells.iter().map(|cell| notation.number(cell)).collect())
+    fn read(cells: &[&str], has_commas: bool) -> Result<Vec<Option<f64>>, UnclearNotation> {
+        let mut evidence = NotationEvidence::default();
+        cells.iter().for_each(|cell| evidence.add_cell(cell, 0..cell.len()));
+        let notation = evidence.decide(has_commas)?;
+        Ok(cells.iter().map(|cell| notation.parse_number(cell)).collect())
     }
 
     #[test]
@@ -226,15 +227,20 @@ mod tests {
     #[test]
     fn unclear_notations_are_rejected() {
         for cells in [["0,9", "0.9"], ["0.9", "1.234.567"], ["1,234,567", "0,9"]] {
-            assert!(matches!(read(&cells, false), Err(Unclear::TwoNotations(..))), "{cells:?}");
+            assert!(
+                matches!(read(&cells, false), Err(UnclearNotation::TwoNotations(..))),
+                "{cells:?}"
+            );
         }
         for cells in [["950", "1,050"], ["1.050", "2"], ["1.050", "1,050"]] {
-            let Err(Unclear::OneCell(cell)) = read(&cells, false) else { panic!("{cells:?}") };
+            let Err(UnclearNotation::OneCell(cell)) = read(&cells, false) else {
+                panic!("{cells:?}")
+            };
             assert!(cells.contains(&cell.cell.as_str()));
             assert_eq!(cell.readings(), ["1050", "1.050"]);
         }
         assert_eq!(read(&["1.050", "2"], true).unwrap(), [Some(1.05), Some(2.0)]);
-        assert!(matches!(read(&["1,050", "2"], true), Err(Unclear::OneCell(_))));
+        assert!(matches!(read(&["1,050", "2"], true), Err(UnclearNotation::OneCell(_))));
     }
 
     #[test]

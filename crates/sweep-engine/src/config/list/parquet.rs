@@ -11,10 +11,10 @@ use parquet::file::metadata::ParquetMetaData;
 use sweep_files::batches::{self, Batches};
 use sweep_files::{cells, footer, panics};
 
-use super::super::section::short;
-use super::names::{KnownName, Names};
+use super::super::section::shorten;
+use super::names::{ColumnNames, KnownName};
 use super::units::UnitScale;
-use super::{ListError, TIME_COLUMN, check_size, is_index};
+use super::{ListError, TIME_COLUMN, check_size, is_index_column};
 
 /// The compressions that are read, for a message.
 const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
@@ -33,21 +33,21 @@ pub(super) struct ParquetColumn {
 }
 
 /// Returns the columns of a file without its index. If `allows_missing` is true, a null is NaN.
-pub(super) fn columns(
+pub(super) fn read_columns(
     bytes: Vec<u8>,
     allows_missing: bool,
-    names: &Names<'_>,
+    names: &ColumnNames<'_>,
 ) -> Result<Vec<ParquetColumn>, ListError> {
-    let panicked = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
-    panics::caught(|| read(bytes.into(), allows_missing, names)).unwrap_or_else(panicked)
+    let panic_error = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
+    panics::caught(|| read(bytes.into(), allows_missing, names)).unwrap_or_else(panic_error)
 }
 
 fn read(
     bytes: Bytes,
     allows_missing: bool,
-    names: &Names<'_>,
+    names: &ColumnNames<'_>,
 ) -> Result<Vec<ParquetColumn>, ListError> {
-    let metadata = footer::metadata(&bytes).map_err(damaged)?;
+    let metadata = footer::metadata(&bytes).map_err(damage_error)?;
     let schema = batches::schema_with_clocks(&metadata);
     let fields = schema.fields();
     check_size(0, fields.len())?;
@@ -60,13 +60,13 @@ fn read(
             Some(KnownName { name, scale }) => {
                 let is_clock = name == TIME_COLUMN && cells::is_clock(field.data_type());
                 if !cells::is_number(field.data_type()) && !is_clock {
-                    return Err(no_numbers(&header, field.data_type()));
+                    return Err(no_numbers_error(&header, field.data_type()));
                 }
                 let scale = if is_clock { UnitScale::ONE } else { scale };
                 known_columns.push((columns.len(), column_index, scale));
                 columns.push(ParquetColumn { name, header, values: Some(Vec::new()), is_clock });
             }
-            None if is_index(&header) => {}
+            None if is_index_column(&header) => {}
             None => {
                 let name = header.clone();
                 columns.push(ParquetColumn { name, header, values: None, is_clock: false });
@@ -77,8 +77,8 @@ fn read(
     let mut rows = 0;
     let fields = known_columns.iter().map(|(_, column_index, _)| *column_index).collect();
     let reader = Batches::new(bytes, Arc::new(metadata), &schema, fields);
-    let mut reader = reader.map_err(damaged)?;
-    while let Some(batch) = reader.batch().map_err(damaged)? {
+    let mut reader = reader.map_err(damage_error)?;
+    while let Some(batch) = reader.batch().map_err(damage_error)? {
         check_size((rows + batch.num_rows()) as u64, known_columns.len())?;
         for ((column, _, scale), array) in known_columns.iter().zip(batch.columns()) {
             let ParquetColumn { header, values: Some(values), is_clock, .. } =
@@ -92,7 +92,7 @@ fn read(
             for (k, value) in numbers.into_iter().enumerate() {
                 let row = rows + k + 1;
                 let no_value =
-                    || format!("its column `{}` has no value in row {row}", short(header));
+                    || format!("its column `{}` has no value in row {row}", shorten(header));
                 let value = if allows_missing { value.or(Some(f64::NAN)) } else { value };
                 values.push(scale.apply(value.ok_or_else(no_value)?));
             }
@@ -103,13 +103,13 @@ fn read(
 }
 
 /// Returns the mistake of a column without numbers.
-fn no_numbers(header: &str, data_type: &DataType) -> ListError {
+fn no_numbers_error(header: &str, data_type: &DataType) -> ListError {
     let type_name = match data_type {
         DataType::Boolean => "true and false",
         text if cells::is_text(text) => "text",
         _ => "dates, times, lists or bytes",
     };
-    format!("its column `{}` holds no numbers but {type_name}", short(header))
+    format!("its column `{}` holds no numbers but {type_name}", shorten(header))
 }
 
 /// Rejects a file of too many rows, or of an unknown compression, before its pages are read.
@@ -123,7 +123,7 @@ fn check_row_groups(metadata: &ParquetMetaData, columns: usize) -> Result<(), Li
             // The parquet library has these codecs only with features that the workspace's
             // Cargo.toml leaves out.
             if matches!(codec, Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO) {
-                let name = short(&column.column_path().string());
+                let name = shorten(&column.column_path().string());
                 // The level in brackets does not matter to the user.
                 let codec = codec.to_string();
                 let codec = codec.split('(').next().unwrap_or_default().to_lowercase();
@@ -137,7 +137,7 @@ fn check_row_groups(metadata: &ParquetMetaData, columns: usize) -> Result<(), Li
     Ok(())
 }
 
-fn damaged(error: ParquetError) -> ListError {
+fn damage_error(error: ParquetError) -> ListError {
     let text = error.to_string();
     let reason = text.strip_prefix("Parquet error: ").unwrap_or(&text);
     format!("it is damaged: {}", reason.trim())

@@ -13,12 +13,12 @@ use super::*;
 const NAME: &str = "unbalance_mass_kg";
 
 /// Names that are all known and have no unit.
-const ANY_NAMES: Names<'_> =
-    Names { known: &|name: &str| Some((name.to_owned(), String::new())), renamed: &[] };
+const ANY_NAMES: ColumnNames<'_> =
+    ColumnNames { known: &|name: &str| Some((name.to_owned(), String::new())), renamed: &[] };
 
 /// Returns the known columns of a Parquet file.
 fn read_parquet(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, ListError> {
-    let columns = parquet::columns(bytes, false, &ANY_NAMES)?;
+    let columns = parquet::read_columns(bytes, false, &ANY_NAMES)?;
     Ok(columns.into_iter().map(|column| (column.name, column.values.unwrap_or_default())).collect())
 }
 
@@ -143,8 +143,8 @@ fn read_csv(text: &str) -> Result<csv::TextTable, ListError> {
 #[test]
 fn a_text_with_too_many_numbers_or_columns_is_rejected() {
     let rows = "1,2\n".repeat((MAX_NUMBERS / 2) as usize);
-    let csv::TextTable { columns, starts, .. } = read_csv(&format!("a,b\n{rows}")).unwrap();
-    assert_eq!((columns[1].values.len(), starts.len()), (10_000_000, 10_000_000));
+    let csv::TextTable { columns, row_starts, .. } = read_csv(&format!("a,b\n{rows}")).unwrap();
+    assert_eq!((columns[1].values.len(), row_starts.len()), (10_000_000, 10_000_000));
     let refusal_text = |text: &str| read_csv(text).map(|_| ()).unwrap_err().to_string();
     assert!(refusal_text(&format!("a,b\n{rows}1,2\n")).contains("more than 20000000 numbers"));
     assert!(refusal_text(&",".repeat(100_000_000)).contains("it has 100000001 columns"));
@@ -162,9 +162,9 @@ fn a_row_of_too_many_numbers_is_one_mistake() {
 #[test]
 fn the_location_of_a_value_is_its_cell() {
     let text = "\u{feff}# by hand\r\n a , \"b\"\r\n\r\n 1,2 \r\n3 , \"4\"\r\n";
-    let csv::TextTable { columns, starts, separator: by, .. } = read_csv(text).unwrap();
+    let csv::TextTable { columns, row_starts, separator: by, .. } = read_csv(text).unwrap();
     assert_eq!([&columns[0].values, &columns[1].values], [&[1.0, 3.0], &[2.0, 4.0]]);
-    let cell = |row: usize, column| &text[cell_span(text, starts[row] as usize, by, column)];
+    let cell = |row: usize, column| &text[cell_span(text, row_starts[row] as usize, by, column)];
     assert_eq!([cell(0, 0), cell(0, 1), cell(1, 0), cell(1, 1)], ["1", "2", "3", "\"4\""]);
     assert_eq!(
         [
@@ -185,9 +185,9 @@ fn a_quoted_cell_may_contain_the_separator() {
 #[test]
 fn semicolons_tabs_and_decimal_commas_are_read() {
     for text in ["a;b\n1,5;2\n3;-4,25e2\n", "a\tb\n1.5\t2\n3\t-425\n"] {
-        let csv::TextTable { columns, starts, separator: by, .. } = read_csv(text).unwrap();
+        let csv::TextTable { columns, row_starts, separator: by, .. } = read_csv(text).unwrap();
         assert_eq!([&columns[0].values, &columns[1].values], [&[1.5, 3.0], &[2.0, -425.0]]);
-        assert_eq!(text[cell_span(text, starts[0] as usize, by, 1)], *"2");
+        assert_eq!(text[cell_span(text, row_starts[0] as usize, by, 1)], *"2");
     }
     let report = Report::default();
     let source = report.add("list.csv", String::new());
@@ -235,7 +235,7 @@ fn read_logger_file(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
         found.map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
     };
     let renamed = [("Acc front".to_owned(), "acc_m_per_s2".to_owned())];
-    let names = Names { known: &known, renamed: &renamed };
+    let names = ColumnNames { known: &known, renamed: &renamed };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("logger.csv");
     std::fs::write(&path, bytes).unwrap();
@@ -327,8 +327,8 @@ fn index_and_unknown_columns_of_parquet_lists_are_ignored() {
     let columns = [("unbalance_mass_g", masses), ("note", words), ("__index_level_0__", index)];
     let bytes = file(&columns, 1, WriterProperties::default());
     let known = |name: &str| (name == NAME).then(|| (NAME.to_owned(), "kg".to_owned()));
-    let names = Names { known: &known, renamed: &[] };
-    let read = parquet::columns(bytes, false, &names).unwrap();
+    let names = ColumnNames { known: &known, renamed: &[] };
+    let read = parquet::read_columns(bytes, false, &names).unwrap();
     assert_eq!((read[0].name.as_str(), read[0].values.as_deref()), (NAME, Some(&[0.3, 0.4][..])));
     assert_eq!((read.len(), read[1].name.as_str(), &read[1].values), (2, "note", &None));
 }
@@ -374,7 +374,7 @@ fn instants_and_times_of_day_of_parquet_files_are_seconds() {
         };
         Some(quantity.map(str::to_owned).into())
     };
-    let names = Names { known: &known, renamed: &[] };
+    let names = ColumnNames { known: &known, renamed: &[] };
     let read = |name: &str, kind: &str, cells: &[i64]| {
         let schema = format!(
             "message m {{ required int64 {name} {kind}; \
@@ -391,7 +391,7 @@ fn instants_and_times_of_day_of_parquet_files_are_seconds() {
         }
         group.close().unwrap();
         writer.close().unwrap();
-        parquet::columns(bytes, true, &names)
+        parquet::read_columns(bytes, true, &names)
     };
     // 2026-03-01 12:34:56.789
     let instant_ns = 1_772_368_496_789_000_000;

@@ -22,8 +22,10 @@ const UTF16_DETECTION_BYTES: usize = 512;
 ///
 /// # Errors
 /// The kind of the file, if it is no text.
-pub(super) fn text(bytes: Vec<u8>) -> Result<String, ListError> {
-    if let Some((_, kind)) = BINARY_KINDS.iter().find(|(first, _)| bytes.starts_with(first)) {
+pub(super) fn decode_text(bytes: Vec<u8>) -> Result<String, ListError> {
+    if let Some((_, kind)) =
+        BINARY_KINDS.iter().find(|(magic_bytes, _)| bytes.starts_with(magic_bytes))
+    {
         return Err((*kind).to_owned());
     }
     let text = match utf16_decoder(&bytes) {
@@ -106,15 +108,15 @@ mod tests {
             wide(u16::to_le_bytes, ""),
             wide(u16::to_be_bytes, ""),
         ] {
-            let decoded = text(bytes).unwrap();
+            let decoded = decode_text(bytes).unwrap();
             assert_eq!(decoded.trim_start_matches('\u{feff}'), expected);
         }
-        assert_eq!(text(b"\x80 \x93".to_vec()).unwrap(), "€ “");
+        assert_eq!(decode_text(b"\x80 \x93".to_vec()).unwrap(), "€ “");
     }
 
     #[test]
     fn other_kinds_of_files_are_named() {
-        let message = |bytes: &[u8]| text(bytes.to_vec()).unwrap_err();
+        let message = |bytes: &[u8]| decode_text(bytes.to_vec()).unwrap_err();
         assert!(message(b"PK\x03\x04rest").contains("save its sheet as CSV"));
         assert!(message(b"MATLAB 5.0 MAT-file").contains("writetable"));
         assert!(message(b"a,b\n\xff\x01").contains("byte 6 is wrong"));

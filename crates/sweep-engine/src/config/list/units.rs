@@ -119,7 +119,7 @@ pub(super) fn is_unit(name: &str) -> bool {
 }
 
 /// Returns the factor from one unit to another, if both measure the same kind of quantity.
-pub(super) fn scale(from: &str, to: &str) -> Option<UnitScale> {
+pub(super) fn unit_scale(from: &str, to: &str) -> Option<UnitScale> {
     let mut pairs = units_named(from).flat_map(|from| units_named(to).map(move |to| (from, to)));
     let (from, to) = pairs.find(|(from, to)| from.base == to.base)?;
     if from.size == to.size {
@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     fn converted(value: f64, from: &str, to: &str) -> f64 {
-        scale(from, to).unwrap_or_else(|| panic!("{from} to {to}")).apply(value)
+        unit_scale(from, to).unwrap_or_else(|| panic!("{from} to {to}")).apply(value)
     }
 
     #[test]
@@ -189,10 +189,10 @@ mod tests {
     fn units_of_different_kinds_do_not_convert() {
         for (from, to) in [("g", "rad"), ("mm", "s"), ("parsec", "m"), ("", "m"), ("rad", "rad/s")]
         {
-            assert_eq!(scale(from, to), None, "{from} to {to}");
+            assert_eq!(unit_scale(from, to), None, "{from} to {to}");
         }
         assert!(is_unit("[g]".trim_matches(['[', ']'])) && !is_unit("front"));
         assert_eq!(unit_from_suffix("m_per_s2"), "m/s2");
-        assert!(scale(&unit_from_suffix("n_s_per_mm"), "N s/m").is_some());
+        assert!(unit_scale(&unit_from_suffix("n_s_per_mm"), "N s/m").is_some());
     }
 }

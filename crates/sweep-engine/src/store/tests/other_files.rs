@@ -173,7 +173,7 @@ fn a_foreign_file_at_the_output_is_not_overwritten() {
     }
     for error in [
         OpenRun::open_for_merge(&home.output(), &job).unwrap_err(),
-        status(&home.output(), &job).unwrap_err(),
+        read_status(&home.output(), &job).unwrap_err(),
     ] {
         assert!(error.to_string().contains("is no result of `sweep run`"), "{error}");
     }

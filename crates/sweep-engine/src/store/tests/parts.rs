@@ -117,14 +117,14 @@ fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
     let first_shard = shard(1);
     let third_shard = shard(3);
     let second_third_shard = shard(3);
-    assert_eq!(first_shard.own_points(), (3 * 8, 0));
-    assert_eq!(third_shard.own_points(), (8 + 8 + 1, 0), "the last chunk has one point");
+    assert_eq!(first_shard.count_own_points(), (3 * 8, 0));
+    assert_eq!(third_shard.count_own_points(), (8 + 8 + 1, 0), "the last chunk has one point");
     for run in [&first_shard, &third_shard, &second_third_shard] {
         write_missing(run);
     }
     let busy_error = OpenRun::open_for_merge(&home.output(), &job).unwrap_err();
     assert!(matches!(busy_error, StoreError::Busy { .. }), "{busy_error}");
-    let running = status(&home.output(), &job).unwrap().running;
+    let running = read_status(&home.output(), &job).unwrap().running;
     assert_eq!(running.iter().map(|holder| holder.shard).collect::<Vec<_>>(), [Some(1), Some(3)]);
     drop((first_shard, third_shard, second_third_shard));
 
@@ -136,7 +136,7 @@ fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
     assert!(!error.is_refusal());
     assert!(error.to_string().contains("5 of 11 chunks are missing, of shards 2,4"), "{error}");
     drop(merge);
-    let folder_status = status(&home.output(), &job).unwrap();
+    let folder_status = read_status(&home.output(), &job).unwrap();
     assert_eq!(
         (folder_status.state, folder_status.missing_shards.as_str(), folder_status.shards),
         (RunStage::Unfinished, "2,4", Some(4))
@@ -166,13 +166,13 @@ fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
     for index in [2, 4] {
         write_missing(&shard(index));
     }
-    assert_eq!(status(&home.output(), &job).unwrap().state, RunStage::Complete);
+    assert_eq!(read_status(&home.output(), &job).unwrap().state, RunStage::Complete);
     let OpenOutcome::Open(merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
         panic!("is not done")
     };
     finish(merge, &job);
     assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
-    let folder_status = status(&home.output(), &job).unwrap();
+    let folder_status = read_status(&home.output(), &job).unwrap();
     assert_eq!((folder_status.state, folder_status.points_done), (RunStage::Finished, POINTS));
     assert!(folder_status.points_failed > 0);
 }
@@ -181,13 +181,13 @@ fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
 fn status_counts_without_changing_files() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
-    assert_eq!(status(&home.output(), &job).unwrap().state, RunStage::NotStarted);
+    assert_eq!(read_status(&home.output(), &job).unwrap().state, RunStage::NotStarted);
     assert_eq!(fs::read_dir(home.0.path()).unwrap().count(), 0);
     let run = open(&home.output(), &job);
     write(&run, 0);
     write(&run, 1);
     fs::write(home.partial().join(part_name(1)), "not a part").unwrap();
-    let folder_status = status(&home.output(), &job).unwrap();
+    let folder_status = read_status(&home.output(), &job).unwrap();
     assert_eq!(
         (
             folder_status.chunks_done,
@@ -201,7 +201,7 @@ fn status_counts_without_changing_files() {
     assert!(home.partial().join(part_name(1)).exists());
     let other_plan = Job { plan: json!({}), ..synthetic::job(POINTS) };
     assert!(matches!(
-        status(&home.output(), &other_plan).unwrap_err(),
+        read_status(&home.output(), &other_plan).unwrap_err(),
         StoreError::PlanDiffers { .. }
     ));
 }
@@ -218,21 +218,21 @@ fn an_incomplete_chunk_is_resumed() {
     write(&run, 0);
     // Rows arrive in any order.
     run.write_chunk(&job, 3, outcomes([30, 25, 27].into_iter())).unwrap();
-    assert_eq!(run.own_points(), (POINTS, 8 + 3));
+    assert_eq!(run.count_own_points(), (POINTS, 8 + 3));
     drop(run);
-    let folder_status = status(&home.output(), &job).unwrap();
+    let folder_status = read_status(&home.output(), &job).unwrap();
     assert_eq!((folder_status.points_done, folder_status.chunks_done), (11, 1));
     assert!(home.partial().join("part-00000003.parquet").exists());
 
     let run = open(&home.output(), &job);
-    assert_eq!(run.own_points(), (POINTS, 11));
+    assert_eq!(run.count_own_points(), (POINTS, 11));
     let incomplete = run.take_incomplete();
     assert_eq!(
         incomplete.into_iter().collect::<Vec<_>>(),
         [(3, outcomes([25, 27, 30].into_iter()))]
     );
     assert_eq!(write_missing(&run), 10);
-    assert_eq!(run.own_points(), (POINTS, POINTS));
+    assert_eq!(run.count_own_points(), (POINTS, POINTS));
     finish(run, &job);
     assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
 }
@@ -241,7 +241,7 @@ fn an_incomplete_chunk_is_resumed() {
 fn an_unfinished_run_is_found_by_the_path_of_result_or_folder() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
-    assert_eq!(unfinished(&home.output()).unwrap(), None);
+    assert_eq!(find_unfinished(&home.output()).unwrap(), None);
     let run = open(&home.output(), &job);
     write(&run, 0);
     run.write_chunk(&job, 3, outcomes([30, 25, 27].into_iter())).unwrap();
@@ -249,7 +249,7 @@ fn an_unfinished_run_is_found_by_the_path_of_result_or_folder() {
     // A damaged part does not count.
     fs::write(home.partial().join(part_name(5)), part_bytes(&job, 5).split_off(1)).unwrap();
     for path in [home.output(), home.partial()] {
-        let unfinished_work = unfinished(&path).unwrap().unwrap();
+        let unfinished_work = find_unfinished(&path).unwrap().unwrap();
         assert_eq!((unfinished_work.points, unfinished_work.points_done), (Some(POINTS), 8 + 3));
         assert_eq!(
             (&unfinished_work.output, &unfinished_work.folder),
@@ -269,8 +269,8 @@ fn an_unfinished_run_is_found_by_the_path_of_result_or_folder() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
-    assert_eq!(unfinished(&home.output()).unwrap(), None);
-    assert_eq!(unfinished(&home.partial()).unwrap(), None);
+    assert_eq!(find_unfinished(&home.output()).unwrap(), None);
+    assert_eq!(find_unfinished(&home.partial()).unwrap(), None);
 }
 
 #[test]
@@ -282,7 +282,7 @@ fn an_unfinished_search_shows_the_number_of_trials() {
         trials.add(vec![k, 0], vec![Some(1)]).unwrap();
     }
     trials.write().unwrap();
-    let unfinished_work = unfinished(&home.output()).unwrap().unwrap();
+    let unfinished_work = find_unfinished(&home.output()).unwrap().unwrap();
     assert_eq!((unfinished_work.points, unfinished_work.points_done), (None, 5));
     assert_eq!(unfinished_work.progress(), "5 trials of a search kept");
 }

@@ -48,7 +48,7 @@ fn another_build_of_the_same_version_is_refused() {
     expect_refusal(OpenRun::open(&home.output(), &other_build, options()));
     expect_refusal(OpenRun::open_for_merge(&home.output(), &other_build));
     assert!(
-        status(&home.output(), &other_build)
+        read_status(&home.output(), &other_build)
             .unwrap_err()
             .to_string()
             .contains("/numerics: was 1, is 2")
@@ -116,7 +116,7 @@ fn json_files_of_any_length_do_not_fill_the_memory() {
     drop(open(&home.output(), &job));
     for name in ["plan.json", "shards.json", "session-x-1-1.json"] {
         fs::File::create(home.partial().join(name)).unwrap().set_len(1 << 40).unwrap();
-        assert!(status(&home.output(), &job).is_ok(), "{name}");
+        assert!(read_status(&home.output(), &job).is_ok(), "{name}");
         drop(open(&home.output(), &job));
     }
     // A plan that would be too long to be read is not written.

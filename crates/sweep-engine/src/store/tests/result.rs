@@ -77,7 +77,7 @@ fn the_metadata_do_not_depend_on_host_or_folder() {
     let columns: Value = file.json("sweep.columns").unwrap();
     assert_eq!(columns["mass_kg"]["type"], "float64");
     let bytes = fs::read(home.output()).unwrap();
-    let host = provenance::host();
+    let host = provenance::host_name();
     let home_text = home.0.path().to_str().unwrap();
     for private_text in [host.as_str(), home_text] {
         assert!(
@@ -188,7 +188,7 @@ fn a_result_with_a_flipped_bit_is_refused() {
             usize::from(matches!(error, StoreError::File(FileError::Damaged { .. })));
         assert!(text.contains("x.parquet") && text.contains("= help: "), "byte {position}: {text}");
         assert!(
-            status(&home.output(), &job).is_err()
+            read_status(&home.output(), &job).is_err()
                 && OpenRun::open_for_merge(&home.output(), &job).is_err()
         );
         assert!(
@@ -250,7 +250,7 @@ fn results_whose_names_differ_after_a_dot_have_different_sidecars() {
     let refusal = |output: &Path| {
         let error = OpenRun::open(output, &job, options()).unwrap_err();
         assert!(error.is_refusal());
-        assert!(error.to_string().contains("is no account of the run with this --out"), "{error}");
+        assert!(error.to_string().contains("is no sidecar of the run with this --out"), "{error}");
     };
     refusal(&home.0.path().join("x"));
     let foreign_sidecar = home.0.path().join("y.run.json");

@@ -178,8 +178,8 @@ fn a_file_of_a_model_is_never_taken_for_a_finished_search() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.toml");
     let job = job(8);
-    let own_file_job = Job { layout: Layout { kind: FileKind::Own, ..layout() }, ..job };
-    fs::write(&output, format!("{}by a fit\n", sweep_files::OWN_FILE)).unwrap();
+    let own_file_job = Job { layout: Layout { kind: FileKind::ModelFile, ..layout() }, ..job };
+    fs::write(&output, format!("{}by a fit\n", sweep_files::MODEL_FILE_START)).unwrap();
     let outcome = Trials::open(&output, &own_file_job, columns(), false);
     assert!(matches!(outcome, Ok(OpenOutcome::Open(_))), "{outcome:?}");
 }

@@ -84,15 +84,15 @@ impl SheetKeys {
                 let description =
                     "mass of tub, shaft and drum without laundry, in place of the tub's, kg";
                 let key = keys::Key::new(MOVING_MASS, description);
-                keys.key(key, &Form::Number(Range::Positive), &mut self.moving_mass_kg);
+                keys.walk_key(key, &Form::Number(Range::Positive), &mut self.moving_mass_kg);
             }
             "drum" => {
                 let key =
                     keys::Key::new(DRUM_RADIUS, "inner radius; other numbers follow from it, m");
-                keys.key(key, &DRUM_SIZE_FORM, &mut self.drum_radius_m);
+                keys.walk_key(key, &DRUM_SIZE_FORM, &mut self.drum_radius_m);
                 let key =
                     keys::Key::new(DRUM_DEPTH, "inner depth; other numbers follow from it, m");
-                keys.key(key, &DRUM_SIZE_FORM, &mut self.drum_depth_m);
+                keys.walk_key(key, &DRUM_SIZE_FORM, &mut self.drum_depth_m);
             }
             name if UNBALANCES.contains(&name) => self.walk_plane(section, k, keys),
             _ => {}
@@ -104,8 +104,11 @@ impl SheetKeys {
         let description = "the drum's front, or its rear where it is fixed: in place of x_m";
         let mut word: Option<String> = None;
         let names = DrumPlane::ALL.map(|(_, name)| name);
-        let field =
-            keys.key(keys::Key::new(UNBALANCE_PLANE, description), &Form::Word(&names), &mut word);
+        let field = keys.walk_key(
+            keys::Key::new(UNBALANCE_PLANE, description),
+            &Form::Word(&names),
+            &mut word,
+        );
         let plane = DrumPlane::ALL.into_iter().find(|(_, name)| word.as_deref() == Some(name));
         let (Field::Present(location), Some((plane, _))) = (field, plane) else { return };
         let Some(table) = keys.section() else { return };

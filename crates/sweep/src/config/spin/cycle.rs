@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use sweep_engine::config::list::{ListColumn, Names, NumberTable};
-use sweep_engine::config::section::counted;
+use sweep_engine::config::list::{ColumnNames, ListColumn, NumberTable};
+use sweep_engine::config::section::format_count;
 use sweep_engine::config::{Diagnostic, Location, Report};
 use washer_model::{Range, decimal};
 
@@ -45,7 +45,7 @@ pub(super) fn read(
     report: &Report,
 ) -> Option<CyclePoints> {
     let table =
-        NumberTable::read(path, &Names { known: &quantity_and_unit, renamed: &[] }, report)?;
+        NumberTable::read(path, &ColumnNames { known: &quantity_and_unit, renamed: &[] }, report)?;
     table.notes().into_iter().for_each(|note| report.add_note(format!("the cycle: {note}")));
     let times = find_column(&table, "time_s", "time", location, report);
     let speeds = find_column(&table, "speed_rpm", "speed", location, report);
@@ -64,7 +64,8 @@ pub(super) fn read(
         _ => (times.values.clone(), speeds.values.clone()),
     };
     if !is_short(points.0.len()) {
-        let title = format!("the cycle has {} with its joints", counted(points.0.len(), "row"));
+        let title =
+            format!("the cycle has {} with its joints", format_count(points.0.len(), "row"));
         let expected = format!(
             "expected at most {MAX_TABLE_ROWS}: leave out rows between which the speed is straight"
         );
@@ -106,7 +107,7 @@ fn find_column<'t>(
         let expected = "expected a header such as `time_s` or `Time [min]`, and one such as \
             `speed_rpm`, `Speed [Hz]` or `n (rad/s)`";
         let refusal = Diagnostic::new(title).at_location(location, expected);
-        report.push(refusal.help(format!("its columns are {headers:?}")));
+        report.push(refusal.with_help(format!("its columns are {headers:?}")));
     }
     first
 }

@@ -11,19 +11,19 @@ use crate::plan::{MAX_STEPS, shortest_step_s};
 use crate::{Model, ModelParameter, Scenario};
 
 /// Reports a window that is invalid at a corner of the grid.
-pub fn windows<M: Model>(draft: &Draft<'_, M>) {
+pub fn check_windows<M: Model>(draft: &Draft<'_, M>) {
     let mut reported = BTreeSet::new();
     for corner in 0..draft.plan.corners() {
         if draft.report.is_full() || !reported.is_empty() {
             break;
         }
         let scenario = draft.plan.scenario_at(&draft.plan.corner(corner));
-        window(draft, &scenario, &mut reported);
+        check_window(draft, &scenario, &mut reported);
     }
 }
 
 /// Reports a window that constants or axes have reversed or moved past the end.
-pub fn window<M: Model>(
+pub fn check_window<M: Model>(
     draft: &Draft<'_, M>,
     scenario: &Scenario<M>,
     reported: &mut BTreeSet<Vec<String>>,
@@ -88,7 +88,7 @@ fn find_locations<M: Model>(
 }
 
 /// Reports a fixed step that is longer than the run, or needs too many steps.
-pub fn steps<M: Model>(draft: &Draft<'_, M>) {
+pub fn check_steps<M: Model>(draft: &Draft<'_, M>) {
     let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
     let end_s = draft.plan.end_s;
     let steps = end_s / step_s;

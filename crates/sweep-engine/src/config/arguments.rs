@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use sweep_parameter::Range;
 
 use super::section::check_number;
-use super::words::known_words;
-use super::{Located, Location, Report, quoted, short, unknown_word};
+use super::words::check_words;
+use super::{Located, Location, Report, quote, shorten, unknown_word};
 
 /// An argument NAME=VALUE, split into its parts.
 pub struct NamedArgument<'a> {
@@ -33,7 +33,7 @@ impl<'a> NamedArgument<'a> {
                 Some(Self { name, value: located(value, equals + 1..argument.len()), report })
             }
             None => {
-                let title = format!("`{}` is not a constant", short(argument));
+                let title = format!("`{}` is not a constant", shorten(argument));
                 let whole_argument = Location::new(source, 0..argument.len());
                 report.refuse(&whole_argument, title, "expected NAME=VALUE")
             }
@@ -45,10 +45,10 @@ impl<'a> NamedArgument<'a> {
         let location = self.value.location.clone();
         match self.value.value.parse() {
             Ok(number) => {
-                check_number(&quoted(self.name.value), number, location, range, self.report)
+                check_number(&quote(self.name.value), number, location, range, self.report)
             }
             Err(_) => {
-                let title = format!("`{}` is not a number", short(self.value.value));
+                let title = format!("`{}` is not a number", shorten(self.value.value));
                 self.report.refuse(&location, title, format!("expected {range}"))
             }
         }
@@ -58,7 +58,7 @@ impl<'a> NamedArgument<'a> {
     pub fn whole_number(&self, bounds: &RangeInclusive<u64>) -> Option<u64> {
         let number = self.value.value.parse().ok();
         number.filter(|number| bounds.contains(number)).or_else(|| {
-            let title = format!("`{}` is not a valid number", short(self.value.value));
+            let title = format!("`{}` is not a valid number", shorten(self.value.value));
             let least = bounds.start();
             let greatest = bounds.end();
             let expected = format!("expected a whole number from {least} to {greatest}");
@@ -80,13 +80,13 @@ impl<'a> NamedArgument<'a> {
         let Located { value, location } = &self.value;
         let parts =
             value.split(',').map(|part| Located { value: part.trim(), location: location.clone() });
-        let (valid_words, are_all_valid) = known_words(parts, noun, all, self.report);
+        let (valid_words, are_all_valid) = check_words(parts, noun, all, self.report);
         are_all_valid.then_some(valid_words)
     }
 }
 
 /// Returns the name of an argument NAME=VALUE.
-pub fn name_of(argument: &str) -> &str {
+pub fn argument_name(argument: &str) -> &str {
     argument.split('=').next().unwrap_or_default().trim()
 }
 
@@ -94,7 +94,7 @@ pub fn name_of(argument: &str) -> &str {
 ///
 /// # Errors
 /// The text of the message.
-pub fn finite(text: &str) -> Result<f64, String> {
+pub fn parse_finite(text: &str) -> Result<f64, String> {
     text.trim()
         .parse::<f64>()
         .ok()
