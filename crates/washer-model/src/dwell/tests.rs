@@ -3,7 +3,7 @@
 use super::*;
 use crate::coordinates::{COORDINATES, TUB_YAW};
 use crate::tests::elements::machine;
-use crate::tests::reference::reference;
+use crate::tests::reference::read_reference;
 use crate::{Channel, InitialDeviation, Method, ModelKind, Spin, Timing, history, prepare};
 use serde_json::{Value, json};
 
@@ -39,7 +39,7 @@ fn relative_error(motion: &Attractor, end: &Value) -> f64 {
 
 /// Compares the motions at all points of the reference that a filter by machine and speed selects.
 fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
-    for case in reference("dwells.json").as_array().unwrap() {
+    for case in read_reference("dwells.json").as_array().unwrap() {
         let name = case["name"].as_str().unwrap();
         let point = case_point(case);
         let reference_points: Vec<&Value> = case["points"]

@@ -10,7 +10,7 @@ use super::settings::Settings;
 use super::*;
 use crate::coordinates::COORDINATES;
 use crate::steps::SUSPENSION_MODES;
-use crate::tests::reference::reference;
+use crate::tests::reference::read_reference;
 use crate::{
     BumpStop, Channel, InitialDeviation, Machine, Method, ModelKind, Spin, Timing, history, prepare,
 };
@@ -54,7 +54,7 @@ fn number(case: &Value, name: &str) -> f64 {
 }
 
 fn reference_list(name: &str) -> Vec<Value> {
-    reference("stability.json")[name].as_array().unwrap().clone()
+    read_reference("stability.json")[name].as_array().unwrap().clone()
 }
 
 /// Returns the first response of a machine at each speed.
@@ -439,7 +439,7 @@ fn responses_do_not_depend_on_other_requests() {
 /// them at a fold.
 #[test]
 fn val_branches_match_an_independent_program() {
-    for case in reference("branches.json").as_array().unwrap() {
+    for case in read_reference("branches.json").as_array().unwrap() {
         let machine =
             machine_with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"));
         let point = prepared(machine, 100.0);
@@ -767,7 +767,7 @@ fn responses_near_resonances_of_the_hinge_are_those_without_caps() {
 #[test]
 fn val_machines_with_elements_match_an_independent_program() {
     let mut compared = 0;
-    for case in reference("stability_elements.json").as_array().unwrap() {
+    for case in read_reference("stability_elements.json").as_array().unwrap() {
         let point = prepared(crate::tests::elements::machine(case), 100.0);
         let reference_rows = case["points"].as_array().unwrap();
         let held_speeds: Vec<HeldSpeed<'_>> = reference_rows

@@ -1,6 +1,6 @@
 //! Tests that the integration of a trajectory allocates nothing after set-up.
 
-use super::instruments::{ALL_RECORDERS, paper, prepared, triangular};
+use super::instruments::{ALL_RECORDERS, paper_machine, prepare_point, triangular_spin};
 use crate::{Method, ModelKind, Recorders, simulate_with};
 use lane_ode::{Simd, Tolerance};
 
@@ -10,7 +10,13 @@ fn a_long_trajectory_allocates_no_more_than_a_short_one() {
     let allocations = |simd, model, method: &Method, recorders, end_s| {
         // There are more points than lanes, so that lanes start further points.
         let points: Vec<_> = (0..11)
-            .map(|i| prepared(paper(0.1 + 0.05 * f64::from(i), 140.0), triangular(), end_s))
+            .map(|i| {
+                prepare_point(
+                    paper_machine(0.1 + 0.05 * f64::from(i), 140.0),
+                    triangular_spin(),
+                    end_s,
+                )
+            })
             .collect();
         let points: Vec<_> = points.iter().collect();
         let mut steps = 0;

@@ -1,6 +1,8 @@
 //! Tests of unbalances at any angle about the drum's axis.
 
-use super::instruments::{equations, paper, prepared, random_machine, skew, triangular};
+use super::instruments::{
+    add_skew_unbalance, equations, paper_machine, prepare_point, random_machine, triangular_spin,
+};
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
@@ -39,16 +41,16 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
     for _ in 0..100 {
         let mut machine = random_machine(&mut rng);
         if rng.bool() {
-            skew(&mut machine, &mut rng);
+            add_skew_unbalance(&mut machine, &mut rng);
         }
-        let added = Unbalance {
+        let added_unbalance = Unbalance {
             mass_kg: 0.1 + rng.f64(),
             x_m: 0.1 + 0.3 * rng.f64(),
             radius_m: 0.1 + 0.2 * rng.f64(),
             angle_deg: 360.0 * rng.f64(),
         };
-        let mut heavier = machine.clone();
-        heavier.further_unbalances.push(added);
+        let mut heavier_machine = machine.clone();
+        heavier_machine.further_unbalances.push(added_unbalance);
         let mut random = |size: f64| size * (2.0 * rng.f64() - 1.0);
         let [angle, speed, acceleration] = [random(3.0), random(130.0), random(10.0)];
         let spin = SpinState::new(N(angle).sin_cos(), N(speed), N(acceleration));
@@ -61,12 +63,13 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
             let residual: [f64; COORDINATES] = core::array::from_fn(|i| (inertia[i] - force[i]).0);
             residual
         };
-        let [without, with] = [residual(&machine), residual(&heavier)];
-        let (sin, cos) = added.angle_deg.to_radians().sin_cos();
-        let position_m = [added.x_m, added.radius_m * cos, added.radius_m * sin];
+        let [residual_without, residual_with] = [residual(&machine), residual(&heavier_machine)];
+        let (sin, cos) = added_unbalance.angle_deg.to_radians().sin_cos();
+        let position_m =
+            [added_unbalance.x_m, added_unbalance.radius_m * cos, added_unbalance.radius_m * sin];
         let hinge_x_m = machine.drum.hinge_x_m;
-        let twice_dual = |value: f64, rate: f64, second: f64| {
-            let slope = Dual { value: rate, slope: second };
+        let twice_dual = |value: f64, rate: f64, second_derivative: f64| {
+            let slope = Dual { value: rate, slope: second_derivative };
             N(Dual { value: Dual { value, slope: rate }, slope })
         };
         let moving_q = core::array::from_fn(|i| twice_dual(q[i], u[i], a[i]));
@@ -74,15 +77,17 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
         let mut accelerations = drum_point(&moving_q, theta, hinge_x_m, position_m)
             .map(|coordinate| coordinate.0.slope.slope);
         accelerations[1] += machine.gravity_m_per_s2;
-        let max_force = with.iter().fold(0.0_f64, |max_force, force| max_force.max(force.abs()));
+        let max_force =
+            residual_with.iter().fold(0.0_f64, |max_force, force| max_force.max(force.abs()));
         for r in 0..COORDINATES {
             let shifted_q = core::array::from_fn(|i| {
                 N(Dual { value: q[i], slope: if i == r { 1.0 } else { 0.0 } })
             });
-            let partial =
+            let position_derivative =
                 drum_point(&shifted_q, N(Dual { value: angle, slope: 0.0 }), hinge_x_m, position_m);
-            let power: f64 = (0..3).map(|i| accelerations[i] * partial[i].0.slope).sum();
-            let error = with[r] - without[r] - added.mass_kg * power;
+            let power: f64 =
+                (0..3).map(|i| accelerations[i] * position_derivative[i].0.slope).sum();
+            let error = residual_with[r] - residual_without[r] - added_unbalance.mass_kg * power;
             max_error = max_error.max(error.abs() / max_force);
         }
     }
@@ -106,16 +111,17 @@ fn quarter_turns_are_exact() {
 fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
     let mut rng = fastrand::Rng::with_seed(82);
     let mut machine = random_machine(&mut rng);
-    skew(&mut machine, &mut rng);
-    let run = |machine: &Machine, rpm: f64| -> Vec<[f64; COORDINATES]> {
+    add_skew_unbalance(&mut machine, &mut rng);
+    let simulate_deviations = |machine: &Machine, rpm: f64| -> Vec<[f64; COORDINATES]> {
         let spin = Spin::Table { time_s: vec![0.0, 2.0], speed_rpm: vec![0.0, rpm] };
-        let point = prepared(machine.clone(), spin, 2.0);
+        let point = prepare_point(machine.clone(), spin, 2.0);
         let method = Method::rk4(2e-4);
         let history =
             history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), 0.1);
         (0..history.len()).map(|k| history.instant(k).unwrap().deviations).collect()
     };
-    let [forwards, mirrored] = [run(&machine, 300.0), run(&machine.mirrored(), -300.0)];
+    let [forwards, mirrored] =
+        [simulate_deviations(&machine, 300.0), simulate_deviations(&machine.mirrored(), -300.0)];
     // The mirror reverses translations along z and rotations about y.
     let signs = [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
     for (k, (forward, backward)) in forwards.iter().zip(&mirrored).enumerate() {
@@ -128,10 +134,10 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
 
 #[test]
 fn an_unbalance_at_an_angle_in_other_lanes_does_not_change_the_bits() {
-    let mut rotated_unbalance = paper(0.6, 90.0);
+    let mut rotated_unbalance = paper_machine(0.6, 90.0);
     rotated_unbalance.unbalance.angle_deg = 40.0;
-    let [reference, rotated_unbalance] =
-        [paper(0.6, 90.0), rotated_unbalance].map(|m| prepared(m, triangular(), 1.5));
+    let [reference, rotated_unbalance] = [paper_machine(0.6, 90.0), rotated_unbalance]
+        .map(|m| prepare_point(m, triangular_spin(), 1.5));
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
             let simulate_points =
@@ -156,7 +162,7 @@ fn an_unbalance_at_an_angle_in_other_lanes_does_not_change_the_bits() {
 
 #[test]
 fn slopes_of_dampers_in_two_stages_are_derivatives_of_their_force() {
-    let mut machine = paper(0.4, 50.0);
+    let mut machine = paper_machine(0.4, 50.0);
     machine.dampers[0] = Damper {
         friction_n: 60.0,
         free_stroke_m: 0.004,

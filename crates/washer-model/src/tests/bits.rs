@@ -1,7 +1,7 @@
 //! Tests that the bits of a result depend neither on the instruction set, nor on the position in a
 //! batch, nor on the other points of the batch.
 
-use super::instruments::{ALL_RECORDERS, paper, random_machine, random_spin};
+use super::instruments::{ALL_RECORDERS, paper_machine, random_machine, random_spin};
 use crate::{
     Caps, Machine, Method, MethodKind, ModelKind, Point, Profile, Reading, Record, Recorders, Spin,
     Timing, prepare, simulate_until, simulate_with,
@@ -28,8 +28,12 @@ const METHODS: [Method; 5] = [
 /// second.
 fn quick_map() -> Vec<BitsScenario> {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 0.6 };
-    let corners = [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
-    corners.chain([(0.4, 90.0), (0.7, 120.0)]).map(|(m, c)| (paper(m, c), spin.clone())).collect()
+    let grid_points =
+        [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
+    grid_points
+        .chain([(0.4, 90.0), (0.7, 120.0)])
+        .map(|(m, c)| (paper_machine(m, c), spin.clone()))
+        .collect()
 }
 
 /// Returns random machines with spins of all kinds.
@@ -38,12 +42,12 @@ fn random_machines() -> Vec<BitsScenario> {
     (0..11).map(|i| (random_machine(&mut rng), random_spin(&mut rng, i, END_S))).collect()
 }
 
-fn points(simd: Simd, scenarios: &[BitsScenario]) -> Vec<Point> {
+fn prepare_points(simd: Simd, scenarios: &[BitsScenario]) -> Vec<Point> {
     prepare(simd, scenarios, &TIMING).into_iter().map(Result::unwrap).collect()
 }
 
 /// Returns the bits of all recorded numbers.
-fn bits((record, reading): (&Record, &Reading)) -> Vec<u64> {
+fn record_bits((record, reading): (&Record, &Reading)) -> Vec<u64> {
     let Record { failure, amplitudes, min_gap_m, steps, rejected } = record;
     let mut bits: Vec<_> = amplitudes.iter().map(|a| a.to_bits()).collect();
     bits.extend([min_gap_m.to_bits(), *steps, *rejected]);
@@ -64,15 +68,15 @@ fn bits((record, reading): (&Record, &Reading)) -> Vec<u64> {
 }
 
 /// Returns the bits of every scenario for each model and method, simulated as one batch.
-fn batch(simd: Simd, scenarios: &[BitsScenario]) -> Vec<Vec<Vec<u64>>> {
-    let points = points(simd, scenarios);
+fn simulate_batch(simd: Simd, scenarios: &[BitsScenario]) -> Vec<Vec<Vec<u64>>> {
+    let points = prepare_points(simd, scenarios);
     let points: Vec<_> = points.iter().collect();
     let mut results = Vec::new();
     for model in MODELS {
         for method in &METHODS {
             let (records, readings) = simulate_with(simd, model, method, &points, ALL_RECORDERS);
             assert_eq!((records.len(), readings.len()), (scenarios.len(), scenarios.len()));
-            results.push(records.iter().zip(&readings).map(bits).collect());
+            results.push(records.iter().zip(&readings).map(record_bits).collect());
         }
     }
     results
@@ -84,50 +88,57 @@ fn select_scenarios(results: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec
 }
 
 fn assert_same_on_every_instruction_set(scenarios: &[BitsScenario]) {
-    let scalar = batch(Simd::Scalar, scenarios);
+    let scalar = simulate_batch(Simd::Scalar, scenarios);
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
-        assert!(batch(simd, scenarios) == scalar, "{} gives other bits than scalar", simd.name());
+        assert!(
+            simulate_batch(simd, scenarios) == scalar,
+            "{} gives other bits than scalar",
+            simd.name()
+        );
     }
 }
 
 fn assert_same_at_any_position(scenarios: &[BitsScenario]) {
     let count = scenarios.len();
-    let in_order = batch(Simd::best(), scenarios);
+    let in_order = simulate_batch(Simd::best(), scenarios);
     for shift in [1, 2, 3, 5, 7] {
         let order: Vec<_> = (0..count).map(|i| (i + shift) % count).collect();
         let reordered: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
         assert!(
-            batch(Simd::best(), &reordered) == select_scenarios(&in_order, &order),
+            simulate_batch(Simd::best(), &reordered) == select_scenarios(&in_order, &order),
             "moved by {shift}"
         );
     }
     let order: Vec<_> = (0..count).rev().collect();
     let reordered: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
-    assert!(batch(Simd::best(), &reordered) == select_scenarios(&in_order, &order), "backwards");
+    assert!(
+        simulate_batch(Simd::best(), &reordered) == select_scenarios(&in_order, &order),
+        "backwards"
+    );
 }
 
 fn assert_same_with_any_other_points(scenarios: &[BitsScenario]) {
-    let together = batch(Simd::best(), scenarios);
+    let together = simulate_batch(Simd::best(), scenarios);
     for (i, scenario) in scenarios.iter().enumerate() {
-        let alone = batch(Simd::best(), core::slice::from_ref(scenario));
+        let alone = simulate_batch(Simd::best(), core::slice::from_ref(scenario));
         assert!(alone == select_scenarios(&together, &[i]), "scenario {i} alone");
     }
     // Two consecutive points fail, one early and one late, and other points start in their lanes.
-    let failing = |ramp_s: f64| {
-        (paper(30.0, 0.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 9e4, ramp_s })
+    let failing_scenario = |ramp_s: f64| {
+        (paper_machine(30.0, 0.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 9e4, ramp_s })
     };
-    let mut mixed = scenarios.to_vec();
-    mixed.insert(1, failing(0.02));
-    mixed.insert(5, failing(0.3));
-    let other_points: Vec<_> = (0..mixed.len()).filter(|i| ![1, 5].contains(i)).collect();
-    let with_failing = batch(Simd::best(), &mixed);
-    let nonlinear = &with_failing[0];
+    let mut mixed_scenarios = scenarios.to_vec();
+    mixed_scenarios.insert(1, failing_scenario(0.02));
+    mixed_scenarios.insert(5, failing_scenario(0.3));
+    let other_points: Vec<_> = (0..mixed_scenarios.len()).filter(|i| ![1, 5].contains(i)).collect();
+    let results_beside_failing = simulate_batch(Simd::best(), &mixed_scenarios);
+    let nonlinear = &results_beside_failing[0];
     assert!(
         [1, 5].iter().all(|&i| nonlinear[i].len() < nonlinear[0].len()),
         "the added points fail"
     );
     assert!(
-        select_scenarios(&with_failing, &other_points) == together,
+        select_scenarios(&results_beside_failing, &other_points) == together,
         "beside failing neighbours"
     );
 }
@@ -172,7 +183,8 @@ fn blocks_of_steps_do_not_change_bits() {
         peak_rpm: 350.0,
         ramp_s,
     });
-    let scenarios: Vec<_> = spins.into_iter().map(|spin| (paper(0.4, 90.0), spin)).collect();
+    let scenarios: Vec<_> =
+        spins.into_iter().map(|spin| (paper_machine(0.4, 90.0), spin)).collect();
     let simd = Simd::best();
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
@@ -184,9 +196,9 @@ fn blocks_of_steps_do_not_change_bits() {
             assert!(together.0[0].steps > 3 * CANCEL_POLL_STEPS, "{} steps", together.0[0].steps);
             for (k, point) in all_points.iter().enumerate() {
                 let alone = simulate_with(simd, model, &method, &[point], ALL_RECORDERS);
-                let expected = bits((&together.0[k], &together.1[k]));
+                let expected = record_bits((&together.0[k], &together.1[k]));
                 assert_eq!(
-                    bits((&alone.0[0], &alone.1[0])),
+                    record_bits((&alone.0[0], &alone.1[0])),
                     expected,
                     "{model:?} by {method:?}, {k}"
                 );
@@ -198,35 +210,37 @@ fn blocks_of_steps_do_not_change_bits() {
 #[test]
 fn every_method_stops_within_a_segment() {
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-    let scenario =
-        (paper(0.4, 90.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 });
+    let scenario = (
+        paper_machine(0.4, 90.0),
+        Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 },
+    );
     let point = prepare(Simd::best(), &[scenario], &timing).remove(0).unwrap();
     let tolerance = Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000 };
     let dop853 = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
     let adaptive = [Method::dopri5(tolerance), Method::additive(tolerance)];
     for method in [Method::rk4(2e-5), dop853].into_iter().chain(adaptive) {
         for model in MODELS {
-            let calls = AtomicU32::new(0);
+            let call_count = AtomicU32::new(0);
             let run_until = |max_calls: u32| {
-                calls.store(0, Ordering::Relaxed);
-                let stop = || calls.fetch_add(1, Ordering::Relaxed) >= max_calls;
+                call_count.store(0, Ordering::Relaxed);
+                let must_stop = || call_count.fetch_add(1, Ordering::Relaxed) >= max_calls;
                 simulate_until(
                     Simd::best(),
                     model,
                     &method,
                     &[&point],
                     Recorders::default(),
-                    Cancel::When(&stop),
+                    Cancel::When(&must_stop),
                 )
             };
             assert!(run_until(u32::MAX).is_some_and(|(records, _)| records[0].failure.is_none()));
             assert!(
-                calls.load(Ordering::Relaxed) > 3,
+                call_count.load(Ordering::Relaxed) > 3,
                 "{model:?} by {method:?}: {} calls",
-                calls.load(Ordering::Relaxed)
+                call_count.load(Ordering::Relaxed)
             );
             assert_eq!(run_until(2), None, "{model:?} by {method:?}");
-            assert_eq!(calls.load(Ordering::Relaxed), 3, "{model:?} by {method:?}");
+            assert_eq!(call_count.load(Ordering::Relaxed), 3, "{model:?} by {method:?}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Tests of the number of arithmetic operations of a right-hand side.
 
-use super::instruments::{paper, prepared, triangular};
+use super::instruments::{paper_machine, prepare_point, triangular_spin};
 use crate::coordinates::STATES;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::run::model::{LaneModel, Linear, Nonlinear};
@@ -33,7 +33,7 @@ thread_local! {
     }) };
 }
 
-fn count(change: impl FnOnce(&mut OperationCount)) {
+fn update_count(change: impl FnOnce(&mut OperationCount)) {
     COUNT.with(|cell| {
         let mut operations = cell.get();
         change(&mut operations);
@@ -49,7 +49,7 @@ fn count_operations<R>(function: impl FnOnce() -> R) -> (R, OperationCount) {
 }
 
 fn count_fused() {
-    count(|operations| {
+    update_count(|operations| {
         operations.multiplications += 1;
         operations.additions += 1;
         operations.fused += 1;
@@ -58,27 +58,27 @@ fn count_fused() {
 
 /// A number that counts its operations.
 #[derive(Clone, Copy, Debug)]
-struct Counting(f64);
+struct CountingNumber(f64);
 
-impl Real for Counting {
+impl Real for CountingNumber {
     type Mask = bool;
     fn lit(self, value: f64) -> Self {
         Self(value)
     }
     fn add(self, b: Self) -> Self {
-        count(|operations| operations.additions += 1);
+        update_count(|operations| operations.additions += 1);
         Self(self.0 + b.0)
     }
     fn sub(self, b: Self) -> Self {
-        count(|operations| operations.additions += 1);
+        update_count(|operations| operations.additions += 1);
         Self(self.0 - b.0)
     }
     fn mul(self, b: Self) -> Self {
-        count(|operations| operations.multiplications += 1);
+        update_count(|operations| operations.multiplications += 1);
         Self(self.0 * b.0)
     }
     fn div(self, b: Self) -> Self {
-        count(|operations| operations.divisions += 1);
+        update_count(|operations| operations.divisions += 1);
         Self(self.0 / b.0)
     }
     fn neg(self) -> Self {
@@ -97,14 +97,14 @@ impl Real for Counting {
         Self((-self.0).mul_add(b.0, c.0))
     }
     fn sqrt(self) -> Self {
-        count(|operations| operations.square_roots += 1);
+        update_count(|operations| operations.square_roots += 1);
         Self(self.0.sqrt())
     }
     fn abs(self) -> Self {
         Self(self.0.abs())
     }
     fn sin_cos(self) -> (Self, Self) {
-        count(|operations| operations.sine_cosine_pairs += 1);
+        update_count(|operations| operations.sine_cosine_pairs += 1);
         let (sin, cos) = Real::sin_cos(self.0);
         (Self(sin), Self(cos))
     }
@@ -119,7 +119,7 @@ impl Real for Counting {
     }
 }
 
-impl Lane for Counting {
+impl Lane for CountingNumber {
     const LANES: usize = 1;
     fn get(self, _: usize) -> f64 {
         self.0
@@ -137,18 +137,22 @@ impl Lane for Counting {
 
 /// Counts the operations of the forcing, which stages at the same time share, and of the
 /// derivative. Asserts that the derivative has the same bits as with plain numbers.
-fn evaluation_cost<M: LaneModel<Counting>, P: LaneModel<f64>>(
+fn count_evaluation<M: LaneModel<CountingNumber>, P: LaneModel<f64>>(
     caps: Option<Caps>,
 ) -> [OperationCount; 2] {
-    let point = prepared(paper(0.4, 140.0), triangular(), 50.0);
-    let model = M::splat(N(Counting(0.0)), &point, Coupling::new(N(Counting(0.0)), caps.as_ref()));
+    let point = prepare_point(paper_machine(0.4, 140.0), triangular_spin(), 50.0);
+    let model = M::splat(
+        N(CountingNumber(0.0)),
+        &point,
+        Coupling::new(N(CountingNumber(0.0)), caps.as_ref()),
+    );
     let mut x = P::at_rest(&point);
     for (i, x) in x.iter_mut().enumerate() {
         *x += 1e-4 * i as f64;
     }
-    let (forcing, forcing_cost) = count_operations(|| model.forcing(N(Counting(7.3))));
+    let (forcing, forcing_cost) = count_operations(|| model.forcing(N(CountingNumber(7.3))));
     let (dx, derivative_cost) =
-        count_operations(|| model.derivative(&forcing, &x.map(|x| N(Counting(x)))));
+        count_operations(|| model.derivative(&forcing, &x.map(|x| N(CountingNumber(x)))));
     let uncounted_model = P::splat(N(0.0), &point, Coupling::new(N(0.0), caps.as_ref()));
     let expected = uncounted_model.derivative(&uncounted_model.forcing(N(7.3)), &x.map(N));
     for i in 0..STATES {
@@ -158,26 +162,26 @@ fn evaluation_cost<M: LaneModel<Counting>, P: LaneModel<f64>>(
 }
 
 /// Counts the operations of an observation within the window: channels and radial distance.
-fn observation_cost<M: LaneModel<Counting>>() -> OperationCount {
-    let point = prepared(paper(0.4, 140.0), triangular(), 50.0);
-    let model = M::splat(N(Counting(0.0)), &point, Coupling::Springs);
-    let x = core::array::from_fn(|i| N(Counting(1e-4 * i as f64)));
-    let forcing = model.forcing(N(Counting(7.3)));
+fn count_observation<M: LaneModel<CountingNumber>>() -> OperationCount {
+    let point = prepare_point(paper_machine(0.4, 140.0), triangular_spin(), 50.0);
+    let model = M::splat(N(CountingNumber(0.0)), &point, Coupling::Springs);
+    let x = core::array::from_fn(|i| N(CountingNumber(1e-4 * i as f64)));
+    let forcing = model.forcing(N(CountingNumber(7.3)));
     count_operations(|| model.observe(&forcing, &x, &x, true)).1
 }
 
 const CAPPED: Option<Caps> = Some(Caps { bearings_rad_per_s: 700.0, hinge_rad_per_s: Some(700.0) });
 
 fn nonlinear_cost(caps: Option<Caps>) -> [OperationCount; 2] {
-    evaluation_cost::<Nonlinear<Counting>, Nonlinear<f64>>(caps)
+    count_evaluation::<Nonlinear<CountingNumber>, Nonlinear<f64>>(caps)
 }
 
 fn linear_cost(caps: Option<Caps>) -> [OperationCount; 2] {
-    evaluation_cost::<Linear<Counting>, Linear<f64>>(caps)
+    count_evaluation::<Linear<CountingNumber>, Linear<f64>>(caps)
 }
 
 /// Returns the sum of all operations but sines and cosines.
-fn flops(count: OperationCount) -> u32 {
+fn sum_operations(count: OperationCount) -> u32 {
     count.multiplications + count.additions + count.divisions + count.square_roots
 }
 
@@ -223,8 +227,10 @@ fn the_cost_of_mass_scaling_is_unchanged() {
 
 #[test]
 fn the_cost_of_observation_is_unchanged() {
-    let observed =
-        [observation_cost::<Nonlinear<Counting>>(), observation_cost::<Linear<Counting>>()];
+    let observed = [
+        count_observation::<Nonlinear<CountingNumber>>(),
+        count_observation::<Linear<CountingNumber>>(),
+    ];
     eprintln!("observed: nonlinear {:?}; linear {:?}", observed[0], observed[1]);
     assert_eq!(observed, [OBSERVED_NONLINEAR, OBSERVED_LINEAR]);
 }
@@ -233,9 +239,10 @@ fn the_cost_of_observation_is_unchanged() {
 fn a_linear_step_costs_less_than_a_nonlinear_one() {
     for caps in [None, CAPPED] {
         // A step of RK4 has four derivatives, and the forcing at two new times.
-        let step =
-            |[forcing, derivative]: [OperationCount; 2]| 4 * flops(derivative) + 2 * flops(forcing);
-        let [nonlinear, linear] = [nonlinear_cost(caps), linear_cost(caps)].map(step);
+        let step_operations = |[forcing, derivative]: [OperationCount; 2]| {
+            4 * sum_operations(derivative) + 2 * sum_operations(forcing)
+        };
+        let [nonlinear, linear] = [nonlinear_cost(caps), linear_cost(caps)].map(step_operations);
         eprintln!("RK4 step, {caps:?}: {nonlinear} operations nonlinear, {linear} linear");
         assert!(linear < nonlinear);
     }

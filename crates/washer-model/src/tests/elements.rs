@@ -1,8 +1,8 @@
 //! Tests of friction, stops, bushings, cubic springs and further unbalances against independent
 //! time histories and closed forms.
 
-use super::instruments::{paper, prepared};
-use super::reference::reference;
+use super::instruments::{paper_machine, prepare_point};
+use super::reference::read_reference;
 use crate::coordinates::COORDINATES;
 use crate::{
     BumpStop, Bushing, Channel, Damper, InitialDeviation, Machine, Method, ModelKind, Point,
@@ -28,7 +28,7 @@ fn rows(case: &Value, key: &str) -> Vec<Vec<f64>> {
 pub(crate) fn machine(case: &Value) -> Machine {
     let number = |key: &str| case[key].as_f64();
     let mut machine =
-        paper(number("unbalance_mass_kg").unwrap(), number("damping_n_s_per_m").unwrap());
+        paper_machine(number("unbalance_mass_kg").unwrap(), number("damping_n_s_per_m").unwrap());
     for damper in &mut machine.dampers {
         damper.friction_n = number("Ff").unwrap_or(0.0);
         damper.friction_speed_m_per_s = number("vs").unwrap_or(damper.friction_speed_m_per_s);
@@ -71,13 +71,13 @@ pub(crate) fn machine(case: &Value) -> Machine {
 
 /// Returns the reference machine that has elements of every kind.
 pub(super) fn with_every_element() -> Machine {
-    machine(&reference("elements_all.json"))
+    machine(&read_reference("elements_all.json"))
 }
 
 /// Computes the largest error of each method's history against a reference, relative to each
 /// channel's peak.
 fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N] {
-    let case = reference(&format!("elements_{name}.json"));
+    let case = read_reference(&format!("elements_{name}.json"));
     let peak_rpm = case["peak_rpm"].as_f64().unwrap();
     let ramp_s = case["ramp_s"].as_f64().unwrap();
     let spin = match case["spin"].as_str().unwrap() {
@@ -85,7 +85,7 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
         "cycloidal" => Spin::Ramped { profile: Profile::Cycloidal, peak_rpm, ramp_s },
         other => panic!("{other}"),
     };
-    let point = prepared(machine(&case), spin, case["end_s"].as_f64().unwrap());
+    let point = prepare_point(machine(&case), spin, case["end_s"].as_f64().unwrap());
     let at_rest = case["equilibrium_m_rad"].as_array().unwrap();
     for i in 0..COORDINATES {
         let expected = at_rest[i].as_f64().unwrap();
@@ -144,7 +144,7 @@ const BEARING_DEFLECTION_M: f64 = 8e-7;
 /// All mass centres are between the bearings, four springs are vertical, and the shaft hardly
 /// bends.
 fn heaving_machine() -> (Machine, f64) {
-    let mut machine = paper(0.0, 0.0);
+    let mut machine = paper_machine(0.0, 0.0);
     machine.tub.centre_x_m = 0.0;
     machine.shaft.centre_x_m = 0.0;
     machine.drum.centre_x_m = 0.0;
@@ -167,7 +167,7 @@ fn heaving_machine() -> (Machine, f64) {
 fn heights_m(machine: Machine, start_m: f64, interval_s: f64, count: u32) -> Vec<f64> {
     let end_s = interval_s * f64::from(count) * (1.0 + 1e-9);
     let zero_spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    let point = prepared(machine, zero_spin, end_s);
+    let point = prepare_point(machine, zero_spin, end_s);
     let mut start = InitialDeviation::default();
     start.deviations[0] = start_m;
     start.deviations[2] = start_m;
@@ -178,7 +178,7 @@ fn heights_m(machine: Machine, start_m: f64, interval_s: f64, count: u32) -> Vec
 
 #[test]
 fn friction_shortens_every_half_swing_by_the_same_length() {
-    let (mut machine, w_rad_per_s) = heaving_machine();
+    let (mut machine, frequency_rad_per_s) = heaving_machine();
     machine.dampers = vec![Damper {
         cabinet_m: [0.0, -0.4, 0.0],
         tub_m: [0.0, -0.1, 0.0],
@@ -188,7 +188,7 @@ fn friction_shortens_every_half_swing_by_the_same_length() {
         friction_linear_speed_m_per_s: Some(0.3),
         ..Machine::paper().dampers[0]
     }];
-    let heights = heights_m(machine, 0.02, PI / w_rad_per_s, 7);
+    let heights = heights_m(machine, 0.02, PI / frequency_rad_per_s, 7);
     assert_eq!(heights.len(), 8);
     for (n, height) in heights.iter().enumerate() {
         let amplitude_m = 0.02 - 2.0 * n as f64 * 40.0 / 32_000.0;
@@ -245,7 +245,7 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
 #[test]
 fn the_linear_model_uses_the_tangent_of_a_damper_within_its_free_stroke() {
     let softness_m = 1e-3;
-    let mut staged = paper(0.4, 80.0);
+    let mut staged = paper_machine(0.4, 80.0);
     for damper in &mut staged.dampers {
         damper.friction_n = 60.0;
         damper.free_stroke_m = 0.01;
@@ -254,12 +254,12 @@ fn the_linear_model_uses_the_tangent_of_a_damper_within_its_free_stroke() {
     }
     // The engagement h at rest, where delta = -s / 2.
     let engagement = 0.5 * (1.0 - 0.005 / 0.005_f64.hypot(softness_m));
-    let mut viscous = paper(0.4, 80.0);
+    let mut viscous = paper_machine(0.4, 80.0);
     for damper in &mut viscous.dampers {
         damper.damping_n_s_per_m += engagement * (300.0 + 60.0 / damper.friction_speed_m_per_s);
     }
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
-    let [staged, viscous] = [staged, viscous].map(|machine| prepared(machine, spin(), 1.0));
+    let [staged, viscous] = [staged, viscous].map(|machine| prepare_point(machine, spin(), 1.0));
     assert!(staged.friction_speeds().is_empty());
     let [computed, expected] = [staged, viscous].map(|point| point.matrices(0.3, 20.0, 1.0));
     assert_eq!(computed.mass, expected.mass);
@@ -317,7 +317,7 @@ fn friction_is_equivalent_viscous_damping_in_the_linear_model() {
         damper.friction_n = 0.0;
     }
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
-    let [point, viscous] = [machine, viscous].map(|machine| prepared(machine, spin(), 1.0));
+    let [point, viscous] = [machine, viscous].map(|machine| prepare_point(machine, spin(), 1.0));
     let matrices = |point: &Point| {
         let matrices = point.matrices(0.3, 20.0, 1.0);
         (matrices.mass, matrices.damping, matrices.stiffness, matrices.force)
@@ -332,7 +332,7 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
     // The stop is closed at rest, and soft enough for the first order to be a good approximation.
     machine.stops[2].clearance_m = 0.01;
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 0.05);
-    let point = prepared(
+    let point = prepare_point(
         machine,
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },
         0.1,
@@ -362,7 +362,7 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
 
 #[test]
 fn elements_without_force_and_machines_in_other_lanes_do_not_change_bits() {
-    let without_friction = paper(0.6, 90.0);
+    let without_friction = paper_machine(0.6, 90.0);
     let mut with_friction_speed = without_friction.clone();
     with_friction_speed
         .dampers
@@ -374,7 +374,7 @@ fn elements_without_force_and_machines_in_other_lanes_do_not_change_bits() {
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 };
     let [without_friction, with_friction_speed, with_friction] =
         [without_friction, with_friction_speed, with_friction]
-            .map(|machine| prepared(machine, spin(), 1.5));
+            .map(|machine| prepare_point(machine, spin(), 1.5));
     let method = Method::rk4(2e-4);
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         let records = |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);

@@ -2,7 +2,7 @@
 //! independently of the equations of motion.
 
 use super::elements::with_every_element;
-use super::instruments::{mass_matrix, prepared};
+use super::instruments::{mass_matrix, prepare_point};
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::{Spin, SpinState};
 use crate::machine::{BumpStop, Damper, Machine};
@@ -13,7 +13,7 @@ use lane_ode::N;
 type PlainVector = [f64; 3];
 
 /// Returns the columns of Ry(yaw) Rz(pitch) (Table 1).
-pub(super) fn axes(yaw: f64, pitch: f64) -> [PlainVector; 3] {
+pub(super) fn body_axes(yaw: f64, pitch: f64) -> [PlainVector; 3] {
     let ((sy, cy), (sp, cp)) = (yaw.sin_cos(), pitch.sin_cos());
     [[cy * cp, sp, -sy * cp], [-cy * sp, cp, sy * sp], [sy, 0.0, cy]]
 }
@@ -34,12 +34,12 @@ fn distance(a: PlainVector, b: PlainVector) -> f64 {
 /// Computes the potential energy (J) at theta = 0: gravity, springs, bearings, flexure, stops,
 /// bushings (model page, section 3).
 fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
-    let tub = axes(q[4], q[5]);
-    let shaft = axes(q[6], q[7]);
+    let tub = body_axes(q[4], q[5]);
+    let shaft = body_axes(q[6], q[7]);
     let p_t = [0.0, q[0], q[1]];
     let p_s = [0.0, q[2], q[3]];
     // The drum's axes are those of the shaft, rotated by q9 about s2, then by q10.
-    let drum_in_shaft = axes(q[8], q[9]);
+    let drum_in_shaft = body_axes(q[8], q[9]);
     let drum: [PlainVector; 3] =
         std::array::from_fn(|k| position([0.0; 3], &shaft, drum_in_shaft[k]));
     let hinge = position(p_s, &shaft, [m.drum.hinge_x_m, 0.0, 0.0]);
@@ -47,15 +47,16 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
         position(hinge, &drum, [x_m - m.drum.hinge_x_m, r_m * cos, r_m * sin])
     };
-    let heights = [
+    let mass_moments_kg_m = [
         m.tub.mass_kg * position(p_t, &tub, [m.tub.centre_x_m, 0.0, 0.0])[1],
         m.shaft.mass_kg * position(p_s, &shaft, [m.shaft.centre_x_m, 0.0, 0.0])[1],
         m.drum.mass_kg * drum_point(m.drum.centre_x_m, 0.0, 0.0)[1],
     ];
-    let height = |u: &Unbalance| u.mass_kg * drum_point(u.x_m, u.radius_m, u.angle_deg)[1];
-    let unbalance_mass_moments = m.unbalances().map(height);
-    let mut energy =
-        m.gravity_m_per_s2 * heights.into_iter().chain(unbalance_mass_moments).sum::<f64>();
+    let unbalance_mass_moment =
+        |u: &Unbalance| u.mass_kg * drum_point(u.x_m, u.radius_m, u.angle_deg)[1];
+    let unbalance_mass_moments = m.unbalances().map(unbalance_mass_moment);
+    let mut energy = m.gravity_m_per_s2
+        * mass_moments_kg_m.into_iter().chain(unbalance_mass_moments).sum::<f64>();
     for s in &m.springs {
         let free_length_m = s.free_length_m.unwrap_or_else(|| distance(s.cabinet_m, s.tub_m));
         let elongation = distance(position(p_t, &tub, s.tub_m), s.cabinet_m) - free_length_m;
@@ -84,10 +85,10 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     for (x_m, stiffness) in
         [(b.front_x_m, b.front_stiffness_n_per_m), (b.rear_x_m, b.rear_stiffness_n_per_m)]
     {
-        let on_tub = position(p_t, &tub, [x_m, 0.0, 0.0]);
-        let shaft_load = position(p_s, &shaft, [x_m, 0.0, 0.0]);
+        let tub_centre = position(p_t, &tub, [x_m, 0.0, 0.0]);
+        let shaft_centre = position(p_s, &shaft, [x_m, 0.0, 0.0]);
         let deflection_squared =
-            (shaft_load[1] - on_tub[1]).powi(2) + (shaft_load[2] - on_tub[2]).powi(2);
+            (shaft_centre[1] - tub_centre[1]).powi(2) + (shaft_centre[2] - tub_centre[2]).powi(2);
         energy += 0.5 * stiffness * deflection_squared;
     }
     let phi = (q[8].cos() * q[9].cos()).acos();
@@ -111,8 +112,8 @@ fn losses_w(
     q: &[f64; COORDINATES],
     u: &[f64; COORDINATES],
 ) -> f64 {
-    let axes_at_rest = axes(at_rest[4], at_rest[5]);
-    let tub = axes(q[4], q[5]);
+    let axes_at_rest = body_axes(at_rest[4], at_rest[5]);
+    let tub = body_axes(q[4], q[5]);
     let tub_point = |point: PlainVector| position([0.0, q[0], q[1]], &tub, point);
     // The tub's angular velocity: yaw rate about c2, pitch rate about t3.
     let angular_velocity: PlainVector = [u[5] * tub[2][0], u[4], u[5] * tub[2][2]];
@@ -133,15 +134,16 @@ fn losses_w(
         let v =
             component_along(velocity(d.tub_m), std::array::from_fn(|i| end[i] - d.cabinet_m[i]));
         losses += d.damping_n_s_per_m * v * v;
-        let stage = d.friction_n / v.hypot(d.friction_speed_m_per_s) + d.outer_damping_n_s_per_m;
-        losses += engagement(d, distance(end, d.cabinet_m) - rest_m) * stage * v * v;
+        let stage_damping =
+            d.friction_n / v.hypot(d.friction_speed_m_per_s) + d.outer_damping_n_s_per_m;
+        losses += engagement(d, distance(end, d.cabinet_m) - rest_m) * stage_damping * v * v;
     }
     for s in &m.stops {
         let cabinet_point = tub_point(s.tub_m);
         let depth = depth_m(s, std::array::from_fn(|i| cabinet_point[i] - s.tub_m[i]));
         let v = component_along(velocity(s.tub_m), s.direction);
-        let contact = 0.5 * (1.0 + depth / depth.hypot(s.softness_m));
-        losses += s.damping_n_s_per_m * contact * v * v;
+        let contact_share = 0.5 * (1.0 + depth / depth.hypot(s.softness_m));
+        losses += s.damping_n_s_per_m * contact_share * v * v;
     }
     for b in &m.bushings {
         let v = velocity(b.tub_m);
@@ -176,7 +178,7 @@ fn history_from_initial_velocity(
     interval_s: f64,
 ) -> Vec<InstantOutputs> {
     let zero_spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    let point = prepared(machine.clone(), zero_spin, end_s);
+    let point = prepare_point(machine.clone(), zero_spin, end_s);
     // Velocities of 0.1 and 0.15 m/s, 0.5 and -0.4 rad/s give motions of some 20 mm and 40 mrad.
     let mut start = InitialDeviation::default();
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
@@ -208,7 +210,7 @@ fn energies_j(step_s: f64) -> Vec<f64> {
 
 fn equilibrium(machine: &Machine) -> [f64; COORDINATES] {
     let zero_spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    prepared(machine.clone(), zero_spin, 1.0).equilibrium
+    prepare_point(machine.clone(), zero_spin, 1.0).equilibrium
 }
 
 #[test]
@@ -266,7 +268,7 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
     let max_depth_m = |stop: &BumpStop| {
         let depth = |instant: &InstantOutputs| {
             let q = &instant.deviations;
-            let cabinet_point = position([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
+            let cabinet_point = position([0.0, q[0], q[1]], &body_axes(q[4], q[5]), stop.tub_m);
             depth_m(stop, std::array::from_fn(|i| cabinet_point[i] - stop.tub_m[i]))
         };
         instants.iter().map(depth).fold(f64::NEG_INFINITY, f64::max)

@@ -1,7 +1,9 @@
 //! Tests of the linear model against automatic differentiation of the nonlinear equations of
 //! motion, for random machines at random spins.
 
-use super::instruments::{equations, paper, prepared, random_machine, skew};
+use super::instruments::{
+    add_skew_unbalance, equations, paper_machine, prepare_point, random_machine,
+};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
@@ -13,27 +15,28 @@ use crate::{Channel, ModelKind, PointEquations, Spin};
 use lane_ode::{Dual, N, System};
 
 /// The number of random machines, each at one instant.
-const INSTANTS: usize = 100;
+const INSTANT_COUNT: usize = 100;
 
 type CoordinateVector = [f64; COORDINATES];
 
 /// The linear model of a machine at a time of its spin.
-struct MotionAtInstant {
+struct LinearModelAtInstant {
     point: Point,
     t_s: f64,
     model: Linear<f64>,
     spin: SpinState<f64>,
 }
 
-impl MotionAtInstant {
+impl LinearModelAtInstant {
     fn random(rng: &mut fastrand::Rng) -> Self {
-        let mut rpm = || 1200.0 * (2.0 * rng.f64() - 1.0);
-        let spin = Spin::Table { time_s: vec![0.0, 10.0], speed_rpm: vec![rpm(), rpm()] };
+        let mut random_rpm = || 1200.0 * (2.0 * rng.f64() - 1.0);
+        let spin =
+            Spin::Table { time_s: vec![0.0, 10.0], speed_rpm: vec![random_rpm(), random_rpm()] };
         let mut machine = random_machine(rng);
         if rng.bool() {
-            skew(&mut machine, rng);
+            add_skew_unbalance(&mut machine, rng);
         }
-        let point = prepared(machine, spin, 10.0);
+        let point = prepare_point(machine, spin, 10.0);
         let model = Linear::splat(N(0.0), &point, Coupling::Springs);
         let t_s = 10.0 * rng.f64();
         let spin = Nonlinear::splat(N(0.0), &point, Coupling::Springs).forcing(N(t_s));
@@ -60,20 +63,23 @@ impl MotionAtInstant {
 }
 
 /// Calls `check` at random instants of random machines.
-fn check_random_instants(seed: u64, mut check: impl FnMut(&MotionAtInstant, &mut fastrand::Rng)) {
+fn check_random_instants(
+    seed: u64,
+    mut check: impl FnMut(&LinearModelAtInstant, &mut fastrand::Rng),
+) {
     let mut rng = fastrand::Rng::with_seed(seed);
-    for _ in 0..INSTANTS {
-        let instant = MotionAtInstant::random(&mut rng);
+    for _ in 0..INSTANT_COUNT {
+        let instant = LinearModelAtInstant::random(&mut rng);
         check(&instant, &mut rng);
     }
 }
 
 /// Returns random numbers between -size and size.
-fn random(rng: &mut fastrand::Rng, size: f64) -> CoordinateVector {
+fn random_vector(rng: &mut fastrand::Rng, size: f64) -> CoordinateVector {
     core::array::from_fn(|_| size * (2.0 * rng.f64() - 1.0))
 }
 
-const AT_REST: CoordinateVector = [0.0; COORDINATES];
+const ZERO_VECTOR: CoordinateVector = [0.0; COORDINATES];
 
 #[test]
 fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
@@ -82,13 +88,13 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
         let SpinState { sin, cos, speed, acceleration, .. } = instant.spin;
         let computed = instant.point.matrices(sin.0.atan2(cos.0), speed.0, acceleration.0);
         let [mut mass, mut damping, mut stiffness] = [[[0.0; COORDINATES]; COORDINATES]; 3];
-        let mut force = AT_REST;
+        let mut force = ZERO_VECTOR;
         for j in 0..COORDINATES {
-            let mut unit = AT_REST;
+            let mut unit = ZERO_VECTOR;
             unit[j] = 1.0;
-            let [at_rest, by_a] = instant.residual(&AT_REST, &AT_REST, &unit);
-            let [_, by_u] = instant.residual(&AT_REST, &unit, &AT_REST);
-            let [_, by_q] = instant.residual(&unit, &AT_REST, &AT_REST);
+            let [at_rest, by_a] = instant.residual(&ZERO_VECTOR, &ZERO_VECTOR, &unit);
+            let [_, by_u] = instant.residual(&ZERO_VECTOR, &unit, &ZERO_VECTOR);
+            let [_, by_q] = instant.residual(&unit, &ZERO_VECTOR, &ZERO_VECTOR);
             for i in 0..COORDINATES {
                 mass[i][j] = by_a[i];
                 damping[i][j] = by_u[i];
@@ -124,8 +130,8 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
 fn accelerations_solve_the_expanded_equations() {
     let mut max_errors = 0.0_f64;
     check_random_instants(22, |instant, rng| {
-        let mut q = random(rng, 0.02);
-        let u = random(rng, 0.5);
+        let mut q = random_vector(rng, 0.02);
+        let u = random_vector(rng, 0.5);
         // Shaft and tub differ by a small deflection of the bearings.
         for (rotor, tub) in [(2, 0), (3, 1), (6, 4), (7, 5)] {
             q[rotor] = q[tub] + 1e-5 * (rng.f64() - 0.5);
@@ -135,7 +141,7 @@ fn accelerations_solve_the_expanded_equations() {
         let dx = instant.model.derivative(&instant.model.forcing(N(instant.t_s)), &x);
         let a: CoordinateVector = core::array::from_fn(|i| dx[COORDINATES + i].0);
         let [at_rest, slope] = instant.residual(&q, &u, &a);
-        let scale = instant.residual(&q, &u, &AT_REST)[1];
+        let scale = instant.residual(&q, &u, &ZERO_VECTOR)[1];
         let scale = (0..COORDINATES).fold(0.0_f64, |m, i| m.max((at_rest[i] + scale[i]).abs()));
         for i in 0..COORDINATES {
             assert_eq!(dx[i].0, u[i]);
@@ -152,7 +158,7 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
     let mut max_errors = [0.0_f64; 3];
     let mut max_rest_value = 0.0_f64;
     check_random_instants(23, |instant, rng| {
-        let [q, u, a] = [0.02, 0.5, 20.0].map(|size| random(rng, size));
+        let [q, u, a] = [0.02, 0.5, 20.0].map(|size| random_vector(rng, size));
         let state = |first: &CoordinateVector, second: &CoordinateVector| -> [N<f64>; STATES] {
             core::array::from_fn(|i| N([first, second][i / COORDINATES][i % COORDINATES]))
         };
@@ -193,7 +199,7 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
          rates and second derivatives within {:.1e} and {:.1e} of what the spin makes of 1 m",
         max_errors[0], max_errors[1], max_errors[2]
     );
-    assert!(max_errors.iter().all(|max_errors| *max_errors < 1e-14), "{max_errors:?}");
+    assert!(max_errors.iter().all(|max_error| *max_error < 1e-14), "{max_errors:?}");
     assert!(max_rest_value > 5e-3, "{max_rest_value:e}");
 }
 
@@ -203,7 +209,7 @@ fn outputs_of_order_zero_turn_with_the_drum() {
     // from an independent program: linear histories of these two machines, with and without the
     // part of order zero.
     for (unbalance_mass_kg, centre_mm, front_um) in [(0.4, 4.960, 47.96), (0.7, 8.600, 56.86)] {
-        let machine = paper(unbalance_mass_kg, 140.0);
+        let machine = paper_machine(unbalance_mass_kg, 140.0);
         let mass =
             machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg + unbalance_mass_kg;
         let [drum_kg, drum_x_m] = [machine.drum.mass_kg, machine.drum.centre_x_m];
@@ -211,7 +217,7 @@ fn outputs_of_order_zero_turn_with_the_drum() {
         let unbalance = machine.unbalance;
         // The drum makes one turn per second.
         let spin = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![60.0, 60.0] };
-        let point = prepared(machine, spin, 1.0);
+        let point = prepare_point(machine, spin, 1.0);
         let mut equations = PointEquations::new(&point, ModelKind::Linear);
         let mut channel_at =
             |t_s: f64, channel: Channel| equations.channels(t_s, &[0.0; STATES]).0[channel.index()];
@@ -270,9 +276,9 @@ fn the_models_differ_by_second_order_in_the_deviation() {
     // For half the deviation the remainder of M a = f is a quarter.
     let mut orders = Vec::new();
     check_random_instants(24, |instant, rng| {
-        let q = random(rng, 1.0);
-        let u = random(rng, 10.0);
-        let a = random(rng, 100.0);
+        let q = random_vector(rng, 1.0);
+        let u = random_vector(rng, 10.0);
+        let a = random_vector(rng, 100.0);
         let remainder = |size: f64| {
             let [q, u, a] = [&q, &u, &a].map(|v| v.map(|v| size * v));
             let [at_rest, slope] = instant.residual(&q, &u, &a);

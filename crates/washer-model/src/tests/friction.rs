@@ -44,9 +44,9 @@ fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
     let points = prepared(&machines);
     let method = Method::rk4(2e-4);
     let recorders = Recorders::gauge(Gauge::DamperSpeed);
-    let simulated: Vec<&Point> = points.iter().collect();
+    let point_references: Vec<&Point> = points.iter().collect();
     let (_, readings) =
-        simulate_with(Simd::best(), ModelKind::Linear, &method, &simulated, recorders);
+        simulate_with(Simd::best(), ModelKind::Linear, &method, &point_references, recorders);
     for ((point, reading), machine) in points.iter().zip(&readings).zip(&machines) {
         let speeds = reading.gauge(Gauge::DamperSpeed);
         let factor = point.friction_speed_factor(ModelKind::Linear, speeds).unwrap();
@@ -57,8 +57,9 @@ fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
         let count = machine.dampers.iter().filter(|damper| damper.friction_n > 0.0).count();
         assert_eq!(point.friction_speeds().len(), count);
     }
-    let fixed = prepared(&[machine(0.4, [60.0, 60.0], Some(0.02))]).remove(0);
-    let factor = fixed.friction_speed_factor(ModelKind::Linear, &[0.1, 0.005]).unwrap();
+    let point_with_fixed_speed = prepared(&[machine(0.4, [60.0, 60.0], Some(0.02))]).remove(0);
+    let factor =
+        point_with_fixed_speed.friction_speed_factor(ModelKind::Linear, &[0.1, 0.005]).unwrap();
     assert!((factor - 5.0).abs() < 1e-12, "{factor}: below 4 v_s / pi friction is viscous");
 }
 
@@ -113,9 +114,9 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
             reciprocals[0] -= (d * residual_here[0] - b * residual_here[1]) / determinant;
             reciprocals[1] -= (a * residual_here[1] - c * residual_here[0]) / determinant;
         }
-        let ratio =
+        let ratios =
             speeds_m_per_s.iter().zip(&reciprocals).map(|(speed, reciprocal)| speed * reciprocal);
-        let ratios: Vec<f64> = ratio.collect();
+        let ratios: Vec<f64> = ratios.collect();
         println!("{friction_n} N: {speeds_m_per_s:?} m/s are {ratios:?} of the fixed point");
         assert!(
             ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.01),
@@ -145,9 +146,9 @@ fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
 #[test]
 fn a_stuck_damper_has_the_least_speed_amplitude() {
     let machine = machine(0.01, [120.0, 120.0], None);
-    let stuck = prepared(std::slice::from_ref(&machine)).remove(0);
+    let stuck_point = prepared(std::slice::from_ref(&machine)).remove(0);
     let min_speed_m_per_s = 4.0 * machine.dampers[0].friction_speed_m_per_s / std::f64::consts::PI;
-    for speed in stuck.friction_speeds() {
+    for speed in stuck_point.friction_speeds() {
         assert!(
             (speed.speed_m_per_s / min_speed_m_per_s - 1.0).abs() < 1e-12,
             "{speed:?}, least {min_speed_m_per_s}"
@@ -160,7 +161,7 @@ fn a_stuck_damper_has_the_least_speed_amplitude() {
 /// hinge's modes.
 #[test]
 fn the_two_rates_of_an_overdamped_mode_have_one_shape() {
-    let frequencies = |frictions_n: [f64; 2]| {
+    let find_modes = |frictions_n: [f64; 2]| {
         let point = prepared(&[machine(0.1, frictions_n, None)]).remove(0);
         let modes = modes(&point, 0.0, 0.0).unwrap().modes;
         let without_shapes = mode_roots(&point, 0.0, None).unwrap();
@@ -170,16 +171,16 @@ fn the_two_rates_of_an_overdamped_mode_have_one_shape() {
         }
         modes
     };
-    let frictionless = frequencies([0.0, 0.0]);
-    let mut most_overdamped = 0;
+    let frictionless_modes = find_modes([0.0, 0.0]);
+    let mut max_overdamped_count = 0;
     for friction_n in [20.0, 40.0, 60.0, 120.0, 300.0] {
-        let damped = frequencies([friction_n, 0.9 * friction_n]);
-        let overdamped = damped.iter().filter(|mode| mode.im_rad_per_s == 0.0).count();
-        most_overdamped = most_overdamped.max(overdamped);
-        for (damped, frictionless) in damped.iter().zip(&frictionless) {
-            let ratio = damped.magnitude_rad_per_s / frictionless.magnitude_rad_per_s;
+        let damped_modes = find_modes([friction_n, 0.9 * friction_n]);
+        let overdamped_count = damped_modes.iter().filter(|mode| mode.im_rad_per_s == 0.0).count();
+        max_overdamped_count = max_overdamped_count.max(overdamped_count);
+        for (damped_mode, frictionless_mode) in damped_modes.iter().zip(&frictionless_modes) {
+            let ratio = damped_mode.magnitude_rad_per_s / frictionless_mode.magnitude_rad_per_s;
             assert!((0.8..1.25).contains(&ratio), "{friction_n} N: {ratio}");
         }
     }
-    assert_eq!(most_overdamped, 2);
+    assert_eq!(max_overdamped_count, 2);
 }

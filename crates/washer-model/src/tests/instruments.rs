@@ -22,12 +22,12 @@ pub(super) const ALL_RECORDERS: Recorders = Recorders {
 };
 
 /// Returns the spin of the paper's Fig. 12.
-pub(super) fn triangular() -> Spin {
+pub(super) fn triangular_spin() -> Spin {
     Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 }
 }
 
 /// Returns the paper's machine with another unbalance mass and damping.
-pub(super) fn paper(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
+pub(super) fn paper_machine(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = unbalance_mass_kg;
     machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = damping_n_s_per_m);
@@ -39,7 +39,7 @@ pub(super) fn paper(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
 pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
     loop {
         let mut machine = Machine::paper();
-        let mut spin = triangular();
+        let mut spin = triangular_spin();
         for parameter in MachineParameter::all(&machine, &spin) {
             if parameter.target() == Target::Machine
                 && let Some(value) = parameter.get(&machine, &spin)
@@ -56,7 +56,7 @@ pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
 }
 
 /// Rotates the unbalance of a machine about the axis, and adds an unbalance in another plane.
-pub(super) fn skew(machine: &mut Machine, rng: &mut fastrand::Rng) {
+pub(super) fn add_skew_unbalance(machine: &mut Machine, rng: &mut fastrand::Rng) {
     let mut angle_deg = || 360.0 * (2.0 * rng.f64() - 1.0);
     machine.unbalance.angle_deg = angle_deg();
     let angle_deg = angle_deg();
@@ -84,7 +84,7 @@ pub(super) fn random_spin(rng: &mut fastrand::Rng, kind: usize, end_s: f64) -> S
 }
 
 /// Prepares the point of a machine and a spin.
-pub(super) fn prepared(machine: Machine, spin: Spin, end_s: f64) -> Point {
+pub(super) fn prepare_point(machine: Machine, spin: Spin, end_s: f64) -> Point {
     let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }

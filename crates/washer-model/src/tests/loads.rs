@@ -2,7 +2,7 @@
 //! of densely sampled time histories.
 
 use super::elements::with_every_element;
-use super::energy::{axes, position};
+use super::energy::{body_axes, position};
 use crate::machine::feet::{Feet, LOAD_COMPONENTS};
 use crate::machine::{Cabinet, Foot, Machine};
 use crate::{
@@ -22,7 +22,7 @@ fn with_cabinet(mut machine: Machine) -> Machine {
     machine
 }
 
-fn point(machine: Machine) -> Point {
+fn prepare_ramp_point(machine: Machine) -> Point {
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 2.0 };
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
@@ -53,22 +53,22 @@ fn read_gauges(point: &Point, model: ModelKind, simd: Simd) -> Reading {
 
 /// Computes the force and the moment about O on the cabinet at an instant, from the forces of the
 /// elements, each along its line or at its point.
-fn load(
+fn compute_load(
     machine: &Machine,
     point: &Point,
     deviations: &[f64; 10],
     forces: &crate::Forces,
 ) -> [f64; LOAD_COMPONENTS] {
     let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + deviations[i]);
-    let tub = axes(q[4], q[5]);
-    let tub_point = |at: [f64; 3]| position([0.0, q[0], q[1]], &tub, at);
+    let tub = body_axes(q[4], q[5]);
+    let tub_point = |position_m: [f64; 3]| position([0.0, q[0], q[1]], &tub, position_m);
     let mut load = [0.0; LOAD_COMPONENTS];
-    let mut add = |at: [f64; 3], force: [f64; 3]| {
+    let mut add_force = |position_m: [f64; 3], force: [f64; 3]| {
         for i in 0..3 {
             let j = (i + 1) % 3;
             let k = (i + 2) % 3;
             load[i] += force[i];
-            load[3 + i] += at[j] * force[k] - at[k] * force[j];
+            load[3 + i] += position_m[j] * force[k] - position_m[k] * force[j];
         }
     };
     let springs = machine.springs.iter().map(|s| (s.cabinet_m, s.tub_m)).zip(&forces.springs_n);
@@ -77,14 +77,14 @@ fn load(
         let end = tub_point(tub_m);
         let span: [f64; 3] = std::array::from_fn(|i| end[i] - cabinet_m[i]);
         let length = span.iter().map(|s| s * s).sum::<f64>().sqrt();
-        add(cabinet_m, span.map(|s| tension_n * s / length));
+        add_force(cabinet_m, span.map(|s| tension_n * s / length));
     }
-    for (stop, push_n) in machine.stops.iter().zip(&forces.stops_n) {
+    for (stop, force_n) in machine.stops.iter().zip(&forces.stops_n) {
         let length = stop.direction_length();
-        add(tub_point(stop.tub_m), stop.direction.map(|d| push_n * d / length));
+        add_force(tub_point(stop.tub_m), stop.direction.map(|d| force_n * d / length));
     }
     for (bushing, force_n) in machine.bushings.iter().zip(&forces.bushings_n) {
-        add(tub_point(bushing.tub_m), *force_n);
+        add_force(tub_point(bushing.tub_m), *force_n);
     }
     load
 }
@@ -97,22 +97,23 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     // The cabinet is so heavy that no foot lifts. On a single foot there would be no resistance to
     // turning.
     machine.cabinet.as_mut().unwrap().mass_kg = 1000.0;
-    let point = point(machine.clone());
+    let point = prepare_ramp_point(machine.clone());
     let feet = Feet::new(&machine).unwrap();
     let method = Method::rk4(1e-4);
     let history =
         history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), INTERVAL_S);
-    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
+    let [first_instant, last_instant] =
+        TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
     let mut feet_n = vec![f64::INFINITY; 4];
     let mut slip_margin_n = f64::INFINITY;
     let mut walk_margin_n = f64::INFINITY;
     let mut stops_n = vec![0.0_f64; 3];
-    let mut closed_s = vec![0.0_f64; 3];
+    let mut contact_s = vec![0.0_f64; 3];
     let mut greatest_tensions_n = vec![0.0_f64; machine.dampers.len()];
-    for k in first..=last {
+    for k in first_instant..=last_instant {
         let forces = history.forces(k).unwrap();
         let instant = history.instant(k).unwrap();
-        let load = load(&machine, &point, &instant.deviations, &forces);
+        let load = compute_load(&machine, &point, &instant.deviations, &forces);
         for i in 0..3 {
             assert!((load[i] - forces.cabinet_n[i]).abs() < 1e-9);
         }
@@ -133,9 +134,10 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         let arms: Vec<f64> = machine.feet.iter().map(arm).collect();
         let mean_square_arm_m2: f64 =
             arms.iter().zip(&loaded_n).map(|(arm, n)| n / total_n * arm * arm).sum();
-        let longest = arms.iter().copied().fold(0.0, f64::max);
+        let longest_arm_m = arms.iter().copied().fold(0.0, f64::max);
         let moment = load[4] + mean(0) * load[2] - mean(2) * load[0];
-        let walk_margin_now_n = slip_margin_now_n - moment.abs() * longest / mean_square_arm_m2;
+        let walk_margin_now_n =
+            slip_margin_now_n - moment.abs() * longest_arm_m / mean_square_arm_m2;
         assert!((forces.walk_margin_n.unwrap() - walk_margin_now_n).abs() < 1e-6);
         walk_margin_n = walk_margin_n.min(walk_margin_now_n);
         feet_n = minima([feet_n, loads_n].into_iter());
@@ -146,17 +148,17 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
             *greatest_n = greatest_n.max(now_n.abs());
         }
         let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
-        for (closed_s, stop) in closed_s.iter_mut().zip(&machine.stops) {
-            let stop_point = position([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
+        for (contact_s, stop) in contact_s.iter_mut().zip(&machine.stops) {
+            let stop_point = position([0.0, q[0], q[1]], &body_axes(q[4], q[5]), stop.tub_m);
             let length = stop.direction_length();
             let displacement_m: f64 =
                 (0..3).map(|i| (stop_point[i] - stop.tub_m[i]) * stop.direction[i] / length).sum();
-            *closed_s += if displacement_m > stop.clearance_m { INTERVAL_S } else { 0.0 };
+            *contact_s += if displacement_m > stop.clearance_m { INTERVAL_S } else { 0.0 };
         }
     }
     let hit_stops =
-        stops_n.iter().zip(&closed_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
-    assert!(hit_stops.count() >= 2, "{stops_n:?} N, {closed_s:?} s");
+        stops_n.iter().zip(&contact_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
+    assert!(hit_stops.count() >= 2, "{stops_n:?} N, {contact_s:?} s");
     let reading = read_gauges(&point, ModelKind::Nonlinear, Simd::best());
     assert_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
     assert_close("margin", reading.gauge(Gauge::SlipMargin), &[slip_margin_n], 1e-2);
@@ -185,7 +187,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     assert_close(
         "contact of stop",
         reading.gauge(Gauge::StopContact),
-        &closed_s,
+        &contact_s,
         40.0 * INTERVAL_S,
     );
     assert_eq!(read_gauges(&point, ModelKind::Nonlinear, Simd::Scalar), reading);
@@ -195,16 +197,19 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
 fn loads_of_the_linear_model_agree_with_its_history() {
     let mut machine = with_cabinet(with_every_element());
     machine.unbalance.mass_kg = 0.9;
-    let point = point(machine.clone());
+    let point = prepare_ramp_point(machine.clone());
     let method = Method::rk4(1e-4);
     let history =
         history(ModelKind::Linear, &method, &point, &InitialDeviation::default(), INTERVAL_S);
-    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
-    let forces: Vec<_> = (first..=last).map(|k| history.forces(k).unwrap()).collect();
+    let [first_instant, last_instant] =
+        TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
+    let forces: Vec<_> =
+        (first_instant..=last_instant).map(|k| history.forces(k).unwrap()).collect();
     let feet_n = minima(forces.iter().map(|forces| forces.feet_n.clone()));
     let slip_margin_n = minima(forces.iter().map(|forces| vec![forces.slip_margin_n.unwrap()]));
-    let below_n = minima(forces.iter().map(|forces| forces.stops_n.iter().map(|n| -n).collect()));
-    let stops_n: Vec<f64> = below_n.iter().map(|below_n| -below_n).collect();
+    let negated_stops_n =
+        minima(forces.iter().map(|forces| forces.stops_n.iter().map(|n| -n).collect()));
+    let stops_n: Vec<f64> = negated_stops_n.iter().map(|negated_n| -negated_n).collect();
     let reading = read_gauges(&point, ModelKind::Linear, Simd::best());
     let at_rest = history.forces(0).unwrap();
     assert!(at_rest.feet_n.iter().zip(&feet_n).all(|(rest_n, n)| rest_n - n > 10.0), "{feet_n:?}");
@@ -219,9 +224,9 @@ fn loads_of_the_linear_model_agree_with_its_history() {
             (damper.damping_n_s_per_m + equivalent) * speed
         })
         .collect();
-    let negative_n =
+    let negated_tensions_n =
         minima(forces.iter().map(|forces| forces.dampers_n.iter().map(|n| -n.abs()).collect()));
-    let greatest_tensions_n: Vec<f64> = negative_n.iter().map(|n| -n).collect();
+    let greatest_tensions_n: Vec<f64> = negated_tensions_n.iter().map(|n| -n).collect();
     assert!(greatest_tensions_n.iter().all(|n| *n > 1.0), "{greatest_tensions_n:?}");
     let quantity = "tension at the greatest speed of damper";
     assert_close(quantity, &tensions_n, &greatest_tensions_n, 1e-2);
@@ -236,7 +241,7 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
     });
     machine.unbalance.mass_kg = 1e-3;
     machine.further_unbalances.clear();
-    let point = point(machine.clone());
+    let point = prepare_ramp_point(machine.clone());
     let feet = Feet::new(&machine).unwrap();
     let history = history(
         ModelKind::Nonlinear,
@@ -245,11 +250,12 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
         &InitialDeviation::default(),
         0.1,
     );
-    let at_rest = load(&machine, &point, &[0.0; 10], &history.forces(0).unwrap());
-    let rest_n = feet.loads_n(&at_rest).into_iter().fold(f64::INFINITY, f64::min);
+    let at_rest = compute_load(&machine, &point, &[0.0; 10], &history.forces(0).unwrap());
+    let min_rest_load_n = feet.loads_n(&at_rest).into_iter().fold(f64::INFINITY, f64::min);
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
         let reading = read_gauges(&point, model, Simd::best());
-        rest_n - reading.gauge(Gauge::FootLoad).iter().copied().fold(f64::INFINITY, f64::min)
+        min_rest_load_n
+            - reading.gauge(Gauge::FootLoad).iter().copied().fold(f64::INFINITY, f64::min)
     });
     assert!(nonlinear > 0.01, "{nonlinear} N");
     assert!((linear / nonlinear - 1.0).abs() < 5e-3, "{linear} N for {nonlinear} N");
@@ -257,7 +263,7 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
 
 #[test]
 fn a_machine_without_stops_and_cabinet_has_only_damper_speeds() {
-    let point = point(Machine::paper());
+    let point = prepare_ramp_point(Machine::paper());
     let mut reading = read_gauges(&point, ModelKind::Nonlinear, Simd::best());
     let speeds = core::mem::take(&mut reading.gauges[Gauge::DamperSpeed as usize]);
     assert_eq!((speeds.len(), reading), (2, Reading::default()));

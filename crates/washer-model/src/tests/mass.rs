@@ -8,15 +8,15 @@ use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::forces::Deflection;
 use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::{accelerations, assemble_coupled_halves};
-use crate::tests::reference::{assert_matrix, machine, numbers, reference, spin};
+use crate::tests::reference::{assert_matrix, machine, read_numbers, read_reference, spin};
 use lane_ode::{Dual, N};
 
 #[test]
 fn val_mass_matrix_matches_that_of_an_independent_program() {
     let mut max_error = 0.0_f64;
-    for case in reference("rhs.json")["cases"].as_array().unwrap() {
+    for case in read_reference("rhs.json")["cases"].as_array().unwrap() {
         let computed =
-            mass_matrix(&Coefficients::new(&machine(case)), &spin(case), &numbers(&case["q"]));
+            mass_matrix(&Coefficients::new(&machine(case)), &spin(case), &read_numbers(&case["q"]));
         max_error = max_error.max(assert_matrix("M", &computed, &case["mass_matrix"], 1e-14));
     }
     eprintln!("mass matrix: at most {max_error:.1e} of the largest entry");

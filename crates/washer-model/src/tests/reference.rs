@@ -1,5 +1,5 @@
-//! Tests against numbers from independent programs (`tests/reference/README.md` says how they were
-//! made).
+//! Tests against numbers from independent programs (`tests/reference/README.md` says how they
+//! were made).
 
 use crate::coordinates::COORDINATES;
 use crate::linear;
@@ -17,12 +17,12 @@ use core::f64::consts::TAU;
 use lane_ode::{N, OutOfLine, Simd};
 use serde_json::Value;
 
-pub(crate) fn reference(file: &str) -> Value {
+pub(crate) fn read_reference(file: &str) -> Value {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-pub(crate) fn numbers<const K: usize>(value: &Value) -> [f64; K] {
+pub(crate) fn read_numbers<const K: usize>(value: &Value) -> [f64; K] {
     let list = value.as_array().unwrap();
     std::array::from_fn(|i| list[i].as_f64().unwrap())
 }
@@ -36,7 +36,8 @@ pub(crate) fn assert_matrix(
     tolerance: f64,
 ) -> f64 {
     let rows = reference.as_array().unwrap();
-    let expected: [[f64; COORDINATES]; COORDINATES] = std::array::from_fn(|i| numbers(&rows[i]));
+    let expected: [[f64; COORDINATES]; COORDINATES] =
+        std::array::from_fn(|i| read_numbers(&rows[i]));
     let max_magnitude = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
     let mut max_error = 0.0_f64;
     for i in 0..COORDINATES {
@@ -71,9 +72,9 @@ pub(crate) fn spin(case: &Value) -> SpinState<f64> {
 
 #[test]
 fn val_accelerations_match_an_independent_right_hand_side() {
-    for case in reference("rhs.json")["cases"].as_array().unwrap() {
+    for case in read_reference("rhs.json")["cases"].as_array().unwrap() {
         let coefficients = Coefficients::new(&machine(case));
-        let [q, u] = ["q", "u"].map(|name| numbers::<COORDINATES>(&case[name]).map(N));
+        let [q, u] = ["q", "u"].map(|name| read_numbers::<COORDINATES>(&case[name]).map(N));
         let computed = nonlinear::accelerations(
             &coefficients,
             &Coupling::Springs,
@@ -82,7 +83,7 @@ fn val_accelerations_match_an_independent_right_hand_side() {
             &q,
             &u,
         );
-        let expected: [f64; COORDINATES] = numbers(&case["acceleration"]);
+        let expected: [f64; COORDINATES] = read_numbers(&case["acceleration"]);
         let max_magnitude = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
         for i in 0..COORDINATES {
             let error = (computed[i].0 - expected[i]).abs() / max_magnitude;
@@ -99,11 +100,11 @@ fn val_accelerations_match_an_independent_right_hand_side() {
 
 #[test]
 fn val_equilibrium_matches_an_independent_solution() {
-    for case in reference("equilibrium.json")["cases"].as_array().unwrap() {
+    for case in read_reference("equilibrium.json")["cases"].as_array().unwrap() {
         let (q, solved_lanes) =
             equilibrium::solve_equilibrium(N(0.0), &Coefficients::new(&machine(case)));
         assert_eq!(solved_lanes & 1, 1);
-        let expected: [f64; COORDINATES] = numbers(&case["q"]);
+        let expected: [f64; COORDINATES] = read_numbers(&case["q"]);
         for i in 0..COORDINATES {
             assert!(
                 (q[i].0 - expected[i]).abs() < 1e-12,
@@ -118,7 +119,7 @@ fn val_equilibrium_matches_an_independent_solution() {
 
 #[test]
 fn val_linear_matrices_match_an_independent_expansion() {
-    for case in reference("linear_matrices.json")["cases"].as_array().unwrap() {
+    for case in read_reference("linear_matrices.json")["cases"].as_array().unwrap() {
         let coefficients = Coefficients::new(&machine(case));
         let (q, _) = equilibrium::solve_equilibrium(N(0.0), &coefficients);
         let point = linear::Linearise { machine: &coefficients, q: &q }.run().remove(0);
@@ -128,7 +129,7 @@ fn val_linear_matrices_match_an_independent_expansion() {
         {
             assert_matrix(name, &computed, &case[name], 1e-9);
         }
-        let expected: [f64; COORDINATES] = numbers(&case["F"]);
+        let expected: [f64; COORDINATES] = read_numbers(&case["F"]);
         let max_magnitude = expected.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
         for i in 0..COORDINATES {
             let error = (computed.force[i] - expected[i]).abs() / max_magnitude;
@@ -140,13 +141,13 @@ fn val_linear_matrices_match_an_independent_expansion() {
 #[test]
 fn val_eigenvalues_match_an_independent_solution() {
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-    for case in reference("modes.json")["cases"].as_array().unwrap() {
+    for case in read_reference("modes.json")["cases"].as_array().unwrap() {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 100.0, ramp_s: 1.0 };
         let point = prepare(Simd::Scalar, &[(machine(case), spin)], &timing).remove(0).unwrap();
         let speed = case["speed_rpm"].as_f64().unwrap() * TAU / 60.0;
         let computed = modes(&point, case["theta"].as_f64().unwrap(), speed).unwrap().modes;
         for (computed, expected) in computed.iter().zip(case["eigenvalues"].as_array().unwrap()) {
-            let [re, im] = numbers(expected);
+            let [re, im] = read_numbers(expected);
             let error = (computed.re_per_s - re).hypot(computed.im_rad_per_s - im) / re.hypot(im);
             assert!(
                 error < 1e-7,
@@ -156,14 +157,14 @@ fn val_eigenvalues_match_an_independent_solution() {
             );
         }
         let highest = highest_frequency_rad_per_s(&point, speed).unwrap();
-        let [re, im] = numbers(case["eigenvalues"].as_array().unwrap().last().unwrap());
+        let [re, im] = read_numbers(case["eigenvalues"].as_array().unwrap().last().unwrap());
         // The reference's highest frequency is that at theta = 0 only.
         assert!((highest / f64::hypot(re, im) - 1.0).abs() < 2e-3, "{highest} against {im}");
     }
 }
 
 /// Reads the names of the columns and the rows of a reference CSV file.
-fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+fn read_table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
@@ -174,7 +175,7 @@ fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
 
 #[test]
 fn val_reliability_map_matches_that_of_an_independent_program() {
-    let (names, rows) = table("reliability_map.csv");
+    let (names, rows) = read_table("reliability_map.csv");
     let scenarios: Vec<_> = rows
         .iter()
         .map(|row| {
@@ -193,7 +194,7 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
     let [nonlinear, linear] =
         [ModelKind::Nonlinear, ModelKind::Linear].map(|m| simulate(simd, m, &method, &points));
     let column = |name: &str| names.iter().position(|n| n == name).unwrap();
-    let mut compared = 0;
+    let mut compared_count = 0;
     for (i, row) in rows.iter().enumerate() {
         let mut largest_ratio = 0.0_f64;
         for channel in Channel::ALL {
@@ -216,7 +217,7 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
                         channel.name(),
                         &row[..2]
                     );
-                    compared += 1;
+                    compared_count += 1;
                 }
             }
         }
@@ -227,5 +228,8 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
             &row[..2]
         );
     }
-    assert!(compared > 500, "only {compared} amplitudes were regular enough to compare");
+    assert!(
+        compared_count > 500,
+        "only {compared_count} amplitudes were regular enough to compare"
+    );
 }

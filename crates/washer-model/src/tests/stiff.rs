@@ -22,7 +22,7 @@ fn tolerance(relative: f64) -> Tolerance {
     Tolerance { relative, absolute: 1e-3 * relative, max_steps: 1_000_000 }
 }
 
-fn run(model: ModelKind, method: &Method, point: &Point) -> Record {
+fn simulate_point(model: ModelKind, method: &Method, point: &Point) -> Record {
     simulate(Simd::best(), model, method, &[point]).remove(0)
 }
 
@@ -39,9 +39,9 @@ fn difference(a: &Record, b: &Record) -> f64 {
 fn the_additive_method_agrees_with_converged_rk4() {
     let point = point(2e8);
     for model in ModelKind::ALL {
-        let reference = run(model, &Method::rk4(5e-5), &point);
+        let reference = simulate_point(model, &Method::rk4(5e-5), &point);
         for (relative, max_error) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
-            let record = run(model, &Method::additive(tolerance(relative)), &point);
+            let record = simulate_point(model, &Method::additive(tolerance(relative)), &point);
             let error = difference(&record, &reference);
             eprintln!("{model:?} at {relative:e}: {error:.1e} in {} steps", record.steps);
             assert!(error < max_error, "{model:?} at {relative:e}: {error:e}");
@@ -55,10 +55,10 @@ fn the_additive_method_integrates_bearings_too_stiff_for_explicit_methods() {
     for model in ModelKind::ALL {
         // The bearings of the reference deflect by a tenth of a micrometre only, so that the almost
         // rigid bearings of the other points give a similar motion.
-        let reference = run(model, &Method::rk4(5e-5), &points[0]);
+        let reference = simulate_point(model, &Method::rk4(5e-5), &points[0]);
         for stiff_point in &points[1..] {
-            assert!(run(model, &Method::rk4(5e-5), stiff_point).failure.is_some());
-            let record = run(model, &Method::additive(tolerance(1e-4)), stiff_point);
+            assert!(simulate_point(model, &Method::rk4(5e-5), stiff_point).failure.is_some());
+            let record = simulate_point(model, &Method::additive(tolerance(1e-4)), stiff_point);
             let error = difference(&record, &reference);
             let attempted_steps = record.steps + record.rejected;
             eprintln!("{model:?}: {error:.1e} in {attempted_steps} steps");
@@ -80,7 +80,7 @@ fn records_of_stiff_bearings_do_not_depend_on_other_points() {
         let together = simulate(Simd::Scalar, model, &method, &all_points);
         assert_eq!(simulate(Simd::best(), model, &method, &all_points), together, "{model:?}");
         for (point, record) in all_points.iter().zip(together) {
-            assert_eq!(run(model, &method, point), record, "{model:?}");
+            assert_eq!(simulate_point(model, &method, point), record, "{model:?}");
         }
     }
 }
@@ -92,9 +92,9 @@ fn stiff_bearings_do_not_limit_the_steps_of_the_additive_method() {
     let explicit_rad_per_s = highest_explicit_frequency_rad_per_s(&stiff, 40.0).unwrap();
     assert!(full_rad_per_s > 1e6, "{full_rad_per_s}");
     assert!(explicit_rad_per_s < 1e4, "{explicit_rad_per_s}");
-    let softer_rad_per_s = highest_explicit_frequency_rad_per_s(&soft, 40.0).unwrap();
+    let soft_explicit_rad_per_s = highest_explicit_frequency_rad_per_s(&soft, 40.0).unwrap();
     assert!(
-        (softer_rad_per_s / explicit_rad_per_s - 1.0).abs() < 0.1,
-        "{softer_rad_per_s} and {explicit_rad_per_s}"
+        (soft_explicit_rad_per_s / explicit_rad_per_s - 1.0).abs() < 0.1,
+        "{soft_explicit_rad_per_s} and {explicit_rad_per_s}"
     );
 }
