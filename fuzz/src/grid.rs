@@ -46,19 +46,19 @@ fn check_plan(plan: &Plan) {
     assert_eq!(plan.axis_values(plan.points() - 1).len(), plan.axes.len());
     assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
     assert_eq!(Job::new(plan).hash(), Job::new(plan).hash());
-    let scenarios: Vec<_> = (0..plan.corners().min(4))
+    let machines: Vec<_> = (0..plan.corners().min(4))
         .map(|corner| {
-            let scenario = plan.scenario_at(&plan.corner(corner));
-            assert_eq!(scenario.model.machine.violations(), []);
-            assert_eq!(scenario.model.spin.violations(), []);
-            (scenario.model.machine, scenario.model.spin)
+            let input = sweep::point_input(plan, &plan.corner(corner));
+            assert_eq!(input.machine.violations(), []);
+            assert_eq!(input.spin.violations(), []);
+            (input.machine, input.spin)
         })
         .collect();
     let end_s = END_S.min(plan.end_s);
     let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
     let mut instruction_sets = Simd::ALL.into_iter();
     let simd = instruction_sets.find(|simd| simd.name() == "scalar").unwrap_or_else(Simd::best);
-    let prepared = prepare(simd, &scenarios, &timing);
+    let prepared = prepare(simd, &machines, &timing);
     let points: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let records = simulate(simd, model, &Method::rk4(STEP_S), &points);

@@ -13,7 +13,7 @@ use sweep_engine::method::{ACCURACY, DOPRI5, IntegrationMethod, RK4, StepRule, S
 use sweep_engine::store::{Layout, PointRows, axis_columns};
 use sweep_engine::{
     About, Build, Engine, Error, Evaluator, GridInput, GridTable, Model, ModelParameter, Plan,
-    RowSink, RowSource, RunContext, Scenario,
+    RowSink, RowSource, RunContext,
 };
 use sweep_parameter::{Range, Verdict};
 
@@ -244,8 +244,16 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
 
     fn evaluate_points(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<PointRuns<C>> {
         let prepare = |values: &Vec<f64>| {
-            let Scenario { model, window_s } = self.plan.scenario_at(values);
-            PreparedPoint::new::<O, D>(model.values, window_s)
+            let mut parameters = self.plan.model.values;
+            let mut window_s = self.plan.window_s;
+            for (axis, &value) in self.plan.axes.iter().zip(values) {
+                let handle = axis.parameter.handle;
+                match handle.checked_sub(P) {
+                    Some(edge) => window_s[edge] = value,
+                    None => parameters[handle] = value,
+                }
+            }
+            PreparedPoint::new::<O, D>(parameters, window_s)
         };
         let points: Vec<Option<PreparedPoint<C, P>>> = axis_values.iter().map(prepare).collect();
         let positions: Vec<usize> = (0..points.len()).filter(|k| points[*k].is_some()).collect();

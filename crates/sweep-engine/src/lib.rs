@@ -45,7 +45,7 @@ pub use execution::{Execution, ExecutionArgs};
 pub use exit::{Error, Exit, print, show, tell};
 pub use interrupt::{Interrupt, check_random_numbers, survive_file_size_limits};
 pub use model::{About, GridTable, ModelFile};
-pub use plan::{Axis, AxisTolerance, AxisValues, Plan, Reliability, Scenario};
+pub use plan::{Axis, AxisTolerance, AxisValues, Plan, Reliability};
 pub use program::program;
 pub use progress::{Progress, ProgressMode, duration};
 pub use store::{Job, StoreError};

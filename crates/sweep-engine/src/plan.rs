@@ -273,24 +273,23 @@ impl<M: Model> Plan<M> {
         values
     }
 
-    /// Returns the scenario of a point.
-    pub fn scenario(&self, point: u64) -> Scenario<M> {
-        self.scenario_at(&self.axis_values(point))
-    }
-
-    /// Returns the scenario at values of the axes, on the grid or between its points.
-    pub fn scenario_at(&self, axis_values: &[f64]) -> Scenario<M> {
-        let mut scenario = Scenario { model: self.model.clone(), window_s: self.window_s };
-        self.write_axis_values(&mut scenario, axis_values);
-        scenario
-    }
-
-    /// Writes values of the axes into a scenario of this plan. Scenarios of a plan differ in
-    /// nothing else.
-    pub fn write_axis_values(&self, scenario: &mut Scenario<M>, axis_values: &[f64]) {
-        for (axis, &value) in self.axes.iter().zip(axis_values) {
-            scenario.write(&axis.parameter, value);
+    /// Writes a parameter's value into the model or the window.
+    pub fn write(&mut self, parameter: &ModelParameter<M>, value: f64) {
+        match parameter.window_edge {
+            Some(edge) => self.window_s[edge] = value,
+            None => self.model.write(&parameter.handle, value),
         }
+    }
+
+    /// Returns the window at values of the axes.
+    pub fn window_at(&self, axis_values: &[f64]) -> [f64; 2] {
+        let mut window_s = self.window_s;
+        for (axis, &value) in self.axes.iter().zip(axis_values) {
+            if let Some(edge) = axis.parameter.window_edge {
+                window_s[edge] = value;
+            }
+        }
+        window_s
     }
 
     /// Returns the number of corners: the points at which every axis has its least or greatest
@@ -354,25 +353,6 @@ pub struct Reliability {
     pub limits: RatioLimits,
     /// The compared channels, in column order.
     pub channels: Vec<Channel>,
-}
-
-/// The input of a point: the model and the window, with the values of the axes written into them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Scenario<M> {
-    /// The model.
-    pub model: M,
-    /// The closed interval over which amplitudes are taken.
-    pub window_s: [f64; 2],
-}
-
-impl<M: Model> Scenario<M> {
-    /// Writes a parameter into the model or the window.
-    pub fn write(&mut self, parameter: &ModelParameter<M>, value: f64) {
-        match parameter.window_edge {
-            Some(edge) => self.window_s[edge] = value,
-            None => self.model.write(&parameter.handle, value),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -15,7 +15,9 @@ use std::sync::{Arc, Condvar, Mutex};
 use lane_ode::{Cancel, Simd};
 use once_cell::sync::OnceCell;
 use pool::{OutcomeSink, Pool};
-use washer_model::{Machine, Method, ModelKind, Point, Spin, StepSelector, Timing, prepare};
+use washer_model::{
+    Machine, Method, ModelKind, Point, PointInput, Spin, StepSelector, Timing, prepare,
+};
 use washer_row::{
     LevelRun, MethodKind, Outcome, OutcomePurpose, RefinementLevels, RowRule, Status,
     integrate_points, refinement_levels,
@@ -24,7 +26,7 @@ use washer_row::{
 use crate::columns::Columns;
 use crate::map_row::{MapLayout, MapRow};
 use crate::method::direct;
-use crate::plan::{Plan, Scenario, compared_channels, failure_reason};
+use crate::plan::{Plan, compared_channels, failure_reason, point_input};
 use sweep_engine::engine::evaluate_points;
 use sweep_engine::method::Steps;
 use sweep_engine::{Error, Interrupt, RowSink, RowSource};
@@ -168,13 +170,13 @@ impl<'a> ModelEngine<'a> {
         }
         // The corners of the grid have the extremes of the machines' frequencies.
         let corners = self.plan.some_corners();
-        let scenarios: Vec<Scenario> =
-            corners.iter().map(|values| self.plan.scenario_at(values)).collect();
-        let prepared = self.prepare(&scenarios);
+        let inputs: Vec<PointInput> =
+            corners.iter().map(|values| point_input(self.plan, values)).collect();
+        let prepared = self.prepare(&inputs);
         let points = prepared
             .iter()
-            .zip(&scenarios)
-            .filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.model.spin)));
+            .zip(&inputs)
+            .filter_map(|(point, input)| Some((point.as_ref().ok()?, &input.spin)));
         let steps = StepSelector::until(points, self.plan.end_s, cancel);
         ModelKind::ALL.map(|model| refinement_levels(&steps, model, self.rule.accuracy))
     }
@@ -229,12 +231,12 @@ impl<'a> ModelEngine<'a> {
 
     /// Prepares points for integration, those with the same window together. A point that cannot be
     /// prepared has its status.
-    fn prepare(&self, scenarios: &[Scenario]) -> Vec<Result<Point, Status>> {
-        let mut prepared = Vec::with_capacity(scenarios.len());
-        for same_window in scenarios.chunk_by(|a, b| a.window_s == b.window_s) {
+    fn prepare(&self, inputs: &[PointInput]) -> Vec<Result<Point, Status>> {
+        let mut prepared = Vec::with_capacity(inputs.len());
+        for same_window in inputs.chunk_by(|a, b| a.window_s == b.window_s) {
             let machines: Vec<_> = same_window
                 .iter()
-                .map(|Scenario { model, .. }| (model.machine.clone(), model.spin.clone()))
+                .map(|PointInput { machine, spin, .. }| (machine.clone(), spin.clone()))
                 .collect();
             let timing = Timing { window_s: same_window[0].window_s, ..self.timing };
             let prepare_group = |machines: &[(Machine, Spin)]| {

@@ -11,14 +11,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
-    Attractor, Channel, Crossing, CrossingEffect, LeftRangeError, Point, Response, Spin,
-    StepSelector, follow_crossings, modes, peaks_without_departures,
+    Attractor, Channel, Crossing, CrossingEffect, LeftRangeError, Point, PointInput, Response,
+    Spin, StepSelector, follow_crossings, modes, peaks_without_departures,
 };
 
 use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
 use crate::estimate::LONG_WORK_S;
 use crate::map_row::MapRow;
-use crate::plan::{Plan, Scenario, compared_channels, prepare_scenario};
+use crate::plan::{Plan, compared_channels, point_input, prepare_input};
 use crate::speeds::Speeds;
 use sweep_engine::columns::MODELS;
 use sweep_engine::config::NamedValues;
@@ -134,11 +134,11 @@ fn explain_in_pool(
     Execution { progress: progress_mode, interrupt, .. }: Execution<'_>,
 ) -> Result<Explanation, Error> {
     let simd = simd_from_environment()?;
-    let scenario = plan.scenario(0);
-    let spin = &scenario.model.spin;
+    let input = point_input(plan, &plan.axis_values(0));
+    let spin = &input.spin;
     let profile_rpm = profile::speed_range(spin, plan.end_s);
-    let point = prepare_scenario(plan, &scenario).map_err(Error::model)?;
-    let find_directions = find_directions(plan, &scenario, &point, profile_rpm, speeds)?;
+    let point = prepare_input(plan, &input).map_err(Error::model)?;
+    let find_directions = find_directions(plan, &input, &point, profile_rpm, speeds)?;
     // The total is that of the scans. The searches after them take a number of speeds that is not
     // known beforehand.
     let speed_count = |direction: &TurningDirection| direction.speeds_to_scan.values().len() as u64;
@@ -155,7 +155,7 @@ fn explain_in_pool(
         let mut finder = ResponseFinder {
             simd,
             plan,
-            scenario: &direction.scenario,
+            input: &direction.input,
             point: &direction.point,
             is_backward: direction.is_backward,
             interrupt,
@@ -254,7 +254,7 @@ fn announce_long_scan(speeds: u64, scan_s: f64) -> Option<String> {
 struct TurningDirection {
     is_backward: bool,
     /// The machine and its spin, mirrored if the drum turns backwards.
-    scenario: Scenario,
+    input: PointInput,
     point: Point,
     /// The speeds at which responses are sought.
     speeds_to_scan: Speeds,
@@ -270,7 +270,7 @@ struct TurningDirection {
 /// Returns an error if the machine has no modes, or if the profile reaches none of these speeds.
 fn find_directions(
     plan: &Plan,
-    scenario: &Scenario,
+    input: &PointInput,
     point: &Point,
     [lowest_rpm, highest_rpm]: [f64; 2],
     requested: Option<Speeds>,
@@ -285,11 +285,11 @@ fn find_directions(
             None if fastest_rpm > from_rpm => Speeds::new(from_rpm, fastest_rpm, STEP_RPM),
             _ => continue,
         };
-        let scenario = if is_backward { mirror_scenario(scenario) } else { scenario.clone() };
-        let point = prepare_scenario(plan, &scenario).map_err(Error::model)?;
+        let input = if is_backward { mirror_input(input) } else { input.clone() };
+        let point = prepare_input(plan, &input).map_err(Error::model)?;
         find_directions.push(TurningDirection {
             is_backward,
-            scenario,
+            input,
             point,
             speeds_to_scan,
             fastest_rpm,
@@ -307,10 +307,10 @@ fn find_directions(
 }
 
 /// Returns the mirror image of a machine and its spin.
-fn mirror_scenario(scenario: &Scenario) -> Scenario {
-    let mut mirrored = scenario.clone();
-    mirrored.model.machine = scenario.model.machine.mirrored();
-    match &mut mirrored.model.spin {
+fn mirror_input(input: &PointInput) -> PointInput {
+    let mut mirrored = input.clone();
+    mirrored.machine = input.machine.mirrored();
+    match &mut mirrored.spin {
         Spin::Ramped { peak_rpm, .. } => *peak_rpm = -*peak_rpm,
         Spin::Table { speed_rpm, .. } => speed_rpm.iter_mut().for_each(|speed| *speed = -*speed),
     }
@@ -325,7 +325,7 @@ fn evaluate_swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResu
     let amplitudes = |model| row.as_ref().map_or_else(Vec::new, |row| row.amplitudes(model));
     Ok(SweptResult {
         channels: compared_channels(plan),
-        window_s: plan.scenario(0).window_s,
+        window_s: plan.window_at(&plan.axis_values(0)),
         limits: plan.reliability.limits,
         status: row.as_ref().map_or("", MapRow::status),
         fail_time_s: row.as_ref().and_then(|row| row.number("fail_time_s")),

@@ -75,7 +75,7 @@ pub use library::{
 pub use map_row::MapRow;
 pub use method::{Integrator, rk4, rk4_mass_scaled};
 pub use model::Washer;
-pub use plan::Plan;
+pub use plan::{Plan, point_input};
 pub use sweep_engine::config::section::format_count;
 pub use sweep_engine::progress::ProgressMode;
 pub use sweep_engine::run::{RunEnd, RunOptions, run};

@@ -6,7 +6,9 @@ use std::path::Path;
 
 use sweep_files::{ParquetFile, key};
 use washer_live::{Setup, Sliders};
-use washer_model::{Attractor, Channel, ModeOverSpeed, ModelKind, StabilityKind, campbell};
+use washer_model::{
+    Attractor, Channel, ModeOverSpeed, ModelKind, PointInput, StabilityKind, campbell,
+};
 use washer_plot::{Live, Slider};
 use washer_row::{MethodKind, Metric, MetricColumn};
 
@@ -15,7 +17,8 @@ use crate::engine::{CHECKPOINTS, ModelEngine, rule};
 use crate::method::rk4_mass_scaled;
 use crate::model::Washer;
 use crate::plan::{
-    Axis, Plan, axis_between, compared_channels, corners_of_forces, prepare_point, timing,
+    Axis, Plan, axis_between, compared_channels, corners_of_forces, point_input, prepare_point,
+    timing,
 };
 use sweep_engine::method::ACCURACY;
 use sweep_engine::store::read::read_overview;
@@ -129,7 +132,7 @@ pub(crate) fn build_live_part(file: &Path, ranges: &[SliderRange]) -> Result<Liv
 /// rows of text: motion, speed and damping ratio. A machine without modes has none.
 pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
     let middle: Vec<f64> = plan.axes.iter().map(|axis| axis.values.interpolate(0.5)).collect();
-    let Washer { machine, spin, .. } = plan.scenario_at(&middle).model;
+    let PointInput { machine, spin, .. } = point_input(plan, &middle);
     let greatest_rpm = spin.max_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
     let count = (greatest_rpm / MODE_STEP_RPM).ceil() as u32;
     let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODE_STEP_RPM * f64::from(k)).collect();
@@ -244,9 +247,8 @@ fn requested_sliders(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, E
 fn is_possible(plan: &Plan, sliders: &[Axis]) -> bool {
     let plan = with_sliders(plan, sliders);
     plan.some_corners().iter().all(|corner| {
-        let scenario = plan.scenario_at(corner);
-        scenario.model.machine.violations().is_empty()
-            && scenario.model.spin.violations().is_empty()
+        let input = point_input(&plan, corner);
+        input.machine.violations().is_empty() && input.spin.violations().is_empty()
     })
 }
 

@@ -3,7 +3,7 @@
 use washer_model::{Point, Spin, stops_at_rest_n};
 use washer_row::Criterion;
 
-use crate::plan::{Plan, prepare_scenario};
+use crate::plan::{Plan, point_input, prepare_input};
 
 /// Minimum force of a stop at rest, as a share of the machine's weight, at which a note reports it.
 /// Basis: softened stops that are open have a small force. Doubling it may hide a stop that is
@@ -13,7 +13,7 @@ const RESTING_SHARE: f64 = 0.01;
 /// Returns a note on the equilibrium of the first point's machine: the reason why it has none, or
 /// the stop with the greatest load, if it rests on one.
 fn rest_note(plan: &Plan) -> Option<(&'static str, String)> {
-    match prepare_scenario(plan, &plan.scenario(0)) {
+    match prepare_input(plan, &point_input(plan, &plan.axis_values(0))) {
         Ok(point) => most_loaded_stop(&point).map(|stop| ("stops", stop)),
         Err(why) => Some(("rest", format!("{why} (first point)"))),
     }

@@ -3,7 +3,7 @@
 use lane_ode::Simd;
 use serde_json::{Map, Value};
 use sweep_engine::ModelParameter;
-use washer_model::{Channel, Machine, NoEquilibrium, Point, Spin, Timing, prepare};
+use washer_model::{Channel, Machine, NoEquilibrium, Point, PointInput, Spin, Timing, prepare};
 
 use crate::model::Washer;
 
@@ -15,12 +15,26 @@ pub type Plan = sweep_engine::Plan<Washer>;
 /// A parameter that varies over the points, with its values.
 pub(crate) type Axis = sweep_engine::Axis<Washer>;
 
-/// The machine, spin and window of a point, with the values of its axes.
-pub(crate) type Scenario = sweep_engine::Scenario<Washer>;
-
 /// Returns the end and the window of a plan's runs.
 pub(crate) fn timing(plan: &Plan) -> Timing {
     Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 }
+}
+
+/// Returns the input of the point at values of a plan's axes, on the grid or between its points.
+pub fn point_input(plan: &Plan, axis_values: &[f64]) -> PointInput {
+    let Washer { machine, spin, .. } = &plan.model;
+    let mut input =
+        PointInput { machine: machine.clone(), spin: spin.clone(), window_s: plan.window_s };
+    write_axis_values(plan, &mut input, axis_values);
+    input
+}
+
+/// Writes values of a plan's axes into the input of a point. Inputs of a plan differ in nothing
+/// else.
+pub(crate) fn write_axis_values(plan: &Plan, input: &mut PointInput, axis_values: &[f64]) {
+    for (axis, &value) in plan.axes.iter().zip(axis_values) {
+        input.write(&axis.parameter.handle, value);
+    }
 }
 
 /// Returns the channels that a plan compares.
@@ -47,18 +61,20 @@ pub(crate) fn prepare_point(
     prepare(Simd::Scalar, &[(machine, spin)], timing).remove(0)
 }
 
-/// Prepares the machine and the spin of a scenario for integration.
+/// Prepares the input of a point for integration.
 ///
 /// # Errors
 /// Returns [`NoEquilibrium`] if the machine has none.
-pub(crate) fn prepare_scenario(plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
-    let timing = Timing { window_s: scenario.window_s, ..timing(plan) };
-    prepare_point(scenario.model.machine.clone(), scenario.model.spin.clone(), &timing)
+pub(crate) fn prepare_input(plan: &Plan, input: &PointInput) -> Result<Point, NoEquilibrium> {
+    let timing = Timing { window_s: input.window_s, ..timing(plan) };
+    prepare_point(input.machine.clone(), input.spin.clone(), &timing)
 }
 
 /// Returns the reason why a point of a plan has no equilibrium, if it has none.
 pub(crate) fn failure_reason(plan: &Plan, point: u64) -> Option<String> {
-    prepare_scenario(plan, &plan.scenario(point)).err().map(|reason| reason.to_string())
+    prepare_input(plan, &point_input(plan, &plan.axis_values(point)))
+        .err()
+        .map(|reason| reason.to_string())
 }
 
 /// Returns the speed amplitudes (m/s) at which the linear model of a point takes the friction of
@@ -136,10 +152,10 @@ mod tests {
             [[0.1, 60.0], [0.1, 70.0], [0.1, 80.0], [0.2, 60.0], [0.2, 70.0], [0.2, 80.0]]
                 .map(Vec::from);
         assert_eq!(order, expected);
-        let scenario = plan.scenario(4);
-        assert_eq!(scenario.model.machine.unbalance.mass_kg, 0.2);
-        assert!(scenario.model.machine.dampers.iter().all(|d| d.damping_n_s_per_m == 70.0));
-        assert_eq!(scenario.model.spin, plan.model.spin);
+        let input = point_input(&plan, &plan.axis_values(4));
+        assert_eq!(input.machine.unbalance.mass_kg, 0.2);
+        assert!(input.machine.dampers.iter().all(|d| d.damping_n_s_per_m == 70.0));
+        assert_eq!(input.spin, plan.model.spin);
     }
 
     #[test]
@@ -157,7 +173,7 @@ mod tests {
         let plan = plan(&[]);
         assert_eq!(plan.points(), 1);
         assert_eq!((plan.corners(), plan.corner(0)), (1, Vec::new()));
-        assert_eq!(plan.scenario(0).model.machine, plan.model.machine);
+        assert_eq!(point_input(&plan, &[]).machine, plan.model.machine);
     }
 
     #[test]
@@ -174,6 +190,6 @@ mod tests {
         assert_eq!([below(0, 0.5), below(1, 1e7)], [512, 512]);
         assert!(points.iter().all(|p| (0.1..0.9).contains(&p[0]) && (1e6..1e8).contains(&p[1])));
         assert_eq!(plan.corners(), 4);
-        assert_eq!(plan.scenario(7).model.machine.unbalance.mass_kg, points[7][0]);
+        assert_eq!(point_input(&plan, &points[7]).machine.unbalance.mass_kg, points[7][0]);
     }
 }

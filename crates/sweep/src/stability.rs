@@ -18,7 +18,7 @@ use crate::dwell::{AttractorEngine, AttractorSearch};
 use crate::engine::{
     Engine, Evaluator, RunContext, find_responses, map_isolating_panics, simd_from_environment,
 };
-use crate::plan::{Plan, compared_channels, failure_reason, timing};
+use crate::plan::{Plan, compared_channels, failure_reason, point_input, timing};
 use sweep_engine::store::{CellType, DeclaredColumn, Layout, axis_columns};
 use sweep_engine::{Error, Job, RowSink, RowSource};
 use sweep_files::{FileKind, key};
@@ -228,11 +228,12 @@ impl HeldSpeedEvaluator<'_> {
 
     /// Prepares points for integration, each for all rows at its speeds.
     fn prepare(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
-        let scenarios = points.iter().map(|&point| self.held_plan.plan.scenario(point));
+        let plan = self.held_plan.plan;
+        let inputs = points.iter().map(|&point| point_input(plan, &plan.axis_values(point)));
         let machines: Vec<(Machine, Spin)> =
-            scenarios.map(|scenario| (scenario.model.machine, scenario.model.spin)).collect();
+            inputs.map(|input| (input.machine, input.spin)).collect();
         let prepare_group = |machines: &[(Machine, Spin)]| {
-            let points = prepare(self.simd, machines, &timing(self.held_plan.plan)).into_iter();
+            let points = prepare(self.simd, machines, &timing(plan)).into_iter();
             points.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
         };
         map_isolating_panics(&machines, prepare_group, || Err(Status::Panicked))

@@ -10,13 +10,12 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde_json::{Value, json};
 use washer_model::{
     COORDINATES, History, HistoryRequest, InitialDeviation, Method, ModelKind, NoEquilibrium,
-    Point, Spin, StepSelector, Timing, histories, histories_per_batch, instant_count,
+    Point, PointInput, Spin, StepSelector, Timing, histories, histories_per_batch, instant_count,
 };
 
 use crate::engine::{CappedRun, reference_method};
 use crate::method::{direct, rk4};
-use crate::model::Washer;
-use crate::plan::{Plan, Scenario, friction_speeds, prepare_point};
+use crate::plan::{Plan, friction_speeds, point_input, prepare_point};
 use lane_ode::Cancel;
 use sweep_engine::config::NamedValues;
 use sweep_engine::{Error, Table, threads};
@@ -99,7 +98,8 @@ pub(crate) fn check_spacing(every_s: Option<f64>, plan: &Plan) -> Result<Option<
         let mut count = 0.0;
         for point in 0..points {
             // The start is an instant, too.
-            count += 1.0 + plan.scenario(point).model.spin.turns_within([0.0, plan.end_s]);
+            count += 1.0
+                + point_input(plan, &plan.axis_values(point)).spin.turns_within([0.0, plan.end_s]);
             if count > MAX_INSTANTS {
                 let expected = format!(
                     "at most {MAX_INSTANTS} turns of the drum, over all points: an earlier end_s, \
@@ -176,7 +176,7 @@ pub(crate) fn trace_in_pool(
     // A single point has at most two integrations, one of each model.
     let thread_count = if parameters.is_some() { 2 } else { threads::cores() };
     let compute_table = || match parameters {
-        Some(parameters) => trace_scenario(plan, plan.scenario(0), parameters, settings, cancel),
+        Some(parameters) => trace_one_point(plan, 0, parameters, settings, cancel),
         None => Ok(trace_all_points(plan, settings, cancel)),
     };
     match threads::pool(thread_count) {
@@ -185,21 +185,21 @@ pub(crate) fn trace_in_pool(
     }
 }
 
-/// Integrates the models of a scenario from 0 to the end of the run; both at once in a thread pool.
+/// Integrates the models of a point from 0 to the end of the run; both at once in a thread pool.
 ///
 /// The parameters name the point in the metadata. Once `cancel` is requested, the integration ends
 /// early and the result is meaningless.
 ///
 /// # Errors
 /// Returns [`NoEquilibrium`] if the machine has none.
-pub(crate) fn trace_scenario(
+pub(crate) fn trace_one_point(
     plan: &Plan,
-    scenario: Scenario,
+    point: u64,
     parameters: NamedValues,
     settings: &TraceSettings,
     cancel: Cancel<'_>,
 ) -> Result<TraceTable, NoEquilibrium> {
-    let run = TraceRun::new(plan, scenario, settings)?;
+    let run = TraceRun::new(plan, point, settings)?;
     let runs = [&run];
     let models = integrate(&runs, settings.models, cancel);
     let mut table = Table::new(crate::identity::BUILD);
@@ -244,7 +244,7 @@ pub(crate) fn trace_all_points(
     let mut failures = Vec::new();
     let mut numbered_runs = Vec::new();
     for number in 0..plan.points() {
-        match TraceRun::new(plan, plan.scenario(number), settings) {
+        match TraceRun::new(plan, number, settings) {
             Ok(run) => numbered_runs.push((number, run)),
             Err(error) => failures.push(format!("point {number}: {error}")),
         }
@@ -284,12 +284,8 @@ struct TraceRun {
 }
 
 impl TraceRun {
-    fn new(
-        plan: &Plan,
-        scenario: Scenario,
-        settings: &TraceSettings,
-    ) -> Result<Self, NoEquilibrium> {
-        let Scenario { model: Washer { machine, spin, .. }, window_s } = scenario;
+    fn new(plan: &Plan, point: u64, settings: &TraceSettings) -> Result<Self, NoEquilibrium> {
+        let PointInput { machine, spin, window_s } = point_input(plan, &plan.axis_values(point));
         let checkpoints = settings.capped.map_or(0, |capped| capped.checkpoints);
         let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
         let point = prepare_point(machine, spin.clone(), &timing)?;

@@ -19,7 +19,7 @@ use lane_ode::{Failure, Simd};
 use washer_model::{Channel, ModelKind, instant_count};
 use washer_row::{Status, Trajectory};
 
-use crate::point::{Answer, PointError, PointScenario, check, motion};
+use crate::point::{Answer, PointError, check, motion, point_input};
 use crate::setup::Setup;
 
 #[derive(Default)]
@@ -160,10 +160,10 @@ pub extern "C" fn dwell(value_count: usize) -> usize {
 #[unsafe(no_mangle)]
 pub extern "C" fn speeds(every_s: f64) -> usize {
     answer_with_setup(|setup, input, output| {
-        if let Ok(scenario) = PointScenario::new(setup, input) {
+        if let Ok(point_input) = point_input(setup, input) {
             let instants = 0..instant_count(setup.rule.end_s, every_s);
             let times_s = instants.map(|k| k as f64 * every_s);
-            output.extend(scenario.spin.speeds_rpm(times_s));
+            output.extend(point_input.spin.speeds_rpm(times_s));
         }
     })
 }

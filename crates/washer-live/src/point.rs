@@ -3,8 +3,8 @@
 use lane_ode::{Cancel, Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, Disturbance, HeldSpeed, InitialDeviation, Machine, Method, ModelKind, Point, Response,
-    Spin, StartRule, Target, Timing, find_attractors, find_responses, history, prepare,
+    Channel, Disturbance, HeldSpeed, InitialDeviation, Method, ModelKind, Point, PointInput,
+    Response, StartRule, Timing, find_attractors, find_responses, history, prepare,
 };
 use washer_row::{
     Deviations, DwellPeaks, LevelRun, MethodKind, NextStep, Outcome, OutcomePurpose,
@@ -73,44 +73,26 @@ pub struct PointHistory {
     pub gaps_m: Vec<f64>,
 }
 
-/// The machine, spin and window of a point: those of the setup, changed by the point's values.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct PointScenario {
-    machine: Machine,
-    pub(crate) spin: Spin,
-    window_s: [f64; 2],
-}
-
-impl PointScenario {
-    /// Creates the scenario with these values of the setup's sliders. Sliders without a value have
-    /// that of the setup.
-    pub(crate) fn new(setup: &Setup, values: &[f64]) -> Result<Self, PointError> {
-        let Setup { machine, spin, rule, .. } = setup;
-        let machine = machine.clone();
-        let spin = spin.clone();
-        let mut scenario = Self { machine, spin, window_s: rule.window_s };
-        for (parameter, &value) in setup.sliders.parameters.iter().zip(values) {
-            if !parameter.range().contains(value) {
-                return Err(PointError::Impossible);
-            }
-            match parameter.target() {
-                Target::Window(end_index) => scenario.window_s[end_index] = value,
-                _ => parameter.set(&mut scenario.machine, &mut scenario.spin, value),
-            }
-        }
-        let [from_s, to_s] = scenario.window_s;
-        let is_window_valid = from_s < to_s && to_s <= setup.rule.end_s;
-        let violations = [scenario.machine.violations(), scenario.spin.violations()].concat();
-        if !is_window_valid || !violations.is_empty() {
+/// Returns the input of a point: that of the setup with these values of its sliders. Sliders
+/// without a value have that of the setup.
+pub(crate) fn point_input(setup: &Setup, values: &[f64]) -> Result<PointInput, PointError> {
+    let Setup { machine, spin, rule, .. } = setup;
+    let machine = machine.clone();
+    let spin = spin.clone();
+    let mut input = PointInput { machine, spin, window_s: rule.window_s };
+    for (parameter, &value) in setup.sliders.parameters.iter().zip(values) {
+        if !parameter.range().contains(value) {
             return Err(PointError::Impossible);
         }
-        Ok(scenario)
+        input.write(parameter, value);
     }
-
-    fn timing(&self, setup: &Setup) -> Timing {
-        let Setup { checkpoints, ref rule, .. } = *setup;
-        Timing { end_s: rule.end_s, window_s: self.window_s, checkpoints }
+    let [from_s, to_s] = input.window_s;
+    let is_window_valid = from_s < to_s && to_s <= rule.end_s;
+    let violations = [input.machine.violations(), input.spin.violations()].concat();
+    if !is_window_valid || !violations.is_empty() {
+        return Err(PointError::Impossible);
     }
+    Ok(input)
 }
 
 /// Returns the refinement levels of both models for these values of the sliders.
@@ -128,9 +110,9 @@ fn refinement_levels<'a>(setup: &'a Setup, values: &[f64]) -> &'a [RefinementLev
 ///
 /// Returns a [`PointError`] if the point is impossible or has no equilibrium.
 fn prepare_point(setup: &Setup, values: &[f64]) -> Result<Point, PointError> {
-    let scenario = PointScenario::new(setup, values)?;
-    let timing = scenario.timing(setup);
-    let mut points = prepare(Simd::Scalar, &[(scenario.machine, scenario.spin)], &timing);
+    let PointInput { machine, spin, window_s } = point_input(setup, values)?;
+    let timing = Timing { end_s: setup.rule.end_s, window_s, checkpoints: setup.checkpoints };
+    let mut points = prepare(Simd::Scalar, &[(machine, spin)], &timing);
     points.pop().and_then(Result::ok).ok_or(PointError::NoEquilibrium)
 }
 

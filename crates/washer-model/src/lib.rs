@@ -106,6 +106,7 @@ pub use modes::{
 };
 pub use nonlinear::coupling::Caps;
 pub use point::friction::FrictionSpeed;
+pub use point::input::PointInput;
 pub use point::ringing::{Swing, UnresolvedModes};
 pub use point::{NoEquilibrium, Point, Timing};
 pub use preparation::prepare;

@@ -2,6 +2,7 @@
 //! integrated.
 
 pub(crate) mod friction;
+pub(crate) mod input;
 pub(crate) mod ringing;
 
 use crate::channel::CHANNELS;

@@ -19,9 +19,9 @@ pub(crate) fn run(bytes: &[u8]) {
         Ok(plan) => {
             assert!(plan.points() >= 1);
             for corner in [0, plan.corners() - 1] {
-                let scenario = plan.scenario_at(&plan.corner(corner));
-                assert_eq!(scenario.model.machine.violations(), []);
-                assert_eq!(scenario.model.spin.violations(), []);
+                let input = sweep::point_input(&plan, &plan.corner(corner));
+                assert_eq!(input.machine.violations(), []);
+                assert_eq!(input.spin.violations(), []);
             }
         }
         Err(mistakes) => {

@@ -8,7 +8,7 @@ use super::{
     Diagnostic, Located, NamedArgument, NamedValues, Section, quote, sections::describe_keys,
 };
 use crate::Model;
-use crate::{ModelParameter, Plan, program};
+use crate::{ModelParameter, program};
 
 /// Number of names that are compared for a suggestion. Basis: a machine of thousands of springs has
 /// more, and the comparison of all would take long. Doubling it doubles that time.
@@ -37,7 +37,7 @@ pub fn set_constants<M: Model>(
     // A constant that equals the file's value does not change the plan.
     let changes_plan = |constant: &&SetConstant<M>| {
         let mut plan_after = plan_before.clone();
-        write(&constant.parameter, &mut plan_after, constant.value.value);
+        plan_after.write(&constant.parameter, constant.value.value);
         plan_after != plan_before
     };
     draft.plan.set = constants
@@ -57,7 +57,7 @@ pub fn fix_point<M: Model>(at_arguments: &[String], draft: &mut Draft<'_, M>) ->
             continue;
         }
         if axis.values.len() == 1 {
-            write(&axis.parameter, &mut draft.plan, axis.values.value(0));
+            draft.plan.write(&axis.parameter, axis.values.value(0));
         } else if let Some(location) = draft.report.location(&format!("axis[{k}]")) {
             let name = &axis.parameter.name;
             let title = format!("a point of the grid needs a value of `{name}`");
@@ -140,18 +140,11 @@ fn apply<M: Model>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
     let mut claimed = ClaimedNumbers::default();
     for constant in constants {
         if claimed.claim(&constant.name, constant.parameter.parts.clone(), draft.report) {
-            write(&constant.parameter, &mut draft.plan, constant.value.value);
+            draft.plan.write(&constant.parameter, constant.value.value);
             for part in &constant.parameter.parts {
                 draft.report.record_location(part.clone(), constant.value.location.clone());
             }
             draft.constants.push(constant.clone());
         }
-    }
-}
-
-fn write<M: Model>(parameter: &ModelParameter<M>, plan: &mut Plan<M>, value: f64) {
-    match parameter.window_edge {
-        Some(edge) => plan.window_s[edge] = value,
-        None => plan.model.write(&parameter.handle, value),
     }
 }

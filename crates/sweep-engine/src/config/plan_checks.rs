@@ -8,7 +8,7 @@ use sweep_parameter::decimal;
 use super::{Diagnostic, Draft, Location, Sources};
 use crate::method::Steps;
 use crate::plan::{MAX_STEPS, shortest_step_s};
-use crate::{Model, ModelParameter, Scenario};
+use crate::{Model, ModelParameter};
 
 /// Reports a window that is invalid at a corner of the grid.
 pub fn check_windows<M: Model>(draft: &Draft<'_, M>) {
@@ -17,18 +17,22 @@ pub fn check_windows<M: Model>(draft: &Draft<'_, M>) {
         if draft.report.is_full() || !reported.is_empty() {
             break;
         }
+<<<<<<< HEAD:crates/sweep-engine/src/config/plan_checks.rs
         let scenario = draft.plan.scenario_at(&draft.plan.corner(corner));
         check_window(draft, &scenario, &mut reported);
+=======
+        let window_s = draft.plan.window_at(&draft.plan.corner(corner));
+        window(draft, window_s, &mut reported);
+>>>>>>> f447bbe1 (Write points into their machines without the engine):crates/sweep-engine/src/config/whole.rs
     }
 }
 
 /// Reports a window that constants or axes have reversed or moved past the end.
 pub fn check_window<M: Model>(
     draft: &Draft<'_, M>,
-    scenario: &Scenario<M>,
+    [from_s, to_s]: [f64; 2],
     reported: &mut BTreeSet<Vec<String>>,
 ) {
-    let [from_s, to_s] = scenario.window_s;
     let end_s = draft.plan.end_s;
     if from_s < to_s && to_s <= end_s {
         return;

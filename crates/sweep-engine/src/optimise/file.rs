@@ -112,10 +112,8 @@ fn find_best(candidates: &[Candidate], front: &[usize], objectives: usize) -> Op
 /// Returns the model's own file with these values of the parameters, if the model has one.
 pub fn own_file<M: Model>(study: &Study<M>, values: &[f64]) -> Option<String> {
     let mut plan = study.grid.clone();
-    let mut scenario = crate::plan::Scenario { model: plan.model, window_s: plan.window_s };
     for (axis, &value) in parameters(study).iter().zip(values) {
-        scenario.write(&axis.parameter, value);
+        plan.write(&axis.parameter, value);
     }
-    plan.model = scenario.model;
     GridInput::<M>::from_plan(&study.name, &plan.to_json()).model_file
 }

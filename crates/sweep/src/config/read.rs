@@ -50,7 +50,7 @@ pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
 
 /// Checks a plan as a whole.
 pub(crate) fn check(draft: &Draft<'_, Washer>) {
-    validate::check_scenarios(draft);
+    validate::check_corners(draft);
     validate::check_stability(draft);
     plausible::note_unusual_numbers(draft);
 }

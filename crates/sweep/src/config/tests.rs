@@ -22,7 +22,7 @@ use washer_row::{Measures, Metric};
 
 use super::*;
 use crate::method::{METHODS, rk4, rk4_mass_scaled};
-use crate::plan::AxisValues;
+use crate::plan::{AxisValues, point_input};
 use sweep_engine::design::{Design, DesignRule};
 use sweep_engine::plan::NumberSources;
 
@@ -190,9 +190,7 @@ fn later_layers_override_earlier_ones() {
     // An axis of one damper overrides a constant for all of them.
     let axis = "[[axis]]\nparameter = \"damper_1_damping_n_s_per_m\"\nvalues = [50, 60]\n";
     let plan = load_text(format!("{grid}{axis}"), &[]).unwrap();
-    let dampings = plan
-        .scenario(1)
-        .model
+    let dampings = point_input(&plan, &plan.axis_values(1))
         .machine
         .dampers
         .iter()
@@ -459,9 +457,9 @@ fn assert_loads_or_explains(text: &[u8]) {
     match load_text(text, &[]) {
         Ok(plan) => {
             for corner in 0..plan.corners() {
-                let scenario = plan.scenario_at(&plan.corner(corner));
-                assert_eq!(scenario.model.machine.violations(), []);
-                assert_eq!(scenario.model.spin.violations(), []);
+                let input = point_input(&plan, &plan.corner(corner));
+                assert_eq!(input.machine.violations(), []);
+                assert_eq!(input.spin.violations(), []);
             }
             assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
         }
@@ -480,7 +478,10 @@ fn the_fuzzers_corpus_loads_or_is_explained() {
         match load(&input.write(folder.path()).unwrap(), &input.sets) {
             Ok(plan) => {
                 loaded += 1;
-                assert_eq!(plan.scenario(plan.points() - 1).model.machine.violations(), []);
+                assert_eq!(
+                    point_input(&plan, &plan.axis_values(plan.points() - 1)).machine.violations(),
+                    []
+                );
             }
             Err(mistakes) => assert!(mistakes.to_string().contains("nothing was done")),
         }
@@ -607,7 +608,7 @@ fn a_plan_with_a_list_depends_on_the_content_of_its_file() {
         [[0.25, 50.0], [0.5, 40.0]].map(Vec::from)
     );
     assert_eq!(
-        plan.scenario(1).model.spin,
+        point_input(&plan, &plan.axis_values(1)).spin,
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 40.0 }
     );
     let changed = load_list(&text.replace("40", "41"));

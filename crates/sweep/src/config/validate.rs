@@ -5,14 +5,14 @@ use std::collections::BTreeSet;
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{
-    ElementList, ModesError, Point, Spin, Target, Violation, decimal,
+    ElementList, ModesError, Point, PointInput, Spin, Target, Violation, decimal,
     highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, prepare,
 };
 use washer_row::{Criterion, MethodKind};
 
 use crate::method::{REFERENCE_SHARE, direct};
 use crate::model::Washer;
-use crate::plan::{Plan, Scenario, timing};
+use crate::plan::{Plan, point_input, timing, write_axis_values};
 use sweep_engine::config::plan_checks::{check_window, refuse, refuse_step};
 use sweep_engine::config::{Diagnostic, Draft};
 use sweep_engine::method::Steps;
@@ -43,26 +43,26 @@ const TURN_COUNT_COST: u64 = 50;
 /// The conditions on inertia and bearings are linear, so that a grid which satisfies them at its
 /// corners satisfies them everywhere. If a spring's length vanishes only between corners, a row of
 /// the run fails.
-pub(crate) fn check_scenarios(draft: &Draft<'_, Washer>) {
+pub(crate) fn check_corners(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
-    let mut scenario = plan.scenario_at(&plan.corner(0));
+    let mut input = point_input(plan, &plan.corner(0));
     let varying = VaryingParts::new(plan);
-    if varying.refuse_too_many_points(draft, &scenario) {
+    if varying.refuse_too_many_points(draft, &input) {
         return;
     }
     let mut check = CornerCheck { draft, reported: BTreeSet::new(), is_spin_valid: true };
-    check.check_corner(&scenario, VaryingParts::ALL);
+    check.check_corner(&input, VaryingParts::ALL);
     for corner in 1..plan.corners() {
         if draft.report.is_full() {
             // No further mistake would be shown.
             break;
         }
-        plan.write_axis_values(&mut scenario, &plan.corner(corner));
-        check.check_corner(&scenario, varying);
+        write_axis_values(plan, &mut input, &plan.corner(corner));
+        check.check_corner(&input, varying);
     }
 }
 
-/// The parts of a scenario that differ from corner to corner.
+/// The parts of a point's input that differ from corner to corner.
 #[derive(Clone, Copy)]
 struct VaryingParts {
     machine: bool,
@@ -87,8 +87,8 @@ impl VaryingParts {
 
     /// Refuses a list of points whose check would take minutes. Returns whether the list was
     /// refused.
-    fn refuse_too_many_points(self, draft: &Draft<'_, Washer>, scenario: &Scenario) -> bool {
-        let Washer { machine, spin, .. } = &scenario.model;
+    fn refuse_too_many_points(self, draft: &Draft<'_, Washer>, input: &PointInput) -> bool {
+        let PointInput { machine, spin, .. } = input;
         let elements = ElementList::all().map(|list| (list.count)(machine) as u64).sum::<u64>();
         let rows = match spin {
             Spin::Table { time_s, .. } => time_s.len() as u64,
@@ -129,20 +129,20 @@ struct CornerCheck<'a> {
 impl CornerCheck<'_> {
     /// Checks the parts that differ from those of the corners before. Single numbers were checked
     /// as they were read; this function checks their combinations.
-    fn check_corner(&mut self, scenario: &Scenario, changed: VaryingParts) {
+    fn check_corner(&mut self, input: &PointInput, changed: VaryingParts) {
         if changed.machine {
-            self.report_violations(scenario.model.machine.joint_violations());
+            self.report_violations(input.machine.joint_violations());
         }
         if changed.spin {
-            let violations = scenario.model.spin.joint_violations();
+            let violations = input.spin.joint_violations();
             self.is_spin_valid = violations.is_empty();
             self.report_violations(violations);
         }
         if changed.window {
-            check_window(self.draft, scenario, &mut self.reported);
+            check_window(self.draft, input.window_s, &mut self.reported);
         }
         if (changed.spin || changed.window) && self.is_spin_valid {
-            check_turns(self.draft, scenario, &mut self.reported);
+            check_turns(self.draft, input, &mut self.reported);
         }
     }
 
@@ -159,14 +159,14 @@ impl CornerCheck<'_> {
 /// Refuses a window with more turns of the drum than the criterion that compares turns permits.
 fn check_turns(
     draft: &Draft<'_, Washer>,
-    scenario: &Scenario,
+    input: &PointInput,
     reported: &mut BTreeSet<Vec<String>>,
 ) {
     let Some(criterion) = draft.report.location("reliability.criterion") else { return };
     if draft.plan.model.measures.criterion != Criterion::Envelope {
         return;
     }
-    let turns = scenario.model.spin.turns_within(scenario.window_s);
+    let turns = input.spin.turns_within(input.window_s);
     if turns <= MAX_COMPARED_TURNS || !reported.insert(vec!["reliability.criterion".to_owned()]) {
         return;
     }
@@ -259,7 +259,7 @@ fn highest_of_corners_rad_per_s(
     let timing = timing(plan);
     let mut highest = 0.0_f64;
     for values in plan.some_corners() {
-        let Washer { mut machine, spin, .. } = plan.scenario_at(&values).model;
+        let PointInput { mut machine, spin, .. } = point_input(plan, &values);
         // The steepest slope of friction bounds the frequency. It holds for a linearisation about
         // rest, without free strokes.
         for damper in &mut machine.dampers {

@@ -19,11 +19,11 @@ use std::time::Duration;
 
 use lane_ode::Cancel;
 use lane_ode::MAX_LANES;
-use washer_model::{Method, Point};
+use washer_model::{Method, Point, PointInput};
 use washer_row::{LevelRun, NextStep, Outcome, RefinementRule, RowRefinement, Status};
 
 use super::{ModelEngine, RunContext, growth};
-use crate::plan::Scenario;
+use crate::plan::point_input;
 use sweep_engine::RowSource;
 use sweep_files::panics::lock;
 
@@ -198,9 +198,9 @@ impl Pool<'_> {
     /// Prepares the next points of the source; none at its end.
     fn prepare_rows(&self) -> Vec<RowTask> {
         let rows = std::iter::from_fn(self.source).take(PREPARE_BATCH);
-        let scenario = |(id, values): (u64, Vec<f64>)| (id, self.engine.plan.scenario_at(&values));
-        let (ids, scenarios): (Vec<u64>, Vec<Scenario>) = rows.map(scenario).unzip();
-        let points = self.engine.prepare(&scenarios);
+        let input = |(id, values): (u64, Vec<f64>)| (id, point_input(self.engine.plan, &values));
+        let (ids, inputs): (Vec<u64>, Vec<PointInput>) = rows.map(input).unzip();
+        let points = self.engine.prepare(&inputs);
         let row = |(id, point): (u64, Result<Point, Status>)| {
             let point = point.map(Arc::new);
             RowTask {

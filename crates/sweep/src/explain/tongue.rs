@@ -6,11 +6,11 @@ use rayon::iter::ParallelIterator as _;
 use rayon::slice::ParallelSlice as _;
 use serde::Serialize;
 use washer_model::{
-    Attractor, GeometryLimit, HeldSpeed, Point, Response, ResponseCurves, StabilityKind, StartRule,
-    find_attractors_from_responses, modes,
+    Attractor, GeometryLimit, HeldSpeed, Point, PointInput, Response, ResponseCurves,
+    StabilityKind, StartRule, find_attractors_from_responses, modes,
 };
 
-use crate::plan::{Plan, Scenario, prepare_scenario};
+use crate::plan::{Plan, prepare_input};
 use crate::speeds::Speeds;
 use sweep_engine::Interrupt;
 
@@ -85,7 +85,7 @@ const MAX_RESONANCE_DISTANCE: f64 = 0.05;
 pub(crate) struct ResponseFinder<'a> {
     pub(crate) simd: Simd,
     pub(crate) plan: &'a Plan,
-    pub(crate) scenario: &'a Scenario,
+    pub(crate) input: &'a PointInput,
     pub(crate) point: &'a Point,
     /// Whether the machine is the mirror image of one whose drum turns backwards.
     pub(crate) is_backward: bool,
@@ -489,7 +489,7 @@ impl Tongue {
     /// Searches for the least factor of the damping that closes the tongue. Increasing factors are
     /// tried together until one closes it, and then factors in the bracket that it ends.
     pub(crate) fn find_closing(&self, finder: &ResponseFinder<'_>) -> Closing {
-        let dampers = &finder.scenario.model.machine.dampers;
+        let dampers = &finder.input.machine.dampers;
         if dampers.iter().all(|damper| damper.damping_n_s_per_m == 0.0) {
             return Closing::NoDampers;
         }
@@ -531,11 +531,11 @@ impl Tongue {
     /// if a response is missing. The machines share the lanes.
     fn remaining_growths(&self, finder: &ResponseFinder<'_>, factors: &[f64]) -> Vec<f64> {
         let prepare_with_factor = |factor: f64| {
-            let mut scenario = finder.scenario.clone();
-            for damper in &mut scenario.model.machine.dampers {
+            let mut input = finder.input.clone();
+            for damper in &mut input.machine.dampers {
                 damper.damping_n_s_per_m *= factor;
             }
-            prepare_scenario(finder.plan, &scenario).ok()
+            prepare_input(finder.plan, &input).ok()
         };
         let points: Vec<Option<Point>> =
             factors.iter().map(|&factor| prepare_with_factor(factor)).collect();

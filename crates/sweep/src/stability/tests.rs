@@ -7,14 +7,14 @@ use washer_model::{
     find_responses,
 };
 
-use crate::plan::{prepare_point, timing};
+use crate::plan::{point_input, prepare_point, timing};
 
 /// Returns the last point of a grid in `tests/held`.
 fn point(name: &str) -> Point {
     let path = format!("{}/tests/held/g_{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let plan = crate::config::load(path.as_ref(), &[]).unwrap();
-    let model = plan.scenario(plan.points() - 1).model;
-    prepare_point(model.machine, model.spin, &timing(&plan)).unwrap()
+    let input = point_input(&plan, &plan.axis_values(plan.points() - 1));
+    prepare_point(input.machine, input.spin, &timing(&plan)).unwrap()
 }
 
 fn find_responses_at(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {

@@ -10,7 +10,7 @@ use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
 use washer_model::InitialDeviation;
 use washer_row::MethodKind;
 
-use super::{Models, TraceExtras, TraceSettings, trace_scenario};
+use super::{Models, TraceExtras, TraceSettings, trace_one_point};
 use crate::engine::ModelEngine;
 
 /// Maximum number of points with a file each. Basis: a file of some 300 kB, so 3 GB in all;
@@ -59,7 +59,7 @@ pub(crate) fn write_point_traces(
                 extras: TraceExtras::default(),
                 capped: kind.and_then(|kind| engine.capped_run(kind)),
             };
-            let trace = trace_scenario(plan, plan.scenario(point), parameters, &settings, cancel);
+            let trace = trace_one_point(plan, point, parameters, &settings, cancel);
             if cancel.is_requested() {
                 return Ok(());
             }

@@ -48,8 +48,7 @@ fn a_trace_with_friction_is_as_accurate_as_its_row() {
             extras,
             capped: None,
         };
-        let trace =
-            trace_scenario(&plan, plan.scenario(0), Vec::new(), &settings, Cancel::Never).unwrap();
+        let trace = trace_one_point(&plan, 0, Vec::new(), &settings, Cancel::Never).unwrap();
         let rows = trace.table.finish().unwrap().0;
         let column = rows.column_by_name("foot_1_load_nonlinear_n").unwrap();
         (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), trace.method)
@@ -88,8 +87,7 @@ fn a_trace_by_a_rows_method_is_the_trajectory_of_the_row() {
             extras: TraceExtras::default(),
             capped: Some(capped),
         };
-        let scenario = plan.scenario(row.point);
-        let trace = trace_scenario(&plan, scenario, Vec::new(), &settings, Cancel::Never);
+        let trace = trace_one_point(&plan, row.point, Vec::new(), &settings, Cancel::Never);
         let (rows, _) = trace.unwrap().table.finish().unwrap();
         // The row's level is that of the nonlinear model; the linear one may have another. Peaks
         // between long steps have an error of 1e-5.
@@ -132,9 +130,7 @@ fn points_integrated_together_have_the_bits_that_each_has_alone() {
         let (all, _) = all.table.finish().unwrap();
         let mut from = 0;
         for point in 0..plan.points() {
-            let one =
-                trace_scenario(&plan, plan.scenario(point), Vec::new(), &settings, Cancel::Never)
-                    .unwrap();
+            let one = trace_one_point(&plan, point, Vec::new(), &settings, Cancel::Never).unwrap();
             let (one, _) = one.table.finish().unwrap();
             for (k, field) in one.schema().fields().iter().enumerate() {
                 let together = all.column_by_name(field.name()).unwrap();

@@ -65,7 +65,7 @@ fn overriding_axes(plan: &Value) -> Vec<&str> {
 /// Returns a plan with another value of a parameter.
 fn with_number<M: Model>(plan: &Plan<M>, name: &str, value: f64) -> Option<Plan<M>> {
     let parameter = plan.model.find(name).ok()?;
-    let mut scenario = plan.scenario_at(&[]);
-    scenario.write(&parameter, value);
-    Some(Plan { model: scenario.model, window_s: scenario.window_s, ..plan.clone() })
+    let mut plan = plan.clone();
+    plan.write(&parameter, value);
+    Some(plan)
 }
