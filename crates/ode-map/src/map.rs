@@ -5,17 +5,15 @@ use std::marker::PhantomData;
 
 use lane_ode::{Cancel, MAX_LANES, Simd};
 use serde_json::Value;
-use sweep_engine::columns::{
-    Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
-};
+use sweep_engine::columns::{Compared, ComparisonColumns, ResultColumn, declared, pass_rows};
 use sweep_engine::config::Keys;
 use sweep_engine::method::{ACCURACY, DOPRI5, IntegrationMethod, RK4, StepRule, Steps};
-use sweep_engine::store::{Layout, PointRows, axis_columns};
+use sweep_engine::store::{Layout, axis_columns};
 use sweep_engine::{
     About, Build, Engine, Error, Evaluator, GridInput, GridTable, Model, ModelParameter, Plan,
     RowSink, RowSource, RunContext,
 };
-use sweep_parameter::{Range, Verdict};
+use sweep_parameter::{Range, RatioLimits, Verdict};
 
 use crate::equations::{OscillatorModel, PreparedPoint};
 use crate::run::{Integration, ModelRun, OscillatorMethod};
@@ -145,15 +143,33 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     }
 }
 
-/// The runs of both models at a point, and their error.
+/// The runs of both models at a point, their error, and their comparison.
 #[derive(Clone)]
 struct PointRuns<const C: usize> {
     runs: [ModelRun<C>; 2],
     error: Option<f64>,
     converged: Option<bool>,
+    /// The index of the method's name.
+    method: usize,
+    /// The amplitudes of each model in the plan's channels; empty for a model that failed.
+    amplitudes: [Vec<f64>; 2],
+    verdict: Verdict,
 }
 
 impl<const C: usize> PointRuns<C> {
+    /// Creates the runs of a point without equilibrium.
+    fn without_equilibrium(method: usize) -> Self {
+        let failed = ModelRun { failure: Some((NO_EQUILIBRIUM, None)), ..ModelRun::NONE };
+        Self {
+            runs: [failed; 2],
+            error: None,
+            converged: None,
+            method,
+            amplitudes: Default::default(),
+            verdict: Verdict::default(),
+        }
+    }
+
     fn status(&self) -> usize {
         match self.runs.map(|run| run.failure.map_or(0, |(status, _)| status)) {
             [0, 0] => 0,
@@ -161,26 +177,53 @@ impl<const C: usize> PointRuns<C> {
             [nonlinear, _] => nonlinear,
         }
     }
+
+    /// Compares the amplitudes of both runs in the coordinates of the plan's channels.
+    fn compare(&mut self, channels: &[usize], limits: RatioLimits) {
+        self.amplitudes = self.runs.map(|run| {
+            let sound_channels = channels.iter().filter(|_| run.failure.is_none());
+            sound_channels.map(|k| run.peaks[*k]).collect()
+        });
+        let ratio = |k: usize| {
+            let linear = self.amplitudes[1].get(k).filter(|linear| **linear != 0.0)?;
+            Some(self.amplitudes[0].get(k)? / linear)
+        };
+        self.verdict = Verdict::new((0..channels.len()).map(ratio).collect(), limits);
+    }
+
+    /// Returns the comparison as columns read it.
+    fn compared(&self) -> Compared<'_> {
+        Compared {
+            amplitudes: self.amplitudes.each_ref().map(Vec::as_slice),
+            verdict: &self.verdict,
+            converged: self.converged,
+            // Chaos is not examined.
+            sensitive: None,
+            method: self.method,
+            error: self.error,
+            status: self.status(),
+            fail_time_s: self.runs.iter().find_map(|run| run.failure).and_then(|(_, at)| at),
+            steps: self.runs.map(|run| run.steps),
+            rejected: self.runs.map(|run| run.rejected),
+        }
+    }
 }
 
 fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     plan: &Plan<Map<O, C, D, P>>,
-) -> Vec<ResultColumn<Compared>> {
-    let reliability = &plan.reliability;
+) -> Vec<ResultColumn<PointRuns<C>>> {
+    let comparison = ComparisonColumns {
+        channels: &plan.reliability.channels,
+        limits: plan.reliability.limits,
+        compared: PointRuns::compared,
+    };
     let amplitude = "largest deviation from equilibrium in the window";
     let ratio = "nonlinear over linear amplitude; null where the linear one is zero or a model \
                  failed";
-    let limits = reliability.limits;
-    let methods = METHODS.to_vec();
-    let mut result_columns = amplitude_columns(&reliability.channels, limits, amplitude, ratio);
+    let mut result_columns = comparison.amplitudes(amplitude, ratio);
     let method_description = "the method that the row's numbers come from";
-    result_columns.extend(verdict_columns(
-        &reliability.channels,
-        limits,
-        methods,
-        method_description,
-    ));
-    result_columns.extend(run_columns(STATUSES.to_vec()));
+    result_columns.extend(comparison.verdict(METHODS.to_vec(), method_description));
+    result_columns.extend(comparison.runs(STATUSES.to_vec()));
     result_columns
 }
 
@@ -193,35 +236,13 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     RowEvaluator<'_, O, C, D, P>
 {
     /// Computes rows at points with these values of the axes, in lanes.
-    fn compare_points(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<Compared> {
+    fn compare_points(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<PointRuns<C>> {
+        let mut rows = self.evaluate_points(axis_values, cancel);
         let channels = self.channels();
-        let limits = self.plan.reliability.limits;
-        let method = self.common_method().1;
-        let to_compared = |row: PointRuns<C>| {
-            let amplitudes = row.runs.map(|run| {
-                let sound_channels = channels.iter().filter(|_| run.failure.is_none());
-                sound_channels.map(|k| run.peaks[*k]).collect::<Vec<_>>()
-            });
-            let ratio = |k: usize| {
-                let linear = amplitudes[1].get(k).filter(|linear| **linear != 0.0)?;
-                Some(amplitudes[0].get(k)? / linear)
-            };
-            let ratios = (0..channels.len()).map(ratio).collect();
-            Compared {
-                verdict: Verdict::new(ratios, limits),
-                converged: row.converged,
-                // Chaos is not examined.
-                sensitive: None,
-                method,
-                error: row.error,
-                status: row.status(),
-                fail_time_s: row.runs.iter().find_map(|run| run.failure).and_then(|(_, at)| at),
-                steps: row.runs.map(|run| run.steps),
-                rejected: row.runs.map(|run| run.rejected),
-                amplitudes,
-            }
-        };
-        self.evaluate_points(axis_values, cancel).into_iter().map(to_compared).collect()
+        for row in &mut rows {
+            row.compare(&channels, self.plan.reliability.limits);
+        }
+        rows
     }
 
     /// Returns the indices of the coordinates that the plan compares.
@@ -242,6 +263,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         }
     }
 
+    /// Integrates both models at points with these values of the axes.
     fn evaluate_points(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<PointRuns<C>> {
         let prepare = |values: &Vec<f64>| {
             let mut parameters = self.plan.model.values;
@@ -258,14 +280,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         let points: Vec<Option<PreparedPoint<C, P>>> = axis_values.iter().map(prepare).collect();
         let positions: Vec<usize> = (0..points.len()).filter(|k| points[*k].is_some()).collect();
         let prepared: Vec<&PreparedPoint<C, P>> = points.iter().flatten().collect();
-        let run_without_equilibrium =
-            ModelRun { failure: Some((NO_EQUILIBRIUM, None)), ..ModelRun::NONE };
-        let mut rows =
-            vec![
-                PointRuns { runs: [run_without_equilibrium; 2], error: None, converged: None };
-                points.len()
-            ];
-        if let (Some(method), _) = self.common_method() {
+        let (common_method, method_index) = self.common_method();
+        let mut rows = vec![PointRuns::without_equilibrium(method_index); points.len()];
+        if let Some(method) = common_method {
             for (position, runs) in
                 positions.into_iter().zip(self.run_both_models(method, &prepared, cancel))
             {
@@ -367,8 +384,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eva
                 if context.must_stop() {
                     break;
                 }
-                for (&point, compared) in points.iter().zip(&rows) {
-                    sink(PointRows { point, rows: vec![row(&columns, compared)] });
+                for (&point, row) in points.iter().zip(&rows) {
+                    pass_rows(&columns, point, [row], sink);
                 }
             }
         });

@@ -1,34 +1,21 @@
 //! The columns of results, and the rows of outcomes.
 
-use std::mem::take;
+use std::iter::once;
 
-use sweep_engine::columns::{
-    Compared, ResultColumn, amplitude_columns, declared, run_columns, verdict_columns,
-};
-use sweep_engine::store::{CellType, DeclaredColumn, PointRows};
+use sweep_engine::RowSink;
+use sweep_engine::columns::{Compared, ComparisonColumns, ResultColumn, declared, pass_rows};
+use sweep_engine::store::{CellType, DeclaredColumn};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Attractor, Channel, Disturbance, GeometryLimit, ModeMotion, StabilityKind};
 use washer_row::{
     DwellPeaks, GrowingMode, Growth, Measures, MethodKind, Metric, MetricProperties, Outcome,
-    ROW_STATUSES, Trajectory, row_status,
+    ROW_STATUSES, Trajectory,
 };
 
 use crate::model::described;
 use crate::plan::{Plan, compared_channels, has_friction};
 
-/// The data from which the cells of a row are computed.
-struct ResultRow {
-    outcome: Outcome,
-    compared: Compared,
-}
-
-impl AsRef<Compared> for ResultRow {
-    fn as_ref(&self) -> &Compared {
-        &self.compared
-    }
-}
-
-type WasherColumn = ResultColumn<ResultRow>;
+type WasherColumn = ResultColumn<Outcome>;
 
 /// The columns of a plan's rows.
 pub(crate) struct Columns {
@@ -51,32 +38,30 @@ impl Columns {
         has_friction: bool,
     ) -> Self {
         let criterion = measures.criterion;
-        let mut columns = amplitude_columns(
-            &descriptions(channels),
-            limits,
-            criterion.amplitude_description(),
-            criterion.ratio_description(),
-        );
-        columns.extend(washer_verdict_columns(channels, limits));
+        let channel_descriptions = descriptions(channels);
+        let comparison = comparison_columns(&channel_descriptions, limits);
+        let mut columns =
+            comparison.amplitudes(criterion.amplitude_description(), criterion.ratio_description());
+        columns.extend(verdict_columns(&comparison));
         columns.extend(gap_columns());
         columns.extend(has_friction.then(friction_column));
         columns.extend(metric_columns(channels, measures));
-        columns.extend(run_columns(ROW_STATUSES.to_vec()));
+        columns.extend(comparison.runs(ROW_STATUSES.to_vec()));
         Self { columns }
     }
 
     /// Returns the columns of periodic responses at held speeds.
     pub(crate) fn for_responses(plan: &Plan) -> Self {
-        let channels = &compared_channels(plan);
-        let limits = plan.reliability.limits;
+        let channel_descriptions = descriptions(&compared_channels(plan));
+        let comparison = comparison_columns(&channel_descriptions, plan.reliability.limits);
         let mut columns = growth_columns("");
         let amplitude = "largest deviation from equilibrium over a turn";
         let ratio = "nonlinear over linear amplitude; null where that is zero";
-        columns.extend(amplitude_columns(&descriptions(channels), limits, amplitude, ratio));
+        columns.extend(comparison.amplitudes(amplitude, ratio));
         // A response has only the verdict's first two columns, those of the greatest ratio.
-        columns.extend(washer_verdict_columns(channels, limits).into_iter().take(2));
+        columns.extend(verdict_columns(&comparison).into_iter().take(2));
         let text = "ok, or why there is no response";
-        let status = |row: &ResultRow| Some(row.compared.status);
+        let status = |row: &Outcome| Some(row.status);
         columns.push(ResultColumn::name("status", text, ROW_STATUSES.to_vec(), status));
         Self { columns }
     }
@@ -86,33 +71,36 @@ impl Columns {
         declared(self.columns)
     }
 
-    /// Returns the rows of a point's outcome.
-    pub(crate) fn done(&self, outcome: Outcome) -> PointRows {
-        let point = outcome.point;
-        let rows = outcome.into_rows().map(|outcome| {
-            let row = Self::result(outcome);
-            self.columns.iter().map(|column| (column.cell)(&row)).collect()
-        });
-        PointRows { point, rows: rows.collect() }
+    /// Passes the rows of a point's outcome to a sink: its own, then those of coexisting outcomes.
+    pub(crate) fn pass(&self, outcome: &Outcome, sink: &RowSink<'_>) {
+        let outcomes = once(outcome).chain(&outcome.coexisting);
+        pass_rows(&self.columns, outcome.point, outcomes, sink);
     }
+}
 
-    fn result(mut outcome: Outcome) -> ResultRow {
-        let (status, fail_time_s) = row_status(&outcome);
-        let models = [&mut outcome.nonlinear, &mut outcome.linear];
-        let compared = Compared {
-            steps: models.each_ref().map(|model| model.steps),
-            rejected: models.each_ref().map(|model| model.rejected),
-            amplitudes: models.map(|model| take(&mut model.amplitudes)),
-            verdict: take(&mut outcome.verdict),
-            converged: outcome.converged,
-            sensitive: outcome.sensitive,
-            method: outcome.method as usize,
-            error: outcome.error,
-            status,
-            fail_time_s,
-        };
-        ResultRow { outcome, compared }
+/// Returns the comparison of both models in an outcome.
+fn compared(outcome: &Outcome) -> Compared<'_> {
+    let models = [&outcome.nonlinear, &outcome.linear];
+    Compared {
+        amplitudes: models.map(|model| model.amplitudes.as_slice()),
+        verdict: &outcome.verdict,
+        converged: outcome.converged,
+        sensitive: outcome.sensitive,
+        method: outcome.method as usize,
+        error: outcome.error,
+        status: outcome.status,
+        fail_time_s: outcome.fail_time_s,
+        steps: models.map(|model| model.steps),
+        rejected: models.map(|model| model.rejected),
     }
+}
+
+/// Returns the columns that compare both models.
+fn comparison_columns(
+    channels: &[sweep_parameter::Channel],
+    limits: RatioLimits,
+) -> ComparisonColumns<'_, Outcome> {
+    ComparisonColumns { channels, limits, compared }
 }
 
 /// The two models, each with its name and its trajectory in an outcome.
@@ -125,15 +113,10 @@ fn descriptions(channels: &[Channel]) -> Vec<sweep_parameter::Channel> {
 }
 
 /// Returns the columns of the verdict, with the levels of this model's methods.
-fn washer_verdict_columns(channels: &[Channel], limits: RatioLimits) -> Vec<WasherColumn> {
+fn verdict_columns(comparison: &ComparisonColumns<'_, Outcome>) -> Vec<WasherColumn> {
     let text = "the method of the row's nonlinear numbers; with the fast method its level: \
                 capped_0 to capped_5, rk4, additive or dop853";
-    verdict_columns(
-        &descriptions(channels),
-        limits,
-        MethodKind::ALL.map(MethodKind::name).to_vec(),
-        text,
-    )
+    comparison.verdict(MethodKind::ALL.map(MethodKind::name).to_vec(), text)
 }
 
 /// Returns the columns of the metrics that the grid file requests.
@@ -145,7 +128,7 @@ fn metric_columns(channels: &[Channel], measures: &Measures) -> Vec<WasherColumn
             Metric::Growth => columns.extend(growth_columns("growth_")),
             Metric::Dwell => columns.extend(dwell_columns(channels)),
             Metric::StaticSag => {
-                let sag_m = |row: &ResultRow| row.outcome.static_sag_m;
+                let sag_m = |row: &Outcome| row.static_sag_m;
                 let text = metric.properties().description;
                 columns.push(metric_column(metric, metric.column(""), text, sag_m));
             }
@@ -154,9 +137,8 @@ fn metric_columns(channels: &[Channel], measures: &Measures) -> Vec<WasherColumn
                     for (model, trajectory) in MODELS {
                         let text = number.description();
                         let text = format!("{text}, {model} model; null if it failed");
-                        let value = move |row: &ResultRow| {
-                            trajectory(&row.outcome).metrics.get(position).copied()
-                        };
+                        let value =
+                            move |row: &Outcome| trajectory(row).metrics.get(position).copied();
                         columns.push(metric_column(metric, number.column(model), text, value));
                     }
                     position += 1;
@@ -172,7 +154,7 @@ fn metric_column(
     metric: Metric,
     name: String,
     text: impl Into<String>,
-    value: impl Fn(&ResultRow) -> Option<f64> + Send + Sync + 'static,
+    value: impl Fn(&Outcome) -> Option<f64> + Send + Sync + 'static,
 ) -> WasherColumn {
     with_limit(metric, ResultColumn::measured(name, metric.properties().unit, text, value))
 }
@@ -189,21 +171,21 @@ fn with_limit(metric: Metric, column: WasherColumn) -> WasherColumn {
 
 /// Returns the columns of the largest deviations of attractors at the plan's held speeds.
 fn dwell_columns(channels: &[Channel]) -> Vec<WasherColumn> {
-    let peaks = |row: &ResultRow| -> Option<DwellPeaks> { row.outcome.dwell_peaks };
+    let peaks = |row: &Outcome| -> Option<DwellPeaks> { row.dwell_peaks };
     let mut columns = Vec::new();
     for &channel in channels {
         let text = format!("{}: {}", channel.description(), Metric::Dwell.properties().description);
         let name = format!("dwell_{}", channel.name());
-        let deviation = move |row: &ResultRow| Some(peaks(row)?.deviations[channel.index()]);
+        let deviation = move |row: &Outcome| Some(peaks(row)?.deviations[channel.index()]);
         let column = ResultColumn::measured(name, channel.unit(), text, deviation);
         columns.push(with_limit(Metric::Dwell, column));
     }
     let text = "the speed at which yaw or pitch of the tub, whichever is larger, goes farthest";
-    let speed = move |row: &ResultRow| Some(peaks(row)?.speed_rpm);
+    let speed = move |row: &Outcome| Some(peaks(row)?.speed_rpm);
     columns.push(ResultColumn::measured("dwell_speed_rpm", "rpm", text, speed));
     let text = "what that motion is, as in a file of `sweep dwell`, or that it left the model's \
                 range or did not settle";
-    let kind = move |row: &ResultRow| Some(peaks(row)?.kind);
+    let kind = move |row: &Outcome| Some(peaks(row)?.kind);
     columns.push(ResultColumn::name("dwell_kind", text, Attractor::KIND_NAMES.to_vec(), kind));
     columns
 }
@@ -215,8 +197,8 @@ fn friction_column() -> WasherColumn {
                 a damper is off from those of the motions in the window, the greatest of all \
                 dampers: of both models where it is given, of the linear model where it is \
                 \"auto\", 1 where that found it; null without friction or if the models failed";
-    let off = |row: &ResultRow| {
-        let models = [&row.outcome.nonlinear, &row.outcome.linear];
+    let off = |row: &Outcome| {
+        let models = [&row.nonlinear, &row.linear];
         models.iter().filter_map(|model| model.friction_speed_off).reduce(f64::max)
     };
     let column = ResultColumn::measured("friction_speed_off", "1", text, off);
@@ -228,8 +210,8 @@ fn friction_column() -> WasherColumn {
 /// motion. Doubling it reports fewer rows.
 const MAX_FRICTION_SPEED_FACTOR: f64 = 2.0;
 
-fn growth(row: &ResultRow) -> Option<&Growth> {
-    row.outcome.growth.as_ref()
+fn growth(row: &Outcome) -> Option<&Growth> {
+    row.growth.as_ref()
 }
 
 /// Returns the columns of the fastest growing disturbance at a held speed. Maps give them a prefix
@@ -272,21 +254,21 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
         ("multiplier_im", "1", "its imaginary part, not negative", |fastest| fastest.multiplier[1]),
     ]);
     for (name, unit, text, number) in numbers {
-        let value = move |row: &ResultRow| Some(number(&growth(row)?.fastest));
+        let value = move |row: &Outcome| Some(number(&growth(row)?.fastest));
         let name =
             if name.starts_with(prefix) { name.to_owned() } else { format!("{prefix}{name}") };
         let column = ResultColumn::measured(name, unit, text, value);
         let is_growth = unit == Metric::Growth.properties().unit;
         columns.push(if is_growth { with_limit(Metric::Growth, column) } else { column });
     }
-    let kind = |row: &ResultRow| Some(growth(row)?.fastest.kind());
-    let kind_index = move |row: &ResultRow| Some(kind(row)? as usize);
+    let kind = |row: &Outcome| Some(growth(row)?.fastest.kind());
+    let kind_index = move |row: &Outcome| Some(kind(row)? as usize);
     let text =
         "what a disturbance turns the response into: stable, period_doubling, quasi_periodic, fold";
     let names = StabilityKind::ALL.map(StabilityKind::name).to_vec();
     columns.push(ResultColumn::name(format!("{prefix}kind"), text, names, kind_index));
     if !in_map {
-        let stable = move |row: &ResultRow| Some(kind(row)? == StabilityKind::Stable);
+        let stable = move |row: &Outcome| Some(kind(row)? == StabilityKind::Stable);
         let text = "true where every disturbance decays";
         columns.push(ResultColumn::flag("stable", text, stable));
     }
@@ -294,7 +276,7 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
         columns.extend(growing_mode_columns(prefix, rank));
     }
     columns.extend(branch_columns(prefix));
-    let on_curve = |row: &ResultRow| Some(growth(row)?.is_on_curve);
+    let on_curve = |row: &Outcome| Some(growth(row)?.is_on_curve);
     let text = if in_map {
         "false where at any of the plan's speeds no response on that curve was found: a machine \
          that runs up may be in another motion there"
@@ -309,23 +291,23 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
 
 /// Returns the columns of the branch of a response.
 fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
-    let number = |row: &ResultRow| Some(u64::from(growth(row)?.branch));
+    let number = |row: &Outcome| Some(u64::from(growth(row)?.branch));
     // In files of responses the branch tells the rows of a speed apart, so it is never null there.
     let tells_rows_apart = prefix.is_empty();
     let kind = if tells_rows_apart { CellType::Count } else { CellType::KnownCount };
-    let branch = move |row: &ResultRow| number(row).or(tells_rows_apart.then_some(0));
+    let branch = move |row: &Outcome| number(row).or(tells_rows_apart.then_some(0));
     let folds = "how many folds the point's curve of responses has before this one, followed from \
                  a low speed up; of those on the curve, a machine that runs up is on the least \
                  branch that there is at a speed";
     let end = |name: &str, side: &str, index: usize| {
         let text =
             format!("speed of the fold {side} which the branch is not; null where it has none");
-        let fold_rpm = move |row: &ResultRow| growth(row)?.fold_speeds_rpm[index];
+        let fold_rpm = move |row: &Outcome| growth(row)?.fold_speeds_rpm[index];
         ResultColumn::measured(format!("{prefix}branch_{name}_rpm"), "rpm", text, fold_rpm)
     };
     let limits = "what of the machine's geometry the response passes, and so is no motion of the \
                   machine: spring_hooks, damper_ends, clearance; null where nothing";
-    let beyond = |row: &ResultRow| Some(growth(row)?.exceeded_limit? as usize);
+    let beyond = |row: &Outcome| Some(growth(row)?.exceeded_limit? as usize);
     let names = GeometryLimit::ALL.map(GeometryLimit::name).to_vec();
     [
         ResultColumn::new(format!("{prefix}branch"), "1", folds, kind, branch),
@@ -337,14 +319,14 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
 
 /// Returns the columns of the first or the second mode (`rank` 0 or 1) of the growing disturbance.
 fn growing_mode_columns(prefix: &str, rank: usize) -> [WasherColumn; 3] {
-    let mode = move |row: &ResultRow| -> Option<GrowingMode> { growth(row)?.modes[rank] };
+    let mode = move |row: &Outcome| -> Option<GrowingMode> { growth(row)?.modes[rank] };
     let which = if rank == 0 { "that takes most part in" } else { "next to that in" };
     let name = format!("{prefix}mode_{}", rank + 1);
     let text = format!(
         "number, by frequency at this speed, of the linear model's mode {which} what grows; null \
          where nothing grows, or no such mode is needed"
     );
-    let number = move |row: &ResultRow| Some(u64::from(mode(row)?.number));
+    let number = move |row: &Outcome| Some(u64::from(mode(row)?.number));
     let moves = "what moves in it";
     let names = ModeMotion::NAMES.to_vec();
     let frequency = "its damped natural frequency at this speed in cycles per minute";
@@ -371,7 +353,7 @@ fn gap_columns() -> [WasherColumn; 2] {
             "least gap between drum and tub over the whole run, {model} model; negative where \
              they clash; null if it failed"
         );
-        let gap = move |row: &ResultRow| trajectory(&row.outcome).min_gap_m;
+        let gap = move |row: &Outcome| trajectory(row).min_gap_m;
         let column = ResultColumn::measured(format!("min_gap_{model}_m"), "m", text, gap);
         let column = column.worse(Worse::Less).limit(0.0, GAP_SCALE_M);
         // The nonlinear model's gap is the better estimate of the machine's.

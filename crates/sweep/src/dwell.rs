@@ -17,7 +17,7 @@ use washer_row::Status;
 use crate::engine::{Carried, find_motions};
 use crate::plan::{Plan, compared_channels};
 use columns::{DwellColumn, DwellRow};
-use sweep_engine::columns::{declared, row};
+use sweep_engine::columns::{declared, point_rows};
 use sweep_engine::store::{DeclaredColumn, PointRows};
 use sweep_engine::{Error, RunContext};
 
@@ -202,7 +202,7 @@ impl AttractorEngine {
     /// Returns the row of a point at a speed for which no motion was found.
     pub(crate) fn failed_row(&self, row_index: u64, status: Status) -> PointRows {
         let failed = DwellRow { attractors: Err(status), motion: 0, turn: 0 };
-        PointRows { point: row_index, rows: vec![row(&self.columns, &failed)] }
+        point_rows(&self.columns, row_index, [&failed])
     }
 
     /// Finds the motions of the requested points at held speeds, each with its row's index, and
@@ -278,11 +278,10 @@ impl AttractorEngine {
         let mut rows = Vec::new();
         for motion in 0..result.attractors.len() {
             for turn in 0..result.attractors[motion].sections.len().max(1) {
-                let dwell_row = DwellRow { attractors: Ok(Arc::clone(&result)), motion, turn };
-                rows.push(row(&self.columns, &dwell_row));
+                rows.push(DwellRow { attractors: Ok(Arc::clone(&result)), motion, turn });
             }
         }
-        PointRows { point: row_index, rows }
+        point_rows(&self.columns, row_index, &rows)
     }
 }
 

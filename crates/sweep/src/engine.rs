@@ -308,7 +308,7 @@ pub(crate) fn map_isolating_panics<I, R>(
 impl Evaluator for ModelEngine<'_> {
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         let columns = Columns::for_run(self.plan);
-        let sink = |outcome: Outcome| sink(columns.done(outcome));
+        let sink = |outcome: &Outcome| columns.pass(outcome, sink);
         self.integrate_rows(source, &sink, context);
     }
 }

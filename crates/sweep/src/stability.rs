@@ -201,10 +201,12 @@ impl HeldSpeedEvaluator<'_> {
             let speed_rpm = self.held_plan.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
                 Ok(point) => requests.push((row, HeldSpeed { point, speed_rpm })),
-                Err(status) => store(match &self.analysis {
-                    HeldAnalysis::Responses(columns) => columns.done(Outcome::failed(row, *status)),
-                    HeldAnalysis::Attractors(engine) => engine.failed_row(row, *status),
-                }),
+                Err(status) => match &self.analysis {
+                    HeldAnalysis::Responses(columns) => {
+                        columns.pass(&Outcome::failed(row, *status), &store);
+                    }
+                    HeldAnalysis::Attractors(engine) => store(engine.failed_row(row, *status)),
+                },
             }
         }
         match &self.analysis {
@@ -217,7 +219,7 @@ impl HeldSpeedEvaluator<'_> {
                     let failed = |status| Outcome::failed(*row, status);
                     let outcome =
                         result.map_or_else(failed, |responses| self.outcome(*row, &responses));
-                    store(columns.done(outcome));
+                    columns.pass(&outcome, &store);
                 }
             }
             HeldAnalysis::Attractors(engine) => {

@@ -28,9 +28,10 @@ pub use error_control::{MAX_ADAPTIVE_STEPS, refinement_levels};
 pub use levels::RefinementLevels;
 pub use measures::{Criterion, MIN_SPEED_SCALE_M_PER_S, Measures, MetricColumn};
 pub use metrics::{Metric, MetricProperties, MetricSource, PartKind};
-pub use outcome::{Deviations, DwellPeaks, GrowingMode, Growth, Outcome, Status, Trajectory};
+pub use outcome::{
+    Deviations, DwellPeaks, GrowingMode, Growth, Outcome, ROW_STATUSES, Status, Trajectory,
+};
 pub use refinement::{NextStep, OutcomePurpose, RefinementRule, RowRefinement};
 pub use run::{LevelRun, RowRule, integrate_points};
 pub use sweep_parameter::Verdict;
-pub use verdict::{ROW_STATUSES, row_status};
 pub use washer_model::MethodKind;

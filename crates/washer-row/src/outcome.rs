@@ -44,6 +44,48 @@ impl From<ResponseError> for Status {
     }
 }
 
+/// The values of the result file's `status` column, in the order of its dictionary.
+///
+/// If the nonlinear model failed, the row has that model's status, even if the linear model failed
+/// too. If only the linear model failed, the row has its status with the prefix `linear_`.
+pub const ROW_STATUSES: [&str; 14] = [
+    "ok",
+    "diverged",
+    "step_too_small",
+    "step_limit",
+    "no_equilibrium",
+    "panicked",
+    "linear_diverged",
+    "linear_step_too_small",
+    "linear_step_limit",
+    "linear_no_equilibrium",
+    "linear_panicked",
+    "no_response",
+    "no_multipliers",
+    "too_slow",
+];
+
+/// The number of statuses that a single model can have. Each except `ok` has a second name with the
+/// prefix `linear_`.
+const MODEL_STATUSES: usize = Status::Panicked as usize + 1;
+
+/// Returns the index in [`ROW_STATUSES`] of the row of two trajectories, and the failing model's
+/// time of failure.
+fn row_status(nonlinear: &Trajectory, linear: &Trajectory) -> (usize, Option<f64>) {
+    // The statuses that apply only to a whole row follow those with the prefix.
+    let code = |status: Status, linear_offset: usize| match status as usize {
+        code if code < MODEL_STATUSES => code + linear_offset,
+        code => code + MODEL_STATUSES - 1,
+    };
+    if nonlinear.status != Status::Ok {
+        (code(nonlinear.status, 0), nonlinear.fail_time_s)
+    } else if linear.status != Status::Ok {
+        (code(linear.status, MODEL_STATUSES - 1), linear.fail_time_s)
+    } else {
+        (0, None)
+    }
+}
+
 /// The trajectory of one model at one grid point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
@@ -187,6 +229,10 @@ pub struct Outcome {
     pub point: u64,
     pub nonlinear: Trajectory,
     pub linear: Trajectory,
+    /// The position of the row's status in [`ROW_STATUSES`].
+    pub status: usize,
+    /// The time at which the model named by the status failed.
+    pub fail_time_s: Option<f64>,
     /// The kind of the method of the nonlinear trajectory.
     pub method: MethodKind,
     /// The estimate of the row's relative error by the differences of its levels; `None` if no
@@ -216,18 +262,13 @@ pub struct Outcome {
 impl Outcome {
     /// Creates an outcome of two trajectories.
     pub fn new(point: u64, nonlinear: Trajectory, linear: Trajectory) -> Self {
-        Self { point, nonlinear, linear, ..Self::default() }
+        let (status, fail_time_s) = row_status(&nonlinear, &linear);
+        Self { point, nonlinear, linear, status, fail_time_s, ..Self::default() }
     }
 
     /// Creates an outcome in which both models failed.
     pub fn failed(point: u64, status: Status) -> Self {
         Self::new(point, Trajectory::failed(status), Trajectory::failed(status))
-    }
-
-    /// Returns the outcome itself, then the coexisting ones.
-    pub fn into_rows(mut self) -> impl Iterator<Item = Self> {
-        let coexisting = core::mem::take(&mut self.coexisting);
-        core::iter::once(self).chain(coexisting)
     }
 }
 

@@ -1,50 +1,9 @@
-//! The verdict of a row: the ratios of its two trajectories, the greatest of them, whether the
-//! linear model is reliable, and the row's status.
+//! The verdict of a row: the ratios of its two trajectories, the greatest of them, and whether the
+//! linear model is reliable.
 
 use sweep_parameter::{RatioLimits, Verdict};
 
-use crate::outcome::{Outcome, Status};
-
-/// The values of the result file's `status` column, in the order of its dictionary.
-///
-/// If the nonlinear model failed, the row has that model's status, even if the linear model failed
-/// too. If only the linear model failed, the row has its status with the prefix `linear_`.
-pub const ROW_STATUSES: [&str; 14] = [
-    "ok",
-    "diverged",
-    "step_too_small",
-    "step_limit",
-    "no_equilibrium",
-    "panicked",
-    "linear_diverged",
-    "linear_step_too_small",
-    "linear_step_limit",
-    "linear_no_equilibrium",
-    "linear_panicked",
-    "no_response",
-    "no_multipliers",
-    "too_slow",
-];
-
-/// The number of statuses that a single model can have. Each except `ok` has a second name with the
-/// prefix `linear_`.
-const MODEL_STATUSES: usize = Status::Panicked as usize + 1;
-
-/// Returns the row's index in [`ROW_STATUSES`], and the failing model's time of failure.
-pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
-    // The statuses that apply only to a whole row follow those with the prefix.
-    let code = |status: Status, linear_offset: usize| match status as usize {
-        code if code < MODEL_STATUSES => code + linear_offset,
-        code => code + MODEL_STATUSES - 1,
-    };
-    if outcome.nonlinear.status != Status::Ok {
-        (code(outcome.nonlinear.status, 0), outcome.nonlinear.fail_time_s)
-    } else if outcome.linear.status != Status::Ok {
-        (code(outcome.linear.status, MODEL_STATUSES - 1), outcome.linear.fail_time_s)
-    } else {
-        (0, None)
-    }
-}
+use crate::outcome::Outcome;
 
 /// Compares the amplitudes of an outcome over `channels` channels: their ratios, or the greatest
 /// ratios over the drum's turns. A ratio is not defined if the linear amplitude is zero or a model
@@ -71,7 +30,7 @@ pub(crate) fn verdict(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::outcome::Trajectory;
+    use crate::outcome::{ROW_STATUSES, Status, Trajectory};
 
     fn trajectory(status: Status, amplitudes: &[f64], fail_time_s: Option<f64>) -> Trajectory {
         Trajectory { fail_time_s, amplitudes: amplitudes.to_vec(), ..Trajectory::failed(status) }
@@ -144,13 +103,12 @@ mod tests {
             trajectory(Status::Ok, &[1.0, 1.0], None),
         );
         assert_eq!(verdict(&row, 2, 2.0).reliable, None);
-        assert_eq!(row_status(&row), (1, Some(3.5)));
+        assert_eq!((row.status, row.fail_time_s), (1, Some(3.5)));
         let row = outcome(
             trajectory(Status::Ok, &[1.0], None),
             trajectory(Status::StepLimit, &[], Some(2.0)),
         );
-        let (status, time) = row_status(&row);
-        assert_eq!((ROW_STATUSES[status], time), ("linear_step_limit", Some(2.0)));
+        assert_eq!((ROW_STATUSES[row.status], row.fail_time_s), ("linear_step_limit", Some(2.0)));
     }
 
     #[test]
@@ -159,7 +117,6 @@ mod tests {
             trajectory(Status::Panicked, &[], None),
             trajectory(Status::Diverged, &[], Some(1.0)),
         );
-        let (status, time) = row_status(&row);
-        assert_eq!((ROW_STATUSES[status], time), ("panicked", None));
+        assert_eq!((ROW_STATUSES[row.status], row.fail_time_s), ("panicked", None));
     }
 }

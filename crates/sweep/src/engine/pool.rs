@@ -51,7 +51,7 @@ impl ModelEngine<'_> {
 const MAX_QUEUE_AGE: u64 = 2048;
 
 /// A sink of rows, in no particular order.
-pub(super) type OutcomeSink<'a> = dyn Fn(Outcome) + Sync + 'a;
+pub(super) type OutcomeSink<'a> = dyn Fn(&Outcome) + Sync + 'a;
 
 /// Time between two looks at the stop flag by a thread that waits for others. Basis: an interrupt
 /// ends a run within a tenth of a second. Doubling it doubles that delay.
@@ -255,7 +255,7 @@ impl Pool<'_> {
                 return;
             }
         }
-        done.into_iter().for_each(|(outcome, _)| (self.sink)(outcome));
+        done.iter().for_each(|(outcome, _)| (self.sink)(outcome));
     }
 }
 

@@ -34,7 +34,7 @@ impl ModelEngine<'_> {
         let source =
             || lock(&remaining).next().map(|(point, values)| (point as u64, values.clone()));
         let outcomes = Mutex::new(Vec::new());
-        let sink = |outcome: Outcome| lock(&outcomes).push(outcome);
+        let sink = |outcome: &Outcome| lock(&outcomes).push(outcome.clone());
         self.integrate_rows(&source, &sink, &RunContext::new(&Interrupt::new()));
         let mut outcomes = unlocked(outcomes);
         outcomes.sort_by_key(|outcome| outcome.point);
