@@ -303,7 +303,7 @@ pub fn count_lines_at(
         }
     };
     text.line("reliable", verdicts);
-    text.push_str(&motionless_line(tally, axis_values));
+    text.push_str(&undefined_line(tally, axis_values));
     // An over-estimated row has a ratio, so that it has a verdict.
     if let Some(share) = verdict_share(*over_estimated, tally).filter(|_| *over_estimated > 0) {
         let below = format_number(limits.over_estimate());
@@ -358,16 +358,19 @@ pub fn count_lines_at(
 }
 
 /// Formats the reason why rows without a failure have no verdict; empty if there are none.
-fn motionless_line(tally: &Tally, axis_values: &dyn Fn(u64) -> String) -> String {
+fn undefined_line(tally: &Tally, axis_values: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
-    let Some(first) = tally.first_motionless else { return text };
-    let rows = format_count(tally.motionless as usize, "row");
+    let Some(first) = tally.first_undefined_without_failure else { return text };
+    let rows = format_count(tally.undefined_without_failure as usize, "row");
     let location = match axis_values(first) {
         values if values.is_empty() => values,
         values => format!(", the first at {values}"),
     };
-    let reason = "the linear model does not move in the window, so that no ratio is defined";
-    text.line("undefined", format!("{rows} without a failure{location}: {reason}"));
+    let condition = tally.undefined_condition.as_deref().unwrap_or("null");
+    text.line(
+        "undefined",
+        format!("{rows} without a failure{location}: each ratio is {condition}"),
+    );
     text
 }
 
@@ -421,16 +424,22 @@ mod tests {
     }
 
     #[test]
-    fn rows_without_motion_are_explained() {
-        let summary = |motionless, first_motionless| {
-            let tally =
-                Tally { points: 3, undefined: 3, motionless, first_motionless, ..Tally::default() };
+    fn rows_without_a_ratio_are_explained_by_the_columns() {
+        let summary = |undefined_without_failure, first_undefined_without_failure| {
+            let tally = Tally {
+                points: 3,
+                undefined: 3,
+                undefined_without_failure,
+                first_undefined_without_failure,
+                undefined_condition: Some("null where the linear one is zero".to_owned()),
+                ..Tally::default()
+            };
             count_lines_at(&tally, 2.0.into(), &|point| format!("mass_kg {point}"))
         };
-        let sentence = " undefined  2 rows without a failure, the first at mass_kg 1: the linear \
-                        model does not move in the window, so that no ratio is defined\n";
+        let sentence = " undefined  2 rows without a failure, the first at mass_kg 1: each ratio \
+                        is null where the linear one is zero\n";
         assert!(summary(2, Some(1)).contains(sentence), "{}", summary(2, Some(1)));
-        assert!(!summary(0, None).contains("does not move"), "{}", summary(0, None));
+        assert!(!summary(0, None).contains("without a failure"), "{}", summary(0, None));
     }
 
     #[test]

@@ -17,13 +17,8 @@ pub fn check_windows<M: Model>(draft: &Draft<'_, M>) {
         if draft.report.is_full() || !reported.is_empty() {
             break;
         }
-<<<<<<< HEAD:crates/sweep-engine/src/config/plan_checks.rs
-        let scenario = draft.plan.scenario_at(&draft.plan.corner(corner));
-        check_window(draft, &scenario, &mut reported);
-=======
         let window_s = draft.plan.window_at(&draft.plan.corner(corner));
-        window(draft, window_s, &mut reported);
->>>>>>> f447bbe1 (Write points into their machines without the engine):crates/sweep-engine/src/config/whole.rs
+        check_window(draft, window_s, &mut reported);
     }
 }
 

@@ -107,12 +107,15 @@ pub struct Tally {
     pub reliable: u64,
     /// The number of rows whose verdict is not reliable.
     pub unreliable: u64,
-    /// The number of rows without a verdict, because a model failed or nothing moves.
+    /// The number of rows without a verdict, because no ratio is defined.
     pub undefined: u64,
     /// The number of rows without a verdict in which no model failed.
-    pub motionless: u64,
+    pub undefined_without_failure: u64,
     /// The first point without a verdict at which no model failed.
-    pub first_motionless: Option<u64>,
+    pub first_undefined_without_failure: Option<u64>,
+    /// The condition under which a ratio is null, as the description of its column ends.
+    #[serde(skip)]
+    pub undefined_condition: Option<String>,
     /// The number of rows in which the linear model over-estimates: a ratio is below `ratio_min`
     /// or, if that is not given, below 1 / `ratio_limit`.
     pub over_estimated: u64,
@@ -150,6 +153,13 @@ pub fn count_failed(by_status: &NameCounts) -> u64 {
 /// Adds one occurrence of a name.
 pub fn count_name(counts: &mut NameCounts, name: &str) {
     *counts.entry(name.to_owned()).or_default() += 1;
+}
+
+/// Returns the condition under which ratios are null, by the description of their first column.
+fn null_condition_of_ratios(columns: &[Column]) -> Option<String> {
+    let ratio = columns.iter().find(|column| column.name.starts_with("ratio_"))?;
+    let (_, condition) = ratio.metadata.description.rsplit_once("; ")?;
+    condition.starts_with("null ").then(|| condition.to_owned())
 }
 
 /// Counts a result file's rows, in bounded memory.
@@ -214,8 +224,8 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
             None => tally.undefined += 1,
         }
         if reliable.is_none() && row.word(status_column) == Some("ok") {
-            tally.motionless += 1;
-            tally.first_motionless.get_or_insert(point);
+            tally.undefined_without_failure += 1;
+            tally.first_undefined_without_failure.get_or_insert(point);
         }
         tally.over_estimated += u64::from(least < over_estimate_limit);
         tally.over_estimated_reliable +=
@@ -237,6 +247,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         Ok::<(), StoreError>(())
     })?;
     tally.extremes = extremes;
+    tally.undefined_condition = null_condition_of_ratios(&all_columns);
     Ok(tally)
 }
 

@@ -124,6 +124,18 @@ fn a_mark_without_a_worse_side_leaves_the_other_extremes() {
 }
 
 #[test]
+fn the_condition_of_undefined_ratios_is_that_of_their_column() {
+    let home = Home::new();
+    let mut job = synthetic::job(POINTS);
+    let ratio = job.layout.position("ratio_max").unwrap();
+    job.layout.columns[ratio].metadata.description = "a quotient; null where b is zero".to_owned();
+    let run = open(&home.output(), &job);
+    write_missing(&run);
+    let (tally, _) = finish(run, &job);
+    assert_eq!(tally.undefined_condition.as_deref(), Some("null where b is zero"));
+}
+
+#[test]
 fn a_finished_result_is_not_computed_again() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
@@ -318,8 +330,12 @@ fn the_counts_agree_with_the_rows() {
     );
     assert_eq!(tally.reliable + tally.unreliable + tally.undefined, POINTS);
     let status = position("status");
-    let is_motionless = |row: &&Vec<Option<u64>>| row[reliable].is_none() && row[status] == Some(0);
-    assert_eq!(tally.motionless, rows.iter().filter(is_motionless).count() as u64);
+    let is_undefined_without_failure =
+        |row: &&Vec<Option<u64>>| row[reliable].is_none() && row[status] == Some(0);
+    assert_eq!(
+        tally.undefined_without_failure,
+        rows.iter().filter(is_undefined_without_failure).count() as u64
+    );
     let ratios =
         (0..).zip(&rows).filter_map(|(point, row)| Some((point, f64::from_bits(row[ratio]?))));
     let (point, greatest) =
