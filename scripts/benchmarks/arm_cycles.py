@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""What a step costs on cores of 64-bit ARM, by LLVM's models of them (llvm-mca): a prediction
-without caches or mispredicted branches, not a measurement. One RK4 step of the nonlinear model,
-peaks included, is cut out of a run under qemu. Prints Markdown.
+"""Predicts the processor cycles of a step on cores of 64-bit ARM.
 
-    scripts/checks/check_arm.sh                      # for the tools
+LLVM's models of the cores (llvm-mca) give the cycles without cache misses and mispredicted
+branches. The instructions are those of one RK4 step of the nonlinear model with its peaks, traced
+in a run under qemu. Prints a table in Markdown.
+
+    scripts/checks/check_arm.sh                      # installs the tools
     CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \\
         cargo build --release --target aarch64-unknown-linux-gnu -p washer-capi --example trajectory
     scripts/benchmarks/arm_cycles.py target/aarch64-unknown-linux-gnu/release/examples/trajectory
@@ -22,38 +24,40 @@ import tempfile
 
 CORES = ["neoverse-n1", "neoverse-n2", "neoverse-v1", "neoverse-v2", "apple-m1", "ampere1"]
 LANES = {"scalar": 1, "neon": 2}
-# Where qemu 7 puts a position-independent program.
+# The address at which qemu 7 loads a position-independent program.
 BASE = 0x5500000000
-# What comes before the first step is shorter; a step is some 20,000 instructions.
-TRACED = 4_000_000
-KEPT = 200_000
-# llvm-mca takes straight code only.
+# Number of traced instructions. The start of the program has fewer, and a step some 20,000.
+TRACED_COUNT = 4_000_000
+# Number of traced instructions, from the last one back, in which a step is searched.
+KEPT_COUNT = 200_000
+# Branches, which are left out because llvm-mca accepts only code without them.
 BRANCH = re.compile(r"(b|bl|br|blr|b\..*|cbz|cbnz|tbz|tbnz|ret|adr|adrp)\s")
 STACK = re.compile(r"(ld|st)\S*\s.*\[(sp|x29)")
 
 
-def disassembled(binary):
-    """Instructions by address, and the range of the project's own functions."""
+def disassemble(binary):
+    """Returns the instructions by address, and the first and last address of the project's own
+    functions."""
     dump = subprocess.run(
         ["aarch64-linux-gnu-objdump", "-d", "--no-show-raw-insn", binary],
         capture_output=True,
         text=True,
         check=True,
     ).stdout
-    code, own, ours = {}, [], False
+    code, own_addresses, is_own_function = {}, [], False
     for line in dump.splitlines():
         if name := re.match(r"[0-9a-f]+ <(.*)>:$", line):
-            ours = "lane_ode" in name[1] or "washer_model" in name[1]
+            is_own_function = "lane_ode" in name[1] or "washer_model" in name[1]
         elif instruction := re.match(r"\s+([0-9a-f]+):\s+(\S.*)$", line):
             address = int(instruction[1], 16)
             code[address] = re.sub(r"<.*>", "", instruction[2].split("//")[0]).strip()
-            if ours:
-                own.append(address)
-    return code, min(own), max(own)
+            if is_own_function:
+                own_addresses.append(address)
+    return code, min(own_addresses), max(own_addresses)
 
 
-def traced(binary, simd, first, last):
-    """The last addresses that ran, of a run that is stopped in the middle."""
+def trace_addresses(binary, simd, first, last):
+    """Returns the addresses of the last instructions before a run is stopped in the middle."""
     with tempfile.TemporaryDirectory() as folder:
         fifo = f"{folder}/trace"
         subprocess.run(["mkfifo", fifo], check=True)
@@ -72,32 +76,33 @@ def traced(binary, simd, first, last):
             stdout=subprocess.DEVNULL,
         )
         with open(fifo) as trace:
-            tail = collections.deque(itertools.islice(trace, TRACED), KEPT)
+            last_lines = collections.deque(itertools.islice(trace, TRACED_COUNT), KEPT_COUNT)
         run.kill()
         run.wait()
-    found = (re.search(r"\[[0-9a-f]+/([0-9a-f]+)/", line) for line in tail)
-    addresses = [int(address[1], 16) - BASE for address in found if address]
+    address_matches = (re.search(r"\[[0-9a-f]+/([0-9a-f]+)/", line) for line in last_lines)
+    addresses = [int(address[1], 16) - BASE for address in address_matches if address]
     if not addresses:
         sys.exit(
             f"{binary} {simd} ran nothing between {BASE + first:#x} and {BASE + last:#x}: does "
-            f"this qemu put it elsewhere?"
+            f"this qemu load it at another address?"
         )
     return addresses
 
 
-def step(addresses):
-    """The addresses of one step: between two visits of an address that runs once a step, the most
-    seldom of all that come back."""
+def find_step(addresses):
+    """Returns the addresses of one step, from one execution of an instruction that runs once per
+    step to the next. This instruction is the one with the fewest repeated executions."""
     visits = collections.defaultdict(list)
     for i, address in enumerate(addresses):
         visits[address].append(i)
-    rarest = min((seen for seen in visits.values() if len(seen) >= 5), key=len)
-    gaps = {b - a for a, b in zip(rarest, rarest[1:])}
+    rarest_visits = min((indices for indices in visits.values() if len(indices) >= 5), key=len)
+    gaps = {b - a for a, b in zip(rarest_visits, rarest_visits[1:])}
     assert max(gaps) < 1.05 * min(gaps), f"steps of {min(gaps)} to {max(gaps)} instructions"
-    return addresses[rarest[-2] : rarest[-1]]
+    return addresses[rarest_visits[-2] : rarest_visits[-1]]
 
 
-def cycles(code, core):
+def predict_cycles(code, core):
+    """Returns the cycles in which a core executes straight code, by llvm-mca."""
     tool = next(
         filter(
             shutil.which, [*(f"llvm-mca-{version}" for version in range(25, 17, -1)), "llvm-mca"]
@@ -115,27 +120,28 @@ def cycles(code, core):
 
 def main():
     (binary,) = sys.argv[1:]
-    code, first, last = disassembled(binary)
+    code, first, last = disassemble(binary)
     table = {"instructions": {}, "of them loads and stores on the stack": {}} | {
         core: {} for core in CORES
     }
     for simd, lanes in LANES.items():
-        ran = [code[address] for address in step(traced(binary, simd, first, last))]
-        straight = "\n".join(line for line in ran if not BRANCH.match(line))
-        table["instructions"][simd] = len(ran) / lanes
+        addresses = trace_addresses(binary, simd, first, last)
+        executed_code = [code[address] for address in find_step(addresses)]
+        straight_code = "\n".join(line for line in executed_code if not BRANCH.match(line))
+        table["instructions"][simd] = len(executed_code) / lanes
         table["of them loads and stores on the stack"][simd] = (
-            sum(bool(STACK.match(line)) for line in ran) / lanes
+            sum(bool(STACK.match(line)) for line in executed_code) / lanes
         )
         for core in CORES:
-            table[core][simd] = cycles(straight, core) / lanes
+            table[core][simd] = predict_cycles(straight_code, core) / lanes
     print("| a step and lane |", *(f"{simd} |" for simd in LANES), "scalar / neon |")
     print("|---|---|---|---|")
-    for name, of in table.items():
+    for name, cycles_by_set in table.items():
         name = name if " " in name or name == "instructions" else f"cycles, {name}"
         print(
             f"| {name} |",
-            *(f"{of[simd]:.0f} |" for simd in LANES),
-            f"{of['scalar'] / of['neon']:.2f} |",
+            *(f"{cycles_by_set[simd]:.0f} |" for simd in LANES),
+            f"{cycles_by_set['scalar'] / cycles_by_set['neon']:.2f} |",
         )
 
 

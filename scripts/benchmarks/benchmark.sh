@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What is measured of this project alone, in one command: ratios, instruction counts, what a step
-# executes. Writes results/benchmarks/NAME.md with machine, versions and commands.
-# `cargo bench --bench kernels` times every kernel by itself.
+# Runs all benchmarks that measure only this project: ratios, instruction counts, and the operations
+# and cache misses of a step. Writes results/benchmarks/NAME.md with machine, versions and commands.
+# `cargo bench --bench kernels` measures each kernel separately.
 #
 #     scripts/benchmarks/benchmark.sh [NAME] [ROUNDS]
 set -euo pipefail

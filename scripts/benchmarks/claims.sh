@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Measures every timed claim of README, docs and results anew, of one commit, on this machine, and
-# writes each into its page. Ninety minutes in which nothing else should run. A part that fails is
-# named at the end, and the others are measured all the same.
+# Repeats every measurement in README, docs and results, with one commit on this machine, and writes
+# the results into their pages. It takes ninety minutes, in which nothing else should run. A failed
+# part does not stop the others; its name is printed at the end.
 #
 #     scripts/benchmarks/claims.sh [PART ...]
 #
-# Parts: kernels, methods, elements, points, build, peers, samples (outputs that pages show).
+# Parts: kernels, methods, elements, points, build, peers, samples (the command outputs in pages).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 parts=("$@")
@@ -20,7 +20,7 @@ for part in "${parts[@]}"; do
   esac
 done
 if ! git diff --quiet HEAD; then
-  echo "there are changes that no commit has: figures would say they are of none" >&2
+  echo "commit all changes first, so that the results can name their commit" >&2
   exit 1
 fi
 MEASURED_COMMIT=$(git describe --always)

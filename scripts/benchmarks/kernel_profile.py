@@ -1,19 +1,19 @@
 #!/usr/bin/env python3
-"""What the processor executes in a step of RK4, counted by single-stepping: that knows every
-instruction set.
+"""Counts the instructions of an RK4 step by single-stepping, which supports all instruction sets.
 
     python3 scripts/benchmarks/kernel_profile.py [--ghz CLOCK] [BENCH_BINARY]
 
 Runs the benchmark `whole_trajectory` (`cargo bench --bench kernels`; built if no binary is given)
 of both models on each instruction set that the processor has. The thread is stopped at some
-instants and followed for some steps from each; how often each instruction ran, and objdump's word
-for it, make the counts. What runs once per step is the rarest of what the loop holds, and tells
-where steps begin. Half of the trajectory lies in the window, where the channels are observed:
-counts are means over both halves, as far as so few instants tell. The time a step is the
-benchmark's fastest. The clock (unless given) is from the time that a chain of subtractions takes,
-one a cycle. The peak rate of arithmetic is that of independent fused operations of the same width:
-some processors execute those of AVX-512 in halves. Needs Linux on x86-64, binutils and a C
-compiler. Writes a Markdown table, in two minutes or so.
+instants and single-stepped for some steps from each. The executions of each address and objdump's
+mnemonic of the address give the counts. The instruction with the fewest executions in the loop runs
+once per step, and marks where steps begin. Half of the trajectory lies in the window, where
+channels are observed, so that counts are approximate means over both halves. The time per step is
+that of the benchmark's fastest run. The clock frequency, unless given, is measured by a chain of
+subtractions, which takes one cycle each. The peak rate of arithmetic is that of independent fused
+operations of the same width, because some processors execute those of AVX-512 in two halves.
+Requires Linux on x86-64, binutils and a C compiler. Writes a table in Markdown, in about two
+minutes.
 """
 
 import argparse
@@ -29,13 +29,15 @@ import tempfile
 import time
 
 ATTACH, DETACH, SINGLE_STEP, GET_REGISTERS = 16, 17, 9, 12
-RIP = 16  # of user_regs_struct, in words
+RIP = 16  # index of the instruction pointer in user_regs_struct, in words
 REGISTERS = 27
 WAIT_FOR_ALL = 0x40000000
-STEPS = 200_000  # of the trajectory
+STEPS = 200_000  # number of steps of the trajectory
+# Number of instants at which the thread is stopped, and of instructions from each.
 SAMPLES, INSTRUCTIONS = 8, 30_000
-# By name: the flag of a processor that has it, and its registers.
+# The instruction sets by name, with the processor's flag and the prefix of the registers.
 SETS = {"Scalar": ("fma", "xmm"), "Avx2": ("avx2", "ymm"), "Avx512": ("avx512dq", "zmm")}
+# The kinds of arithmetic, with patterns of the mnemonics.
 KINDS = {
     "fused": r"vf\w*m(add|sub)",
     "multiplied": r"vmul[ps]d",
@@ -54,6 +56,8 @@ def ptrace(request, thread, data=None):
 
 
 def busiest_thread(pid):
+    """Returns the thread with the most processor time."""
+
     def ticks(thread):
         with open(f"/proc/{pid}/task/{thread}/stat") as file:
             return int(file.read().rsplit(")", 1)[1].split()[11])
@@ -61,9 +65,9 @@ def busiest_thread(pid):
     return max(map(int, os.listdir(f"/proc/{pid}/task")), key=ticks)
 
 
-def executed(pid):
-    """The addresses that ran, in each sample, from where the program was loaded."""
-    time.sleep(0.5)  # the first trajectory is on its way
+def trace_samples(pid):
+    """Yields the executed addresses of each sample, relative to the address of the program."""
+    time.sleep(0.5)  # until the first trajectory has begun
     with open(f"/proc/{pid}/maps") as file:
         base = int(file.readline().split("-")[0], 16)
     thread = busiest_thread(pid)
@@ -82,39 +86,44 @@ def executed(pid):
         yield trace
 
 
-def disassembled(binary, addresses):
-    """Mnemonic and operands of the instructions at and between the given ones."""
-    span = [f"--start-address={min(addresses)}", f"--stop-address={max(addresses) + 16}"]
-    command = ["objdump", "-d", "--insn-width=16", *span, binary]
-    found = {}
+def disassemble(binary, addresses):
+    """Returns mnemonic and operands by address, from the first to the last of these addresses."""
+    address_range = [f"--start-address={min(addresses)}", f"--stop-address={max(addresses) + 16}"]
+    command = ["objdump", "-d", "--insn-width=16", *address_range, binary]
+    code_by_address = {}
     for line in subprocess.run(command, capture_output=True, text=True, check=True).stdout.split(
         "\n"
     ):
         match = re.match(r"\s*([0-9a-f]+):\t(?:[0-9a-f]{2} )+\s*(\S+)\s*(.*)", line)
         if match:
             address, mnemonic, operands = match.groups()
-            found[int(address, 16)] = (mnemonic, operands.split("#")[0].strip())
-    return found
+            code_by_address[int(address, 16)] = (mnemonic, operands.split("#")[0].strip())
+    return code_by_address
 
 
-def whole_steps(trace):
-    """How often each address ran in the whole steps of a sample, and how many they are."""
+def count_whole_steps(trace):
+    """Returns the executions of each address in the whole steps of a sample, and the number of
+    these steps."""
     counts = collections.Counter(trace)
-    sharing = collections.Counter(counts.values())
-    many = 0.03 * len(counts)
-    once = next(n for n in sorted(sharing) if n > 1 and sharing[n] + sharing[n + 1] > many)
-    mark = next(address for address in trace if counts[address] == once)
-    first = trace.index(mark)
-    last = len(trace) - 1 - trace[::-1].index(mark)
-    return collections.Counter(trace[first:last]), once - 1
+    addresses_by_count = collections.Counter(counts.values())
+    min_addresses = 0.03 * len(counts)
+    executions_per_sample = next(
+        n
+        for n in sorted(addresses_by_count)
+        if n > 1 and addresses_by_count[n] + addresses_by_count[n + 1] > min_addresses
+    )
+    mark_address = next(address for address in trace if counts[address] == executions_per_sample)
+    first = trace.index(mark_address)
+    last = len(trace) - 1 - trace[::-1].index(mark_address)
+    return collections.Counter(trace[first:last]), executions_per_sample - 1
 
 
-def per_step(samples, code):
-    """Executions of every kind in a step."""
+def count_per_step(samples, code):
+    """Returns the executions per step by kind of instruction."""
     kinds = collections.Counter()
     steps = 0
-    for counts, within in map(whole_steps, samples):
-        steps += within
+    for counts, sample_steps in map(count_whole_steps, samples):
+        steps += sample_steps
         for address, count in counts.items():
             mnemonic, operands = code.get(address, ("", ""))
             kinds["all instructions"] += count
@@ -127,36 +136,37 @@ def per_step(samples, code):
     return {kind: count / steps for kind, count in kinds.items()}
 
 
-def fastest_ns(output):
-    """The time a step, from the benchmark's report."""
+def read_step_time_ns(output):
+    """Returns the time per step (ns) from the benchmark's report."""
     number, unit = re.search(r"\)\s+([\d.]+) (ns|µs|ms|s)\s", output).groups()
     return float(number) * {"ns": 1, "µs": 1e3, "ms": 1e6, "s": 1e9}[unit] / STEPS
 
 
-def fastest_s(source, *flags):
-    """The time that a program in C takes, the least of five."""
+def measure_program_s(source, *flags):
+    """Returns the processor time of a C program (s), the least of five runs."""
     with tempfile.TemporaryDirectory() as folder:
         program = f"{folder}/program"
         command = ["cc", "-x", "c", "-O1", *flags, "-o", program, "-"]
         subprocess.run(command, input=source, text=True, check=True)
         times = []
         for _ in range(5):
-            begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+            start_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
             subprocess.run([program], check=True)
-            times.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin)
+            times.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - start_s)
     return min(times)
 
 
-def clock_ghz():
-    """Cycles a nanosecond."""
-    return 1.0 / fastest_s(
+def measure_clock_ghz():
+    """Measures the clock frequency (GHz)."""
+    return 1.0 / measure_program_s(
         "int main(void) { unsigned long n = 1000000000; "
         '__asm__ volatile("1: sub $1, %0; jnz 1b" : "+r"(n)); return 0; }'
     )
 
 
-def fused_per_ns(register):
-    """Fused operations a nanosecond of this kind of register: twelve of them wait for no other."""
+def measure_fused_per_ns(register):
+    """Measures the fused operations per nanosecond with this kind of register. Twelve operations
+    are independent of each other."""
     loops = 50_000_000
     fused = "".join(
         f"vfmadd213{'sd' if register == 'xmm' else 'pd'} %%{register}{i}, %%{register}{i}, "
@@ -170,10 +180,11 @@ def fused_per_ns(register):
         f'__asm__ volatile("{zeroed} 1: {fused} sub $1, %0; jnz 1b" : "+r"(n) : : {clobbered}); '
         "return 0; }"
     )
-    return 12e-9 * loops / fastest_s(source, "-mavx512f")
+    return 12e-9 * loops / measure_program_s(source, "-mavx512f")
 
 
-def built():
+def build_benchmark():
+    """Builds the benchmark of the kernels and returns the path of its binary."""
     command = ["cargo", "bench", "--bench", "kernels", "--no-run", "--message-format=json"]
     messages = map(
         json.loads,
@@ -193,14 +204,16 @@ def main():
     arguments.add_argument("binary", nargs="?")
     arguments.add_argument("--ghz", type=float)
     options = arguments.parse_args()
-    binary = options.binary or built()
+    binary = options.binary or build_benchmark()
     with open("/proc/cpuinfo") as file:
-        cpu = file.read()
-    ghz = options.ghz or clock_ghz()
-    flags = re.search(r"flags\s*: (.*)", cpu)[1].split()
-    available = {name: registers for name, (flag, registers) in SETS.items() if flag in flags}
-    peaks = {name: fused_per_ns(registers) for name, registers in available.items()}
-    rates = ", ".join(f"{name.lower()} {peak / ghz:.1f}" for name, peak in peaks.items())
+        processor_info = file.read()
+    ghz = options.ghz or measure_clock_ghz()
+    flags = re.search(r"flags\s*: (.*)", processor_info)[1].split()
+    available_sets = {name: registers for name, (flag, registers) in SETS.items() if flag in flags}
+    peaks_per_ns = {
+        name: measure_fused_per_ns(registers) for name, registers in available_sets.items()
+    }
+    rates = ", ".join(f"{name.lower()} {peak / ghz:.1f}" for name, peak in peaks_per_ns.items())
     print(
         f"A step of RK4 of all lanes, peaks included, at {ghz:.2f} GHz. Fused operations a cycle, "
         f"in a loop\nof nothing else: {rates}.\n"
@@ -211,7 +224,7 @@ def main():
         + " | ns | instructions a cycle | arithmetic to fused peak |"
     )
     print("|---|" + "---:|" * (len(COLUMNS) + 4))
-    for instruction_set, peak in peaks.items():
+    for instruction_set, peak in peaks_per_ns.items():
         for model in ["Nonlinear", "Linear"]:
             command = [
                 binary,
@@ -220,18 +233,18 @@ def main():
                 "--color",
                 "never",
             ]
-            free = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-            followed = subprocess.Popen(
+            report = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+            process = subprocess.Popen(
                 [*command, "--sample-count", "1000"],
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
-            samples = list(executed(followed.pid))
-            followed.kill()
-            followed.wait()
-            code = disassembled(binary, set().union(*samples))
-            kinds = per_step(samples, code)
-            ns = fastest_ns(free)
+            samples = list(trace_samples(process.pid))
+            process.kill()
+            process.wait()
+            code = disassemble(binary, set().union(*samples))
+            kinds = count_per_step(samples, code)
+            ns = read_step_time_ns(report)
             arithmetic = sum(kinds.get(kind, 0) for kind in KINDS)
             counts = [arithmetic, *(kinds.get(column, 0) for column in COLUMNS), ns]
             cells = [f"{count:.0f}" for count in counts]

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""What each method costs and how accurate it is: writes the table of docs/method.md.
+"""Measures the cost and the accuracy of each method, and writes the table of docs/method.md.
 
     scripts/tools/python.sh scripts/benchmarks/method_costs.py SWEEP_BINARY [POINTS_PER_AXIS]
 
-Runs the map of `sweeps/quick.toml` by each method on one thread. Processor time is told, which
-other work on the machine disturbs less than it does the wall's. The error is the worst relative
-difference of an amplitude, of either model, from plain `rk4` at a quarter of its usual step, over
-the points that are reliable: elsewhere most motions are chaotic, and no two methods agree on their
+Runs the map of `sweeps/quick.toml` by each method on one thread. Times are processor times, which
+other work on the machine disturbs less than wall times. The error is the greatest relative
+difference of an amplitude of either model from that of plain `rk4` at a quarter of its usual step.
+Only reliable points count: most other motions are chaotic, so that no two methods agree on their
 digits.
 """
 
@@ -17,7 +17,14 @@ import tempfile
 
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from measured import ROOT, Spent, figure, put, said, table
+from measured import (
+    ROOT,
+    MeasuredCommand,
+    format_number,
+    markdown_table,
+    measurement_note,
+    write_between_marks,
+)
 
 GRID = (ROOT / "sweeps/quick.toml").read_text()
 
@@ -33,45 +40,47 @@ METHODS = [
 ]
 
 
-def run(sweep, folder, integrator, count):
-    """The map by one method, and its processor time in seconds."""
+def compute_map(sweep, folder, integrator, count):
+    """Computes the map by one method; returns its table and its processor time (s)."""
     grid, out = folder / "grid.toml", folder / "map.parquet"
     text = re.sub(r"\[integrator\].*?\n\n", f"[integrator]\n{integrator}\n\n", GRID, flags=re.S)
     grid.write_text(text.replace("count = 9", f"count = {count}"))
-    spent = Spent(sweep, "run", grid, "--out", out, "--fresh", "--threads", "1")
-    return pq.read_table(out), spent.core_s
+    command = MeasuredCommand(sweep, "run", grid, "--out", out, "--fresh", "--threads", "1")
+    return pq.read_table(out), command.core_s
 
 
-def error(found, reference):
-    """Worst relative difference of an amplitude where the reference is reliable."""
-    reliable = reference["reliable"]
-    worst = 0.0
+def max_error(table, reference):
+    """Returns the greatest relative difference of an amplitude where the reference is reliable."""
+    is_reliable = reference["reliable"]
+    greatest = 0.0
     for name in reference.column_names:
         if name.startswith(("nonlinear_", "linear_")):
-            right = reference[name].filter(reliable)
-            apart = pc.abs(pc.divide(pc.subtract(found[name].filter(reliable), right), right))
-            worst = max(worst, pc.max(apart).as_py())
-    return worst
+            expected = reference[name].filter(is_reliable)
+            computed = table[name].filter(is_reliable)
+            errors = pc.abs(pc.divide(pc.subtract(computed, expected), expected))
+            greatest = max(greatest, pc.max(errors).as_py())
+    return greatest
 
 
 def main():
-    """Measure, and put the table into the page."""
+    """Measures all methods and writes the table into the page."""
     sweep, count = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 9
-    heads = ["`[integrator]`", "points per core-second", "steps, both models", "worst error",
-             "verdicts other than the reference's"]
+    headings = ["`[integrator]`", "points per core-second", "steps, both models", "worst error",
+                "verdicts other than the reference's"]
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        reference, _ = run(sweep, folder, REFERENCE, count)
+        reference, _ = compute_map(sweep, folder, REFERENCE, count)
         for integrator in METHODS:
-            found, spent_s = run(sweep, folder, integrator, count)
-            steps = pc.mean(pc.add(found["steps_nonlinear"], found["steps_linear"])).as_py()
-            other = pc.sum(pc.not_equal(found["reliable"], reference["reliable"])).as_py()
-            shown = integrator.replace("\n", ", ").replace('"', "").replace("method = ", "")
-            rows.append([f"`{shown}`", figure(found.num_rows / spent_s), f"{steps:.0f}",
-                         f"{error(found, reference):.0e}", other])
+            result, core_s = compute_map(sweep, folder, integrator, count)
+            steps = pc.mean(pc.add(result["steps_nonlinear"], result["steps_linear"])).as_py()
+            other_verdicts = pc.sum(pc.not_equal(result["reliable"], reference["reliable"])).as_py()
+            settings = integrator.replace("\n", ", ").replace('"', "").replace("method = ", "")
+            rows.append([f"`{settings}`", format_number(result.num_rows / core_s), f"{steps:.0f}",
+                         f"{max_error(result, reference):.0e}", other_verdicts])
             print(rows[-1], file=sys.stderr, flush=True)
-    put("docs/method.md", "costs", table(heads, rows), said())
+    table = markdown_table(headings, rows)
+    write_between_marks("docs/method.md", "costs", table, measurement_note())
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
-"""What the Python package costs beside the command: processor time of Fig. 12's 1287 points, by
-`sweep run` and by `plan.evaluate`, in turns.
+"""Compares the costs of the Python package and of the command: the processor times of the 1287
+points of Fig. 12 by `sweep run` and by `plan.evaluate`, in turns.
 
     python scripts/benchmarks/python_cost.py SWEEP_BINARY [ROUNDS]
 
-Each is a process of its own, with all that it takes to start, read and, for the command, write the
-result. Times are the sum over threads, in user and kernel mode. Then the parts of a call that are
-not the engine's: the table read and checked, and all columns of eight rows made arrays.
+Each runs in a separate process, whose time includes the start, the reading and, for the command,
+the writing of the result. Times are sums over threads, in user and kernel mode. Then the script
+measures the parts of a call outside of the engine: reading and checking the table, and converting
+all columns of eight rows to arrays.
 """
 
 import pathlib
@@ -16,64 +17,66 @@ import sys
 import tempfile
 
 GRID = pathlib.Path(__file__).resolve().parent.parent.parent / "sweeps/fig12.toml"
-# The last line of what it prints: seconds of processor time that the call took.
+# A script that prints the processor time of a call of `plan.evaluate` (s).
 CALL = f"""
 import itertools, resource, numpy as np, washer_sweep
 plan = washer_sweep.Plan.from_toml({str(GRID)!r})
 points = np.array(list(itertools.product(np.linspace(0.05, 1, 39), np.linspace(60, 300, 33)))).T
 table = dict(zip(plan.axes, points))
-def used():
+def processor_time_s():
     now = resource.getrusage(resource.RUSAGE_SELF)
     return now.ru_utime + now.ru_stime
-began = used()
+start_s = processor_time_s()
 result = plan.evaluate(table)
 ratios = result["ratio_max"]
-print(used() - began)
+print(processor_time_s() - start_s)
 """
+# A script that prints the least times to check a table and to convert the columns (s).
 PARTS = f"""
 import itertools, timeit, numpy as np, washer_sweep
 plan = washer_sweep.Plan.from_toml({str(GRID)!r})
 points = np.array(list(itertools.product(np.linspace(0.05, 1, 39), np.linspace(60, 300, 33)))).T
 points[0, -1] = 2
-refused = dict(zip(plan.axes, points))
+invalid_table = dict(zip(plan.axes, points))
 def check():
     try:
-        plan.evaluate(refused)
+        plan.evaluate(invalid_table)
     except washer_sweep.PlanError:
         pass
-def least(work):
-    return min(timeit.repeat(work, number=10, repeat=5)) / 10
-some = plan.evaluate(dict(zip(plan.axes, points[:, :8])))
-print(least(check), least(lambda: [some[name] for name in some.columns]))
+def least_time_s(function):
+    return min(timeit.repeat(function, number=10, repeat=5)) / 10
+result = plan.evaluate(dict(zip(plan.axes, points[:, :8])))
+print(least_time_s(check), least_time_s(lambda: [result[name] for name in result.columns]))
 """
 
 
-def used(words):
-    """Seconds of processor time that a command takes, and what it prints."""
+def run_measured(words):
+    """Returns the processor time of a command (s) and its output."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    told = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    output = subprocess.run(words, check=True, capture_output=True, text=True).stdout
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, told
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, output
 
 
 def main():
-    """Measure and tell."""
+    """Measures both ways and prints the results."""
     sweep, rounds = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 5
-    commands, calls = [], []
+    command_times_s, call_times_s = [], []
     with tempfile.TemporaryDirectory() as folder:
         for k in range(rounds):
             out = pathlib.Path(folder, f"{k}.parquet")
-            run = [sweep, "run", GRID, "--out", out, "--progress", "none"]
-            commands.append(used(run)[0])
-            calls.append(float(used([sys.executable, "-c", CALL])[1]))
-    check, hand_over = map(float, used([sys.executable, "-c", PARTS])[1].split())
-    command, call = statistics.median(commands), statistics.median(calls)
-    print(f"sweep run      {command:.2f} s of processor time (of {rounds}: {min(commands):.2f} to "
-          f"{max(commands):.2f})")
-    print(f"plan.evaluate  {call:.2f} s ({min(calls):.2f} to {max(calls):.2f}), "
-          f"{100 * (call / command - 1):+.1f} %")
-    print(f"of that        {1e3 * check:.2f} ms to read and check the table, {1e3 * hand_over:.2f} "
-          f"ms to hand over the columns: {100 * (check + hand_over) / call:.3f} %")
+            words = [sweep, "run", GRID, "--out", out, "--progress", "none"]
+            command_times_s.append(run_measured(words)[0])
+            call_times_s.append(float(run_measured([sys.executable, "-c", CALL])[1]))
+    check_s, conversion_s = map(float, run_measured([sys.executable, "-c", PARTS])[1].split())
+    command_s, call_s = statistics.median(command_times_s), statistics.median(call_times_s)
+    print(f"sweep run      {command_s:.2f} s of processor time "
+          f"(of {rounds}: {min(command_times_s):.2f} to {max(command_times_s):.2f})")
+    print(f"plan.evaluate  {call_s:.2f} s ({min(call_times_s):.2f} to {max(call_times_s):.2f}), "
+          f"{100 * (call_s / command_s - 1):+.1f} %")
+    print(f"of that        {1e3 * check_s:.2f} ms to read and check the table, "
+          f"{1e3 * conversion_s:.2f} ms to convert the columns: "
+          f"{100 * (check_s + conversion_s) / call_s:.3f} %")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""What memory a call of the Python package takes beside its table and its result.
+"""Measures the memory of a call of the Python package beside its table and its result.
 
     python scripts/benchmarks/python_memory.py ROWS
 
-Rows are of trajectories of 0.05 s: what a row costs in memory does not go by its time.
+The trajectories last 0.05 s, because the memory of a row does not depend on its duration.
 """
 
 import resource
@@ -26,25 +26,25 @@ GRID = {
 
 
 def peak_mb():
-    """The most memory that this process has had."""
+    """Returns the peak memory of this process (MiB)."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def main():
-    """Measure and tell."""
+    """Measures a call and prints the result."""
     rows = int(sys.argv[1])
     plan = washer_sweep.Plan(GRID)
     rng = np.random.default_rng(1)
     table = pa.table({"unbalance_mass_kg": rng.uniform(0.1, 0.9, rows),
                       "damping_n_s_per_m": rng.uniform(60.0, 300.0, rows)})
-    # Code and threads are there.
+    # The first call loads the code and starts the threads.
     plan.evaluate(table.slice(0, 1000))
-    before, began = peak_mb(), time.perf_counter()
+    peak_before_mb, start_s = peak_mb(), time.perf_counter()
     result = plan.evaluate(table)
-    took_s, more = time.perf_counter() - began, peak_mb() - before
-    held = pa.table(result).nbytes / 2**20
-    print(f"{rows} rows, {rows / took_s:.0f}/s: result {held:.1f} MB, {more - held:.1f} MB beside "
-          "it and the table")
+    elapsed_s, added_mb = time.perf_counter() - start_s, peak_mb() - peak_before_mb
+    result_mb = pa.table(result).nbytes / 2**20
+    print(f"{rows} rows, {rows / elapsed_s:.0f}/s: result {result_mb:.1f} MB, "
+          f"{added_mb - result_mb:.1f} MB beside it and the table")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 #!/bin/sh
-# Exports of a result, opened by the programs that people open them with:
+# Checks the exports of a result with common programs:
 # scripts/checks/check_exports.sh MAP.parquet
 #
-# SWEEP names another binary than the release build.
+# SWEEP names the binary; the default is the release build.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)

@@ -3,19 +3,19 @@
 
     python scripts/checks/check_lines.py [--language [CRATE ...]]
 
---language counts by crate what does not follow the rules of language, and fails nothing; with names
-of crates it lists the places in these. Without it, what crates that are clean have of this is a
-mistake (`language.py`).
+With --language the script only counts the deviations from the rules of language by crate; with
+names of crates it lists them. Without --language, a deviation in one of the crates that are free of
+deviations is a mistake (`language.py`).
 
-It looks for long lines in code, scripts, configuration and documents by the endings below. It
-excepts, because a line break would change what they are:
+Long lines are searched in code, scripts, configuration and documents with the endings below.
+Exceptions are lines that a line break would damage:
 
-- rows of Markdown tables, and what `text` blocks of Markdown quote of the program's output,
-- a line that is too long only by an address (https://...) in it,
-- pages that the program makes ("Made by" in a comment at their top),
-- the tests' inputs (`testdata/`, `fuzz/corpus/`).
+- rows of Markdown tables, and program output in `text` blocks of Markdown,
+- a line that is too long only because of a web address,
+- pages that the program generates ("Made by" in a comment at the top),
+- inputs of tests (`testdata/`, `fuzz/corpus/`).
 
-Python's own library is all it needs.
+Requires only the standard library.
 """
 
 import pathlib
@@ -26,52 +26,52 @@ import sys
 import language
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-COLUMNS = 100
+MAX_COLUMNS = 100
 ENDINGS = set("rs md py sh toml yml yaml js css html c h cpp".split())
-WITHOUT_ENDING = {".ci/run", "justfile"}
-INPUTS = re.compile(r"(^|/)testdata/|^fuzz/corpus/")
+FILES_WITHOUT_ENDING = {".ci/run", "justfile"}
+TEST_INPUTS = re.compile(r"(^|/)testdata/|^fuzz/corpus/")
 
 
 def checked_files():
-    """Paths of the files that the rule is for."""
-    listed = subprocess.run(
+    """Yields the paths of the checked files."""
+    listed_paths = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         cwd=ROOT, check=True, capture_output=True, text=True,
     ).stdout.split("\0")
-    for name in sorted(set(listed)):
-        wanted = name.rpartition(".")[2] in ENDINGS or name in WITHOUT_ENDING
-        if wanted and not INPUTS.search(name) and (ROOT / name).is_file():
+    for name in sorted(set(listed_paths)):
+        is_checked = name.rpartition(".")[2] in ENDINGS or name in FILES_WITHOUT_ENDING
+        if is_checked and not TEST_INPUTS.search(name) and (ROOT / name).is_file():
             yield name
 
 
 def long_lines(name):
-    """Numbers of the lines that are too long."""
+    """Yields the numbers of the lines that are too long."""
     lines = (ROOT / name).read_text().splitlines()
-    markdown = name.endswith(".md")
-    if markdown and any("<!-- Made by" in line for line in lines[:5]):
+    is_markdown = name.endswith(".md")
+    if is_markdown and any("<!-- Made by" in line for line in lines[:5]):
         return
     fence = None
     for number, line in enumerate(lines, 1):
-        if markdown and line.startswith("```"):
+        if is_markdown and line.startswith("```"):
             fence = None if fence is not None else line.removeprefix("```").strip()
-        quoted = markdown and (line.startswith("|") or fence == "text")
-        if not quoted and len(re.sub(r"https?://\S+", "", line)) > COLUMNS:
+        is_exempt = is_markdown and (line.startswith("|") or fence == "text")
+        if not is_exempt and len(re.sub(r"https?://\S+", "", line)) > MAX_COLUMNS:
             yield number
 
 
 def main():
-    """Check everything; exit with 1 if anything is wrong."""
+    """Prints all mistakes; returns 1 if there are any."""
     if sys.argv[1:2] == ["--language"]:
         print("\n".join(language.report(sys.argv[2:])))
         return 0
-    wrong = [(name, number) for name in checked_files() for number in long_lines(name)]
-    for name, number in wrong:
-        print(f"{name}:{number}: longer than {COLUMNS} columns", file=sys.stderr)
-    unlike = list(language.mistakes())
-    for mistake in unlike:
+    too_long = [(name, number) for name in checked_files() for number in long_lines(name)]
+    for name, number in too_long:
+        print(f"{name}:{number}: longer than {MAX_COLUMNS} columns", file=sys.stderr)
+    deviations = list(language.mistakes())
+    for mistake in deviations:
         print(mistake, file=sys.stderr)
-    print(f"lines: {len(wrong) + len(unlike)} mistakes", file=sys.stderr)
-    return 1 if wrong or unlike else 0
+    print(f"lines: {len(too_long) + len(deviations)} mistakes", file=sys.stderr)
+    return 1 if too_long or deviations else 0
 
 
 if __name__ == "__main__":

@@ -1,33 +1,33 @@
 #!/usr/bin/env bash
-# What packagers and terminals need: manual pages, completions, a short summary.
+# Checks the manual pages, the completions of shells and the summary of a run:
 # scripts/checks/check_manners.sh SWEEP_BINARY
 set -euo pipefail
 sweep=$1
 root=$(cd "$(dirname "$0")/../.." && pwd)
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
 
-# A page for each command that --help lists, and completions that name each.
-"$sweep" man "$work/man"
+# Each command that --help lists has a manual page and a completion.
+"$sweep" man "$folder/man"
 shells="bash zsh fish elvish powershell"
-for shell in $shells; do "$sweep" completions "$shell" > "$work/completions.$shell"; done
-bash -n "$work/completions.bash"
+for shell in $shells; do "$sweep" completions "$shell" > "$folder/completions.$shell"; done
+bash -n "$folder/completions.bash"
 commands=$("$sweep" --help | sed -n '/^Usage:/,/^Options:/p' | awk '/^  [a-z]/ { print $1 }')
 test "$(wc -w <<< "$commands")" -ge 11
 for command in $commands; do
-    grep -q "^\.SH SYNOPSIS" "$work/man/sweep-$command.1"
-    for shell in $shells; do grep -q -- "$command" "$work/completions.$shell"; done
-    # Examples first.
+    grep -q "^\.SH SYNOPSIS" "$folder/man/sweep-$command.1"
+    for shell in $shells; do grep -q -- "$command" "$folder/completions.$shell"; done
+    # The help of a command begins with examples.
     test "$("$sweep" "$command" --help | head -1)" = "Examples:"
 done
 
-# A summary of at most twelve lines, the next command last; nothing on standard output, no colour in
-# a file.
-"$sweep" run "$root/docs/examples/compact_grid.toml" --out "$work/compact.parquet" \
-    --progress none > "$work/out" 2> "$work/err"
-test ! -s "$work/out"
-test "$(wc -l < "$work/err")" -le 12
-tail -1 "$work/err" | grep -q 'next  sweep plot'
-! grep -q $'\x1b' "$work/err"
+# The summary has at most twelve lines and ends with the next command. It has no colour in a file,
+# and standard output is empty.
+"$sweep" run "$root/docs/examples/compact_grid.toml" --out "$folder/compact.parquet" \
+    --progress none > "$folder/out" 2> "$folder/err"
+test ! -s "$folder/out"
+test "$(wc -l < "$folder/err")" -le 12
+tail -1 "$folder/err" | grep -q 'next  sweep plot'
+! grep -q $'\x1b' "$folder/err"
 echo "manners: $(wc -w <<< "$commands") commands with examples, manual pages and completions;" \
-    "a summary of $(wc -l < "$work/err") lines"
+    "a summary of $(wc -l < "$folder/err") lines"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The example of docs/your_own_model.md as a crate of its own, outside of the workspace: its code,
-# and dependencies by path.
+# Builds and runs the example of docs/your_own_model.md as a crate outside of the workspace, with
+# dependencies by path.
 #
 #   scripts/checks/check_outside.sh [FOLDER]    default: target/ci/work/outside
 set -euo pipefail
@@ -9,7 +9,7 @@ folder=${1:-$root/target/ci/work/outside}
 mkdir -p "$folder/src"
 cp "$root/crates/ode-map/examples/two_springs.rs" "$folder/src/main.rs"
 cp "$root/crates/ode-map/examples/two_springs.toml" "$folder"
-# The versions that everything else is tested with.
+# Uses the dependencies' versions of the workspace.
 cp "$root/Cargo.lock" "$folder"
 cat > "$folder/Cargo.toml" << EOF
 [package]

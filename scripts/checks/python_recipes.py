@@ -1,11 +1,11 @@
-"""Runs the `python` blocks of the package's README and docs/python.md, then the recipes of
-docs/python, and holds what these print against their pages.
+"""Runs the `python` blocks of the package's README and of docs/python.md, then the recipes of
+docs/python, and compares the output of the recipes with their pages.
 
     python scripts/checks/python_recipes.py [--write]
 
-The blocks of a document are one program, in a folder with `sweeps/` and `crates/`. The first `text`
-block of a page holds what its script prints. --write renews these blocks and the pictures beside
-them.
+The blocks of a document are run as one program, in a folder with `sweeps/` and `crates/`. The first
+`text` block of a page has the output of its script. With --write the script updates these blocks
+and the pictures of the pages.
 """
 
 import pathlib
@@ -23,53 +23,54 @@ OUTPUT = re.compile(r"(?<=\n```text\n).*?(?=```\n)", re.DOTALL)
 
 
 def run_blocks(document):
-    """What goes wrong in the blocks of a document, if anything does."""
+    """Runs the blocks of a document; returns a list of its mistakes."""
     program = "".join(BLOCK.findall(document.read_text()))
     if not program:
         return [f"{document.name} has no `python` block"]
     with tempfile.TemporaryDirectory() as folder:
         for name in ["sweeps", "crates"]:
             pathlib.Path(folder, name).symlink_to(ROOT / name)
-        told = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True,
+        completed = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True,
                               text=True, check=False)
-    return [f"{document.name} fails:\n{told.stderr}"] if told.returncode != 0 else []
+    return [f"{document.name} fails:\n{completed.stderr}"] if completed.returncode != 0 else []
 
 
 def main():
-    """Run all; exit with 1 if a page differs."""
-    write = "--write" in sys.argv
-    wrong = []
+    """Runs all blocks and recipes; returns 1 if there are mistakes."""
+    must_write = "--write" in sys.argv
+    mistakes = []
     for document in DOCUMENTS:
-        began = time.perf_counter()
-        wrong += run_blocks(document)
-        print(f"{document.name}: {time.perf_counter() - began:.1f} s")
+        start_s = time.perf_counter()
+        mistakes += run_blocks(document)
+        print(f"{document.name}: {time.perf_counter() - start_s:.1f} s")
     scripts = {page.with_suffix(".py") for page in PAGES}
-    wrong += [f"{script} has no page" for script in set(ROOT.glob("docs/python/*.py")) - scripts]
+    mistakes += [f"{script} has no page" for script in set(ROOT.glob("docs/python/*.py")) - scripts]
     for page in PAGES:
-        began = time.perf_counter()
+        start_s = time.perf_counter()
         with tempfile.TemporaryDirectory() as folder:
             picture = pathlib.Path(folder, "picture.svg")
             words = [sys.executable, page.with_suffix(".py"), picture]
-            told = subprocess.run(words, capture_output=True, text=True, check=False)
-            if told.returncode != 0:
-                wrong.append(f"{page.stem} fails:\n{told.stderr}")
+            completed = subprocess.run(words, capture_output=True, text=True, check=False)
+            if completed.returncode != 0:
+                mistakes.append(f"{page.stem} fails:\n{completed.stderr}")
                 continue
-            if write:
+            if must_write:
                 page.with_suffix(".svg").write_bytes(picture.read_bytes())
             elif not picture.stat().st_size or not page.with_suffix(".svg").exists():
-                wrong.append(f"{page.stem} has drawn nothing, or its page has no picture")
+                mistakes.append(f"{page.stem} has drawn nothing, or its page has no picture")
         text = page.read_text()
-        shown = OUTPUT.search(text)
-        if shown is None or f"({page.stem}.svg)" not in text:
-            wrong.append(f"{page.name} shows no output or no picture")
-        elif write:
-            page.write_text(OUTPUT.sub(lambda _: told.stdout, text, count=1))
-        elif shown[0] != told.stdout:
-            wrong.append(f"{page.name} shows\n{shown[0]}and the script prints\n{told.stdout}")
-        print(f"{page.stem}: {time.perf_counter() - began:.1f} s")
-    for line in wrong:
+        output_block = OUTPUT.search(text)
+        if output_block is None or f"({page.stem}.svg)" not in text:
+            mistakes.append(f"{page.name} shows no output or no picture")
+        elif must_write:
+            page.write_text(OUTPUT.sub(lambda _: completed.stdout, text, count=1))
+        elif output_block[0] != completed.stdout:
+            mistakes.append(f"{page.name} shows\n{output_block[0]}"
+                            f"and the script prints\n{completed.stdout}")
+        print(f"{page.stem}: {time.perf_counter() - start_s:.1f} s")
+    for line in mistakes:
         print(line, file=sys.stderr)
-    return 1 if wrong else 0
+    return 1 if mistakes else 0
 
 
 if __name__ == "__main__":

@@ -1,22 +1,22 @@
 #!/bin/sh
-# Every reading recipe, as a reader runs it, and all held against each other:
+# Runs every reading recipe as a script, and compares the recipes with each other:
 # scripts/checks/recipes.sh MAP.parquet
 set -eu
 root=$(cd "$(dirname "$0")/../.." && pwd)
 python=$root/scripts/tools/python.sh
 map=$1
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
 
 for recipe in "$root"/docs/recipes/with_*.py; do
-    "$python" "$recipe" "$map" 0.6 "$work/$(basename "$recipe").png" > "$work/out" || {
-        cat "$work/out"
+    "$python" "$recipe" "$map" 0.6 "$folder/$(basename "$recipe").png" > "$folder/out" || {
+        cat "$folder/out"
         exit 1
     }
-    echo "$(basename "$recipe"): $(tail -1 "$work/out")"
+    echo "$(basename "$recipe"): $(tail -1 "$folder/out")"
 done
-# The one that draws has drawn, and so has the script that stands beside the recipes.
-test -s "$work/with_xarray.py.png"
-"$python" "$root/scripts/figures/plot_map.py" "$map" -o "$work/map.png"
-test -s "$work/map.png"
+# One recipe and plot_map.py draw a picture.
+test -s "$folder/with_xarray.py.png"
+"$python" "$root/scripts/figures/plot_map.py" "$map" -o "$folder/map.png"
+test -s "$folder/map.png"
 "$python" "$root/scripts/checks/check_recipes.py" "$map"

@@ -1,6 +1,6 @@
 #!/bin/sh
-# The CI kit of docs/workflows in a throw-away repository whose grid names a machine file in another
-# folder: its scripts, with `gh` and the release's server replaced by stand-ins on this machine.
+# Checks the scripts of the CI kit of docs/workflows in a temporary repository, whose grid names a
+# machine file in another folder. `gh` and the release's server are replaced by local substitutes.
 #
 #     scripts/checks/workflow.sh SWEEP
 set -eu
@@ -10,7 +10,7 @@ home=$(mktemp -d)
 trap 'rm -rf "$home"' EXIT
 fails() { echo "workflow.sh: $1" >&2; exit 1; }
 
-# A release, on a file system: its archive with its digest.
+# Creates a release in a folder: an archive with its digest.
 name=sweep-1.2.3-$(uname -m)-linux
 release=$home/origin/releases/download/v1.2.3
 mkdir -p "$release" "$home/$name"
@@ -19,7 +19,7 @@ cp "$sweep" "$home/$name/sweep"
 (cd "$release" && sha256sum "$name.tar.gz" > "$name.tar.gz.sha256")
 sh "$kit/install.sh" "file://$home/origin" v1.2.3 "$home/tool" > /dev/null
 rm -r "$home/origin"
-# From the cache now: the release is gone.
+# Installs from the cache, because the release is deleted.
 sh "$kit/install.sh" "file://$home/origin" v1.2.3 "$home/tool"
 PATH=$home/tool/bin:$home/bin:$PATH
 export PATH
@@ -50,7 +50,7 @@ compare() {
 }
 compare 0 "nothing has changed"
 grep -q "They do not differ" out/summary.md || fails "no word that nothing differs"
-# The change is in the machine's file, in another folder than the grid's.
+# Changes the machine file, which is not in the folder of the grid.
 sed -i 's/23.87/20.0/' machines/mine.toml
 FAIL_ON=plan compare 4 "another machine"
 grep -q mass_kg out/summary.md || fails "the machine's change is not told"
@@ -59,14 +59,14 @@ grep -q FAILS out/summary.md || fails "the gate is not told"
 sed 's/0.5/0.6/' grids/my.toml > grids/new.toml
 sh "$kit/compare.sh" HEAD grids/new.toml out > /dev/null 2>&1 || fails "a new grid"
 
-# Differences over one axis have no picture; the gate is checked all the same.
+# Differences over one axis have no picture, but the gate is checked.
 head -n 6 grids/my.toml > grids/one.toml
 git add grids/one.toml && git commit -qm "One axis"
 code=0
 GATE='ratio_max < 0' sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
 [ "$code" = 4 ] && grep -q FAILS out/summary.md || fails "a grid of one axis: exit code $code"
 
-# A tolerance moves with the machine's number; the points correspond.
+# The points of a tolerance are matched although its middle differs between the machines.
 git checkout -q machines/mine.toml
 { head -n 3 grids/my.toml; cat << 'GRID'
 design = { method = "monte_carlo", points = 4 }
@@ -81,7 +81,7 @@ sh "$kit/compare.sh" HEAD grids/tolerance.toml out > log.txt 2>&1 ||
     { cat log.txt; fails "a tolerance about another number"; }
 grep -q "rows: 4 in both" out/summary.md || fails "points of a tolerance are not matched"
 
-# Maps without a common row cannot be compared, which the summary says; the gate is checked too.
+# The summary says that maps without a common row cannot be compared, and the gate is checked.
 sed 's/values = .*/values = [0.3]/' grids/one.toml > grids/other.toml
 mv grids/other.toml grids/one.toml
 code=0
@@ -90,7 +90,7 @@ sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
 grep -q "they share no row" out/summary.md || fails "the refusal of the comparison is not told"
 grep -q "^holds" out/summary.md || fails "no gate after a refused comparison"
 
-# A pull request that mends the base's grid passes, and one that breaks it says why it does not.
+# A pull request that repairs the base's grid passes; one that breaks it fails with the reason.
 sed 's/ramp_s = 4.0/ramp_s = -1/' grids/my.toml > grids/broken.toml
 git add grids/broken.toml && git commit -qm "A broken grid"
 cp grids/my.toml grids/broken.toml
@@ -102,7 +102,8 @@ code=0
 sh "$kit/compare.sh" HEAD grids/broken.toml out > /dev/null 2>&1 || code=$?
 [ "$code" = 2 ] && grep -q "ramp_s" out/summary.md || fails "a broken grid: exit code $code"
 
-# `gh` keeps one comment a file: posting twice leaves one, with the later text.
+# The substitute of `gh` stores each comment in a file. Posting twice must leave one comment, with
+# the later text.
 mkdir -p "$home/bin" "$home/comments"
 cat > "$home/bin/gh" << 'GH'
 #!/bin/sh
@@ -126,7 +127,7 @@ sh "$kit/comment.sh" out/summary.md me/mine 7
 [ "$(ls "$home/comments" | wc -l)" = 2 ] || fails "not one comment"
 grep -q "a later run" "$home/comments/2" || fails "the comment is not the last run's"
 
-# The action's steps call scripts that exist, with inputs that it has.
+# The steps of the action call existing scripts with existing inputs.
 for script in $(grep -o '[a-z]*\.sh' "$kit/action.yml" | sort -u); do
     [ -x "$kit/$script" ] || fails "the action calls $script"
 done
