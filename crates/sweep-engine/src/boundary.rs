@@ -69,7 +69,7 @@ pub struct SearchRange {
 
 named! {
     /// The kind of a row of the boundary file, in the order of the file's dictionary.
-    pub enum EdgeKind {
+    pub enum SideChangeKind {
         /// The quantity passes its limit continuously within the bracket.
         Crossing = "crossing",
         /// The quantity jumps over its limit within the bracket.
@@ -86,11 +86,12 @@ named! {
     }
 }
 
-/// An edge: a position at which the side changes, or the statement that there is none.
+/// A change of side on a line: the bracket in which the quantity passes its limit, jumps over it or
+/// becomes undefined, or the statement that there is no change.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub struct SideChange {
     /// The kind.
-    pub kind: EdgeKind,
+    pub kind: SideChangeKind,
     /// The value of the second axis at which the quantity is at its limit; `None` unless it is a
     /// crossing.
     pub position: Option<f64>,
@@ -100,13 +101,13 @@ pub struct Edge {
     pub distances: [Option<f64>; 2],
 }
 
-/// The edges of the boundary at one value of the first axis.
+/// The changes of side at one value of the first axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundaryRow {
     /// The value of the first axis.
     pub first: f64,
-    /// The edges from the least to the greatest value of the second axis; never empty.
-    pub edges: Vec<Edge>,
+    /// The changes of side from the least to the greatest value of the second axis; never empty.
+    pub side_changes: Vec<SideChange>,
     /// The number of points evaluated.
     pub trials: usize,
 }

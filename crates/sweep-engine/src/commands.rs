@@ -50,9 +50,9 @@ pub trait Arguments {
 
 /// The arguments of a program that adds no options.
 #[derive(Debug)]
-pub enum Unextended {}
+pub enum BaseArguments {}
 
-impl Arguments for Unextended {
+impl Arguments for BaseArguments {
     type Run = run::RunArgs;
     type Check = check::CheckArgs;
     type Plot = plot::PlotArgs;
@@ -95,10 +95,10 @@ pub enum GeneralCommand<A: Arguments> {
 }
 
 #[derive(Debug, Parser)]
-#[command(after_help = Exit::table(), disable_help_subcommand = true)]
+#[command(after_help = Exit::format_codes(), disable_help_subcommand = true)]
 struct Cli {
     #[command(subcommand)]
-    command: GeneralCommand<Unextended>,
+    command: GeneralCommand<BaseArguments>,
 }
 
 /// Runs the command that this process's arguments give, and returns its exit code. `name` is the
@@ -109,13 +109,13 @@ pub fn main<M: Model>(name: &'static str) -> ExitCode {
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let exit = run::<M>(&cli.command).unwrap_or_else(|error| {
         error.report();
-        error.exit()
+        error.exit_code()
     });
     exit.into()
 }
 
-fn run<M: Model>(command: &GeneralCommand<Unextended>) -> Result<Exit, Error> {
-    survive_file_size_limits().map_err(Error::signals)?;
+fn run<M: Model>(command: &GeneralCommand<BaseArguments>) -> Result<Exit, Error> {
+    survive_file_size_limits().map_err(Error::signal_handlers)?;
     check_random_numbers()?;
     match command {
         GeneralCommand::Run(args) => run::run::<M>(args),

@@ -21,7 +21,7 @@ pub type RowLookup<'a> = dyn Fn(u64) -> Option<PointRows> + Sync + 'a;
 /// An evaluator of the rows of a plan.
 pub trait Evaluator: Sync {
     /// Evaluates rows until the source is empty, on the grid or between its points, and passes each
-    /// result to the sink, in any order. Leaves rows unevaluated only if [`RunContext::stopped`]
+    /// result to the sink, in any order. Leaves rows unevaluated only if [`RunContext::must_stop`]
     /// holds. Works on all threads of the rayon pool that it is called in, and calls source and
     /// sink from any of them.
     ///
@@ -38,8 +38,8 @@ pub fn evaluate_points(
     axis_values: &[Vec<f64>],
     context: &RunContext<'_>,
 ) -> Option<Vec<PointRows>> {
-    let remaining = Mutex::new(axis_values.iter().enumerate());
-    let source = || lock(&remaining).next().map(|(point, values)| (point as u64, values.clone()));
+    let queue = Mutex::new(axis_values.iter().enumerate());
+    let source = || lock(&queue).next().map(|(point, values)| (point as u64, values.clone()));
     let results = Mutex::new(Vec::with_capacity(axis_values.len()));
     let sink = |result: PointRows| lock(&results).push(result);
     evaluator.evaluate(&source, &sink, context);
@@ -56,7 +56,7 @@ pub struct Engine<'a> {
     pub simd: &'static str,
     /// Whether consecutive rows share work. If so, the source yields points in the grid's order;
     /// otherwise it yields chunks that are far apart.
-    pub is_helped_by_neighbours: bool,
+    pub shares_work_of_rows: bool,
     /// The function that returns the reason, in words, why a point of the grid fails; `None` if the
     /// reason is not known.
     pub failure_reason: Box<dyn Fn(u64) -> Option<String> + Sync + 'a>,
@@ -68,7 +68,7 @@ impl<'a> Engine<'a> {
         Self {
             evaluator: Box::new(evaluator),
             simd,
-            is_helped_by_neighbours: false,
+            shares_work_of_rows: false,
             failure_reason: Box::new(|_| None),
         }
     }
@@ -82,7 +82,7 @@ pub struct RunContext<'a> {
     is_aborted: AtomicBool,
     points_done: AtomicU64,
     is_late: Option<&'a (dyn Fn() -> bool + Sync)>,
-    known: Option<&'a RowLookup<'a>>,
+    row_lookup: Option<&'a RowLookup<'a>>,
 }
 
 impl<'a> RunContext<'a> {
@@ -93,13 +93,13 @@ impl<'a> RunContext<'a> {
             is_aborted: AtomicBool::new(false),
             points_done: AtomicU64::new(0),
             is_late: None,
-            known: None,
+            row_lookup: None,
         }
     }
 
     /// Creates a context with the rows that earlier processes have stored.
-    pub const fn with_known_rows(interrupt: &'a Interrupt, known: &'a RowLookup<'a>) -> Self {
-        Self { known: Some(known), ..Self::new(interrupt) }
+    pub const fn with_known_rows(interrupt: &'a Interrupt, row_lookup: &'a RowLookup<'a>) -> Self {
+        Self { row_lookup: Some(row_lookup), ..Self::new(interrupt) }
     }
 
     /// Creates a context that stops the engine once `is_late` returns true.
@@ -111,8 +111,8 @@ impl<'a> RunContext<'a> {
     }
 
     /// Returns a row that any process has stored.
-    pub fn known(&self, row: u64) -> Option<PointRows> {
-        self.known.and_then(|known| known(row))
+    pub fn find_known_row(&self, row: u64) -> Option<PointRows> {
+        self.row_lookup.and_then(|look_up| look_up(row))
     }
 
     /// Adds to the number of points done, which progress shows.

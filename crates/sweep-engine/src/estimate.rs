@@ -19,7 +19,7 @@ pub struct Estimate {
     /// The time of one core for one point.
     pub core_s_per_point: f64,
     /// The numbers of points that were integrated for the estimate, by status.
-    pub sampled: NameCounts,
+    pub sample_statuses: NameCounts,
     /// The time up to which these points were integrated; at most the plan's `end_s`.
     pub sampled_s: f64,
     /// The peak memory.
@@ -60,16 +60,16 @@ impl Estimate {
         let axis_values: Vec<Vec<f64>> = (0..points).map(|point| plan.axis_values(point)).collect();
         let interrupt = Interrupt::new();
         let context = RunContext::new(&interrupt);
-        let pool = threads::pool(1)?;
+        let pool = threads::build_pool(1)?;
         let start = Instant::now();
         let results =
             pool.install(|| evaluate_points(engine.evaluator.as_ref(), &axis_values, &context));
         let core_s_per_point = start.elapsed().as_secs_f64() / points as f64;
         let layout = M::layout(plan);
-        let mut sampled = NameCounts::new();
+        let mut sample_statuses = NameCounts::new();
         for row in results.iter().flatten().flat_map(|result| &result.rows) {
             if let Some(status) = layout.name(row, "status") {
-                count_name(&mut sampled, status);
+                count_name(&mut sample_statuses, status);
             }
         }
         let result_bytes = plan.points() as f64 * layout.bytes_per_row() as f64;
@@ -83,7 +83,7 @@ impl Estimate {
             threads,
             wall_s: plan.points() as f64 * core_s_per_point / threads as f64,
             core_s_per_point,
-            sampled,
+            sample_statuses,
             sampled_s: plan.end_s,
             memory_bytes: PROGRAM_BYTES + result_bytes.min(ROW_GROUP_BYTES),
             disk_bytes: result_bytes,
@@ -96,7 +96,7 @@ impl Estimate {
 }
 
 /// Formats a size with three digits.
-pub fn size(bytes: f64) -> String {
+pub fn format_bytes(bytes: f64) -> String {
     /// The units, each 1000 times the one before.
     const UNITS: [&str; 5] = ["bytes", "kB", "MB", "GB", "TB"];
     let mut scaled = bytes;
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn sizes_have_readable_units() {
-        let formatted = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(size);
+        let formatted = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(format_bytes);
         assert_eq!(
             formatted,
             ["0 bytes", "999 bytes", "1.2 kB", "56.7 MB", "1.0 GB", "2.0 GB", "3000 TB"]

@@ -64,7 +64,7 @@ impl<'a> CachedEvaluator<'a> {
     ) -> Result<Self, ThreadsError> {
         Ok(Self {
             engine,
-            pool: threads::pool(threads)?,
+            pool: threads::build_pool(threads)?,
             interrupt,
             cache: Mutex::new(cache),
             responses: AtomicU64::new(0),
@@ -91,24 +91,27 @@ impl<'a> CachedEvaluator<'a> {
         axis_values: &(dyn Fn(usize, u64) -> Vec<f64> + Sync),
         respond: &(dyn Fn(usize, Vec<PointRows>) -> Result<RequestValues, StoreError> + Sync),
     ) -> Result<Vec<RequestValues>, SearchStop> {
-        let cached: Vec<Option<RequestValues>> = keys.iter().map(|key| self.look_up(key)).collect();
-        let missing: Vec<usize> = (0..keys.len()).filter(|&k| cached[k].is_none()).collect();
-        self.count_responses((keys.len() - missing.len()) as u64);
+        let cached_responses: Vec<Option<RequestValues>> =
+            keys.iter().map(|key| self.look_up(key)).collect();
+        let missing_requests: Vec<usize> =
+            (0..keys.len()).filter(|&k| cached_responses[k].is_none()).collect();
+        self.count_responses((keys.len() - missing_requests.len()) as u64);
         // The points of all requests are one queue, so that they fill lanes together.
-        let queue = Mutex::new(missing.iter().flat_map(|&k| (0..rows).map(move |row| (k, row))));
+        let queue =
+            Mutex::new(missing_requests.iter().flat_map(|&k| (0..rows).map(move |row| (k, row))));
         let context = RunContext::new(self.interrupt);
         let source = || {
             let (k, row) = if context.must_stop() { None } else { lock(&queue).next() }?;
             Some((k as u64 * rows + row, axis_values(k, row)))
         };
-        let mut responses = cached;
+        let mut responses = cached_responses;
         let mut failure = None;
         let groups = IncompleteGroups::default();
         let (sender, receiver) = channel();
         let evaluator = &self.engine.evaluator;
         // The calling thread writes while the pool evaluates.
         self.pool.in_place_scope(|scope| {
-            if missing.is_empty() {
+            if missing_requests.is_empty() {
                 drop(sender);
             } else {
                 scope.spawn(|_| {

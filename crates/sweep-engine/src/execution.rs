@@ -22,8 +22,8 @@ impl Execution<'_> {
     /// An invalid number, given by the caller or by a scheduler.
     pub fn threads(&self) -> Result<usize, ThreadsError> {
         match self.threads {
-            Some(threads) => threads::checked(threads),
-            None => threads::count(None, &threads::process),
+            Some(threads) => threads::check_count(threads),
+            None => threads::choose_count(None, &threads::read_variable),
         }
     }
 }
@@ -32,7 +32,7 @@ impl Execution<'_> {
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct ExecutionArgs {
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    #[arg(long, value_name = "N", value_parser = threads::parse_count)]
     pub threads: Option<usize>,
     /// Display of progress: auto (a bar on a terminal, else a line a minute), plain (a line every
     /// 5 s) or none
@@ -47,7 +47,7 @@ pub struct ExecutionArgs {
 
 impl ExecutionArgs {
     /// Adds an interrupt to the options.
-    pub fn with(self, interrupt: &Interrupt) -> Execution<'_> {
+    pub fn with_interrupt(self, interrupt: &Interrupt) -> Execution<'_> {
         Execution { threads: self.threads, progress: self.progress, interrupt }
     }
 }

@@ -23,7 +23,7 @@ pub enum Exit {
     PointsFailed = 3,
     /// A condition of `require`, `report` or `compare --fail-on` is violated, or `optimise` found
     /// no feasible candidate.
-    NotHeld = 4,
+    ConditionViolated = 4,
     /// Another run has locked the output.
     Busy = 75,
     /// SIGHUP ended the command.
@@ -42,7 +42,7 @@ impl Exit {
         (Self::BadInput, "bad input, or an unreadable file: refused before any work"),
         (Self::PointsFailed, "with --fail-on-error: done, but some points failed"),
         (
-            Self::NotHeld,
+            Self::ConditionViolated,
             "done, but a condition of require, report, compare or optimise does not hold",
         ),
         (Self::Busy, "another run holds this output"),
@@ -61,7 +61,7 @@ impl Exit {
     }
 
     /// Formats all codes with their meanings for `--help`.
-    pub fn table() -> String {
+    pub fn format_codes() -> String {
         let line = |(exit, meaning)| format!("\n  {:>3}  {meaning}", exit as u8);
         let outputs = "Results go to standard output, messages to standard error.";
         format!("{outputs}\n\nExit codes:{}", Self::ALL.map(line).concat())
@@ -123,7 +123,7 @@ impl Error {
     }
 
     /// Creates the error of signal handlers that cannot be installed.
-    pub fn signals(source: std::io::Error) -> Self {
+    pub fn signal_handlers(source: std::io::Error) -> Self {
         Self::File { action: "install signal handlers for", path: "this process".into(), source }
     }
 
@@ -133,7 +133,7 @@ impl Error {
     }
 
     /// Returns the exit code.
-    pub fn exit(&self) -> Exit {
+    pub fn exit_code(&self) -> Exit {
         let is_refusal = match self {
             Self::Files(error)
             | Self::Results(ResultsError::File(error))
@@ -157,7 +157,7 @@ impl Error {
                 let text = diagnostics.styled();
                 // The escapes in this text are those of colours, because the renderer has replaced
                 // the escapes in quoted input.
-                let text = escaped(&text, |letter| letter != '\x1b' && is_unsafe(letter));
+                let text = escape(&text, |letter| letter != '\x1b' && is_unsafe(letter));
                 // Without standard error, only the exit code reports the error.
                 let _ = writeln!(anstream::stderr(), "{text}");
             }
@@ -173,7 +173,7 @@ fn is_unsafe(letter: char) -> bool {
 }
 
 /// Returns a text with some characters written as `\u001b`, which is their form in JSON too.
-fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> String {
+fn escape(text: &str, is_bad: impl Fn(char) -> bool) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         if is_bad(c) {
@@ -192,7 +192,7 @@ fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> String {
 /// # Errors
 /// The errors of [`print()`].
 pub fn show(text: &str) -> Result<Exit, Error> {
-    print(&escaped(text, is_unsafe))
+    print(&escape(text, is_unsafe))
 }
 
 /// Writes the output of a command (a script, a file) to standard output without changes. A reader
@@ -211,7 +211,7 @@ pub fn print(text: &str) -> Result<Exit, Error> {
 /// Writes a message to standard error, with control characters escaped.
 pub fn tell(text: &str) {
     // Without standard error, the message is lost.
-    let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));
+    let _ = writeln!(anstream::stderr(), "{}", escape(text, is_unsafe));
 }
 
 #[cfg(test)]
@@ -222,18 +222,18 @@ mod tests {
     fn exit_codes_do_not_change() {
         assert_eq!(Exit::ALL.map(|(exit, _)| exit as u8), [0, 1, 2, 3, 4, 75, 129, 130, 143]);
         for (_, meaning) in Exit::ALL {
-            assert!(Exit::table().contains(meaning));
+            assert!(Exit::format_codes().contains(meaning));
         }
     }
 
     #[test]
     fn control_characters_are_escaped_and_text_stays() {
-        let text = escaped("a\x1b[2J\u{9b}3m\r\u{202e}é\tb\n", is_unsafe);
+        let text = escape("a\x1b[2J\u{9b}3m\r\u{202e}é\tb\n", is_unsafe);
         assert_eq!(text, "a\\u001b[2J\\u009b3m\\u000d\\u202eé\tb\n");
         let json = serde_json::json!({ "host": "a\u{9b}\x07b" }).to_string();
-        let parsed: serde_json::Value = serde_json::from_str(&escaped(&json, is_unsafe)).unwrap();
+        let parsed: serde_json::Value = serde_json::from_str(&escape(&json, is_unsafe)).unwrap();
         assert_eq!(parsed["host"], "a\u{9b}\x07b");
-        assert_eq!(escaped("plain", is_unsafe), "plain");
+        assert_eq!(escape("plain", is_unsafe), "plain");
     }
 
     #[test]
@@ -248,7 +248,7 @@ mod tests {
             (ThreadsError::Scheduler { given: "0".to_owned() }.into(), Exit::BadInput),
             (StoreError::NoRun { output, folder }, Exit::Failed),
         ] {
-            assert_eq!(Error::Store(error).exit(), exit);
+            assert_eq!(Error::Store(error).exit_code(), exit);
         }
     }
 
@@ -257,15 +257,15 @@ mod tests {
         let io = |action, kind: io::ErrorKind| {
             let path = PathBuf::from("x.parquet");
             let source = kind.into();
-            Error::from(FileError::Io { action, path, source }).exit()
+            Error::from(FileError::Io { action, path, source }).exit_code()
         };
         assert_eq!(io("open", io::ErrorKind::NotFound), Exit::BadInput);
         assert_eq!(io("open", io::ErrorKind::Other), Exit::Failed);
         assert_eq!(io("write", io::ErrorKind::PermissionDenied), Exit::Failed);
         let path = PathBuf::from("x.parquet");
         let error = ResultsError::TemporaryFile { path, reason: "disk full".to_owned() };
-        assert_eq!(Error::from(error).exit(), Exit::Failed);
+        assert_eq!(Error::from(error).exit_code(), Exit::Failed);
         let error = FileError::damaged(&PathBuf::from("x.parquet"));
-        assert_eq!(Error::Plot(error.into()).exit(), Exit::BadInput);
+        assert_eq!(Error::Plot(error.into()).exit_code(), Exit::BadInput);
     }
 }

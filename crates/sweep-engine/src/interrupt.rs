@@ -40,7 +40,7 @@ pub fn check_random_numbers() -> Result<(), Error> {
 /// A flag, shared by all threads, that signals set in order to stop the work.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
-    stop: Arc<AtomicBool>,
+    stop_flag: Arc<AtomicBool>,
     signal: Arc<AtomicUsize>,
 }
 
@@ -60,16 +60,20 @@ impl Interrupt {
         for signal in [SIGINT, SIGTERM] {
             // The shutdown is registered first, so that it reads the flag before the same signal
             // sets the flag.
-            flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.stop))?;
+            flag::register_conditional_shutdown(
+                signal,
+                128 + signal,
+                Arc::clone(&interrupt.stop_flag),
+            )?;
             flag::register_usize(signal, Arc::clone(&interrupt.signal), signal as usize)?;
-            flag::register(signal, Arc::clone(&interrupt.stop))?;
+            flag::register(signal, Arc::clone(&interrupt.stop_flag))?;
         }
         // A closing terminal may send SIGHUP twice, so that a second one must not end the process.
         #[cfg(target_os = "linux")]
         if !ignores_hangups() {
             use signal_hook::consts::SIGHUP;
             flag::register_usize(SIGHUP, Arc::clone(&interrupt.signal), SIGHUP as usize)?;
-            flag::register(SIGHUP, Arc::clone(&interrupt.stop))?;
+            flag::register(SIGHUP, Arc::clone(&interrupt.stop_flag))?;
         }
         Ok(interrupt)
     }
@@ -77,17 +81,17 @@ impl Interrupt {
     /// Sets the flag, as a signal of this number does.
     pub fn raise(&self, signal: usize) {
         self.signal.store(signal, Ordering::Relaxed);
-        self.stop.store(true, Ordering::Release);
+        self.stop_flag.store(true, Ordering::Release);
     }
 
     /// Returns the flag itself, which long computations poll.
     pub fn flag(&self) -> &AtomicBool {
-        &self.stop
+        &self.stop_flag
     }
 
     /// Returns whether the flag is set.
     pub fn is_raised(&self) -> bool {
-        self.stop.load(Ordering::Acquire)
+        self.stop_flag.load(Ordering::Acquire)
     }
 
     /// Returns the signal that set the flag (1 for SIGHUP, 2 for SIGINT, 15 for SIGTERM).

@@ -47,7 +47,7 @@ pub use interrupt::{Interrupt, check_random_numbers, survive_file_size_limits};
 pub use model::{About, GridTable, ModelFile};
 pub use plan::{Axis, AxisTolerance, AxisValues, Plan, Reliability};
 pub use program::program;
-pub use progress::{Progress, ProgressMode, duration};
+pub use progress::{Progress, ProgressMode, format_duration};
 pub use store::{Job, StoreError};
 pub use table::Table;
 pub use threads::{Environment, ThreadsError};

@@ -31,9 +31,9 @@ pub struct About {
     pub start_advice: Option<&'static str>,
     /// The settings that optional columns require, each by the prefix of the columns' names (the
     /// part before the first underscore).
-    pub needed: &'static [(&'static str, &'static str)],
+    pub required_settings: &'static [(&'static str, &'static str)],
     /// The sentence about optional columns in the message about an unknown column.
-    pub further: &'static str,
+    pub further_columns: &'static str,
 }
 
 /// A file of a model's own.
@@ -60,8 +60,8 @@ impl About {
             methods,
             model_file: None,
             start_advice: None,
-            needed: &[],
-            further: "",
+            required_settings: &[],
+            further_columns: "",
         }
     }
 

@@ -28,32 +28,37 @@ pub struct Progress {
     noun: &'static str,
     /// The number of points that were stored at the start. These points count as done, but not in
     /// the rate.
-    start: u64,
-    began: Instant,
+    stored_points: u64,
+    start_time: Instant,
 }
 
 /// The form of the display.
 enum Display {
     Bar(ProgressBar),
-    Lines { every: Duration, next: Instant },
+    Lines { interval: Duration, next_line_time: Instant },
     Nothing,
 }
 
 impl Progress {
     /// Creates the display of a run and shows it.
-    pub fn new(mode: ProgressMode, total: u64, start: u64) -> Self {
-        let progress = Self::for_search(mode, total, "points", start);
-        progress.show(start);
+    pub fn new(mode: ProgressMode, total: u64, stored_points: u64) -> Self {
+        let progress = Self::for_search(mode, total, "points", stored_points);
+        progress.show(stored_points);
         progress
     }
 
     /// Creates the display of a search, whose number of points is not known in advance. It counts
     /// units up to a total; if the total is 0, it counts points only. `noun` is the plural noun for
-    /// the units, `start` the number of points that were stored at the start.
-    pub fn for_search(mode: ProgressMode, total: u64, noun: &'static str, start: u64) -> Self {
+    /// the units, `stored_points` the number of points that were stored at the start.
+    pub fn for_search(
+        mode: ProgressMode,
+        total: u64,
+        noun: &'static str,
+        stored_points: u64,
+    ) -> Self {
         let lines = |seconds| {
-            let every = Duration::from_secs(seconds);
-            Display::Lines { every, next: Instant::now() + every }
+            let interval = Duration::from_secs(seconds);
+            Display::Lines { interval, next_line_time: Instant::now() + interval }
         };
         let display = match mode {
             ProgressMode::None => Display::Nothing,
@@ -62,7 +67,7 @@ impl Progress {
                 let target = ProgressDrawTarget::stderr_with_hz(8);
                 let bar = ProgressBar::with_draw_target(Some(total), target);
                 bar.enable_steady_tick(Duration::from_millis(125));
-                Display::Bar(bar.with_style(style(if total == 0 {
+                Display::Bar(bar.with_style(create_style(if total == 0 {
                     SPINNER_TEMPLATE
                 } else {
                     BAR_TEMPLATE
@@ -70,21 +75,27 @@ impl Progress {
             }
             ProgressMode::Auto => lines(60),
         };
-        Self { display: Mutex::new(display), total, noun, start, began: Instant::now() }
+        Self {
+            display: Mutex::new(display),
+            total,
+            noun,
+            stored_points,
+            start_time: Instant::now(),
+        }
     }
 
     /// Shows that `done` points are done.
     pub fn show(&self, done: u64) {
-        self.update(done, || self.line(done));
+        self.update(done, || self.format_line(done));
     }
 
     /// Shows that `done` units of a search are done, with a number of points.
     pub fn show_search(&self, done: u64, points: u64) {
-        self.update(done, || self.search_line(done, points));
+        self.update(done, || self.format_search_line(done, points));
     }
 
-    fn search_line(&self, done: u64, points: u64) -> String {
-        let rate = per_second(self.rate(points));
+    fn format_search_line(&self, done: u64, points: u64) -> String {
+        let rate = format_rate(self.rate(points));
         let points = format!("{}, {rate}", format_count(points as usize, "point"));
         match (self.total, self.noun) {
             (0, _) => points,
@@ -101,10 +112,10 @@ impl Progress {
                 bar.set_position(position);
                 bar.set_message(text());
             }
-            Display::Lines { every, next } if Instant::now() >= *next => {
+            Display::Lines { interval, next_line_time } if Instant::now() >= *next_line_time => {
                 // A log that cannot be written must not end the run.
                 let _ = writeln!(std::io::stderr(), "{}", text());
-                *next = Instant::now() + *every;
+                *next_line_time = Instant::now() + *interval;
             }
             _ => {}
         }
@@ -112,13 +123,14 @@ impl Progress {
 
     /// Returns the points per second of this process.
     fn rate(&self, done: u64) -> f64 {
-        done.saturating_sub(self.start) as f64 / self.began.elapsed().as_secs_f64().max(1e-9)
+        done.saturating_sub(self.stored_points) as f64
+            / self.start_time.elapsed().as_secs_f64().max(1e-9)
     }
 
     /// Shows in the bar that the chunks are being joined.
-    pub fn joining(&self) {
+    pub fn show_joining(&self) {
         if let Display::Bar(bar) = &*lock(&self.display) {
-            bar.set_style(style("{spinner} joining {human_len} points"));
+            bar.set_style(create_style("{spinner} joining {human_len} points"));
             bar.tick();
         }
     }
@@ -130,7 +142,7 @@ impl Progress {
         }
     }
 
-    fn line(&self, done: u64) -> String {
+    fn format_line(&self, done: u64) -> String {
         let rate = self.rate(done);
         let percent = 100.0 * done as f64 / self.total.max(1) as f64;
         let position = format!("{done} of {} points ({percent:.1} %)", self.total);
@@ -138,8 +150,8 @@ impl Progress {
         if rate == 0.0 {
             return position;
         }
-        let remaining_time = duration(self.total.saturating_sub(done) as f64 / rate);
-        format!("{position}, {}, {remaining_time} left", per_second(rate))
+        let remaining_time = format_duration(self.total.saturating_sub(done) as f64 / rate);
+        format!("{position}, {}, {remaining_time} left", format_rate(rate))
     }
 }
 
@@ -149,12 +161,12 @@ const BAR_TEMPLATE: &str = "{wide_bar} {msg}";
 /// The template of a search without a total.
 const SPINNER_TEMPLATE: &str = "{spinner} {msg}";
 
-fn style(template: &str) -> ProgressStyle {
+fn create_style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 /// Formats a duration: `0.42 s`, `12 s`, `3 min 20 s`, `5 h 02 min`.
-pub fn duration(seconds: f64) -> String {
+pub fn format_duration(seconds: f64) -> String {
     if seconds < 10.0 {
         return format!("{seconds:.2} s");
     }
@@ -169,7 +181,7 @@ pub fn duration(seconds: f64) -> String {
 }
 
 /// Formats a rate with three digits.
-pub fn per_second(rate: f64) -> String {
+pub fn format_rate(rate: f64) -> String {
     if rate >= 100.0 { format!("{rate:.0} points/s") } else { format!("{rate:.3} points/s") }
 }
 
@@ -179,8 +191,10 @@ mod tests {
 
     #[test]
     fn durations_have_readable_units() {
-        let formatted: Vec<String> =
-            [0.416, 12.2, 200.0, 18_120.0, 1e6, f64::INFINITY].into_iter().map(duration).collect();
+        let formatted: Vec<String> = [0.416, 12.2, 200.0, 18_120.0, 1e6, f64::INFINITY]
+            .into_iter()
+            .map(format_duration)
+            .collect();
         assert_eq!(formatted[..5], ["0.42 s", "12 s", "3 min 20 s", "5 h 02 min", "11 days"]);
         assert!(formatted[5].ends_with("days"));
     }
@@ -188,8 +202,8 @@ mod tests {
     #[test]
     fn stored_points_count_as_done_but_not_in_the_rate() {
         let mut progress = Progress::new(ProgressMode::Plain, 1000, 900);
-        progress.began = Instant::now() - Duration::from_secs(10);
-        let line = progress.line(950);
+        progress.start_time = Instant::now() - Duration::from_secs(10);
+        let line = progress.format_line(950);
         assert!(line.starts_with("950 of 1000 points (95.0 %), 5.0"), "{line}");
         assert!(
             line.ends_with("10 s left")
@@ -197,14 +211,14 @@ mod tests {
                 || line.ends_with("10.00 s left"),
             "{line}"
         );
-        assert_eq!(progress.line(900), "900 of 1000 points (90.0 %)");
+        assert_eq!(progress.format_line(900), "900 of 1000 points (90.0 %)");
     }
 
     #[test]
     fn a_search_counts_units_and_the_rate_of_new_points() {
         let mut progress = Progress::for_search(ProgressMode::Plain, 39, "speeds", 100);
-        progress.began = Instant::now() - Duration::from_secs(10);
-        let line = progress.search_line(7, 200);
+        progress.start_time = Instant::now() - Duration::from_secs(10);
+        let line = progress.format_search_line(7, 200);
         assert!(line.starts_with("7 of 39 speeds, 200 points, "), "{line}");
         assert!((9.0..=10.0).contains(&progress.rate(200)), "{line}");
     }

@@ -1,6 +1,10 @@
 //! The runner of a job:
 //!
+//! 1. Open or create the run's folder, and find the missing chunks.
 //! 2. Have the engine evaluate the rows of these chunks on all cores.
+//! 3. Write each chunk when its rows are complete, and at the end the rows of chunks that a signal
+//!    or an error left incomplete.
+//! 4. Join the chunks into the result file.
 //!
 //! Memory: at most one chunk for each thread (4096 points, about 2 MB) and as many chunks that wait
 //! for the disk, then about 40 MB for the join. Only the set of missing chunks grows with the
@@ -50,7 +54,7 @@ pub struct RunOptions<'a> {
 #[derive(Debug)]
 pub enum RunEnd {
     /// The result existed already.
-    Already(Box<ResultFile>, Box<Tally>),
+    AlreadyFinished(Box<ResultFile>, Box<Tally>),
     /// The run was completed.
     Finished(Box<Tally>),
     /// The shard was completed, with these numbers of rows by status. `sweep merge` joins all
@@ -61,7 +65,7 @@ pub enum RunEnd {
         /// The signal.
         signal: u8,
         /// The number of stored points.
-        kept: u64,
+        stored_points: u64,
         /// The number of all points.
         points: u64,
     },
@@ -92,12 +96,12 @@ pub fn run(
     let RunOptions { threads, fresh, shard, environment, .. } = options;
     let mut run = match OpenRun::open(output, job, OpenOptions { fresh, shard, environment })? {
         OpenOutcome::Finished((file, tally)) => {
-            let end = RunEnd::Already(Box::new(file), Box::new(tally));
+            let end = RunEnd::AlreadyFinished(Box::new(file), Box::new(tally));
             return Ok(RunReport { end, session: None, notes: Vec::new() });
         }
         OpenOutcome::Open(run) => run,
     };
-    let (points, stored) = run.count_own_points();
+    let (points, stored_points) = run.count_own_points();
     if let Some(shard) = run.shard() {
         (options.tell)(&format!("shard {} of {}", shard.index, shard.count));
         note_idle_shards(job.points, shard.count).iter().for_each(|note| (options.tell)(note));
@@ -105,29 +109,29 @@ pub fn run(
     for note in run.take_notes() {
         (options.tell)(&note);
     }
-    if stored > 0 {
-        (options.tell)(&format!("going on: {stored} of {points} points are there"));
+    if stored_points > 0 {
+        (options.tell)(&format!("going on: {stored_points} of {points} points are there"));
     }
     let start_time = Instant::now();
     let started_unix_s = provenance::now_unix_s();
-    let progress = Progress::new(options.progress, points, stored);
+    let progress = Progress::new(options.progress, points, stored_points);
     let runner = Runner { engine, job, threads, progress: &progress, interrupt };
     let result = runner.compute_and_join(&mut run);
     progress.finish();
     let wall_s = start_time.elapsed().as_secs_f64();
-    let computed = run.count_own_points().1.saturating_sub(stored);
+    let computed_points = run.count_own_points().1.saturating_sub(stored_points);
     let session = Session {
         started_unix_s,
         wall_s,
         host: provenance::host_name(),
         pid: std::process::id(),
-        cpus: threads::cores(),
+        cpus: threads::count_cores(),
         cpu_model: provenance::cpu_model(),
         simd: engine.simd.to_owned(),
         threads,
         shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.count)),
-        points: computed,
-        points_per_s: if wall_s > 0.0 { computed as f64 / wall_s } else { 0.0 },
+        points: computed_points,
+        points_per_s: if wall_s > 0.0 { computed_points as f64 / wall_s } else { 0.0 },
         version: job.version.to_owned(),
     };
     match result {
@@ -141,12 +145,14 @@ pub fn run(
             // A failure to record the session affects only the sidecar's list of sessions, not the
             // rows.
             notes.extend(run.record_session(&session).err().map(|error| error.to_string()));
-            let (points, kept) = run.count_own_points();
+            let (points, stored_points) = run.count_own_points();
             let end = match (interrupt.signal(), run.shard()) {
                 (None, Some(shard)) => RunEnd::Shard(shard, run.count_statuses()?),
-                (signal, _) => {
-                    RunEnd::Interrupted { signal: signal.unwrap_or_default(), kept, points }
-                }
+                (signal, _) => RunEnd::Interrupted {
+                    signal: signal.unwrap_or_default(),
+                    stored_points,
+                    points,
+                },
             };
             Ok(RunReport { end, session: Some(session), notes })
         }
@@ -177,7 +183,7 @@ impl Runner<'_> {
             if is_interrupted() || run.shard().is_some() {
                 return Ok(None);
             }
-            self.progress.joining();
+            self.progress.show_joining();
             match run.join(self.job, &is_interrupted) {
                 // A chunk became unreadable after it was counted. It is computed again, at most
                 // twice.
@@ -191,16 +197,16 @@ impl Runner<'_> {
 
     /// Computes and writes the missing chunks of this process's shard, until a signal or an error.
     fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
-        let pool = threads::pool(self.threads)?;
+        let pool = threads::build_pool(self.threads)?;
         let stored_rows = |point| run.stored_rows(point);
         let context = RunContext::with_known_rows(self.interrupt, &stored_rows);
         let (_, start) = run.count_own_points();
         // A bounded channel makes the engine wait for a slower disk instead of filling memory.
         let (sender, receiver) = sync_channel(self.threads);
         let collector = ChunkCollector::new(self, run, &context, sender);
-        let collected = Mutex::new(Ok(()));
+        let collection_result = Mutex::new(Ok(()));
         let write_result = pool.in_place_scope(|scope| {
-            scope.spawn(|_| *lock(&collected) = collector.run());
+            scope.spawn(|_| *lock(&collection_result) = collector.run());
             let mut write_result = Ok(());
             loop {
                 match receiver.recv_timeout(PROGRESS_INTERVAL) {
@@ -220,7 +226,7 @@ impl Runner<'_> {
                 self.progress.show(start + context.points_done());
             }
         });
-        write_result.and(unlocked(collected))
+        write_result.and(unlocked(collection_result))
     }
 }
 
@@ -233,7 +239,7 @@ struct ChunkCollector<'a> {
     /// The queue of points that have not been evaluated.
     queue: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
     /// The rows of incomplete chunks, including those that an interrupted process has stored.
-    incomplete: IncompleteGroups,
+    incomplete_chunks: IncompleteGroups,
     writer: SyncSender<(u64, Vec<PointRows>)>,
 }
 
@@ -244,10 +250,11 @@ impl<'a> ChunkCollector<'a> {
         context: &'a RunContext<'a>,
         writer: SyncSender<(u64, Vec<PointRows>)>,
     ) -> Self {
-        let incomplete = run.take_incomplete();
-        let stored: BTreeSet<u64> = incomplete.values().flatten().map(|row| row.point).collect();
+        let incomplete_chunks = run.take_incomplete();
+        let stored: BTreeSet<u64> =
+            incomplete_chunks.values().flatten().map(|row| row.point).collect();
         let chunks = run.chunks();
-        let stride = if runner.engine.is_helped_by_neighbours { 1 } else { stride(chunks) };
+        let stride = if runner.engine.shares_work_of_rows { 1 } else { chunk_stride(chunks) };
         let queue = (0..chunks)
             .map(move |k| (u128::from(k) * u128::from(stride) % u128::from(chunks)) as u64)
             .filter(|&chunk| run.is_missing(chunk))
@@ -258,7 +265,7 @@ impl<'a> ChunkCollector<'a> {
             run,
             context,
             queue: Mutex::new(Box::new(queue)),
-            incomplete: IncompleteGroups(Mutex::new(incomplete)),
+            incomplete_chunks: IncompleteGroups(Mutex::new(incomplete_chunks)),
             writer,
         }
     }
@@ -267,8 +274,8 @@ impl<'a> ChunkCollector<'a> {
     /// the first error.
     fn run(self) -> Result<(), StoreError> {
         let mut result = self.evaluate();
-        let incomplete = std::mem::take(&mut *lock(&self.incomplete.0));
-        for (chunk, rows) in incomplete {
+        let incomplete_chunks = std::mem::take(&mut *lock(&self.incomplete_chunks.0));
+        for (chunk, rows) in incomplete_chunks {
             // After an error in one chunk, the others are written all the same.
             let write_result = self.run.write_chunk(self.runner.job, chunk, rows);
             result = result.and(write_result);
@@ -287,12 +294,13 @@ impl<'a> ChunkCollector<'a> {
         let reason = match catch_unwind(AssertUnwindSafe(evaluate)) {
             Err(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
             Ok(()) if self.context.must_stop() => return Ok(()),
-            Ok(()) => "the engine put its work down unasked".to_owned(),
+            Ok(()) => "the engine ended before it had evaluated all points".to_owned(),
         };
-        let incomplete = lock(&self.incomplete.0);
-        let unfinished = incomplete.keys().next().map(|&chunk| self.run.chunk_range(chunk));
-        let unstarted = lock(&self.queue).next().map(|point| point..point + 1);
-        match unfinished.or(unstarted) {
+        let incomplete_chunks = lock(&self.incomplete_chunks.0);
+        let unfinished_points =
+            incomplete_chunks.keys().next().map(|&chunk| self.run.chunk_range(chunk));
+        let unstarted_points = lock(&self.queue).next().map(|point| point..point + 1);
+        match unfinished_points.or(unstarted_points) {
             None => Ok(()),
             Some(Range { start: first, end }) => {
                 Err(StoreError::Engine { first, last: end.saturating_sub(1), reason })
@@ -305,7 +313,7 @@ impl<'a> ChunkCollector<'a> {
         self.context.add_points(1);
         let chunk = self.run.chunk_of(row.point);
         let points = self.run.chunk_range(chunk);
-        if let Some(rows) = self.incomplete.add(chunk, points.end - points.start, row) {
+        if let Some(rows) = self.incomplete_chunks.add(chunk, points.end - points.start, row) {
             // The receiver outlives the engine's work.
             let _ = self.writer.send((chunk, rows));
         }
@@ -318,7 +326,7 @@ impl<'a> ChunkCollector<'a> {
 /// Expensive rows are neighbours in a grid. In this order some of them start early, together with
 /// cheap rows that keep the other threads busy, and the finished rows are a sample of the remaining
 /// ones.
-fn stride(chunks: u64) -> u64 {
+fn chunk_stride(chunks: u64) -> u64 {
     // Multiples of the golden ratio spread most evenly (Knuth, TAOCP 3, section 6.4).
     const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
     let is_coprime = |stride: &u64| greatest_common_divisor(*stride, chunks) == 1;

@@ -34,7 +34,7 @@ impl Table {
     }
 
     /// Adds a column of numbers, null where there is none.
-    pub fn numbers(
+    pub fn add_numbers(
         &mut self,
         name: &str,
         unit: &str,
@@ -46,29 +46,34 @@ impl Table {
     }
 
     /// Adds a column of a parameter's values.
-    pub fn parameter(
+    pub fn add_parameter(
         &mut self,
         parameter: &Parameter<impl Sized>,
         values: impl IntoIterator<Item = Option<f64>>,
     ) {
-        self.numbers(&parameter.name, parameter.unit, parameter.description, values);
+        self.add_numbers(&parameter.name, parameter.unit, parameter.description, values);
     }
 
     /// Sets the direction in which values of the last column are worse.
-    pub fn worse(&mut self, worse: Worse) {
+    pub fn set_worse(&mut self, worse: Worse) {
         if let Some((column, _)) = self.columns.last_mut() {
             column.metadata.worse = Some(worse);
         }
     }
 
     /// Adds a column of counts.
-    pub fn counts(&mut self, name: &str, description: &str, values: impl IntoIterator<Item = u64>) {
+    pub fn add_counts(
+        &mut self,
+        name: &str,
+        description: &str,
+        values: impl IntoIterator<Item = u64>,
+    ) {
         let array = UInt64Array::from_iter_values(values);
         self.add(name, "1", description, CellType::Count, Arc::new(array));
     }
 
     /// Adds a column of words, few of which are distinct.
-    pub fn words<'a>(
+    pub fn add_words<'a>(
         &mut self,
         name: &str,
         description: &str,
@@ -79,7 +84,7 @@ impl Table {
     }
 
     /// Adds a column of truth values.
-    pub fn flags(&mut self, name: &str, description: &str, values: impl Iterator<Item = bool>) {
+    pub fn add_flags(&mut self, name: &str, description: &str, values: impl Iterator<Item = bool>) {
         let array: BooleanArray = values.map(Some).collect();
         self.add(name, "", description, CellType::Flag, Arc::new(array));
     }
@@ -89,12 +94,12 @@ impl Table {
     }
 
     /// Adds a JSON value to the file's key-value metadata.
-    pub fn metadata(&mut self, key: &str, value: &Value) {
-        self.text(key, value.to_string());
+    pub fn add_metadata(&mut self, key: &str, value: &Value) {
+        self.add_text(key, value.to_string());
     }
 
     /// Adds a text to the file's key-value metadata.
-    pub fn text(&mut self, key: &str, value: String) {
+    pub fn add_text(&mut self, key: &str, value: String) {
         self.metadata.push(KeyValue::new(key.to_owned(), value));
     }
 
@@ -119,8 +124,8 @@ impl Table {
     /// A table that the Parquet library refuses, such as one with columns of different lengths.
     pub fn finish(mut self) -> Result<(RecordBatch, Vec<u8>), ParquetError> {
         let Build { version, numerics } = self.build;
-        self.text(key::VERSION, version.to_owned());
-        self.text(key::NUMERICS, numerics.to_string());
+        self.add_text(key::VERSION, version.to_owned());
+        self.add_text(key::NUMERICS, numerics.to_string());
         let properties = writer(version, self.metadata).set_dictionary_enabled(false).build();
         let field = |(column, array): (DeclaredColumn, ArrayRef)| {
             let data_type = array.data_type().clone();

@@ -6,7 +6,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// Looks up an environment variable of this process.
-pub fn process(name: &str) -> Option<String> {
+pub fn read_variable(name: &str) -> Option<String> {
     std::env::var(name).ok()
 }
 
@@ -39,7 +39,7 @@ pub enum ThreadsError {
     },
     /// A caller requests an invalid number.
     #[error("{threads} threads: expected a number from 1 to {MAX_THREADS}")]
-    Asked {
+    InvalidCount {
         /// The number requested.
         threads: usize,
     },
@@ -48,7 +48,7 @@ pub enum ThreadsError {
 impl ThreadsError {
     /// Returns whether the requested number or the scheduler's variable is invalid.
     pub fn is_refusal(&self) -> bool {
-        matches!(self, Self::Scheduler { .. } | Self::Asked { .. })
+        matches!(self, Self::Scheduler { .. } | Self::InvalidCount { .. })
     }
 }
 
@@ -56,7 +56,7 @@ impl ThreadsError {
 ///
 /// # Errors
 /// A text with the expected values.
-pub fn parse(text: &str) -> Result<usize, String> {
+pub fn parse_count(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(threads @ 1..=MAX_THREADS) => Ok(threads),
         _ => Err(format!("expected a number of threads from 1 to {MAX_THREADS}; got `{text}`")),
@@ -67,9 +67,9 @@ pub fn parse(text: &str) -> Result<usize, String> {
 ///
 /// # Errors
 /// [`ThreadsError::Asked`].
-pub fn checked(threads: usize) -> Result<usize, ThreadsError> {
+pub fn check_count(threads: usize) -> Result<usize, ThreadsError> {
     let is_valid = (1..=MAX_THREADS).contains(&threads);
-    if is_valid { Ok(threads) } else { Err(ThreadsError::Asked { threads }) }
+    if is_valid { Ok(threads) } else { Err(ThreadsError::InvalidCount { threads }) }
 }
 
 /// Returns the number of worker threads: that of `--threads`, else the cores that Slurm gave this
@@ -77,19 +77,19 @@ pub fn checked(threads: usize) -> Result<usize, ThreadsError> {
 ///
 /// # Errors
 /// [`ThreadsError::Scheduler`].
-pub fn count(
+pub fn choose_count(
     requested: Option<usize>,
     environment: Environment<'_>,
 ) -> Result<usize, ThreadsError> {
     match (requested, environment(SLURM_CORES)) {
         (Some(threads), _) => Ok(threads),
-        (None, Some(given)) => parse(&given).map_err(|_| ThreadsError::Scheduler { given }),
-        (None, None) => Ok(cores()),
+        (None, Some(given)) => parse_count(&given).map_err(|_| ThreadsError::Scheduler { given }),
+        (None, None) => Ok(count_cores()),
     }
 }
 
 /// Returns the number of cores that this process may use.
-pub fn cores() -> usize {
+pub fn count_cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
@@ -97,7 +97,7 @@ pub fn cores() -> usize {
 ///
 /// # Errors
 /// [`ThreadsError::Start`].
-pub fn pool(threads: usize) -> Result<ThreadPool, ThreadsError> {
+pub fn build_pool(threads: usize) -> Result<ThreadPool, ThreadsError> {
     ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("sweep-{i}"))
@@ -113,13 +113,13 @@ mod tests {
     fn the_option_comes_before_slurm_and_slurm_before_the_cores() {
         let slurm =
             |cores: &'static str| move |name: &str| (name == SLURM_CORES).then(|| cores.to_owned());
-        assert_eq!(count(None, &slurm("3")).unwrap(), 3);
-        assert_eq!(count(Some(2), &slurm("3")).unwrap(), 2);
-        assert_eq!(count(None, &|_| None).unwrap(), cores());
+        assert_eq!(choose_count(None, &slurm("3")).unwrap(), 3);
+        assert_eq!(choose_count(Some(2), &slurm("3")).unwrap(), 2);
+        assert_eq!(choose_count(None, &|_| None).unwrap(), count_cores());
         for invalid in ["0", "x", "", "4097", "99999999"] {
-            let error = count(None, &slurm(invalid)).unwrap_err().to_string();
+            let error = choose_count(None, &slurm(invalid)).unwrap_err().to_string();
             assert!(error.contains(&format!("SLURM_CPUS_PER_TASK is `{invalid}`")), "{error}");
-            assert_eq!(count(Some(2), &slurm(invalid)).unwrap(), 2);
+            assert_eq!(choose_count(Some(2), &slurm(invalid)).unwrap(), 2);
         }
     }
 }

@@ -47,7 +47,7 @@ const EXAMPLES: &str = include_str!("commands/examples.txt");
 #[command(
     name = "sweep",
     version,
-    after_help = Exit::table(),
+    after_help = Exit::format_codes(),
     subcommand_required = true,
     arg_required_else_help = true,
     disable_help_subcommand = true,

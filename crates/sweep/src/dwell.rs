@@ -240,7 +240,10 @@ impl AttractorEngine {
             let is_requested = |k: usize| groups[k].iter().any(|(row, _)| *row == row_at(k));
             let mut groups_to_compute = Vec::new();
             for k in (0..groups.len()).filter(|k| groups[*k].iter().any(is_left_to_compute)) {
-                match Some(k).filter(|k| !is_requested(*k)).and_then(|k| context.known(row_at(k))) {
+                match Some(k)
+                    .filter(|k| !is_requested(*k))
+                    .and_then(|k| context.find_known_row(row_at(k)))
+                {
                     Some(known) => carried[k] = columns::carried_state(&known),
                     None => groups_to_compute.push(k),
                 }

@@ -77,7 +77,7 @@ fn estimate_within(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate
     // The time to find the levels does not belong to the points.
     engine.levels();
     let first = MeasuredCost::measure_few(&engine, whole_s);
-    let MeasuredCost { core_s_per_point, sampled, integrated_s } =
+    let MeasuredCost { core_s_per_point, sample_statuses, integrated_s } =
         MeasuredCost::measure_batch(&engine, &first).unwrap_or(first);
     let chunk = chunk_points(plan.points());
     let layout = &Job::new(plan).layout;
@@ -92,7 +92,7 @@ fn estimate_within(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate
         threads,
         wall_s: points_a_thread as f64 * core_s_per_point,
         core_s_per_point,
-        sampled,
+        sample_statuses,
         sampled_s: integrated_s,
         memory_bytes: memory_bytes(&engine, threads),
         disk_bytes: row_bytes + parts * columns * PART_COLUMN_BYTES,
@@ -107,7 +107,7 @@ fn estimate_within(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate
 struct MeasuredCost {
     core_s_per_point: f64,
     /// The number of points by status.
-    sampled: NameCounts,
+    sample_statuses: NameCounts,
     /// The end (s) of the integrated beginnings.
     integrated_s: f64,
 }
@@ -120,10 +120,10 @@ impl MeasuredCost {
         // A method with levels costs most at the beginning, where little moves, so that beginnings
         // overestimate it.
         if let Steps::Checked(_) = plan.integrator.steps()
-            && let Some((cost_s, sampled)) = cost_within(whole_s, engine, points)
+            && let Some((cost_s, sample_statuses)) = cost_within(whole_s, engine, points)
         {
             let core_s_per_point = cost_s / points as f64;
-            return Self { core_s_per_point, sampled, integrated_s: plan.end_s };
+            return Self { core_s_per_point, sample_statuses, integrated_s: plan.end_s };
         }
         let mut shorter: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
@@ -135,7 +135,7 @@ impl MeasuredCost {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
             // The levels of a shorter run would be for lower speeds, with longer steps.
-            let (cost_s, sampled) = cost(&engine.for_plan(&cut), points);
+            let (cost_s, sample_statuses) = cost(&engine.for_plan(&cut), points);
             let grows_with_length =
                 |metric: &Metric| !matches!(metric, Metric::Growth | Metric::Dwell);
             if !cut.model.measures.metrics.iter().all(grows_with_length) {
@@ -150,7 +150,7 @@ impl MeasuredCost {
                 let rate = ((cost_s - base_s) / (end_s - base_end_s)).max(0.0);
                 let whole_s = held_s + cost_s + rate * (plan.end_s - end_s);
                 let core_s_per_point = whole_s / points as f64;
-                return Self { core_s_per_point, sampled, integrated_s: end_s };
+                return Self { core_s_per_point, sample_statuses, integrated_s: end_s };
             }
             shorter = Some((end_s, cost_s));
             end_s = (4.0 * end_s).min(plan.end_s);
@@ -164,12 +164,12 @@ impl MeasuredCost {
         let plan = engine.plan();
         let affordable = (BATCH_S / first.core_s_per_point) as u64;
         let points = affordable.min(MAX_BATCH).min(plan.points());
-        if first.integrated_s < plan.end_s || points <= first.sampled.values().sum() {
+        if first.integrated_s < plan.end_s || points <= first.sample_statuses.values().sum() {
             return None;
         }
-        let (cost_s, sampled) = cost(engine, points);
+        let (cost_s, sample_statuses) = cost(engine, points);
         let core_s_per_point = cost_s / points as f64;
-        Some(Self { core_s_per_point, sampled, integrated_s: plan.end_s })
+        Some(Self { core_s_per_point, sample_statuses, integrated_s: plan.end_s })
     }
 }
 
@@ -203,9 +203,9 @@ fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<(f6
     let context = RunContext::with_time_limit(&interrupt, &is_late);
     let rows = engine.evaluate_points(&axis_values, &context)?;
     let cost_s = thread_time_s() - began_s;
-    let mut sampled = NameCounts::new();
-    rows.iter().for_each(|row| count_name(&mut sampled, row.status()));
-    Some((cost_s, sampled))
+    let mut sample_statuses = NameCounts::new();
+    rows.iter().for_each(|row| count_name(&mut sample_statuses, row.status()));
+    Some((cost_s, sample_statuses))
 }
 
 /// Returns the processor time (s) of this thread, which other work on the computer does not affect.
@@ -343,7 +343,7 @@ mod tests {
             let alone_s = least();
             let is_over = std::sync::atomic::AtomicBool::new(false);
             let beside_s = std::thread::scope(|scope| {
-                for _ in 0..8 * sweep_engine::threads::cores() {
+                for _ in 0..8 * sweep_engine::threads::count_cores() {
                     scope.spawn(|| {
                         while !is_over.load(std::sync::atomic::Ordering::Relaxed) {
                             std::hint::spin_loop();

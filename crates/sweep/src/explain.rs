@@ -22,7 +22,9 @@ use crate::plan::{Plan, compared_channels, point_input, prepare_input};
 use crate::speeds::Speeds;
 use sweep_engine::columns::MODELS;
 use sweep_engine::config::NamedValues;
-use sweep_engine::{Error, Execution, Interrupt, Progress, ProgressMode, duration, tell, threads};
+use sweep_engine::{
+    Error, Execution, Interrupt, Progress, ProgressMode, format_duration, tell, threads,
+};
 
 pub(crate) use cause::Cause;
 use sweep_parameter::RatioLimits;
@@ -123,7 +125,7 @@ pub(crate) fn explain(
     speeds: Option<Speeds>,
     execution: Execution<'_>,
 ) -> Result<Explanation, Error> {
-    threads::pool(execution.threads()?)?
+    threads::build_pool(execution.threads()?)?
         .install(|| explain_in_pool(plan, parameters, speeds, execution))
 }
 
@@ -237,8 +239,8 @@ fn announce_long_scan(speeds: u64, scan_s: f64) -> Option<String> {
     if total_s < ANNOUNCED_TIME_S {
         return None;
     }
-    let scan = duration(scan_s);
-    let total = duration(total_s);
+    let scan = format_duration(scan_s);
+    let total = format_duration(total_s);
     let mut text = format!(
         "{speeds} speeds take about {scan}; the edges, endings and remedies of unstable bands may \
          add to {total}"

@@ -26,7 +26,7 @@ pub use stability::held_speeds_task;
 pub use trace::{TraceOptions, trace_point};
 
 use sweep_engine::Error;
-use sweep_engine::commands::parameters::{self, as_json};
+use sweep_engine::commands::parameters::{self, format_json};
 pub use sweep_engine::execution::Execution;
 
 use crate::model::Washer;
@@ -37,7 +37,7 @@ use crate::speeds::MAX_SPEEDS;
 /// `range` and `source`. The values are those of the plan without its axes, or those of the
 /// built-in machine.
 pub fn list_parameters(plan: Option<&Plan>) -> String {
-    as_json(&parameters::list_parameters::<Washer>(plan))
+    format_json(&parameters::list_parameters::<Washer>(plan))
 }
 
 /// Returns the error for a list of speeds that is refused.

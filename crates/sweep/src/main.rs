@@ -8,7 +8,7 @@ use sweep::{Error, Exit, WasherCli, check_random_numbers, survive_file_size_limi
 fn main() -> ExitCode {
     let exit = run().unwrap_or_else(|error| {
         error.report();
-        error.exit()
+        error.exit_code()
     });
     exit.into()
 }
@@ -16,7 +16,7 @@ fn main() -> ExitCode {
 fn run() -> Result<Exit, Error> {
     let cli = WasherCli::read();
     Simd::check().map_err(Error::model)?;
-    survive_file_size_limits().map_err(Error::signals)?;
+    survive_file_size_limits().map_err(Error::signal_handlers)?;
     check_random_numbers()?;
     cli.command.run()
 }

@@ -159,7 +159,7 @@ impl<'a> HeldPlan<'a> {
         // The rows of a point share its curve of responses.
         let plan = self.plan;
         Ok(Engine {
-            is_helped_by_neighbours: true,
+            shares_work_of_rows: true,
             failure_reason: Box::new(move |point| failure_reason(plan, point)),
             ..Engine::new(evaluator, simd_name)
         })

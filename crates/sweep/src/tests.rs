@@ -5,7 +5,7 @@ use crate::engine::ModelEngine;
 use crate::model::Washer;
 use crate::plan::Plan;
 use sweep_engine::boundary::{
-    BoundaryOptions, BoundaryTask, Edge, EdgeKind, TracedBoundary, quantity, trace,
+    BoundaryOptions, BoundaryTask, SideChange, SideChangeKind, TracedBoundary, quantity, trace,
 };
 use sweep_engine::evaluator::{CachedEvaluator, SearchStop};
 use sweep_engine::store::{OpenOutcome, Trials};
@@ -92,7 +92,7 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
     let outcomes = engine.outcomes_at(&all_points(&plan));
     for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
         assert!(row.trials < 21, "{row:?}");
-        let edge = row.edges[0];
+        let side_change = row.side_changes[0];
         let distances: Vec<(f64, f64)> = outcomes
             .iter()
             .map(|outcome| {
@@ -101,18 +101,18 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
                 (damping, (verdict.greatest.unwrap().1 / 2.0).ln())
             })
             .collect();
-        let Some([low, high]) = edge.bracket else {
-            assert_eq!((row.first, edge.kind), (0.1, EdgeKind::NoneReliable));
+        let Some([low, high]) = side_change.bracket else {
+            assert_eq!((row.first, side_change.kind), (0.1, SideChangeKind::NoneReliable));
             assert!(distances.iter().all(|(_, distance)| *distance < 0.0));
             continue;
         };
-        assert_eq!((row.edges.len(), edge.kind), (1, EdgeKind::Crossing));
+        assert_eq!((row.side_changes.len(), side_change.kind), (1, SideChangeKind::Crossing));
         assert!(high - low <= 0.5);
         for (damping, distance) in &distances {
             let reliable = *distance < 0.0;
             assert!(
                 if reliable { *damping > low } else { *damping < high },
-                "{damping} {distance} {edge:?}"
+                "{damping} {distance} {side_change:?}"
             );
         }
         let contour_damping = distances.windows(2).find_map(|pair| {
@@ -121,8 +121,8 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
                 .then(|| a + (b - a) * distance_a / (distance_a - distance_b))
         });
         assert!(
-            (contour_damping.unwrap() - edge.position.unwrap()).abs() < 1.0,
-            "{contour_damping:?} {edge:?}"
+            (contour_damping.unwrap() - side_change.position.unwrap()).abs() < 1.0,
+            "{contour_damping:?} {side_change:?}"
         );
     }
 }
@@ -162,26 +162,27 @@ fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
             plan(&format!("{criterion_head}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
         let task = Task::new(&coarse, &options_of_ratio(Some(0.5), 4)).unwrap();
         let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
-        let edges: Vec<_> = rows.iter().map(|row| row.edges.last().copied().unwrap()).collect();
+        let side_changes: Vec<_> =
+            rows.iter().map(|row| row.side_changes.last().copied().unwrap()).collect();
         assert!(
-            edges.iter().all(|edge| edge.kind == EdgeKind::Crossing),
-            "{criterion:?}: {edges:?}"
+            side_changes.iter().all(|side_change| side_change.kind == SideChangeKind::Crossing),
+            "{criterion:?}: {side_changes:?}"
         );
         // The dampings are 0.5 N s/m apart about the last crossing.
-        let from = edges[0].position.unwrap().round() - 4.0;
+        let from = side_changes[0].position.unwrap().round() - 4.0;
         let count = 29;
         let fine = plan(&format!("{criterion_head}{}", axes(&masses, from, from + 14.0, count)));
         let dampings: Vec<f64> = (0..count).map(|k| from + 0.5 * f64::from(k)).collect();
         let grid = grid_distances(&fine);
         let contour_damping = zero_lines(&masses, &dampings, |i, j| grid[i][j]).concat();
-        for (row, edge) in rows.iter().zip(&edges) {
+        for (row, side_change) in rows.iter().zip(&side_changes) {
             let contour_point = contour_damping.windows(2).find_map(|pair| {
                 let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
                 let inside = (x0.min(x1)..=x0.max(x1)).contains(&row.first) && x0 != x1;
                 inside.then(|| y0 + (y1 - y0) * (row.first - x0) / (x1 - x0))
             });
             let contour_damping = contour_point.unwrap();
-            let crossing = edge.position.unwrap();
+            let crossing = side_change.position.unwrap();
             assert!(
                 (contour_damping - crossing).abs() < 0.25,
                 "{criterion:?} at {} kg: {contour_damping} and {crossing}",
@@ -226,9 +227,11 @@ fn grids_of_the_repository_have_the_brackets_of_an_earlier_search() {
         assert!(traced.trials <= max_trials, "{name}: {} points", traced.trials);
         let mut brackets = Vec::new();
         for row in &traced.curves[0] {
-            for edge in row.edges.iter().filter(|edge| edge.bracket.is_some()) {
-                assert_eq!(edge.kind, EdgeKind::Crossing, "{name}: {row:?}");
-                brackets.push((row.first, edge.bracket.unwrap()));
+            for side_change in
+                row.side_changes.iter().filter(|side_change| side_change.bracket.is_some())
+            {
+                assert_eq!(side_change.kind, SideChangeKind::Crossing, "{name}: {row:?}");
+                brackets.push((row.first, side_change.bracket.unwrap()));
             }
         }
         let expected = reference_brackets(name);
@@ -308,10 +311,10 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
     let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
     // At 0.1 m no damping is reliable. From 0.125 m on, all dampings above a crossing are reliable.
     // The row between the two has a reliable interval that contains no point of the lattice.
-    let kinds: Vec<EdgeKind> = rows.iter().map(|row| row.edges[0].kind).collect();
+    let kinds: Vec<SideChangeKind> = rows.iter().map(|row| row.side_changes[0].kind).collect();
     assert_eq!(
         kinds[..3],
-        [EdgeKind::NoneUnreliable, EdgeKind::Crossing, EdgeKind::Crossing],
+        [SideChangeKind::NoneUnreliable, SideChangeKind::Crossing, SideChangeKind::Crossing],
         "{rows:?}"
     );
     let engine = ModelEngine::new(&plan).unwrap();
@@ -321,17 +324,24 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
             dampings.iter().map(|damping| vec![row.first, *damping]).collect();
         for (damping, outcome) in dampings.iter().zip(engine.outcomes_at(&points)) {
             let is_reliable = distance(&outcome, &plan) < 0.0;
-            let bracket_below =
-                row.edges.iter().rev().find(|edge| edge.bracket.is_some_and(|b| b[1] <= *damping));
-            let expected = match (bracket_below, row.edges[0].distances[0]) {
-                (Some(edge), _) => edge.distances[1].unwrap() < 0.0,
+            let bracket_below = row
+                .side_changes
+                .iter()
+                .rev()
+                .find(|side_change| side_change.bracket.is_some_and(|b| b[1] <= *damping));
+            let expected = match (bracket_below, row.side_changes[0].distances[0]) {
+                (Some(side_change), _) => side_change.distances[1].unwrap() < 0.0,
                 (None, Some(distance)) => distance < 0.0,
-                (None, None) => row.edges[0].kind == EdgeKind::NoneReliable,
+                (None, None) => row.side_changes[0].kind == SideChangeKind::NoneReliable,
             };
-            let is_bracketed =
-                |edge: &Edge| edge.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1]);
-            let context = (row.first, damping, &row.edges);
-            assert!(expected == is_reliable || row.edges.iter().any(is_bracketed), "{context:?}");
+            let is_bracketed = |side_change: &SideChange| {
+                side_change.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1])
+            };
+            let context = (row.first, damping, &row.side_changes);
+            assert!(
+                expected == is_reliable || row.side_changes.iter().any(is_bracketed),
+                "{context:?}"
+            );
         }
     }
 }
@@ -423,8 +433,9 @@ fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
     };
     let crossings = |task: &Task| {
         let rows = trace_boundary(task, 2, &Interrupt::new()).unwrap().curves.remove(0);
-        let edges = rows.into_iter().flat_map(|row| row.edges);
-        let dampings: Vec<f64> = edges.filter_map(|edge| edge.position).collect();
+        let side_changes = rows.into_iter().flat_map(|row| row.side_changes);
+        let dampings: Vec<f64> =
+            side_changes.filter_map(|side_change| side_change.position).collect();
         assert!(!dampings.is_empty());
         dampings
     };
@@ -463,10 +474,14 @@ fn a_force_crosses_its_limit_within_the_bracket() {
     )
     .unwrap();
     let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
-    let crossings = rows.iter().flat_map(|row| row.edges.iter().map(|edge| (row.first, edge)));
+    let crossings = rows
+        .iter()
+        .flat_map(|row| row.side_changes.iter().map(|side_change| (row.first, side_change)));
     let mut crossing_count = 0;
-    for (mass, edge) in crossings.filter(|(_, edge)| edge.kind == EdgeKind::Crossing) {
-        let ends = edge.bracket.unwrap().map(|damping| vec![mass, damping]);
+    for (mass, side_change) in
+        crossings.filter(|(_, side_change)| side_change.kind == SideChangeKind::Crossing)
+    {
+        let ends = side_change.bracket.unwrap().map(|damping| vec![mass, damping]);
         let outcomes = ModelEngine::new(&task.plan).unwrap().outcomes_at(&ends);
         let forces: Vec<f64> =
             outcomes.iter().map(|outcome| outcome.nonlinear.metrics[0]).collect();

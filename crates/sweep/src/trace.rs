@@ -174,12 +174,12 @@ pub(crate) fn trace_in_pool(
     cancel: Cancel<'_>,
 ) -> Result<TraceTable, NoEquilibrium> {
     // A single point has at most two integrations, one of each model.
-    let thread_count = if parameters.is_some() { 2 } else { threads::cores() };
+    let thread_count = if parameters.is_some() { 2 } else { threads::count_cores() };
     let compute_table = || match parameters {
         Some(parameters) => trace_one_point(plan, 0, parameters, settings, cancel),
         None => Ok(trace_all_points(plan, settings, cancel)),
     };
-    match threads::pool(thread_count) {
+    match threads::build_pool(thread_count) {
         Ok(pool) => pool.install(compute_table),
         Err(_) => compute_table(),
     }
@@ -208,7 +208,7 @@ pub(crate) fn trace_one_point(
         let model = settings.models.model_kinds().iter().position(|known| *known == kind);
         model.and_then(|model| failures[model][0].clone())
     };
-    table.metadata(key::PLAN, &plan.to_json());
+    table.add_metadata(key::PLAN, &plan.to_json());
     let mut facts = json!({
         "at": parameters.into_iter().collect::<BTreeMap<_, _>>(),
         "every_s": settings.every_s,
@@ -222,7 +222,7 @@ pub(crate) fn trace_one_point(
     if !friction_speeds.is_empty() {
         facts["friction_speeds_m_per_s"] = friction_speeds.into();
     }
-    table.metadata(key::TRACE, &facts);
+    table.add_metadata(key::TRACE, &facts);
     let failures = failures.into_iter().flatten().flatten().collect();
     Ok(TraceTable {
         table,
@@ -254,20 +254,20 @@ pub(crate) fn trace_all_points(
     let mut table = Table::new(crate::identity::BUILD);
     let rows = || numbered_runs.iter().map(|(number, run)| (*number, run.times_s.len()));
     let numbers = rows().flat_map(|(number, count)| repeat_n(number, count));
-    table.counts("point", "number of the point in its grid", numbers);
+    table.add_counts("point", "number of the point in its grid", numbers);
     for (k, axis) in plan.axes.iter().enumerate() {
         let values = rows()
             .flat_map(|(number, count)| repeat_n(plan.axis_values(number).get(k).copied(), count));
-        table.parameter(&axis.parameter, values);
+        table.add_parameter(&axis.parameter, values);
     }
     let model_failures = add_columns(&mut table, &runs, &models, settings.extras);
     for (k, (number, _)) in numbered_runs.iter().enumerate() {
         let messages = model_failures.iter().filter_map(|model| model[k].as_deref());
         failures.extend(messages.map(|text| format!("point {number}: {text}")));
     }
-    table.metadata(key::PLAN, &plan.to_json());
+    table.add_metadata(key::PLAN, &plan.to_json());
     let facts = json!({ "every_s": settings.every_s, "start": start_json(&settings.start) });
-    table.metadata(key::TRACE, &facts);
+    table.add_metadata(key::TRACE, &facts);
     let instants = runs.iter().map(|run| run.times_s.len()).sum();
     TraceTable { table, instants, failures, method: None }
 }

@@ -44,7 +44,7 @@ impl Model for Washer {
         default_channels: &DEFAULT_CHANNELS,
         model_file: Some(ModelFile { key: "machine", keys: &read::MACHINE_KEYS }),
         start_advice: Some("`sweep init FILE` writes a grid file to start from"),
-        needed: &[
+        required_settings: &[
             ("growth", HELD_SPEEDS),
             ("dwell", HELD_SPEEDS),
             ("foot", CABINET),
@@ -52,7 +52,7 @@ impl Model for Washer {
             ("walk", CABINET),
             ("stop", "a machine with [[stops]]"),
         ],
-        further: "; a machine with [cabinet] and feet, with stops, and a grid file with \
+        further_columns: "; a machine with [cabinet] and feet, with stops, and a grid file with \
                   [stability] have more",
         ..About::new(BUILD, &CHANNELS, &METHODS)
     };
@@ -134,13 +134,14 @@ mod tests {
     use washer_model::{Profile, Spin};
 
     use super::*;
-    use sweep_engine::commands::parameters::{as_json, list_parameters};
+    use sweep_engine::commands::parameters::{format_json, list_parameters};
     use sweep_engine::plan::NumberSources;
 
     #[test]
     fn json_has_every_parameter() {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 120.0, ramp_s: 2.0 };
-        let json: Value = serde_json::from_str(&as_json(&list_parameters::<Washer>(None))).unwrap();
+        let json: Value =
+            serde_json::from_str(&format_json(&list_parameters::<Washer>(None))).unwrap();
         assert_eq!(
             json.as_array().map(Vec::len),
             Some(MachineParameter::all(&Machine::paper(), &spin).len())

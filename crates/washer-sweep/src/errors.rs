@@ -44,7 +44,7 @@ pub(crate) fn to_exception(py: Python<'_>, error: &Error) -> PyErr {
         | Error::File { .. }
         | Error::Store(StoreError::File(_) | StoreError::Parquet { .. })
         | Error::Plot(PlotError::File(_)) => PyOSError::new_err(error.to_string()),
-        other if other.exit() == Exit::BadInput => {
+        other if other.exit_code() == Exit::BadInput => {
             let no_mistakes = PyList::empty(py).into_any().unbind();
             package_error(py, "PlanError", other.to_string(), no_mistakes)
         }

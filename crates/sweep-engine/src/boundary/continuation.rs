@@ -118,8 +118,9 @@ impl LinePair<'_> {
         // A crossing and its prediction are a pair between which the sides differ, by as much as
         // the prediction is wrong.
         let mut prediction_errors = shared_crossings(intervals, &predicted);
-        prediction_errors
-            .retain(|[is, predicted]| (is - predicted).abs() <= DISPUTED_FRACTION * cell);
+        prediction_errors.retain(|[position, predicted]| {
+            (position - predicted).abs() <= DISPUTED_FRACTION * cell
+        });
         let mut interval_ends: Vec<f64> = intervals
             .iter()
             .chain(&predicted)
@@ -197,20 +198,20 @@ fn shared_crossings(a: &[SideInterval], b: &[SideInterval]) -> Vec<[f64; 2]> {
 
 /// A change of side.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct SideChange {
+struct LineCrossing {
     position: f64,
     sides: [LimitSide; 2],
 }
 
-fn crossings(intervals: &[SideInterval]) -> Vec<SideChange> {
-    let change = |pair: &[SideInterval]| SideChange {
+fn crossings(intervals: &[SideInterval]) -> Vec<LineCrossing> {
+    let change = |pair: &[SideInterval]| LineCrossing {
         position: pair[1].from,
         sides: [pair[0].side, pair[1].side],
     };
     intervals.windows(2).map(change).filter(|change| change.sides[0] != change.sides[1]).collect()
 }
 
-fn nearest_crossing(crossing: &SideChange, candidates: &[SideChange]) -> Option<SideChange> {
+fn nearest_crossing(crossing: &LineCrossing, candidates: &[LineCrossing]) -> Option<LineCrossing> {
     let same_sides = candidates.iter().filter(|other| other.sides == crossing.sides);
     same_sides
         .min_by(|a, b| {

@@ -4,17 +4,17 @@
 use serde_json::{Value, json};
 use sweep_parameter::unit_suffix;
 
-use super::{BoundaryRow, BoundaryTask, Edge, TracedBoundary, TracedQuantity};
+use super::{BoundaryRow, BoundaryTask, SideChange, TracedBoundary, TracedQuantity};
 use crate::{Job, Model, Table};
 use sweep_files::{FileKind, key};
 
 /// A row of the file.
-struct EdgeRow<'a> {
+struct SideChangeRow<'a> {
     curve: usize,
     row: &'a BoundaryRow,
-    /// The number of the edge on its line, from 1; 0 if no edge is in range.
+    /// The number of the change of side on its line, from 1; 0 if there is none in range.
     number: usize,
-    edge: &'a Edge,
+    side_change: &'a SideChange,
 }
 
 /// Returns a name with a word before its unit's suffix: `damping_low_n_s_per_m` for
@@ -52,89 +52,101 @@ impl<M: Model> BoundaryTask<M> {
         let mut table = Table::new(M::ABOUT.build);
         self.add_columns(&mut table, traced);
         let job = self.job();
-        table.metadata(key::PLAN, &job.plan);
-        table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
-        table.metadata(key::BOUNDARY, &boundary_metadata);
+        table.add_metadata(key::PLAN, &job.plan);
+        table.add_text(key::PLAN_HASH, job.hash().to_hex().to_string());
+        table.add_metadata(key::BOUNDARY, &boundary_metadata);
         table
     }
 
     fn add_columns(&self, table: &mut Table, traced: &TracedBoundary) {
         let TracedQuantity { name: quantity, unit, .. } = &self.quantity;
-        let mut edge_rows = Vec::new();
+        let mut change_rows = Vec::new();
         for (curve, rows) in traced.curves.iter().enumerate() {
             for row in rows {
-                for (k, edge) in row.edges.iter().enumerate() {
-                    let number = if edge.bracket.is_some() { k + 1 } else { 0 };
-                    edge_rows.push(EdgeRow { curve, row, number, edge });
+                for (k, side_change) in row.side_changes.iter().enumerate() {
+                    let number = if side_change.bracket.is_some() { k + 1 } else { 0 };
+                    change_rows.push(SideChangeRow { curve, row, number, side_change });
                 }
             }
         }
-        self.add_axes(table, &edge_rows);
-        table.words(
+        self.add_axes(table, &change_rows);
+        table.add_words(
             "kind",
             "crossing, jump (the quantity leaps over its limit), undefined (it is not defined on \
              one side), or why there is none in range: reliable, unreliable or undefined wherever \
              it was evaluated",
-            edge_rows.iter().map(|edge_row| edge_row.edge.kind.name()),
+            change_rows.iter().map(|change_row| change_row.side_change.kind.name()),
         );
-        table.counts(
+        table.add_counts(
             "crossing",
             "number of this change of side at this value of the first axis, from 1 upwards along \
              the second; 0 where none is in range",
-            edge_rows.iter().map(|edge_row| edge_row.number as u64),
+            change_rows.iter().map(|change_row| change_row.number as u64),
         );
-        let edge_counts = edge_rows.iter().map(|edge_row| {
-            edge_row.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64
+        let change_counts = change_rows.iter().map(|change_row| {
+            change_row
+                .row
+                .side_changes
+                .iter()
+                .filter(|side_change| side_change.bracket.is_some())
+                .count() as u64
         });
-        table.counts("crossings", "how many changes of side there are", edge_counts);
+        table.add_counts("crossings", "how many changes of side there are", change_counts);
         for (side_index, word, side_word) in [(0, "low", "lower"), (1, "high", "upper")] {
             let name = format!("quantity_{word}");
             let description =
                 format!("{quantity} at the bracket's {side_word} end; null where not defined");
-            let value = |edge_row: &EdgeRow<'_>| {
-                Some(self.quantity.value(edge_row.edge.distances[side_index]?))
+            let value = |change_row: &SideChangeRow<'_>| {
+                Some(self.quantity.value(change_row.side_change.distances[side_index]?))
             };
-            table.numbers(&name, unit, &description, edge_rows.iter().map(value));
+            table.add_numbers(&name, unit, &description, change_rows.iter().map(value));
         }
-        let trial_counts = edge_rows.iter().map(|edge_row| edge_row.row.trials as u64);
-        table.counts("points", "points evaluated at this value of the first axis", trial_counts);
+        let trial_counts = change_rows.iter().map(|change_row| change_row.row.trials as u64);
+        table.add_counts(
+            "points",
+            "points evaluated at this value of the first axis",
+            trial_counts,
+        );
     }
 
     /// Adds both axes, the bracket, and the axes beyond the second.
-    fn add_axes(&self, table: &mut Table, edge_rows: &[EdgeRow<'_>]) {
+    fn add_axes(&self, table: &mut Table, change_rows: &[SideChangeRow<'_>]) {
         let [first, second, other_axes @ ..] = self.plan.axes.as_slice() else { return };
         let name = &*second.parameter.name;
         let unit = second.parameter.unit;
-        table
-            .parameter(&first.parameter, edge_rows.iter().map(|edge_row| Some(edge_row.row.first)));
+        table.add_parameter(
+            &first.parameter,
+            change_rows.iter().map(|change_row| Some(change_row.row.first)),
+        );
         let second_meaning = second.parameter.description;
         let TracedQuantity { name: quantity, limit, .. } = &self.quantity;
         let description =
             format!("{second_meaning}, where {quantity} = {limit}; null unless it is a crossing");
-        table.numbers(
+        table.add_numbers(
             name,
             unit,
             &description,
-            edge_rows.iter().map(|edge_row| edge_row.edge.position),
+            change_rows.iter().map(|change_row| change_row.side_change.position),
         );
         for (side_index, word, side_word) in [(0, "low", "lower"), (1, "high", "upper")] {
             let description = format!(
                 "{side_word} end of the bracket in which the side changes; null where none is in \
                  range"
             );
-            let value = |edge_row: &EdgeRow<'_>| Some(edge_row.edge.bracket?[side_index]);
-            table.numbers(
+            let value =
+                |change_row: &SideChangeRow<'_>| Some(change_row.side_change.bracket?[side_index]);
+            table.add_numbers(
                 &insert_word(name, unit, word),
                 unit,
                 &description,
-                edge_rows.iter().map(value),
+                change_rows.iter().map(value),
             );
         }
         for (k, axis) in other_axes.iter().enumerate() {
-            let values = edge_rows
-                .iter()
-                .map(|edge_row| self.plan.axis_values(edge_row.curve as u64).get(2 + k).copied());
-            table.parameter(&axis.parameter, values);
+            let values = change_rows.iter().map(|change_row| {
+                self.plan.axis_values(change_row.curve as u64).get(2 + k).copied()
+            });
+            table.add_parameter(&axis.parameter, values);
         }
     }
 }

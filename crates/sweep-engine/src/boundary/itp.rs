@@ -26,7 +26,7 @@ pub(super) const ROOT_MARGIN: f64 = 0.45;
 /// A bracket's root finder between two steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Itp {
-    first_width: f64,
+    initial_width: f64,
     tolerance: f64,
     steps_left: i32,
 }
@@ -36,12 +36,17 @@ impl Itp {
     /// than the tolerance.
     pub(super) fn new(width: f64, tolerance: f64) -> Self {
         let bisections = libm::ceil(libm::log2(width / tolerance)).max(0.0);
-        Self { first_width: width, tolerance, steps_left: bisections as i32 + N_0 }
+        Self { initial_width: width, tolerance, steps_left: bisections as i32 + N_0 }
     }
 
     /// Returns the position to evaluate next, strictly between the bracket's ends. `distances` are
     /// the signed distances at the ends; without them the step is a bisection.
-    pub(super) fn step(&mut self, low: f64, high: f64, distances: Option<[f64; 2]>) -> f64 {
+    pub(super) fn next_position(
+        &mut self,
+        low: f64,
+        high: f64,
+        distances: Option<[f64; 2]>,
+    ) -> f64 {
         let width = high - low;
         let middle = 0.5 * (low + high);
         let widest_next = 0.5 * self.tolerance * libm::exp2(f64::from(self.steps_left));
@@ -50,7 +55,7 @@ impl Itp {
         let Some([distance_low, distance_high]) = distances else { return middle };
         let x_f = low + width * (distance_low / (distance_low - distance_high));
         let sigma = if x_f <= middle { 1.0 } else { -1.0 };
-        let delta = KAPPA_1 * width * (width / self.first_width);
+        let delta = KAPPA_1 * width * (width / self.initial_width);
         let delta = delta.max(ROOT_MARGIN * self.tolerance);
         let x_t = if delta <= (middle - x_f).abs() { x_f + sigma * delta } else { middle };
         let x = if (x_t - middle).abs() <= r { x_t } else { middle - sigma * r };
@@ -70,7 +75,7 @@ mod tests {
         let mut count = 0;
         // Rounding may leave a bracket wider than the tolerance by this factor.
         while high - low > tolerance * (1.0 + 1e-12) {
-            let x = itp.step(low, high, Some([function(low), function(high)]));
+            let x = itp.next_position(low, high, Some([function(low), function(high)]));
             assert!(low < x && x < high, "{x} in {low}..{high}");
             if (function(x) < 0.0) == (function(low) < 0.0) {
                 low = x
@@ -113,6 +118,6 @@ mod tests {
 
     #[test]
     fn without_distances_it_bisects() {
-        assert_eq!(Itp::new(8.0, 1.0).step(2.0, 10.0, None), 6.0);
+        assert_eq!(Itp::new(8.0, 1.0).next_position(2.0, 10.0, None), 6.0);
     }
 }

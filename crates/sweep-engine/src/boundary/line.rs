@@ -7,9 +7,9 @@
 use super::continuation::PredictedSide;
 use super::itp::Itp;
 use super::sample::{LimitSide, LineSample, SideInterval, Span};
-use super::{Edge, EdgeKind};
+use super::{SideChange, SideChangeKind};
 
-/// The change of the distance over a narrow bracket above which the edge is a jump. Basis: ln 1.5,
+/// The change of the distance over a narrow bracket above which it contains a jump. Basis: ln 1.5,
 /// a factor of 1.5 in a ratio, which changes a reader's decision. Doubling it reports jumps by a
 /// factor of up to 2.25 as crossings.
 const JUMP_LN_RATIO: f64 = 0.405;
@@ -32,8 +32,8 @@ pub(super) struct LineSearch {
 impl LineSearch {
     /// Requests samples at these positions, clamped to the range, except where samples exist.
     pub(super) fn request(&mut self, positions: impl IntoIterator<Item = f64>, span: &Span) {
-        for place in positions {
-            let position = place.clamp(span.least, span.greatest);
+        for requested in positions {
+            let position = requested.clamp(span.least, span.greatest);
             if self.sample_at(position).is_none() {
                 self.requested.push(position);
             }
@@ -78,7 +78,7 @@ impl LineSearch {
         }
         let earlier_brackets = std::mem::take(&mut self.brackets);
         let open_brackets: Vec<[LineSample; 2]> =
-            self.changes().filter(|[low, high]| is_open(low, high, span)).collect();
+            self.sample_brackets().filter(|[low, high]| is_open(low, high, span)).collect();
         let mut positions = Vec::with_capacity(open_brackets.len());
         for [low, high] in open_brackets {
             let width = high.position - low.position;
@@ -94,7 +94,11 @@ impl LineSearch {
                 None => Itp::new(width, span.tolerance),
             };
             let distances = low.finite_distance().zip(high.finite_distance());
-            positions.push(itp.step(low.position, high.position, distances.map(<[f64; 2]>::from)));
+            positions.push(itp.next_position(
+                low.position,
+                high.position,
+                distances.map(<[f64; 2]>::from),
+            ));
             self.brackets.push(([low.position, high.position], itp));
         }
         positions
@@ -132,7 +136,7 @@ impl LineSearch {
     }
 
     /// Iterates over neighbouring samples on different sides.
-    fn changes(&self) -> impl Iterator<Item = [LineSample; 2]> + '_ {
+    fn sample_brackets(&self) -> impl Iterator<Item = [LineSample; 2]> + '_ {
         let pairs = self.samples.windows(2).map(|pair| [pair[0], pair[1]]);
         pairs.filter(|[low, high]| low.side() != high.side())
     }
@@ -141,7 +145,7 @@ impl LineSearch {
     pub(super) fn intervals(&self, span: &Span) -> Vec<SideInterval> {
         let mut intervals = Vec::new();
         let mut from = span.least;
-        for [low, high] in self.changes() {
+        for [low, high] in self.sample_brackets() {
             let to = interpolate_root(&low, &high).unwrap_or(0.5 * (low.position + high.position));
             intervals.push(SideInterval { from, to, side: low.side() });
             from = to;
@@ -152,11 +156,11 @@ impl LineSearch {
         intervals
     }
 
-    /// Returns the edges of the line in order; `value` turns positions into values of the second
-    /// axis.
-    pub(super) fn edges(&self, span: &Span, value: &dyn Fn(f64) -> f64) -> Vec<Edge> {
-        let mut edges = Vec::new();
-        for [low, high] in self.changes() {
+    /// Returns the changes of side of the line in order; `value` returns the value of the second
+    /// axis at a position.
+    pub(super) fn side_changes(&self, span: &Span, value: &dyn Fn(f64) -> f64) -> Vec<SideChange> {
+        let mut side_changes = Vec::new();
+        for [low, high] in self.sample_brackets() {
             let is_narrow = high.position - low.position <= span.tolerance;
             let is_jump =
                 |change: f64| !change.is_finite() || (change.abs() > JUMP_LN_RATIO && is_narrow);
@@ -164,29 +168,34 @@ impl LineSearch {
                 (Some(distance_low), Some(distance_high))
                     if is_jump(distance_low - distance_high) =>
                 {
-                    EdgeKind::Jump
+                    SideChangeKind::Jump
                 }
-                (Some(_), Some(_)) => EdgeKind::Crossing,
-                _ => EdgeKind::Undefined,
+                (Some(_), Some(_)) => SideChangeKind::Crossing,
+                _ => SideChangeKind::Undefined,
             };
             let root =
-                if kind == EdgeKind::Crossing { interpolate_root(&low, &high) } else { None };
-            edges.push(Edge {
+                if kind == SideChangeKind::Crossing { interpolate_root(&low, &high) } else { None };
+            side_changes.push(SideChange {
                 kind,
                 position: root.map(value),
                 bracket: Some([value(low.position), value(high.position)]),
                 distances: [low.distance, high.distance],
             });
         }
-        if edges.is_empty() {
+        if side_changes.is_empty() {
             let kind = match self.samples.first().map(LineSample::side) {
-                Some(LimitSide::Reliable) => EdgeKind::NoneReliable,
-                Some(LimitSide::Unreliable) => EdgeKind::NoneUnreliable,
-                Some(LimitSide::Undefined) | None => EdgeKind::NoneUndefined,
+                Some(LimitSide::Reliable) => SideChangeKind::NoneReliable,
+                Some(LimitSide::Unreliable) => SideChangeKind::NoneUnreliable,
+                Some(LimitSide::Undefined) | None => SideChangeKind::NoneUndefined,
             };
-            edges.push(Edge { kind, position: None, bracket: None, distances: [None; 2] });
+            side_changes.push(SideChange {
+                kind,
+                position: None,
+                bracket: None,
+                distances: [None; 2],
+            });
         }
-        edges
+        side_changes
     }
 }
 

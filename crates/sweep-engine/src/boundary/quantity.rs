@@ -12,9 +12,9 @@ use crate::store::{CellType, DeclaredColumn};
 use crate::{Error, Model, Plan, nearest};
 
 /// The prefix of the columns of ratios.
-const RATIO: &str = "ratio_";
+const RATIO_PREFIX: &str = "ratio_";
 /// The name of the column of the least ratio.
-const LEAST_RATIO: &str = "ratio_min";
+const LEAST_RATIO_COLUMN: &str = "ratio_min";
 
 /// A quantity with a limit, named as its column in a result file.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,8 +36,8 @@ pub struct TracedQuantity {
 pub enum Scale {
     /// The logarithm of the quantity over its limit.
     Logarithm,
-    /// The difference, divided by this number.
-    Over(f64),
+    /// The difference, divided by this unit.
+    Difference(f64),
 }
 
 impl TracedQuantity {
@@ -51,7 +51,9 @@ impl TracedQuantity {
                 let is_good = worse.excess(value, self.limit) < 0.0;
                 if is_good { distance.min(-f64::MIN_POSITIVE) } else { distance }
             }
-            (Scale::Over(per), worse) => worse.excess(value, self.limit) / per,
+            (Scale::Difference(unit_of_distance), worse) => {
+                worse.excess(value, self.limit) / unit_of_distance
+            }
         }
     }
 
@@ -60,7 +62,7 @@ impl TracedQuantity {
         let away = self.worse.excess(distance, 0.0);
         match self.scale {
             Scale::Logarithm => self.limit * libm::exp(away),
-            Scale::Over(per) => self.limit + away * per,
+            Scale::Difference(unit_of_distance) => self.limit + away * unit_of_distance,
         }
     }
 }
@@ -80,26 +82,26 @@ pub fn traceable_columns<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<
     let plans =
         M::ABOUT.channels.iter().map(channel_plan).chain(other_plans.map(|plan| (plan, None)));
     let mut columns: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
-    for (plan, channel_columns_only) in plans {
+    for (plan, allowed_columns) in plans {
         for column in M::layout(&plan).columns {
             let is_number =
                 matches!(column.kind, CellType::Measured | CellType::Time | CellType::Count);
-            let is_wanted = channel_columns_only
+            let is_allowed = allowed_columns
                 .as_ref()
-                .is_none_or(|channel_columns_only| channel_columns_only.contains(&column.name));
+                .is_none_or(|allowed_columns| allowed_columns.contains(&column.name));
             let is_new = columns.iter().all(|(known, _)| known.name != column.name);
-            if is_number && column.metadata.worse.is_some() && is_wanted && is_new {
+            if is_number && column.metadata.worse.is_some() && is_allowed && is_new {
                 columns.push((column, plan.clone()));
             }
         }
     }
     // The ratios that decide on the verdict come first.
-    columns.sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO].contains(&&*column.name));
+    columns.sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO_COLUMN].contains(&&*column.name));
     columns
 }
 
 /// Returns whether a text is the name of a column, not an expression.
-pub fn is_name(text: &str) -> bool {
+pub fn is_column_name(text: &str) -> bool {
     text.chars().all(|letter| letter.is_alphanumeric() || letter == '_')
 }
 
@@ -175,14 +177,14 @@ pub fn derive_quantity<M: Model>(
             unit: "1".to_owned(),
             limit: 0.0,
             worse: Worse::Less,
-            scale: Scale::Over(1.0),
+            scale: Scale::Difference(1.0),
         },
         Some(limit) => TracedQuantity {
             name: text.to_owned(),
             unit: goal.unit().to_owned(),
             limit,
             worse: Worse::Greater,
-            scale: Scale::Over(if limit == 0.0 { 1.0 } else { limit.abs() }),
+            scale: Scale::Difference(if limit == 0.0 { 1.0 } else { limit.abs() }),
         },
     };
     let plan = plans.into_iter().nth(plan_index).unwrap_or_else(|| plan.clone());
@@ -223,7 +225,7 @@ pub fn margin(goal: &Goal, row: &RecordBatch) -> Result<Option<f64>, ArrowError>
 
 /// Returns the names of a channel's columns.
 fn channel_columns(name: &str) -> [String; 3] {
-    [RATIO, "nonlinear_", "linear_"].map(|kind| format!("{kind}{name}"))
+    [RATIO_PREFIX, "nonlinear_", "linear_"].map(|kind| format!("{kind}{name}"))
 }
 
 /// Returns the column of this name as a quantity, and the plan that computes it. The limit is the
@@ -242,8 +244,10 @@ pub fn find_quantity<M: Model>(
         let names = || candidates.iter().map(|(column, _)| column.name.as_str());
         let kind = |name: &str| name.split('_').next().map(str::to_owned);
         let is_of_kind = |known: &str| kind(known) == kind(name);
-        let required_setting =
-            M::ABOUT.needed.iter().find(|(prefix, _)| kind(name).as_deref() == Some(prefix));
+        let required_setting = M::ABOUT
+            .required_settings
+            .iter()
+            .find(|(prefix, _)| kind(name).as_deref() == Some(prefix));
         if let Some((_, required_setting)) = required_setting.filter(|_| !names().any(is_of_kind)) {
             return Err(Error::option("--quantity", name, required_setting));
         }
@@ -256,7 +260,7 @@ pub fn find_quantity<M: Model>(
         let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
         let names = names.join(", ");
         let [ratio, nonlinear, linear] = channel_columns("CHANNEL");
-        let optional_columns = M::ABOUT.further;
+        let optional_columns = M::ABOUT.further_columns;
         let expected =
             format!("one of {names}, {ratio}, {nonlinear}, {linear}{optional_columns}{suggestion}");
         return Err(Error::option("--quantity", name, expected));
@@ -267,13 +271,13 @@ pub fn find_quantity<M: Model>(
         let expected = format!("--limit with it, in {unit}: it has no limit of its own");
         return Err(Error::option("--quantity", name, expected));
     };
-    let is_ratio = name.starts_with(RATIO);
+    let is_ratio = name.starts_with(RATIO_PREFIX);
     let scale = column.limit_scale.unwrap_or(value.abs());
     if !value.is_finite() || (is_ratio && value <= 0.0) || scale == 0.0 {
         let expected = format!("a number greater than 0, as {name} is never below");
         return Err(Error::option("--limit", value, expected));
     }
-    if name == LEAST_RATIO {
+    if name == LEAST_RATIO_COLUMN {
         plan.reliability.limits.lower = Some(value);
     } else if is_ratio {
         plan.reliability.limits.upper = value;
@@ -283,7 +287,7 @@ pub fn find_quantity<M: Model>(
         unit: column.metadata.unit,
         limit: value,
         worse: column.metadata.worse.unwrap_or(Worse::Greater),
-        scale: if is_ratio { Scale::Logarithm } else { Scale::Over(scale) },
+        scale: if is_ratio { Scale::Logarithm } else { Scale::Difference(scale) },
     };
     Ok((quantity, plan))
 }

@@ -1,11 +1,11 @@
 //! The task of a plan, and a model's distances at trial points.
 
 use super::lattice::{columns, lattice_ranks};
-use super::quantity::{DerivedQuantity, derive_quantity, find_quantity, is_name, margin};
+use super::quantity::{DerivedQuantity, derive_quantity, find_quantity, is_column_name, margin};
 use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::arguments::parse_finite;
 use crate::evaluator::{CachedEvaluator, RequestValues, SearchStop};
-use crate::optimise::search::defect;
+use crate::optimise::search::row_defect;
 use crate::store::{
     CellType, DeclaredColumn, Layout, PointRows, ResultRows, TrialColumns, TrialKey, axis_columns,
 };
@@ -71,7 +71,7 @@ impl<M: Model> BoundaryTask<M> {
     /// The errors of [`find_quantity`] and [`derive_quantity`], and [`Error::Refused`] for a plan
     /// without a boundary or a tolerance that cannot be met or means nothing.
     pub fn new(plan: &Plan<M>, options: &BoundaryOptions) -> Result<Self, Error> {
-        let (quantity, expression, plan) = if is_name(&options.quantity) {
+        let (quantity, expression, plan) = if is_column_name(&options.quantity) {
             let (quantity, plan) = find_quantity(plan, &options.quantity, options.limit)?;
             (quantity, None, plan)
         } else {
@@ -176,7 +176,7 @@ impl<M: Model> BoundaryTask<M> {
             rows.push(point, axis_values.clone(), row);
         }
         let value = rows.take().and_then(|batch| margin(expression, &batch));
-        Ok(value.map_err(defect)?.filter(|value| value.is_finite()))
+        Ok(value.map_err(row_defect)?.filter(|value| value.is_finite()))
     }
 
     /// Returns the function that evaluates the distances at trial points.

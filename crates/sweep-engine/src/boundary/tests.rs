@@ -1,4 +1,4 @@
-//! Tests of the search with functions whose edges are known.
+//! Tests of the search with functions whose changes of side are known.
 
 mod random;
 
@@ -60,21 +60,22 @@ fn line(mass: f64) -> f64 {
     30.0 + 230.0 * mass + 15.0 * (5.0 * mass).sin()
 }
 
-/// Checks that every edge has the right sides at its ends and is no wider than the tolerance.
-pub(crate) fn check_edges(
+/// Checks that every change of side has the right sides at its ends and is no wider than the
+/// tolerance.
+pub(crate) fn check_side_changes(
     traced: &TracedBoundary,
     distance: impl Fn(f64, f64) -> Option<f64>,
     tolerance: f64,
 ) {
     for row in &traced.curves[0] {
-        for edge in &row.edges {
-            let Some([low, high]) = edge.bracket else { continue };
+        for side_change in &row.side_changes {
+            let Some([low, high]) = side_change.bracket else { continue };
             assert!(high - low <= tolerance, "{row:?}");
             let [a, b] = [distance(row.first, low), distance(row.first, high)];
-            assert_eq!(edge.distances, [a, b], "{row:?}");
+            assert_eq!(side_change.distances, [a, b], "{row:?}");
             assert_ne!(a.map(|a| a < 0.0), b.map(|b| b < 0.0), "{row:?}");
             assert!(
-                edge.position.is_none_or(|position| (low..=high).contains(&position)),
+                side_change.position.is_none_or(|position| (low..=high).contains(&position)),
                 "{row:?}"
             );
         }
@@ -85,18 +86,21 @@ pub(crate) fn check_edges(
 fn a_smooth_boundary_takes_a_fifth_of_the_grids_points() {
     let first_values = masses(39);
     let traced = traced(fig12_distance, &first_values, &SEARCH);
-    check_edges(&traced, fig12_distance, 0.5);
+    check_side_changes(&traced, fig12_distance, 0.5);
     assert!(traced.trials <= 39 * 33 / 5, "{}", traced.trials);
     for (row, &mass) in traced.curves[0].iter().zip(&first_values) {
-        assert_eq!((row.first, row.edges.len()), (mass, 1));
-        let edge = row.edges[0];
+        assert_eq!((row.first, row.side_changes.len()), (mass, 1));
+        let side_change = row.side_changes[0];
         if line(mass) <= 60.0 {
-            assert_eq!(edge.kind, EdgeKind::NoneReliable, "{mass}");
+            assert_eq!(side_change.kind, SideChangeKind::NoneReliable, "{mass}");
         } else {
-            assert_eq!(edge.kind, EdgeKind::Crossing, "{mass}");
+            assert_eq!(side_change.kind, SideChangeKind::Crossing, "{mass}");
             // The function has a kink at its limit, so that linear interpolation in the bracket is
             // not exact.
-            assert!((edge.position.unwrap() - line(mass)).abs() < 0.2, "{mass}: {edge:?}");
+            assert!(
+                (side_change.position.unwrap() - line(mass)).abs() < 0.2,
+                "{mass}: {side_change:?}"
+            );
         }
     }
 }
@@ -123,29 +127,30 @@ fn the_cost_of_a_trace_is_pinned() {
 fn jumps_are_distinguished_from_steep_crossings() {
     let step_function = |_: f64, damping: f64| Some(if damping < 137.3 { 1.0 } else { -0.6 });
     for row in &traced(step_function, &masses(12), &SEARCH).curves[0] {
-        let edge = row.edges[0];
-        assert_eq!((edge.kind, edge.position), (EdgeKind::Jump, None));
-        let [low, high] = edge.bracket.unwrap();
+        let side_change = row.side_changes[0];
+        assert_eq!((side_change.kind, side_change.position), (SideChangeKind::Jump, None));
+        let [low, high] = side_change.bracket.unwrap();
         assert!(low < 137.3 && 137.3 <= high && high - low <= 0.5 / 16.0);
     }
     let steep = |_: f64, damping: f64| Some(((137.3 - damping) * 5.0).clamp(-0.6, 1.0));
     for row in &traced(steep, &masses(12), &SEARCH).curves[0] {
-        assert_eq!(row.edges[0].kind, EdgeKind::Crossing);
-        assert!((row.edges[0].position.unwrap() - 137.3).abs() < 0.03, "{row:?}");
+        assert_eq!(row.side_changes[0].kind, SideChangeKind::Crossing);
+        assert!((row.side_changes[0].position.unwrap() - 137.3).abs() < 0.03, "{row:?}");
     }
 }
 
 #[test]
-fn several_crossings_are_several_edges() {
+fn several_crossings_are_several_changes_of_side() {
     let wave = |mass: f64, damping: f64| Some(0.8 * ((damping - 20.0 * mass) / 25.0).sin());
     let traced = traced(wave, &masses(20), &SEARCH);
-    check_edges(&traced, wave, 0.5);
+    check_side_changes(&traced, wave, 0.5);
     for row in &traced.curves[0] {
         let roots: Vec<f64> = (0..12)
             .map(|k| 20.0 * row.first + 25.0 * std::f64::consts::PI * f64::from(k))
             .filter(|root| (60.0..300.0).contains(root))
             .collect();
-        let positions: Vec<f64> = row.edges.iter().map(|edge| edge.position.unwrap()).collect();
+        let positions: Vec<f64> =
+            row.side_changes.iter().map(|side_change| side_change.position.unwrap()).collect();
         assert_eq!(positions.len(), roots.len(), "{}", row.first);
         assert!(
             positions.iter().zip(&roots).all(|(position, root)| (position - root).abs() < 0.1),
@@ -165,15 +170,18 @@ fn an_island_as_wide_as_two_cells_is_found_in_every_row_it_spans() {
             Some(sign * (x * x + y * y - 1.0).clamp(-0.6, 2.0))
         };
         let traced = traced(disc, &masses(39), &SEARCH);
-        check_edges(&traced, disc, 0.5);
+        check_side_changes(&traced, disc, 0.5);
         for row in &traced.curves[0] {
             let x = (row.first - 0.5) / 0.3;
             if x.abs() < 0.97 {
-                assert_eq!(row.edges.len(), 2, "{row:?}");
+                assert_eq!(row.side_changes.len(), 2, "{row:?}");
             } else if x.abs() > 1.0 {
-                let has_no_edge =
-                    if sign > 0.0 { EdgeKind::NoneUnreliable } else { EdgeKind::NoneReliable };
-                assert_eq!(row.edges[0].kind, has_no_edge, "{row:?}");
+                let no_change_kind = if sign > 0.0 {
+                    SideChangeKind::NoneUnreliable
+                } else {
+                    SideChangeKind::NoneReliable
+                };
+                assert_eq!(row.side_changes[0].kind, no_change_kind, "{row:?}");
             }
         }
     }
@@ -194,10 +202,10 @@ fn distance_with_dip(mass: f64, damping: f64) -> Option<f64> {
 #[test]
 fn a_narrow_dip_beside_the_crossing_is_found_and_followed() {
     let traced = traced(distance_with_dip, &masses(39), &SEARCH);
-    check_edges(&traced, distance_with_dip, 0.5);
-    let edges: Vec<usize> =
-        traced.curves[0].iter().rev().take(5).map(|row| row.edges.len()).collect();
-    assert_eq!(edges, [3, 3, 3, 1, 1]);
+    check_side_changes(&traced, distance_with_dip, 0.5);
+    let side_changes: Vec<usize> =
+        traced.curves[0].iter().rev().take(5).map(|row| row.side_changes.len()).collect();
+    assert_eq!(side_changes, [3, 3, 3, 1, 1]);
 }
 
 #[test]
@@ -212,13 +220,14 @@ fn a_pocket_that_ends_between_rows_is_found_up_to_its_last_row() {
         Some(((bottom(height) - damping).max(damping - top) / 40.0).clamp(-0.65, 2.4))
     };
     let traced = traced(pocket, &heights, &SEARCH);
-    check_edges(&traced, pocket, 0.5);
+    check_side_changes(&traced, pocket, 0.5);
     let rows = &traced.curves[0];
-    assert_eq!(rows[0].edges[0].kind, EdgeKind::NoneUnreliable);
+    assert_eq!(rows[0].side_changes[0].kind, SideChangeKind::NoneUnreliable);
     for (row, height) in rows.iter().zip(&heights).skip(1) {
         let mut expected = vec![bottom(*height)];
         expected.extend((*height < 0.12).then_some(180.0));
-        let positions: Vec<f64> = row.edges.iter().filter_map(|edge| edge.position).collect();
+        let positions: Vec<f64> =
+            row.side_changes.iter().filter_map(|side_change| side_change.position).collect();
         let is_near = |(a, b): (&f64, &f64)| (a - b).abs() < 0.1;
         assert!(
             positions.len() == expected.len() && positions.iter().zip(&expected).all(is_near),
@@ -236,10 +245,10 @@ fn a_pocket_found_late_is_followed_through_every_row() {
         Some((((damping - middle).abs() - half) / 10.0).clamp(-0.6, 0.6))
     };
     let traced = traced(tongue, &masses(39), &SEARCH);
-    check_edges(&traced, tongue, 0.5);
+    check_side_changes(&traced, tongue, 0.5);
     for row in &traced.curves[0] {
         let crosses_tongue = ((row.first - 0.55) / 0.3).abs() < 0.9;
-        assert!(row.edges.len() == 2 || !crosses_tongue, "{row:?}");
+        assert!(row.side_changes.len() == 2 || !crosses_tongue, "{row:?}");
     }
 }
 
@@ -254,8 +263,8 @@ fn pockets_are_found_once_a_cell_fits_into_them() {
     let search = SearchRange { least: 4.0, greatest: 30.0, tolerance: 0.02, ..SEARCH };
     // These cells are 0.299 s wide.
     let traced = traced(distance, &masses(3), &SearchRange { lattice: 87, ..search });
-    check_edges(&traced, distance, 0.02);
-    assert!(traced.curves[0].iter().all(|row| row.edges.len() == 6), "{traced:?}");
+    check_side_changes(&traced, distance, 0.02);
+    assert!(traced.curves[0].iter().all(|row| row.side_changes.len() == 6), "{traced:?}");
 }
 
 #[test]
@@ -267,23 +276,36 @@ fn undefined_quantities_are_reported() {
         traced(distance, first_values, &SEARCH).curves.remove(0)
     };
     let rows = rows_of(&partly_undefined, &[0.2, 0.6]);
-    let kinds: Vec<Vec<EdgeKind>> =
-        rows.iter().map(|row| row.edges.iter().map(|edge| edge.kind).collect()).collect();
-    assert_eq!(kinds, [vec![EdgeKind::Undefined], vec![EdgeKind::Undefined, EdgeKind::Crossing]]);
-    assert_eq!(rows[0].edges[0].position, None);
+    let kinds: Vec<Vec<SideChangeKind>> = rows
+        .iter()
+        .map(|row| row.side_changes.iter().map(|side_change| side_change.kind).collect())
+        .collect();
+    assert_eq!(
+        kinds,
+        [
+            vec![SideChangeKind::Undefined],
+            vec![SideChangeKind::Undefined, SideChangeKind::Crossing]
+        ]
+    );
+    assert_eq!(rows[0].side_changes[0].position, None);
     let undefined_rows = rows_of(&|_, _| None, &masses(5));
-    assert!(undefined_rows.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
+    assert!(
+        undefined_rows.iter().all(|row| row.side_changes[0].kind == SideChangeKind::NoneUndefined)
+    );
     let nan_rows = rows_of(&|_, _| Some(f64::NAN), &masses(5));
-    assert!(nan_rows.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
+    assert!(nan_rows.iter().all(|row| row.side_changes[0].kind == SideChangeKind::NoneUndefined));
 }
 
 #[test]
-fn a_row_without_an_edge_has_no_number() {
-    for (distance, kind) in [(-1.0, EdgeKind::NoneReliable), (1.0, EdgeKind::NoneUnreliable)] {
+fn a_row_without_a_change_of_side_has_no_number() {
+    for (distance, kind) in
+        [(-1.0, SideChangeKind::NoneReliable), (1.0, SideChangeKind::NoneUnreliable)]
+    {
         let traced = traced(|_, _| Some(distance), &masses(39), &SEARCH);
         for row in &traced.curves[0] {
-            let edge = Edge { kind, position: None, bracket: None, distances: [None; 2] };
-            assert_eq!(row.edges, [edge]);
+            let side_change =
+                SideChange { kind, position: None, bracket: None, distances: [None; 2] };
+            assert_eq!(row.side_changes, [side_change]);
         }
     }
 }
@@ -303,7 +325,7 @@ fn the_search_of_noise_ends() {
             }
         };
         let traced = traced(noise, &masses(17), &SEARCH);
-        check_edges(&traced, noise, 0.5);
+        check_side_changes(&traced, noise, 0.5);
         // The bound is twice the number of trials at every tolerance.
         assert!(traced.trials <= 2 * 17 * 480, "{}", traced.trials);
     }
@@ -323,10 +345,10 @@ fn logarithmic_axes_are_searched_in_their_logarithms() {
         ..SEARCH
     };
     for row in &traced(distance, &first_values, &search).curves[0] {
-        let edge = row.edges[0];
-        let [low, high] = edge.bracket.unwrap();
-        assert!((high / low).ln() <= 0.0101, "{edge:?}");
-        assert!((edge.position.unwrap() / line(row.first)).ln().abs() < 0.005);
+        let side_change = row.side_changes[0];
+        let [low, high] = side_change.bracket.unwrap();
+        assert!((high / low).ln() <= 0.0101, "{side_change:?}");
+        assert!((side_change.position.unwrap() / line(row.first)).ln().abs() < 0.005);
     }
 }
 
@@ -348,7 +370,7 @@ fn curves_share_batches() {
     for (k, rows) in three_curves.curves.iter().enumerate() {
         for row in rows {
             let line = line(row.first) + 9.0 * k as f64;
-            let position = row.edges[0].position;
+            let position = row.side_changes[0].position;
             assert!(
                 position.map_or(line <= 60.0, |position| (position - line).abs() < 0.2),
                 "{k}: {row:?}"
@@ -358,7 +380,7 @@ fn curves_share_batches() {
 }
 
 #[test]
-fn rows_in_any_order_give_the_same_edges() {
+fn rows_in_any_order_give_the_same_changes_of_side() {
     let first_values = masses(13);
     let mut shuffled = first_values.clone();
     shuffled.swap(0, 7);

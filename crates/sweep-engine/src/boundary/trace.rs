@@ -24,7 +24,7 @@ use super::{BoundaryRow, BoundaryTrial, SearchRange, TracedBoundary};
 
 /// The greatest number of lines that are traced at once, in whole curves. Basis: they take some ten
 /// megabytes, and give trials enough to fill lanes. Doubling it doubles the memory.
-const MAX_BLOCK_LINES: usize = 1 << 14;
+const MAX_GROUP_LINES: usize = 1 << 14;
 /// The greatest number of samples that a line takes because its neighbours disagree with it. Basis:
 /// it makes the trace of any function end (test `the_search_of_noise_ends`). Doubling it doubles
 /// the trials of noise.
@@ -49,26 +49,26 @@ pub fn trace<E>(
 ) -> Result<TracedBoundary, E> {
     let mut boundary =
         TracedBoundary { curves: Vec::with_capacity(curves), ..TracedBoundary::default() };
-    let curves_at_once = (MAX_BLOCK_LINES / first_values.len().max(1)).max(1);
+    let curves_at_once = (MAX_GROUP_LINES / first_values.len().max(1)).max(1);
     while boundary.curves.len() < curves {
         let first_curve = boundary.curves.len();
         let end = (first_curve + curves_at_once).min(curves);
-        let mut block = Block::new(first_curve..end, first_values, search);
+        let mut group = CurveGroup::new(first_curve..end, first_values, search);
         loop {
-            let batch = block.next_batch();
+            let batch = group.next_batch();
             if batch.is_empty() {
                 break;
             }
-            report_lines(first_curve * first_values.len() + block.lines_traced());
+            report_lines(first_curve * first_values.len() + group.lines_traced());
             let trials: Vec<BoundaryTrial> = batch.iter().map(|request| request.trial).collect();
             let distances = evaluate(&trials)?;
             for (request, distance) in batch.iter().zip(distances) {
-                block.insert(request, distance);
+                group.insert(request, distance);
             }
             boundary.trials += trials.len();
             boundary.rounds += 1;
         }
-        boundary.curves.extend(block.finish());
+        boundary.curves.extend(group.finish());
     }
     Ok(boundary)
 }
@@ -83,7 +83,7 @@ struct TrialRequest {
 }
 
 /// Curves that are traced together.
-struct Block<'a> {
+struct CurveGroup<'a> {
     first_curve: usize,
     first_values: &'a [f64],
     search: SearchRange,
@@ -112,7 +112,7 @@ struct LineState {
     disputed_samples: usize,
 }
 
-impl<'a> Block<'a> {
+impl<'a> CurveGroup<'a> {
     fn new(curves: std::ops::Range<usize>, first_values: &'a [f64], search: &SearchRange) -> Self {
         let span = search.span();
         let cells = search.lattice.max(1);
@@ -280,7 +280,7 @@ impl<'a> Block<'a> {
                 let Some(search) = &states[rank].search else { continue };
                 rows.push(BoundaryRow {
                     first: self.first_values[self.lines[rank].index],
-                    edges: search.edges(&self.span, &value),
+                    side_changes: search.side_changes(&self.span, &value),
                     trials: search.samples().len(),
                 });
             }

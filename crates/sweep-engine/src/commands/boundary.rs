@@ -9,19 +9,21 @@ use super::grid::resume_command;
 use super::{GridArgs, Lines as _, format_number, install_interrupt};
 use crate::boundary::quantity::traceable_columns;
 use crate::boundary::{
-    BoundaryOptions, BoundaryRow, BoundaryTask, EdgeKind, TracedBoundary, trace,
+    BoundaryOptions, BoundaryRow, BoundaryTask, SideChangeKind, TracedBoundary, trace,
 };
 use crate::config::section::format_count;
 use crate::evaluator::{CachedEvaluator, SearchStop};
 use crate::store::{DeclaredColumn, OpenOutcome, Trials};
-use crate::{Error, Execution, ExecutionArgs, Exit, Model, Plan, Progress, duration, show, tell};
+use crate::{
+    Error, Execution, ExecutionArgs, Exit, Model, Plan, Progress, format_duration, show, tell,
+};
 use sweep_files::{FileKind, Output};
 use sweep_parameter::Worse;
 use sweep_plot::label;
 
 /// Arguments of `sweep boundary`.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LONG)]
+#[command(after_long_help = LONG_HELP)]
 pub struct BoundaryArgs {
     /// The grid: its first axis gives the rows, its second the range that is searched
     #[command(flatten)]
@@ -41,7 +43,7 @@ pub struct BoundaryArgs {
 }
 
 /// The text that `--help` adds.
-const LONG: &str = "\
+const LONG_HELP: &str = "\
 For each value of the first axis, the file has the crossings of the limit along the second axis, \
 each with its bracket. If there is no crossing, or the quantity jumps over its limit, the file \
 says so and has no number. The range of the search is from the least to the greatest value of the \
@@ -79,22 +81,22 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
         tell(&format!("going on: {} there", format_count(stored_points as usize, "point")));
     }
     let start = Instant::now();
-    let execution = args.execution.with(&interrupt);
-    let (traced, trials) = search(&task, Some(trials), execution)?;
-    let Some(traced) = traced else {
+    let execution = args.execution.with_interrupt(&interrupt);
+    let (boundary, trials) = search(&task, Some(trials), execution)?;
+    let Some(boundary) = boundary else {
         let stored_points = format_count(trials.map_or(0, |trials| trials.count()), "point");
-        let wall = duration(start.elapsed().as_secs_f64());
+        let wall = format_duration(start.elapsed().as_secs_f64());
         let mut text =
             format!("{}: interrupted with {stored_points} kept, after {wall}\n", plan.name);
         text.line("go on", resume_command());
         tell(text.trim_end());
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    file.finish(&task.table(&traced).into_bytes(&output)?)?;
+    file.finish(&task.table(&boundary).into_bytes(&output)?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let text = summary(&task, &traced, start.elapsed().as_secs_f64());
+    let text = format_summary(&task, &boundary, start.elapsed().as_secs_f64());
     Ok(print_summary(text, &output))
 }
 
@@ -124,39 +126,45 @@ fn print_summary(mut text: String, output: &Path) -> Exit {
 }
 
 /// Formats the limit that is traced: a quantity's, or a condition as the user typed it.
-pub(super) fn limit_in_words(quantity: &str, limit: impl Display) -> String {
+pub(super) fn describe_limit(quantity: &str, limit: impl Display) -> String {
     match label::condition(quantity) {
         Some(condition) => format!("the limit of {condition}"),
         None => format!("{quantity} = {limit}"),
     }
 }
 
-fn summary<M: Model>(task: &BoundaryTask<M>, traced: &TracedBoundary, wall_s: f64) -> String {
+fn format_summary<M: Model>(
+    task: &BoundaryTask<M>,
+    boundary: &TracedBoundary,
+    wall_s: f64,
+) -> String {
     let BoundaryTask { plan, quantity, search, .. } = task;
     let grid_points: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
     let mut text = format!(
         "{}: {} traced with {} (the grid has {grid_points}) in {}, {}\n",
         plan.name,
-        limit_in_words(&quantity.name, quantity.limit),
-        format_count(traced.trials, "point"),
-        format_count(traced.rounds, "round"),
-        duration(wall_s)
+        describe_limit(&quantity.name, quantity.limit),
+        format_count(boundary.trials, "point"),
+        format_count(boundary.rounds, "round"),
+        format_duration(wall_s)
     );
-    let rows = || traced.curves.iter().flatten();
-    let count_kind =
-        |row: &BoundaryRow, kind| row.edges.iter().filter(|edge| edge.kind == kind).count();
-    let edge_counts = EdgeKind::ALL.into_iter().filter_map(|kind| {
+    let rows = || boundary.curves.iter().flatten();
+    let count_kind = |row: &BoundaryRow, kind| {
+        row.side_changes.iter().filter(|side_change| side_change.kind == kind).count()
+    };
+    let change_counts = SideChangeKind::ALL.into_iter().filter_map(|kind| {
         let count: usize = rows().map(|row| count_kind(row, kind)).sum();
         let [noun, qualifier] = noun_and_qualifier(kind);
         (count > 0).then(|| format_count(count, noun) + qualifier)
     });
-    text.line("found", edge_counts.collect::<Vec<_>>().join(", "));
-    let folded_values = rows().filter(|row| count_kind(row, EdgeKind::Crossing) > 1).count();
+    text.line("found", change_counts.collect::<Vec<_>>().join(", "));
+    let folded_values = rows().filter(|row| count_kind(row, SideChangeKind::Crossing) > 1).count();
     if folded_values > 0 {
         let value_count = format_count(folded_values, "value");
         text.line("folds", format!("several crossings at {value_count} of the first axis"));
     }
-    let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);
+    let brackets =
+        rows().flat_map(|row| &row.side_changes).filter_map(|side_change| side_change.bracket);
     let bracket_width = |[low, high]: [f64; 2]| match search.second_log {
         true => (high / low).ln(),
         false => high - low,
@@ -180,15 +188,15 @@ fn summary<M: Model>(task: &BoundaryTask<M>, traced: &TracedBoundary, wall_s: f6
     text
 }
 
-/// Returns the noun for edges of this kind, and the words that follow the noun.
-const fn noun_and_qualifier(kind: EdgeKind) -> [&'static str; 2] {
+/// Returns the noun for changes of side of this kind, and the words that follow the noun.
+const fn noun_and_qualifier(kind: SideChangeKind) -> [&'static str; 2] {
     match kind {
-        EdgeKind::Crossing => ["crossing", ""],
-        EdgeKind::Jump => ["jump", ""],
-        EdgeKind::Undefined => ["edge", " of undefined points"],
-        EdgeKind::NoneReliable => ["line", " within the limit throughout"],
-        EdgeKind::NoneUnreliable => ["line", " beyond the limit throughout"],
-        EdgeKind::NoneUndefined => ["line", " undefined throughout"],
+        SideChangeKind::Crossing => ["crossing", ""],
+        SideChangeKind::Jump => ["jump", ""],
+        SideChangeKind::Undefined => ["edge", " of undefined points"],
+        SideChangeKind::NoneReliable => ["line", " within the limit throughout"],
+        SideChangeKind::NoneUnreliable => ["line", " beyond the limit throughout"],
+        SideChangeKind::NoneUndefined => ["line", " undefined throughout"],
     }
 }
 
@@ -214,11 +222,11 @@ pub fn search<M: Model>(
         CachedEvaluator::new(engine, threads, execution.interrupt, trials, &show_points)?;
     let mut record_rows_done = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let distances = task.distances(&evaluator);
-    let traced =
+    let boundary =
         trace(&distances, &task.first_values, task.curves, &task.search, &mut record_rows_done);
     drop(distances);
     progress.finish();
-    Ok((SearchStop::interrupted_to_none(traced)?, evaluator.into_cache()))
+    Ok((SearchStop::interrupted_to_none(boundary)?, evaluator.into_cache()))
 }
 
 #[cfg(test)]
@@ -227,8 +235,8 @@ mod tests {
 
     #[test]
     fn a_condition_is_told_as_it_was_typed() {
-        assert_eq!(limit_in_words("ratio_max", 2.0), "ratio_max = 2");
+        assert_eq!(describe_limit("ratio_max", 2.0), "ratio_max = 2");
         let margin = "margin(ratio_max < 2 and growth_per_s < 0)";
-        assert_eq!(limit_in_words(margin, 0.0), "the limit of ratio_max < 2 and growth_per_s < 0");
+        assert_eq!(describe_limit(margin, 0.0), "the limit of ratio_max < 2 and growth_per_s < 0");
     }
 }

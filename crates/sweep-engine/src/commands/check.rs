@@ -7,10 +7,10 @@ use super::run::describe_failures;
 use super::{GridArgs, format_number, format_range};
 use crate::config::section::format_count;
 use crate::design::{Design, Distribution};
-use crate::estimate::size;
+use crate::estimate::format_bytes;
 use crate::method::Steps;
 use crate::store::read::count_failed;
-use crate::{Axis, AxisValues, Error, Estimate, Exit, Model, Plan, duration, show, threads};
+use crate::{Axis, AxisValues, Error, Estimate, Exit, Model, Plan, format_duration, show, threads};
 use sweep_parameter::RatioLimits;
 
 /// Arguments of `sweep check`.
@@ -33,14 +33,14 @@ pub fn run<M: Model>(args: &CheckArgs) -> Result<Exit, Error> {
     if args.json {
         return show(&format!("{:#}\n", plan.to_json()));
     }
-    let estimate = M::estimate(&plan, threads::count(None, &threads::process)?)?;
-    show(&summary(&plan, &estimate))?;
+    let estimate = M::estimate(&plan, threads::choose_count(None, &threads::read_variable)?)?;
+    show(&format_summary(&plan, &estimate))?;
     // If every sampled point fails, the run would be of no use.
-    Ok(if is_failed_throughout(&estimate) { Exit::Failed } else { Exit::Done })
+    Ok(if have_all_points_failed(&estimate) { Exit::Failed } else { Exit::Done })
 }
 
 /// Formats the plan and the estimate in a few lines.
-fn summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
+fn format_summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         // Writing to a String cannot fail.
@@ -74,13 +74,14 @@ fn summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let Estimate { threads, simd, .. } = estimate;
     let threads = format_count(*threads, "thread");
     line("runs on", format!("{threads}, instruction set {simd}"));
-    let sampled_points = format_count(estimate.sampled.values().sum::<u64>() as usize, "point");
+    let sampled_points =
+        format_count(estimate.sample_statuses.values().sum::<u64>() as usize, "point");
     line("takes", describe_time(plan, estimate, &sampled_points));
     let [memory, disk, result] =
-        [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
+        [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(format_bytes);
     let disk = format!("on disk {disk} while it runs, and at most {result} for the result");
     line("", format!("{memory} of memory; {disk}"));
-    if let Some(failures) = describe_failures(&estimate.sampled) {
+    if let Some(failures) = describe_failures(&estimate.sample_statuses) {
         line("failed", format!("{failures}, of {sampled_points} tried"));
     }
     text
@@ -100,17 +101,17 @@ fn describe_time<M: Model>(plan: &Plan<M>, estimate: &Estimate, sampled_points: 
             format!(", the first {sampled_s} s each{warning}")
         }
     };
-    if is_failed_throughout(estimate) {
+    if have_all_points_failed(estimate) {
         return format!("not known: none of the {sampled_points} tried could be computed");
     }
-    let time = duration(estimate.wall_s);
+    let time = format_duration(estimate.wall_s);
     format!("about {time}: an estimate, from {sampled_points} integrated just now{sampled_time}")
 }
 
 /// Whether points were sampled, and every one of them failed.
-fn is_failed_throughout(estimate: &Estimate) -> bool {
-    let sampled_points = estimate.sampled.values().sum::<u64>();
-    sampled_points > 0 && count_failed(&estimate.sampled) == sampled_points
+fn have_all_points_failed(estimate: &Estimate) -> bool {
+    let sampled_points = estimate.sample_statuses.values().sum::<u64>();
+    sampled_points > 0 && count_failed(&estimate.sample_statuses) == sampled_points
 }
 
 fn describe_axis<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> String {

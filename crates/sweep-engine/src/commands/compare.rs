@@ -14,7 +14,7 @@ use crate::config::section::{format_count, truncate};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, Model, show, tell};
 use fail_on::FailOn;
-use overridden::{Overridden, overridden};
+use overridden::{OverriddenNumbers, find_overridden};
 use sweep_files::{FileKind, Output};
 use sweep_plot::capitalise;
 use sweep_results::{
@@ -23,7 +23,7 @@ use sweep_results::{
 
 /// Arguments of `sweep compare`.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LONG)]
+#[command(after_long_help = LONG_HELP)]
 pub struct CompareArgs {
     /// The result to compare with: a map, a boundary, or any other Parquet file of this program
     #[arg(value_name = "A")]
@@ -50,7 +50,7 @@ pub struct CompareArgs {
 }
 
 /// The text that `--help` adds.
-const LONG: &str = "\
+const LONG_HELP: &str = "\
 Two rows are compared if their axes have the same values to nine digits; rows of only one file \
 are counted. Where axes have the same tolerances about other numbers, rows of the same point are \
 compared. An axis that only one file has is ignored if it has a single value. Files of \
@@ -95,12 +95,13 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
             return Err(Error::option("--out", path.display(), expected));
         }
         output.finish(
-            &differences::table(args, &comparison, &tables, M::ABOUT.build).into_bytes(path)?,
+            &differences::differences_table(args, &comparison, &tables, M::ABOUT.build)
+                .into_bytes(path)?,
         )?;
     }
     let violations: Vec<String> =
         args.fail_on.iter().filter_map(|fail_on| fail_on.violation(&comparison)).collect();
-    let overridden = overridden::<M>(&tables, &comparison);
+    let overridden = find_overridden::<M>(&tables, &comparison);
     if args.json {
         show(&format!("{:#}\n", to_json(args, &comparison, &overridden, &violations)))?;
     } else if args.markdown {
@@ -116,7 +117,7 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
             tell(&format!("wrote {out}: sweep plot {}", quote_for_shell(&out.to_string())));
         }
     }
-    Ok(if violations.is_empty() { Exit::Done } else { Exit::NotHeld })
+    Ok(if violations.is_empty() { Exit::Done } else { Exit::ConditionViolated })
 }
 
 /// Formats a value of a plan, and shortens it if it is long.
@@ -133,7 +134,7 @@ fn format_optional(value: Option<f64>) -> String {
     value.map_or_else(|| "null".to_owned(), format_number)
 }
 
-fn verdict_text(row: &SharedRow, side: usize) -> &'static str {
+fn describe_verdict(row: &SharedRow, side: usize) -> &'static str {
     // The flip determines the verdict of either side.
     match (row.flip, side) {
         (Flip::Lost, 0) | (Flip::Gained, 1) => "reliable",
@@ -184,7 +185,7 @@ fn difference_tables(args: &CompareArgs, comparison: &Comparison) -> Vec<TitledT
         };
         match row.flip {
             Flip::Defined => ratio,
-            _ => format!("{ratio} {}", verdict_text(row, side)),
+            _ => format!("{ratio} {}", describe_verdict(row, side)),
         }
     };
     for (sensitive, row_kind) in [(false, ""), (true, " of sensitive rows")] {
@@ -242,10 +243,10 @@ fn column_table(fail_on: &FailOn, comparison: &Comparison, max_rows: usize) -> O
 /// verdicts, the boundary.
 fn summary_lines(
     comparison: &Comparison,
-    overridden: &[Overridden],
+    overridden: &[OverriddenNumbers],
 ) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
-    for Overridden { axis, paths } in overridden {
+    for OverriddenNumbers { axis, paths } in overridden {
         let first_paths = paths.iter().take(MAX_PLAN_LINES).map(String::as_str).collect::<Vec<_>>();
         let ellipsis = if paths.len() > first_paths.len() { ", ..." } else { "" };
         let first_paths = first_paths.join(", ");
@@ -349,7 +350,11 @@ fn describe_shift(shift: &BoundaryShift) -> String {
 }
 
 /// Formats the differences as text.
-fn format_text(args: &CompareArgs, comparison: &Comparison, overridden: &[Overridden]) -> String {
+fn format_text(
+    args: &CompareArgs,
+    comparison: &Comparison,
+    overridden: &[OverriddenNumbers],
+) -> String {
     let mut text = String::new();
     text.line("A", args.first.display());
     text.line("B", args.second.display());
@@ -385,10 +390,10 @@ const MAX_PLAN_LINES: usize = 12;
 fn format_markdown(
     args: &CompareArgs,
     comparison: &Comparison,
-    overridden: &[Overridden],
+    overridden: &[OverriddenNumbers],
     violations: &[String],
 ) -> String {
-    let names = [&args.first, &args.second].map(|path| code(&path.display().to_string()));
+    let names = [&args.first, &args.second].map(|path| format_code(&path.display().to_string()));
     let mut text = format!("### {} compared with {}\n\n", names[1], names[0]);
     if comparison.is_empty() {
         text.push_str("They do not differ.\n");
@@ -399,22 +404,22 @@ fn format_markdown(
         let _ = writeln!(text, "- **`--fail-on`: {violation}**");
     }
     for PlanChange { path, first, second } in comparison.plan.iter().take(MAX_PLAN_LINES) {
-        let first = code(&format_plan_value(first));
-        let second = code(&format_plan_value(second));
-        let _ = writeln!(text, "- plan: {} from {first} to {second}", code(path));
+        let first = format_code(&format_plan_value(first));
+        let second = format_code(&format_plan_value(second));
+        let _ = writeln!(text, "- plan: {} from {first} to {second}", format_code(path));
     }
     if comparison.plan.len() > MAX_PLAN_LINES {
         let _ = writeln!(text, "- plan: {} more", comparison.plan.len() - MAX_PLAN_LINES);
     }
     for (name, description) in summary_lines(comparison, overridden) {
-        let _ = writeln!(text, "- {name}: {}", escaped(&description));
+        let _ = writeln!(text, "- {name}: {}", escape_markdown(&description));
     }
     for TitledTable { title, headings, rows } in difference_tables(args, comparison) {
         let row = |cells: &[String]| {
-            let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
+            let cells: Vec<String> = cells.iter().map(|cell| escape_markdown(cell)).collect();
             format!("| {} |\n", cells.join(" | "))
         };
-        let _ = writeln!(text, "\n#### {}\n", capitalise(&escaped(&title)));
+        let _ = writeln!(text, "\n#### {}\n", capitalise(&escape_markdown(&title)));
         text.push_str(&row(&headings));
         let _ = writeln!(text, "|{}", "---:|".repeat(headings.len()));
         rows.iter().for_each(|cells| text.push_str(&row(cells)));
@@ -423,12 +428,12 @@ fn format_markdown(
 }
 
 /// Formats a text as Markdown code.
-fn code(text: &str) -> String {
+fn format_code(text: &str) -> String {
     format!("`{}`", text.replace('`', "'"))
 }
 
 /// Escapes the characters of a text that have a meaning in Markdown.
-fn escaped(text: &str) -> String {
+fn escape_markdown(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
         if "\\`*_|<>[]#".contains(c) {
@@ -443,7 +448,7 @@ fn escaped(text: &str) -> String {
 fn to_json(
     args: &CompareArgs,
     comparison: &Comparison,
-    overridden: &[Overridden],
+    overridden: &[OverriddenNumbers],
     violations: &[String],
 ) -> Value {
     let row = |row: &SharedRow| {
@@ -514,7 +519,7 @@ mod tests {
 
     #[test]
     fn markdown_shows_texts_as_they_are() {
-        assert_eq!(escaped("ratio_max | <b>"), "ratio\\_max \\| \\<b\\>");
-        assert_eq!(code("a`b"), "`a'b`");
+        assert_eq!(escape_markdown("ratio_max | <b>"), "ratio\\_max \\| \\<b\\>");
+        assert_eq!(format_code("a`b"), "`a'b`");
     }
 }

@@ -8,13 +8,13 @@ use sweep_results::{Condition, ResultTable};
 ///
 /// # Errors
 /// Every mistake, with its position.
-pub fn parse(
+pub fn parse_conditions(
     option: &str,
     texts: &[String],
     table: &ResultTable,
 ) -> Result<Vec<Condition>, Diagnostics> {
     let report = Report::default();
-    let parse = |text: &String| match Condition::parse(text, table) {
+    let parse_condition = |text: &String| match Condition::parse(text, table) {
         Ok(condition) => Some(condition),
         Err(mistake) => {
             let location = Location::new(report.add(option, text.as_str()), mistake.span.clone());
@@ -22,8 +22,8 @@ pub fn parse(
             None
         }
     };
-    let parsed = texts.iter().filter_map(parse).collect();
-    report.finish(Some(parsed))
+    let conditions = texts.iter().filter_map(parse_condition).collect();
+    report.finish(Some(conditions))
 }
 
 /// Parses the condition of `--where`, which selects rows.
@@ -34,7 +34,8 @@ pub fn parse_filter(
     text: Option<&String>,
     table: &ResultTable,
 ) -> Result<Option<Condition>, Error> {
-    let condition = parse("--where", text.map_or(&[], std::slice::from_ref), table)?.pop();
+    let condition =
+        parse_conditions("--where", text.map_or(&[], std::slice::from_ref), table)?.pop();
     if let Some(Condition { text, .. }) =
         condition.as_ref().filter(|condition| condition.has_aggregates())
     {

@@ -7,17 +7,17 @@ use super::cells::format_table;
 use super::grid::resume_command;
 use super::{Lines as _, format_cell, format_number, install_interrupt};
 use crate::config::section::format_count;
-use crate::optimise::file::{own_file, parameters, table, trial_columns};
-use crate::optimise::search::{search, slacks};
+use crate::optimise::file::{candidates_table, format_model_file, parameters, trial_columns};
+use crate::optimise::search::{compute_slacks, search};
 use crate::optimise::study::{Objective, SearchedParameter, Study};
 use crate::store::{OpenOutcome, Trials};
-use crate::{Error, Execution, ExecutionArgs, Exit, Model, duration, tell};
+use crate::{Error, Execution, ExecutionArgs, Exit, Model, format_duration, tell};
 use sweep_files::{FileKind, MODEL_FILE_START, Output, atomic, key};
 use sweep_results::{Cell, ResultTable, Slack};
 
 /// Arguments of `sweep optimise`.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LONG)]
+#[command(after_long_help = LONG_HELP)]
 pub struct OptimiseArgs {
     /// Study file
     #[arg(value_name = "STUDY.toml")]
@@ -43,7 +43,7 @@ pub struct OptimiseArgs {
 }
 
 /// The text that `--help` adds.
-const LONG: &str = "\
+const LONG_HELP: &str = "\
 A study names a grid file, numbers to minimise or maximise, parameters with bounds, and \
 conditions as in `sweep require`. Every candidate is evaluated at all points of the grid. \
 docs/optimise.md describes study files.
@@ -73,17 +73,17 @@ pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
     let default_path = || PathBuf::from(format!("results/{}.parquet", study.name));
     let output = args.out.clone().unwrap_or_else(default_path);
     let file = Output::begin(&output, FileKind::Optimise)?;
-    let own_file_output = claim_own_file(&study, args, &output)?;
+    let model_file_output = claim_model_file(&study, args, &output)?;
     let interrupt = install_interrupt()?;
     let mut trials = match Trials::open(&output, &study.job(), trial_columns(&study), args.fresh)? {
         OpenOutcome::Open(trials) => trials,
         OpenOutcome::Finished(()) => {
             let search_note = "it is there already (--fresh searches again)";
-            let execution = args.execution.with(&interrupt);
+            let execution = args.execution.with_interrupt(&interrupt);
             return summarise(
                 &study,
                 args.candidate,
-                own_file_output,
+                model_file_output,
                 &output,
                 search_note,
                 execution,
@@ -92,17 +92,17 @@ pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
     };
     trials.take_notes().iter().for_each(|note| tell(note));
     let start = Instant::now();
-    let execution = args.execution.with(&interrupt);
+    let execution = args.execution.with_interrupt(&interrupt);
     let (candidates, trials) = search(&study, Some(trials), execution)?;
     let wall_s = start.elapsed().as_secs_f64();
     let Some(candidates) = candidates else {
-        let wall = duration(wall_s);
+        let wall = format_duration(wall_s);
         let mut text = format!("{}: interrupted after {wall}\n", study.name);
         text.line("go on", resume_command());
         tell(text.trim_end());
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    file.finish(&table(&study, &candidates).into_bytes(&output)?)?;
+    file.finish(&candidates_table(&study, &candidates).into_bytes(&output)?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
@@ -111,16 +111,16 @@ pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
     let search_note = format!(
         "{candidate_count} candidates of {} in {}, {:.0} points/s",
         format_count(rows as usize, "point"),
-        duration(wall_s),
+        format_duration(wall_s),
         (candidate_count * rows) as f64 / wall_s
     );
     summarise(
         &study,
         args.candidate,
-        own_file_output,
+        model_file_output,
         &output,
         &search_note,
-        args.execution.with(&interrupt),
+        args.execution.with_interrupt(&interrupt),
     )
 }
 
@@ -132,7 +132,7 @@ fn slack_lines<M: Model>(
     values: &[f64],
     execution: Execution<'_>,
 ) -> Result<Option<String>, Error> {
-    let Some(slacks) = slacks(study, values, execution)? else { return Ok(None) };
+    let Some(slacks) = compute_slacks(study, values, execution)? else { return Ok(None) };
     let known_slacks = study.conditions.iter().zip(slacks);
     let known_slacks = known_slacks.filter_map(|(goal, slack)| Some((goal.text(), slack?)));
     Ok(Some(describe_slacks(known_slacks.collect())))
@@ -191,7 +191,7 @@ fn find_nearest<M: Model>(
 }
 
 /// Claims the path of the model's own file before the search, if `--best` requests the file.
-fn claim_own_file<'a, M: Model>(
+fn claim_model_file<'a, M: Model>(
     study: &Study<M>,
     args: &'a OptimiseArgs,
     output: &Path,
@@ -206,14 +206,14 @@ fn claim_own_file<'a, M: Model>(
         let expected = format!("a number from 0 to {}", candidates - 1);
         return Err(Error::option("--candidate", candidate, expected));
     }
-    let own_file_output = Output::begin(path, FileKind::ModelFile)?;
+    let model_file_output = Output::begin(path, FileKind::ModelFile)?;
     // The files may not exist yet, so the paths of their folders are compared.
     let resolved_path =
         |path: &Path| Some(atomic::parent(path).canonicalize().ok()?.join(path.file_name()?));
     if resolved_path(path) == resolved_path(output) {
         return refuse("another file than that of all candidates");
     }
-    Ok(Some((path, own_file_output)))
+    Ok(Some((path, model_file_output)))
 }
 
 /// Prints a summary of the file of candidates, and writes the model's own file of a candidate if it
@@ -221,7 +221,7 @@ fn claim_own_file<'a, M: Model>(
 fn summarise<M: Model>(
     study: &Study<M>,
     candidate: Option<u64>,
-    own_file_output: Option<(&Path, Output<'_>)>,
+    model_file_output: Option<(&Path, Output<'_>)>,
     output: &Path,
     search_note: &str,
     execution: Execution<'_>,
@@ -245,7 +245,7 @@ fn summarise<M: Model>(
     let mut values = None;
     // The least value of the first objective before and in the last third of the candidates.
     let mut least_objective = [f64::INFINITY; 2];
-    let mut late_on_front = 0;
+    let mut late_front_count = 0;
     let first_of_last_third = study.evolution.first_of_last_third();
     file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
@@ -266,7 +266,7 @@ fn summarise<M: Model>(
             nearest_cells = Some(cells.clone());
         }
         if cells[2] == Cell::Flag(true) {
-            late_on_front += usize::from(row.index() >= first_of_last_third);
+            late_front_count += usize::from(row.index() >= first_of_last_third);
             front.push(cells);
         }
         Ok::<(), Error>(())
@@ -293,7 +293,7 @@ fn summarise<M: Model>(
             .map(|value| format_number(sign * value))
         {
             _ if has_several_objectives => {
-                format!("put {late_on_front} of {} on the front{advice}", front.len())
+                format!("put {late_front_count} of {} on the front{advice}", front.len())
             }
             [before, after] if before == after => "found none better".to_owned(),
             [from, to] => format!("took {name} from {from} to {to}{advice}"),
@@ -340,12 +340,12 @@ fn summarise<M: Model>(
     let listed_candidates: Vec<Vec<String>> =
         listed_candidates.map(|cells| row_texts(cells)).collect();
     text.push_str(&format_table(&headings, &listed_candidates, "  "));
-    if let Some((path, file)) = own_file_output {
-        let own_text = values.as_deref().and_then(|values| own_file(study, values));
-        match chosen_candidate.zip(own_text) {
-            Some((chosen_candidate, own_text)) => {
+    if let Some((path, file)) = model_file_output {
+        let model_file_text = values.as_deref().and_then(|values| format_model_file(study, values));
+        match chosen_candidate.zip(model_file_text) {
+            Some((chosen_candidate, model_file_text)) => {
                 let origin = format!("candidate {chosen_candidate} of {}", study.name);
-                file.finish(format!("{MODEL_FILE_START}{origin}\n{own_text}").as_bytes())?;
+                file.finish(format!("{MODEL_FILE_START}{origin}\n{model_file_text}").as_bytes())?;
                 text.line("wrote", path.display());
             }
             None => {
@@ -357,7 +357,7 @@ fn summarise<M: Model>(
     text.suggest_command("plot", output);
     tell(text.trim_end());
     // An empty front means that no candidate is feasible.
-    Ok(if front.is_empty() { Exit::NotHeld } else { Exit::Done })
+    Ok(if front.is_empty() { Exit::ConditionViolated } else { Exit::Done })
 }
 
 #[cfg(test)]

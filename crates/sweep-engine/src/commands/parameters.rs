@@ -27,7 +27,7 @@ pub fn run<M: Model>(args: &ParametersArgs) -> Result<Exit, Error> {
     let plan =
         args.grid.clone().map(|grid| GridInput::<M>::file(grid, Vec::new()).load()).transpose()?;
     let rows = list_parameters(plan.as_ref());
-    show(&if args.json { as_json(&rows) } else { as_text(&rows) })
+    show(&if args.json { format_json(&rows) } else { format_text(&rows) })
 }
 
 /// A line of the listing of parameters.
@@ -60,7 +60,7 @@ pub fn list_parameters<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<
     parameters.into_iter().map(list_parameter).collect()
 }
 
-fn as_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
+fn format_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
     let value_text = |row: &ListedParameter<M>| {
         let value_text = row.value.map(|value| without_rounding_noise(value).to_string());
         value_text.unwrap_or_else(|| "-".to_owned())
@@ -85,14 +85,14 @@ fn as_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
 }
 
 /// Formats the table as JSON.
-pub fn as_json<M: Model>(rows: &[ListedParameter<M>]) -> String {
+pub fn format_json<M: Model>(rows: &[ListedParameter<M>]) -> String {
     let row = |row: &ListedParameter<M>| {
         json!({
             "name": row.parameter.name,
             "value": row.value,
             "unit": row.parameter.unit,
             "description": row.parameter.description,
-            "range": range(row.parameter.range),
+            "range": range_to_json(row.parameter.range),
             "source": row.source,
         })
     };
@@ -101,7 +101,7 @@ pub fn as_json<M: Model>(rows: &[ListedParameter<M>]) -> String {
 
 /// Returns the bounds of a range as JSON. An end that only the greatest magnitude of all parameters
 /// limits is `null`.
-fn range(range: Range) -> Value {
+fn range_to_json(range: Range) -> Value {
     let [least, greatest] = range.bounds();
     json!({ "least": least, "greatest": greatest, "zero_excluded": range.excludes_zero() })
 }

@@ -63,7 +63,7 @@ pub fn run<M: Model>(
         let expected = format!("a {}; other files go behind it", FileKind::Map.name());
         return Err(Error::option("RESULT", args.result.display(), expected));
     }
-    let requirements = conditions::parse("--require", &args.requirements, &file)?;
+    let requirements = conditions::parse_conditions("--require", &args.requirements, &file)?;
     let (picture, description) = describe_as_html(&args.result, model)?;
     let plan = file.plan.clone().unwrap_or_default();
     let name = plan["name"].as_str().unwrap_or_default();
@@ -146,7 +146,7 @@ pub fn run<M: Model>(
     body += &format!("<p>{path}</p><p>{hashes}</p></details>\n");
     page.finish(printable_page(&args.question, &body).as_bytes())?;
     tell(&format!("wrote {}", output.display()));
-    Ok(if all_hold { Exit::Done } else { Exit::NotHeld })
+    Ok(if all_hold { Exit::Done } else { Exit::ConditionViolated })
 }
 
 /// Returns whether an argument looks like an expression and is not a file.
@@ -180,7 +180,7 @@ fn worst_values(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
         let rows = top(file, &columns, None, Some((name, worse)), 1)?;
         let Some([value, axis_cells @ ..]) = rows.first().map(Vec::as_slice) else { continue };
         let Cell::Number(number) = value else { continue };
-        let format_value = |value: f64| with_unit(format_significant(value, 4), column.unit());
+        let format_value = |value: f64| join_unit(format_significant(value, 4), column.unit());
         table_rows.push(vec![
             quantity_in_words(name),
             format_value(*number),
@@ -193,16 +193,16 @@ fn worst_values(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
 
 /// Formats the values of the axes.
 fn format_axis_values(file: &ResultTable, axis_cells: &[Cell]) -> String {
-    let unit_of = |name: &str| file.column(name).map_or("", Column::unit);
+    let axis_unit = |name: &str| file.column(name).map_or("", Column::unit);
     let axes = file.axes().into_iter().zip(axis_cells);
     let values = axes.map(|(axis, cell)| {
-        format!("{} {}", name_in_words(axis), with_unit(format_cell(cell), unit_of(axis)))
+        format!("{} {}", name_in_words(axis), join_unit(format_cell(cell), axis_unit(axis)))
     });
     values.collect::<Vec<_>>().join(", ")
 }
 
 /// Joins a number and its unit by a space at which no line breaks.
-fn with_unit(text: String, unit: &str) -> String {
+fn join_unit(text: String, unit: &str) -> String {
     match unit {
         "" => text,
         unit => format!("{text} {unit}").replace(' ', "\u{a0}"),

@@ -14,7 +14,7 @@ use sweep_results::{Cell, Condition, ConditionCheck, ResultTable, check};
 
 /// Arguments of `sweep require`.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LONG)]
+#[command(after_long_help = LONG_HELP)]
 pub struct RequireArgs {
     /// A result of `sweep run`, or any other Parquet file of this program
     #[arg(value_name = "FILE")]
@@ -38,7 +38,7 @@ pub struct RequireArgs {
 }
 
 /// The text that `--help` adds.
-const LONG: &str = "\
+const LONG_HELP: &str = "\
 An expression compares columns (`sweep show FILE` lists them), numbers and texts in quotes by < <= \
 > >= == !=, joins comparisons by and, or, not, and calculates by + - * / and abs(). \
 `COLUMN is null` and `COLUMN is not null` ask for missing values.
@@ -64,37 +64,42 @@ The exit code is 0 where every expression holds, else 4.";
 pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
     refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
-    let conditions = conditions::parse("EXPRESSION", &args.expressions, &file)?;
+    let conditions = conditions::parse_conditions("EXPRESSION", &args.expressions, &file)?;
     let filter = conditions::parse_filter(args.filter.as_ref(), &file)?;
     let max_rows = usize::from(args.rows);
     let is_random = is_random(&file);
-    let gates = conditions
+    let expression_checks = conditions
         .iter()
         .map(|condition| {
             let whole = check(&file, condition, filter.as_ref(), args.allow_null, max_rows)?;
             let parts =
                 check_parts(&file, condition, filter.as_ref(), args.allow_null, whole.holds)?;
-            Ok(Gate { intervals: share_intervals(&whole, is_random), whole, parts })
+            Ok(ExpressionCheck { intervals: share_intervals(&whole, is_random), whole, parts })
         })
-        .collect::<Result<Vec<Gate>, Error>>()?;
-    let holds = gates.iter().all(|gate| gate.whole.holds);
+        .collect::<Result<Vec<ExpressionCheck>, Error>>()?;
+    let holds = expression_checks.iter().all(|expression_check| expression_check.whole.holds);
     if args.json {
         let json = json!({
             "file": args.file.display().to_string(),
             "where": args.filter,
             "holds": holds,
-            "expressions": gates,
+            "expressions": expression_checks,
         });
         show(&format!("{json:#}\n"))?;
     } else {
-        show(&gates.iter().map(|gate| format_gate(args, gate, is_random)).collect::<String>())?;
+        show(
+            &expression_checks
+                .iter()
+                .map(|expression_check| format_expression_check(args, expression_check, is_random))
+                .collect::<String>(),
+        )?;
     }
-    Ok(if holds { Exit::Done } else { Exit::NotHeld })
+    Ok(if holds { Exit::Done } else { Exit::ConditionViolated })
 }
 
 /// An expression with the result of its check.
 #[derive(Serialize)]
-struct Gate {
+struct ExpressionCheck {
     #[serde(flatten)]
     whole: ConditionCheck,
     /// The 95 % confidence interval of each function over all rows; `None` for functions other than
@@ -113,12 +118,12 @@ fn is_random(file: &ResultTable) -> bool {
 }
 
 /// Computes Wilson's interval of every share.
-fn share_intervals(checked: &ConditionCheck, is_random: bool) -> Vec<Option<[f64; 2]>> {
+fn share_intervals(condition_check: &ConditionCheck, is_random: bool) -> Vec<Option<[f64; 2]>> {
     let interval = |(count, rows): (&Option<u64>, &u64)| {
         let share = Share::wilson((*count)?, *rows).filter(|_| is_random)?;
         Some([share.low, share.high])
     };
-    checked.share_counts.iter().zip(&checked.aggregate_rows).map(interval).collect()
+    condition_check.share_counts.iter().zip(&condition_check.aggregate_rows).map(interval).collect()
 }
 
 /// Checks each part that an expression joins by `and`, if the expression fails.
@@ -134,16 +139,21 @@ fn check_parts(
         return Ok(Vec::new());
     }
     let texts: Vec<String> = texts.into_iter().map(str::to_owned).collect();
-    let parts = conditions::parse("EXPRESSION", &texts, file)?;
+    let parts = conditions::parse_conditions("EXPRESSION", &texts, file)?;
     let checks = parts.iter().map(|part| check(file, part, filter, allow_null, 0));
     Ok(checks.collect::<Result<Vec<_>, _>>()?)
 }
 
 /// Formats the result of an expression and of its parts.
-fn format_gate(args: &RequireArgs, gate: &Gate, is_random: bool) -> String {
-    let mut text = format_checked(args, &gate.whole, &gate.intervals);
-    for part in &gate.parts {
-        let part_text = format_checked(args, part, &share_intervals(part, is_random));
+fn format_expression_check(
+    args: &RequireArgs,
+    expression_check: &ExpressionCheck,
+    is_random: bool,
+) -> String {
+    let mut text =
+        format_condition_check(args, &expression_check.whole, &expression_check.intervals);
+    for part in &expression_check.parts {
+        let part_text = format_condition_check(args, part, &share_intervals(part, is_random));
         text.push_str(&format!("       {part_text}"));
     }
     text
@@ -161,33 +171,33 @@ fn format_with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> Str
 }
 
 /// Formats the result of an expression: a line, and a table of the rows that violate it.
-fn format_checked(
+fn format_condition_check(
     args: &RequireArgs,
-    checked: &ConditionCheck,
+    condition_check: &ConditionCheck,
     share_intervals: &[Option<[f64; 2]>],
 ) -> String {
-    let verdict = if checked.holds { "holds" } else { "FAILS" };
-    let mut text = format!("{verdict}  {}", checked.expression);
+    let verdict = if condition_check.holds { "holds" } else { "FAILS" };
+    let mut text = format!("{verdict}  {}", condition_check.expression);
     // Writing to a String cannot fail.
-    let _ = match (checked.rows, checked.by_row) {
+    let _ = match (condition_check.rows, condition_check.by_row) {
         (0, _) => writeln!(text, ": there is no row to check"),
-        (rows, true) if checked.failing + checked.undefined == 0 => {
+        (rows, true) if condition_check.failing + condition_check.undefined == 0 => {
             writeln!(text, ": {rows} rows")
         }
         (rows, true) => {
-            let undefined = match (checked.undefined, args.allow_null) {
+            let undefined = match (condition_check.undefined, args.allow_null) {
                 (0, _) => String::new(),
                 (count, true) => format!(", {count} undefined (null) and let pass"),
                 (count, false) => format!(", {count} undefined (null)"),
             };
-            writeln!(text, ": {} of {rows} rows false{undefined}", checked.failing)
+            writeln!(text, ": {} of {rows} rows false{undefined}", condition_check.failing)
         }
         (rows, false) => {
-            let values = checked.aggregate_values.iter().enumerate();
+            let values = condition_check.aggregate_values.iter().enumerate();
             let values = values.map(|(k, cell)| format_with_interval(cell, share_intervals.get(k)));
             let values: Vec<String> = values.collect();
             let values = values.join(", ");
-            match checked.aggregate_rows.iter().min() {
+            match condition_check.aggregate_rows.iter().min() {
                 Some(&complete_rows) if complete_rows < rows => {
                     let missing = rows - complete_rows;
                     let null_note = match args.allow_null {
@@ -203,15 +213,16 @@ fn format_checked(
             }
         }
     };
-    let Some(first) = checked.offenders.first() else { return text };
+    let Some(first) = condition_check.offenders.first() else { return text };
     let headings: Vec<String> = first.cells.iter().map(|(name, _)| name.clone()).collect();
     let cells = |violating_row: &sweep_results::ViolatingRow| {
         violating_row.cells.iter().map(|(_, cell)| format_cell(cell)).collect()
     };
-    let rows: Vec<Vec<String>> = checked.offenders.iter().map(cells).collect();
+    let rows: Vec<Vec<String>> = condition_check.offenders.iter().map(cells).collect();
     text.push_str(&format_table(&headings, &rows, "       "));
-    let violation_count = checked.failing + if args.allow_null { 0 } else { checked.undefined };
-    let hidden_rows = violation_count - checked.offenders.len() as u64;
+    let violation_count =
+        condition_check.failing + if args.allow_null { 0 } else { condition_check.undefined };
+    let hidden_rows = violation_count - condition_check.offenders.len() as u64;
     if hidden_rows > 0 {
         let _ = writeln!(text, "       and {hidden_rows} more (--rows)");
     }

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use super::{Lines as _, ResultArgs, format_number};
 use crate::config::section::format_count;
-use crate::progress::per_second;
+use crate::progress::format_rate;
 use crate::run::{self as runner, RunEnd, RunOptions, RunReport};
 use crate::store::read::{ColumnExtreme, NameCounts, count_failed, failure_counts};
 use crate::store::{Session, ShardRequest, Tally};
 use crate::{
-    Design, Engine, Error, ExecutionArgs, Exit, Interrupt, Job, Model, Plan, duration, tell,
+    Design, Engine, Error, ExecutionArgs, Exit, Interrupt, Job, Model, Plan, format_duration, tell,
     threads,
 };
 use sweep_parameter::RatioLimits;
@@ -23,13 +23,12 @@ pub struct RunArgs {
     pub target: ResultArgs,
     /// The threads, the progress, the shard, and whether to start over.
     #[command(flatten)]
-    pub work: WorkArgs,
+    pub control: RunControlArgs,
 }
 
-/// The arguments for the work of a run, which do not change its result: threads, progress, shard,
-/// and whether to start over.
+/// The arguments
 #[derive(Debug, clap::Args)]
-pub struct WorkArgs {
+pub struct RunControlArgs {
     /// The threads and the progress.
     #[command(flatten)]
     pub execution: ExecutionArgs,
@@ -46,15 +45,15 @@ pub struct WorkArgs {
     pub fail_on_error: bool,
 }
 
-impl WorkArgs {
+impl RunControlArgs {
     /// Returns the options for the runner.
     fn options(&self) -> Result<RunOptions<'static>, Error> {
         Ok(RunOptions {
-            threads: threads::count(self.execution.threads, &threads::process)?,
+            threads: threads::choose_count(self.execution.threads, &threads::read_variable)?,
             fresh: self.fresh,
             shard: self.shard,
             progress: self.execution.progress,
-            environment: &threads::process,
+            environment: &threads::read_variable,
             tell: &tell,
         })
     }
@@ -68,7 +67,7 @@ pub fn run<M: Model>(args: &RunArgs) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let engine = M::engine(&plan, None)?;
     let report = execute(args, &plan, &engine, &install_interrupt()?, "")?;
-    Ok(exit(&args.work, &report))
+    Ok(exit_code(&args.control, &report))
 }
 
 /// Installs the signal handlers of this process.
@@ -76,7 +75,7 @@ pub fn run<M: Model>(args: &RunArgs) -> Result<Exit, Error> {
 /// # Errors
 /// Handlers that the system refuses.
 pub fn install_interrupt() -> Result<Interrupt, Error> {
-    Interrupt::install().map_err(Error::signals)
+    Interrupt::install().map_err(Error::signal_handlers)
 }
 
 /// Runs a plan by an engine that was made for it, and prints a summary. `options` are further
@@ -108,20 +107,20 @@ pub fn execute<M: Model>(
         verb: "run",
         rows: "points",
         target: &args.target,
-        work: &args.work,
+        control: &args.control,
         options: [options, ""],
     };
     run.execute(engine, job, output, interrupt, &add_result_lines)
 }
 
 /// Returns the exit code of a run.
-pub fn exit(work: &WorkArgs, report: &RunReport) -> Exit {
+pub fn exit_code(control: &RunControlArgs, report: &RunReport) -> Exit {
     let by_status = match &report.end {
         RunEnd::Interrupted { signal, .. } => return Exit::interrupted(Some(*signal)),
-        RunEnd::Already(_, tally) | RunEnd::Finished(tally) => &tally.by_status,
+        RunEnd::AlreadyFinished(_, tally) | RunEnd::Finished(tally) => &tally.by_status,
         RunEnd::Shard(_, by_status) => by_status,
     };
-    exit_code_by_status(work.fail_on_error, by_status)
+    exit_code_by_status(control.fail_on_error, by_status)
 }
 
 /// Returns the exit code of finished work, by the statuses of its rows.
@@ -141,7 +140,7 @@ pub struct RunCommand<'a> {
     /// The grid file and the output of the run.
     pub target: &'a ResultArgs,
     /// The threads, the progress, the shard, and whether to start over.
-    pub work: &'a WorkArgs,
+    pub control: &'a RunControlArgs,
     /// Further arguments for the command lines in the summary: those of this command, and those of
     /// `merge`. Each begins with a space, or is empty.
     pub options: [&'a str; 2],
@@ -164,7 +163,7 @@ impl RunCommand<'_> {
         interrupt: &Interrupt,
         add_result_lines: ResultLines<'_>,
     ) -> Result<RunReport, Error> {
-        let report = runner::run(engine, job, output, self.work.options()?, interrupt)?;
+        let report = runner::run(engine, job, output, self.control.options()?, interrupt)?;
         report.notes.iter().for_each(|note| tell(note));
         tell(self.summary(&report, add_result_lines)?.trim_end());
         Ok(report)
@@ -181,7 +180,7 @@ impl RunCommand<'_> {
         let work_text = session.map(describe_work).unwrap_or_default();
         let mut text;
         match &report.end {
-            RunEnd::Already(file, tally) => {
+            RunEnd::AlreadyFinished(file, tally) => {
                 let computed_note = format!("all {} {rows} are there already", file.points);
                 text = format!("{name}: {computed_note} (--fresh computes them again)\n");
                 add_result_lines(&mut text, tally)?;
@@ -198,12 +197,13 @@ impl RunCommand<'_> {
                 let merge = target.command("merge") + merge_options;
                 text.line("next", format!("{merge}, when all shards are done"));
             }
-            RunEnd::Interrupted { kept, points, .. } => {
+            RunEnd::Interrupted { stored_points, points, .. } => {
                 let wall_time =
-                    session.map(|session| format!(", after {}", duration(session.wall_s)));
+                    session.map(|session| format!(", after {}", format_duration(session.wall_s)));
                 let wall_time = wall_time.unwrap_or_default();
-                text =
-                    format!("{name}: interrupted with {kept} of {points} {rows} kept{wall_time}\n");
+                text = format!(
+                    "{name}: interrupted with {stored_points} of {points} {rows} kept{wall_time}\n"
+                );
                 let shard = session.and_then(|session| session.shard.as_deref());
                 let shard = shard.map(|shard| format!(" --shard {shard}")).unwrap_or_default();
                 text.line("go on", format!("{}{run_options}{shard}", target.command(self.verb)));
@@ -216,8 +216,8 @@ impl RunCommand<'_> {
 /// Describes the work of this process.
 fn describe_work(session: &Session) -> String {
     let Session { simd, .. } = session;
-    let wall = duration(session.wall_s);
-    let rate = per_second(session.points_per_s);
+    let wall = format_duration(session.wall_s);
+    let rate = format_rate(session.points_per_s);
     let points = format_count(session.points as usize, "point");
     let threads = format_count(session.threads, "thread");
     format!("{points} in {wall}, {rate} on {threads} ({simd})")

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::boundary::limit_in_words;
+use super::boundary::describe_limit;
 use super::run::{count_lines_at, format_named_values};
 use super::{
     Lines as _, conditions, format_cell, format_number, format_range, format_table, shorten,
@@ -109,7 +109,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
         return show(&if args.json {
             format!("{:#}\n", json!(unfinished_work))
         } else {
-            progress(&unfinished_work)
+            format_progress(&unfinished_work)
         });
     }
     let parquet_file = ParquetFile::open(&args.file)?;
@@ -123,7 +123,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
     text.line("file", args.file.display());
     match &read_overview.result {
         Some(result) => {
-            provenance(&mut text, result);
+            add_provenance(&mut text, result);
             if parquet_file.is_copy() {
                 let writer = parquet_file.created_by().unwrap_or("another program");
                 text.line("checked", format!("no: a copy that {writer} wrote"));
@@ -150,7 +150,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
                 let quantity = boundary_settings["quantity"].as_str().unwrap_or("unknown");
                 let limit =
                     boundary_settings["limit"].as_f64().map_or("unknown".to_owned(), format_number);
-                text.line("boundary", limit_in_words(quantity, limit));
+                text.line("boundary", describe_limit(quantity, limit));
             }
         }
     }
@@ -164,7 +164,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
 }
 
 /// Formats the progress of a run or a search that has no result yet.
-fn progress(unfinished_work: &UnfinishedWork) -> String {
+fn format_progress(unfinished_work: &UnfinishedWork) -> String {
     let mut text = String::new();
     text.line("file", unfinished_work.output.display());
     text.line("state", format!("unfinished: {}", unfinished_work.progress()));
@@ -237,7 +237,7 @@ fn shown_columns(args: &ShowArgs, file: &ResultTable, filter: Option<&Condition>
 }
 
 /// Returns the content of the text as JSON, with the whole plan.
-fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
+fn to_json(args: &ShowArgs, file: &ParquetFile, overview: &Overview) -> Result<Value, Error> {
     let column = |column: &ColumnRange| {
         let counts = || column.word_counts.iter().cloned().collect::<Value>();
         json!({
@@ -252,16 +252,16 @@ fn to_json(args: &ShowArgs, opened: &ParquetFile, file: &Overview) -> Result<Val
     };
     let mut json = json!({
         "file": args.file.display().to_string(),
-        "rows": file.rows,
-        "made_by": opened.created_by(),
-        "is_sealed": opened.is_sealed(),
-        "columns": file.columns.iter().map(column).collect::<Value>(),
-        "boundary": opened.json(key::BOUNDARY),
-        "plan": opened.json(key::PLAN),
+        "rows": overview.rows,
+        "made_by": file.created_by(),
+        "is_sealed": file.is_sealed(),
+        "columns": overview.columns.iter().map(column).collect::<Value>(),
+        "boundary": file.json(key::BOUNDARY),
+        "plan": file.json(key::PLAN),
     });
-    if let Some(result) = &file.result {
-        let tally = tally(opened)?;
-        let locations = extreme_locations(opened, result, &tally)?;
+    if let Some(result) = &overview.result {
+        let tally = tally(file)?;
+        let locations = extreme_locations(file, result, &tally)?;
         let locations = locations
             .into_iter()
             .map(|(point, values)| (point.to_string(), values.into_iter().collect::<Value>()));
@@ -281,7 +281,7 @@ fn extreme_locations(
     tally: &Tally,
 ) -> Result<Vec<(u64, Vec<(String, f64)>)>, Error> {
     let axes: Vec<&str> =
-        axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
+        plan_axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
     let worst_of_columns = tally.extremes.iter().filter_map(|column| column.worst.as_ref());
     let extreme_points: Vec<u64> =
         tally.greatest_ratio.iter().chain(worst_of_columns).map(|extreme| extreme.point).collect();
@@ -297,7 +297,7 @@ fn extreme_locations(
     Ok(locations)
 }
 
-fn provenance(text: &mut String, result: &ResultFile) {
+fn add_provenance(text: &mut String, result: &ResultFile) {
     let plan = &result.plan;
     text.line("name", plan["name"].as_str().unwrap_or_default());
     let build = crate::build::words(&result.version, result.numerics);
@@ -313,7 +313,7 @@ fn provenance(text: &mut String, result: &ResultFile) {
     if let Some(design) = plan.get("design") {
         text.line("design", format_json_value(design));
     }
-    for axis in axes(plan) {
+    for axis in plan_axes(plan) {
         let name = axis["parameter"].as_str().unwrap_or_default();
         // The axes of a list are its columns, whose ranges are listed with the columns.
         let values = ["range", "values", "distribution"].iter().find_map(|key| axis.get(key));
@@ -346,7 +346,7 @@ fn format_json_value(value: &Value) -> String {
     }
 }
 
-fn axes(plan: &Value) -> &[Value] {
+fn plan_axes(plan: &Value) -> &[Value] {
     plan["axis"].as_array().map_or(&[], Vec::as_slice)
 }
 

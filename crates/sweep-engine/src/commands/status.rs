@@ -43,11 +43,11 @@ pub fn show_job(
     show(&if args.json {
         format!("{:#}\n", json!(folder_status))
     } else {
-        summary(args, &folder_status, continuation)
+        format_summary(args, &folder_status, continuation)
     })
 }
 
-fn summary(
+fn format_summary(
     args: &StatusArgs,
     folder_status: &FolderStatus,
     [verb, run_options, merge_options]: [&str; 3],

@@ -100,10 +100,16 @@ pub fn evolve<E>(
                     .filter_map(|axis| initial_design.position(k, axis))
                     .collect();
             }
-            let number = first as u64 + k;
+            let trial_number = first as u64 + k;
             let start_candidate =
-                best.filter(|_| objectives == 1 && number >= evolution.first_of_last_third());
-            create_trial(&evaluated, &members, (k as usize, start_candidate), number, evolution)
+                best.filter(|_| objectives == 1 && trial_number >= evolution.first_of_last_third());
+            create_trial(
+                &evaluated,
+                &members,
+                (k as usize, start_candidate),
+                trial_number,
+                evolution,
+            )
         };
         let positions: Vec<Vec<f64>> = (0..count).map(position).collect();
         let responses = evaluate(&positions)?;
@@ -132,13 +138,13 @@ pub fn evolve<E>(
     Ok(evaluated)
 }
 
-/// Returns the position of the trial that challenges a member. `number` selects its random numbers;
-/// `start_candidate` is the best candidate, if the trial starts from it.
+/// Returns the position of the trial that challenges a member. `trial_number` selects its random
+/// numbers; `start_candidate` is the best candidate, if the trial starts from it.
 fn create_trial(
     candidates: &[Candidate],
     members: &[usize],
     (member, start_candidate): (usize, Option<usize>),
-    number: u64,
+    trial_number: u64,
     evolution: &Evolution,
 ) -> Vec<f64> {
     let draws = Design::Spread {
@@ -149,7 +155,7 @@ fn create_trial(
     let mut axis = 0;
     let mut draw = || {
         axis += 1;
-        draws.position(number, axis).unwrap_or(0.5)
+        draws.position(trial_number, axis).unwrap_or(0.5)
     };
     let mut others = [member; 4];
     for k in 1..4 {
@@ -316,9 +322,9 @@ mod tests {
         // The minimum of x + y with x y >= 0.25 is at (0.5, 0.5); there are no responses for x >
         // 0.9.
         let candidates = run_evolution(SEARCH, |position| {
-            let number =
+            let trial_number =
                 vec![position[0] + position[1], (0.25 - position[0] * position[1]).max(0.0)];
-            (position[0] <= 0.9).then_some(number)
+            (position[0] <= 0.9).then_some(trial_number)
         });
         let best = &candidates[find_front(&candidates, 1)[0]];
         let sum = best.responses.as_ref().unwrap()[0];

@@ -9,16 +9,20 @@ use crate::store::{CellType, DeclaredColumn, TrialColumns};
 use crate::{Axis, GridInput, Model, Table};
 
 /// Returns the table of a study's candidates.
-pub fn table<M: Model>(study: &Study<M>, candidates: &[Candidate]) -> Table {
+pub fn candidates_table<M: Model>(study: &Study<M>, candidates: &[Candidate]) -> Table {
     let objectives = study.objectives.len();
     let front = find_front(candidates, objectives);
     let mut table = Table::new(M::ABOUT.build);
-    table.counts("candidate", "index, in the order of trial", 0..candidates.len() as u64);
-    table.counts("generation", "from 0", candidates.iter().map(|candidate| candidate.generation));
+    table.add_counts("candidate", "index, in the order of trial", 0..candidates.len() as u64);
+    table.add_counts(
+        "generation",
+        "from 0",
+        candidates.iter().map(|candidate| candidate.generation),
+    );
     let values: Vec<Vec<f64>> = candidates.iter().map(|one| study.values(&one.position)).collect();
     for (k, Axis { parameter, .. }) in parameters(study).iter().enumerate() {
         let column = values.iter().map(|values| Some(values[k]));
-        table.parameter(parameter, column);
+        table.add_parameter(parameter, column);
     }
     let signed_response = |k: usize, sign: f64| {
         candidates
@@ -29,23 +33,27 @@ pub fn table<M: Model>(study: &Study<M>, candidates: &[Candidate]) -> Table {
         let unit = objective_unit(&one.goal);
         let verb = if one.sign > 0.0 { "minimised" } else { "maximised" };
         let description = format!("{}, {verb}; null where a row has no value", one.goal.text());
-        table.numbers(&one.name, unit, &description, signed_response(k, one.sign));
+        table.add_numbers(&one.name, unit, &description, signed_response(k, one.sign));
     }
     for (k, goal) in study.conditions.iter().enumerate() {
         let description =
             format!("how far the rows are from keeping {}; 0 where they do", goal.text());
-        table.numbers(&excess_name(k), "1", &description, signed_response(objectives + k, 1.0));
+        table.add_numbers(&excess_name(k), "1", &description, signed_response(objectives + k, 1.0));
     }
     let feasible = candidates.iter().map(|candidate| candidate.is_feasible(objectives));
-    table.flags("feasible", "whether every condition holds", feasible);
+    table.add_flags("feasible", "whether every condition holds", feasible);
     let on_front = (0..candidates.len()).map(|k| front.contains(&k));
-    table.flags("on_front", "whether no feasible candidate beats it in every objective", on_front);
+    table.add_flags(
+        "on_front",
+        "whether no feasible candidate beats it in every objective",
+        on_front,
+    );
     let mut optimum = study.settings();
     optimum["best"] = find_best(candidates, &front, objectives).into();
     let job = study.job();
-    table.metadata(key::PLAN, &job.plan);
-    table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
-    table.metadata(key::OPTIMISE, &optimum);
+    table.add_metadata(key::PLAN, &job.plan);
+    table.add_text(key::PLAN_HASH, job.hash().to_hex().to_string());
+    table.add_metadata(key::OPTIMISE, &optimum);
     table
 }
 
@@ -110,7 +118,7 @@ fn find_best(candidates: &[Candidate], front: &[usize], objectives: usize) -> Op
 }
 
 /// Returns the model's own file with these values of the parameters, if the model has one.
-pub fn own_file<M: Model>(study: &Study<M>, values: &[f64]) -> Option<String> {
+pub fn format_model_file<M: Model>(study: &Study<M>, values: &[f64]) -> Option<String> {
     let mut plan = study.grid.clone();
     for (axis, &value) in parameters(study).iter().zip(values) {
         plan.write(&axis.parameter, value);

@@ -35,10 +35,10 @@ pub fn search<M: Model>(
         let candidates: Vec<Vec<f64>> =
             positions.iter().map(|position| study.values(position)).collect();
         let keys: Vec<TrialKey> =
-            (count..).zip(&candidates).map(|(number, values)| key(number, values)).collect();
+            (count..).zip(&candidates).map(|(number, values)| trial_key(number, values)).collect();
         count += positions.len() as u64;
         let values = |k: usize, row| study.axis_values(&candidates[k], row);
-        let respond = |k: usize, points| respond(study, &layout, &candidates[k], points);
+        let respond = |k: usize, points| compute_responses(study, &layout, &candidates[k], points);
         let result = evaluator.evaluate(&keys, study.rows(), &values, &respond)?;
         let signs = study.objectives.iter().map(|objective| objective.sign);
         let signs: Vec<f64> = signs.chain(study.conditions.iter().map(|_| 1.0)).collect();
@@ -57,7 +57,7 @@ pub fn search<M: Model>(
 ///
 /// # Errors
 /// A model without an engine, and threads that cannot be started.
-pub fn slacks<M: Model>(
+pub fn compute_slacks<M: Model>(
     study: &Study<M>,
     values: &[f64],
     execution: Execution<'_>,
@@ -68,42 +68,43 @@ pub fn slacks<M: Model>(
     let evaluator =
         CachedEvaluator::new(engine, threads, execution.interrupt, None, &ignore_count)?;
     let layout = M::layout(&study.plan);
-    let slacks_found = Mutex::new(Vec::new());
+    let found_slacks = Mutex::new(Vec::new());
     let respond = |_: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
-        let batch = batch(study, &layout, values, points)?;
+        let batch = collect_batch(study, &layout, values, points)?;
         let slacks = study.conditions.iter().map(|goal| goal.slack(&batch));
-        *lock(&slacks_found) = slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(defect)?;
+        *lock(&found_slacks) =
+            slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(row_defect)?;
         Ok(RequestValues::new())
     };
-    let keys = [key(0, values)];
+    let keys = [trial_key(0, values)];
     let result =
         evaluator.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &respond);
-    Ok(SearchStop::interrupted_to_none(result)?.map(|_| unlocked(slacks_found)))
+    Ok(SearchStop::interrupted_to_none(result)?.map(|_| unlocked(found_slacks)))
 }
 
 /// Returns the error of rows that do not fit their own columns, which is a defect of the program.
-pub(crate) fn defect(error: ArrowError) -> StoreError {
+pub(crate) fn row_defect(error: ArrowError) -> StoreError {
     StoreError::Engine { first: 0, last: 0, reason: error.to_string() }
 }
 
 /// Returns the objectives of a candidate, then its constraint violations.
-fn respond<M: Model>(
+fn compute_responses<M: Model>(
     study: &Study<M>,
     layout: &Layout,
     values: &[f64],
     points: Vec<PointRows>,
 ) -> Result<RequestValues, StoreError> {
-    let batch = batch(study, layout, values, points)?;
+    let batch = collect_batch(study, layout, values, points)?;
     let objectives = study.objectives.iter().map(|objective| &objective.goal);
     let goals = objectives.chain(&study.conditions);
     let numbers = goals.map(|goal: &Goal| goal.evaluate(&batch)).collect::<Result<Vec<_>, _>>();
     // An infinite number counts as missing.
     let finite_or_none = |number: Option<f64>| number.filter(|number| number.is_finite());
-    Ok(numbers.map_err(defect)?.into_iter().map(finite_or_none).collect())
+    Ok(numbers.map_err(row_defect)?.into_iter().map(finite_or_none).collect())
 }
 
 /// Returns the rows of a candidate's points as a batch.
-fn batch<M: Model>(
+fn collect_batch<M: Model>(
     study: &Study<M>,
     layout: &Layout,
     values: &[f64],
@@ -117,10 +118,10 @@ fn batch<M: Model>(
     for (row, cells) in points.into_iter().flat_map(keyed_rows) {
         rows.push(row, study.axis_values(values, row), cells);
     }
-    rows.take().map_err(defect)
+    rows.take().map_err(row_defect)
 }
 
 /// Returns the key of a candidate: its number, and its parameters.
-fn key(number: u64, values: &[f64]) -> TrialKey {
+fn trial_key(number: u64, values: &[f64]) -> TrialKey {
     std::iter::once(number).chain(values.iter().map(|value| value.to_bits())).collect()
 }

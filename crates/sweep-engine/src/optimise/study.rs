@@ -103,7 +103,7 @@ impl<M: Model> Study<M> {
         let mut draft = input.and_then(|input| read_draft::<M>(&input, report));
         let grid = draft.as_ref().map(|draft| draft.plan.clone());
         if let Some(draft) = &mut draft {
-            flatten(&mut draft.plan);
+            merge_axes(&mut draft.plan);
         }
         let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
         let parameters = parameters(&root, root.tables(parameter), design, &mut draft);
@@ -122,13 +122,20 @@ impl<M: Model> Study<M> {
         let plan = draft.map(|draft| draft.plan);
         let axes = plan.as_ref().map_or(&[][..], |plan| &plan.axes);
         let names: Vec<String> = axes.iter().map(|axis| axis.parameter.name.to_string()).collect();
-        let known = plan.as_ref().map_or_else(Vec::new, |plan| columns(&M::layout(plan).schema()));
+        let known_columns =
+            plan.as_ref().map_or_else(Vec::new, |plan| columns(&M::layout(plan).schema()));
         let rows = grid.as_ref().map_or(1, Plan::points);
         if rows > MAX_ROWS {
             let title = format!("a grid of {rows} points for every candidate");
             report.refuse::<()>(root.location(), title, format!("expected at most {}", MAX_ROWS));
         }
-        let goals = GoalReader { known, is_sound: report.is_clean(), rows, text: &text, report };
+        let goals = GoalReader {
+            known_columns,
+            is_plan_valid: report.is_clean(),
+            rows,
+            text: &text,
+            report,
+        };
         let objectives = objectives(&root, root.tables(objective), &goals, &names);
         let conditions = root.texts(conditions).into_located();
         let conditions = conditions.into_iter().flat_map(|texts| texts.value);
@@ -160,9 +167,9 @@ impl<M: Model> Study<M> {
     }
 
     /// Returns the candidate's parameters at a position in the box of their bounds.
-    pub fn values(&self, place: &[f64]) -> Vec<f64> {
-        let values = self.parameters.iter().zip(place);
-        values.map(|(parameter, &place)| parameter.bounds.interpolate(place)).collect()
+    pub fn values(&self, position: &[f64]) -> Vec<f64> {
+        let values = self.parameters.iter().zip(position);
+        values.map(|(parameter, &position)| parameter.bounds.interpolate(position)).collect()
     }
 
     /// Returns the values of the plan's axes in a row of a candidate.
@@ -193,15 +200,17 @@ impl<M: Model> Study<M> {
 
     /// Returns the study's settings beside the plan, as JSON.
     pub fn settings(&self) -> Value {
-        let objective_verb = |one: &Objective| if one.sign > 0.0 { "minimise" } else { "maximise" };
-        let objectives = self.objectives.iter();
-        let objectives =
-            objectives.map(|one| json!({ "name": one.name, objective_verb(one): one.goal.text() }));
+        let objective_json = |objective: &Objective| {
+            let verb = if objective.sign > 0.0 { "minimise" } else { "maximise" };
+            json!({ "name": objective.name, verb: objective.goal.text() })
+        };
+        let objectives = self.objectives.iter().map(objective_json);
+        let tolerances = self.parameters.iter().map(|parameter| parameter.tolerance);
         json!({
             "grid": self.grid.to_json(),
             "objective": objectives.collect::<Value>(),
             "conditions": self.conditions.iter().map(Goal::text).collect::<Value>(),
-            "tolerance": self.parameters.iter().map(|one| one.tolerance).collect::<Value>(),
+            "tolerance": tolerances.collect::<Value>(),
             "population": self.evolution.population,
             "candidates": self.evolution.candidates,
             "seed": self.evolution.seed,
@@ -211,7 +220,7 @@ impl<M: Model> Study<M> {
 
 /// Makes every axis a range and drops the design, because rows of candidates lie anywhere in the
 /// ranges.
-fn flatten<M: Model>(plan: &mut Plan<M>) {
+fn merge_axes<M: Model>(plan: &mut Plan<M>) {
     for axis in &mut plan.axes {
         if let AxisValues::List(_) = axis.values {
             let [from, to] = axis.values.extremes();
@@ -392,8 +401,8 @@ fn unique_name(name: &str, objectives: &[Objective], parameters: &[String]) -> S
 /// The context in which expressions are read.
 struct GoalReader<'a> {
     /// The columns of rows; some may be missing while the plan has mistakes.
-    known: Vec<Column>,
-    is_sound: bool,
+    known_columns: Vec<Column>,
+    is_plan_valid: bool,
     rows: u64,
     text: &'a str,
     report: &'a Report,
@@ -405,9 +414,9 @@ impl GoalReader<'_> {
         expression: &Located<&str>,
         read: fn(&str, &[Column]) -> Result<Goal, ExpressionError>,
     ) -> Option<Goal> {
-        let mistake = match read(expression.value, &self.known) {
+        let mistake = match read(expression.value, &self.known_columns) {
             Ok(goal) => return Some(goal),
-            Err(mistake) if mistake.candidates.is_some() && !self.is_sound => return None,
+            Err(mistake) if mistake.candidates.is_some() && !self.is_plan_valid => return None,
             Err(mistake) => mistake,
         };
         // The location begins after the opening quote, unless escapes have moved the text.

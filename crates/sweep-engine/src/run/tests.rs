@@ -83,7 +83,7 @@ fn whole_run(points: u64, threads: usize) -> Vec<u8> {
 #[test]
 fn strides_visit_every_chunk_once_in_long_steps() {
     for chunks in [1, 2, 3, 4, 41, 42, 1000, 4096] {
-        let stride = stride(chunks);
+        let stride = chunk_stride(chunks);
         let order: Vec<u64> = (0..chunks).map(|k| k * stride % chunks).collect();
         let mut sorted = order.clone();
         sorted.sort_unstable();
@@ -146,15 +146,15 @@ fn a_run_interrupted_at_any_point_is_resumed_to_the_same_bytes() {
         });
         let report =
             run(&interrupting_engine, &job, &output(&home), options(1), &interrupt).unwrap();
-        let RunEnd::Interrupted { signal: 15, kept, points: POINTS } = report.end else {
+        let RunEnd::Interrupted { signal: 15, stored_points, points: POINTS } = report.end else {
             panic!("{report:?}")
         };
         let evaluated = interrupting_engine.evaluated.into_inner();
-        assert_eq!(kept, evaluated, "rows of incomplete chunks are kept too");
+        assert_eq!(stored_points, evaluated, "rows of incomplete chunks are stored_points too");
         assert!(!output(&home).exists());
         let resumed_engine = FormulaEngine::new(|_| {});
         run(&resumed_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-        assert_eq!(resumed_engine.evaluated.into_inner(), POINTS - kept);
+        assert_eq!(resumed_engine.evaluated.into_inner(), POINTS - stored_points);
         assert!(fs::read(output(&home)).unwrap() == bytes, "interrupted at {interrupted_point}");
     }
 }
@@ -166,7 +166,7 @@ fn a_finished_run_is_not_repeated() {
     run(&FormulaEngine::new(|_| {}), &job, &output(&home), options(2), &Interrupt::new()).unwrap();
     let second_engine = FormulaEngine::new(|_| {});
     let report = run(&second_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    assert!(matches!(report.end, RunEnd::Already(..)), "{report:?}");
+    assert!(matches!(report.end, RunEnd::AlreadyFinished(..)), "{report:?}");
     assert_eq!(second_engine.evaluated.into_inner(), 0);
 }
 

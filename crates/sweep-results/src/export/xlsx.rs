@@ -155,7 +155,7 @@ fn write_columns(workbook: &mut Workbook, table: &ResultTable) -> Result<(), Xls
     sheet.write_row(["column", "unit", "description"].map(text_cell))?;
     for column in &table.columns {
         let texts = [&column.name, column.unit(), &column.metadata.description];
-        sheet.write_row(texts.map(|text| text_cell(text)))?;
+        sheet.write_row(texts.map(text_cell))?;
     }
     Ok(())
 }

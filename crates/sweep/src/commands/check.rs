@@ -5,8 +5,8 @@ use arrow_array::Array;
 use sweep_engine::commands::check as engine_check;
 use sweep_engine::config::section::format_count;
 use sweep_engine::{
-    AxisValues, Design, Error, Estimate, Execution, Exit, Interrupt, ProgressMode, duration, show,
-    tell, threads,
+    AxisValues, Design, Error, Estimate, Execution, Exit, Interrupt, ProgressMode, format_duration,
+    show, tell, threads,
 };
 use sweep_files::cells;
 use washer_model::{MachineParameter, Range, decimal};
@@ -47,9 +47,9 @@ pub(crate) fn run(args: &WasherCheckArgs) -> Result<Exit, Error> {
         return show("the machine file leaves out no number: nothing is assumed\n");
     }
     let trial = Trial::new(&plan, assumed);
-    let estimate = estimate(&trial.plan, threads::count(None, &threads::process)?)?;
+    let estimate = estimate(&trial.plan, threads::choose_count(None, &threads::read_variable)?)?;
     tell(&trial.describe_work(&estimate));
-    let interrupt = Interrupt::install().map_err(Error::signals)?;
+    let interrupt = Interrupt::install().map_err(Error::signal_handlers)?;
     let execution =
         Execution { threads: None, progress: ProgressMode::default(), interrupt: &interrupt };
     let Some(outcomes) = trial.compute_outcomes(execution)? else {
@@ -185,7 +185,7 @@ impl Trial {
     fn describe_work(&self, estimate: &Estimate) -> String {
         let points = format_count(self.rows() as usize / self.rows_per_point, "point");
         let threads = format_count(estimate.threads, "thread");
-        let time = duration(estimate.wall_s);
+        let time = format_duration(estimate.wall_s);
         let rows = self.rows();
         let mut text = format!(
             "{rows} rows, {} for each of {points}, take about {time} on {threads}",
@@ -375,7 +375,7 @@ mod tests {
         let plan = plan("[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.3]\n");
         let trial = Trial::new(&plan, AssumedNumber::find_all(&plan));
         let estimate = estimate(&trial.plan, 2).unwrap();
-        assert!(estimate.wall_s > 0.0 && estimate.sampled.values().sum::<u64>() > 0);
+        assert!(estimate.wall_s > 0.0 && estimate.sample_statuses.values().sum::<u64>() > 0);
         let announced = |wall_s: f64| {
             let estimate = Estimate { wall_s, ..estimate.clone() };
             trial.describe_work(&estimate)

@@ -38,7 +38,8 @@ pub(crate) fn run(args: &ExplainArgs) -> Result<Exit, Error> {
     let (plan, parameters) = args.grid.load_point(&args.grid.at)?;
     // A signal ends the process, because there are no partial results to keep.
     let interrupt = Interrupt::new();
-    let explanation = explain(&plan, parameters, args.speed, args.execution.with(&interrupt))?;
+    let explanation =
+        explain(&plan, parameters, args.speed, args.execution.with_interrupt(&interrupt))?;
     if args.json {
         return show(&format!("{:#}\n", json::to_json(&explanation)));
     }

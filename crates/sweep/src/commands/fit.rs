@@ -89,7 +89,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let curves: Vec<PathBuf> = args.curves.iter().flat_map(paths).collect();
     let curve_outputs = curves.iter().map(|path| Output::begin(path, FileKind::Fit));
     let curve_outputs = curve_outputs.collect::<Result<Vec<_>, _>>()?;
-    let interrupt = Interrupt::install().map_err(Error::signals)?;
+    let interrupt = Interrupt::install().map_err(Error::signal_handlers)?;
     let progress = Progress::for_search(args.execution.progress, 0, "", 0);
     let report_progress =
         |evaluation_count: usize| progress.show_search(0, evaluation_count as u64);
@@ -97,9 +97,9 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let output = args.out.as_deref();
     let context =
         FitContext { cancel, count_evaluations: &report_progress, output, fresh: args.fresh };
-    let threads = threads::count(args.execution.threads, &threads::process)?;
+    let threads = threads::choose_count(args.execution.threads, &threads::read_variable)?;
     let fit_result =
-        threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &context))?;
+        threads::build_pool(threads)?.install(|| fit::fit(cases, &args.options, &context))?;
     progress.finish();
     let Some(mut fit_result) = fit_result else {
         let kept = "with --out, its evaluations are kept";

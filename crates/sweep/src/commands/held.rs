@@ -11,7 +11,7 @@ use crate::stability::{HeldPlan, check_axes};
 use sweep_engine::commands::cells::Lines as _;
 use sweep_engine::commands::grid::ResultArgs;
 use sweep_engine::commands::run::{
-    RunCommand, WorkArgs, count_lines, exit, failure_reasons, install_interrupt,
+    RunCommand, RunControlArgs, count_lines, exit_code, failure_reasons, install_interrupt,
 };
 use sweep_engine::commands::{merge, status};
 use sweep_engine::store::Tally;
@@ -29,7 +29,7 @@ pub struct HeldSpeedArgs<Options: clap::Args> {
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
-    work: WorkArgs,
+    control: RunControlArgs,
 }
 
 /// The options of `sweep stability` alone: none.
@@ -74,7 +74,7 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<O
     /// Returns an error for mistakes in the grid file or the options, and if the file cannot be
     /// written; finished chunks are kept.
     pub(super) fn run(&self) -> Result<Exit, Error> {
-        let Self { target, speed, options, work } = self;
+        let Self { target, speed, options, control } = self;
         let search: Option<AttractorSearch> = (*options).into();
         let plan: Plan = target.grid.load()?;
         check_axes(&plan, "--speed", &speed.to_string())?;
@@ -87,7 +87,7 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<O
             verb: held_plan.command_name(),
             rows: "rows",
             target,
-            work,
+            control,
             options: [&speed_options, &merge_options],
         };
         let engine = held_plan.engine()?;
@@ -100,7 +100,7 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<O
         };
         let report =
             command.execute(&engine, &job, &output, &install_interrupt()?, &add_summary)?;
-        Ok(exit(work, &report))
+        Ok(exit_code(control, &report))
     }
 }
 

@@ -7,7 +7,7 @@ use crate::plan::Plan;
 use crate::trace::{MAX_POINT_TRACES, write_point_traces};
 use lane_ode::Cancel;
 use sweep_engine::commands::run as engine_run;
-use sweep_engine::commands::run::{execute, exit, install_interrupt};
+use sweep_engine::commands::run::{execute, exit_code, install_interrupt};
 use sweep_engine::run::RunEnd;
 use sweep_engine::{Error, Exit, Progress, tell, threads};
 use sweep_files::{self as files, ParquetFile};
@@ -47,11 +47,12 @@ pub(crate) fn run(args: &WasherRunArgs) -> Result<Exit, Error> {
         further_options,
     )?;
     let output = args.run.target.output(&plan);
-    if args.keep_traces && matches!(report.end, RunEnd::Already(..) | RunEnd::Finished(_)) {
-        let threads = threads::count(args.run.work.execution.threads, &threads::process)?;
+    if args.keep_traces && matches!(report.end, RunEnd::AlreadyFinished(..) | RunEnd::Finished(_)) {
+        let threads =
+            threads::choose_count(args.run.control.execution.threads, &threads::read_variable)?;
         let folder = files::beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
-        let progress = Progress::new(args.run.work.execution.progress, plan.points(), 0);
+        let progress = Progress::new(args.run.control.execution.progress, plan.points(), 0);
         let traced_points = AtomicU64::new(0);
         let count_point = || progress.show(traced_points.fetch_add(1, Ordering::Relaxed) + 1);
         let map = ParquetFile::open(&output)?;
@@ -65,5 +66,5 @@ pub(crate) fn run(args: &WasherRunArgs) -> Result<Exit, Error> {
         }
         tell(&format!("traces      {}", folder.display()));
     }
-    Ok(exit(&args.run.work, &report))
+    Ok(exit_code(&args.run.control, &report))
 }

@@ -84,10 +84,10 @@ impl Fitted<'_> {
         let measurement = &fit_case.measurement;
         let mut table = Table::new(crate::identity::BUILD);
         let times = &measurement.time_s;
-        table.numbers("time_s", "s", "time since the start", times.iter().copied().map(Some));
+        table.add_numbers("time_s", "s", "time since the start", times.iter().copied().map(Some));
         let shift_s = self.problem.shift_s(case, &self.x);
         let speeds = fit_case.spin().speeds_rpm(times.iter().map(|time| time + shift_s)).map(Some);
-        table.numbers("speed_rpm", "rpm", "spin of the shaft, smoothed if measured", speeds);
+        table.add_numbers("speed_rpm", "rpm", "spin of the shaft, smoothed if measured", speeds);
         for comparison in self.comparisons.iter().filter(|comparison| comparison.case == case) {
             let SignalComparison { signal, offset, model, .. } = comparison;
             let signal = &measurement.signals[*signal];
@@ -96,7 +96,7 @@ impl Fitted<'_> {
             let finite_value = |value: f64| (!value.is_nan()).then_some(value);
             let mut add_column =
                 |prefix: &str, description: &str, values: &mut dyn Iterator<Item = Option<f64>>| {
-                    table.numbers(&format!("{prefix}_{name}"), &unit, description, values);
+                    table.add_numbers(&format!("{prefix}_{name}"), &unit, description, values);
                 };
             let values = signal.values.iter().copied();
             add_column("measured", "as measured", &mut values.clone().map(finite_value));
@@ -112,12 +112,12 @@ impl Fitted<'_> {
         // The starting values of the search are not the fitted values.
         let free: Vec<&str> = self.problem.free.iter().map(|free| free.parameter.name()).collect();
         plan.set.retain(|(name, _)| !free.contains(&name.as_str()));
-        table.metadata(key::PLAN, &plan.to_json());
+        table.add_metadata(key::PLAN, &plan.to_json());
         let mut results = json!({ "report": self.report, "spectra": self.spectra(case) });
         if self.report.follows {
             results["profiles"] = self.profiles();
         }
-        table.metadata(key::FIT, &results);
+        table.add_metadata(key::FIT, &results);
         table
     }
 }

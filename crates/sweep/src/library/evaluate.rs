@@ -85,7 +85,7 @@ impl EvaluationTask<'_> {
     /// Returns an error if no threads can be started, and if the engine panics.
     pub fn compute_in_memory(&self, execution: Execution<'_>) -> Result<MemoryTable, Error> {
         let Self { job, engine } = self;
-        let pool = threads::pool(execution.threads()?)?;
+        let pool = threads::build_pool(execution.threads()?)?;
         let context = RunContext::new(execution.interrupt);
         let rows = Mutex::new(0..job.points);
         let source = || {

@@ -35,8 +35,8 @@ pub fn fit_tables(
     }
     let cancel = Cancel::Flag(execution.interrupt.flag());
     let context = FitContext { cancel, count_evaluations: &|_| {}, output: None, fresh: false };
-    let fit_result =
-        threads::pool(execution.threads()?)?.install(|| fit::fit(cases, options, &context))?;
+    let fit_result = threads::build_pool(execution.threads()?)?
+        .install(|| fit::fit(cases, options, &context))?;
     Ok(fit_result.map(|fit| CommandReport { data: json!(fit.report), text: fit.report.text() }))
 }
 

@@ -143,16 +143,16 @@ impl ModeAnalysis {
         let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
         let mut table = Table::new(crate::identity::BUILD);
         let speed = rows().map(|(k, _)| Some(speeds[k]));
-        table.numbers("speed_rpm", "rpm", "spin of the shaft", speed);
+        table.add_numbers("speed_rpm", "rpm", "spin of the shaft", speed);
         let description = "number of the mode, by its frequency at the lowest speed";
-        table.counts("mode", description, rows().map(|(_, mode)| mode as u64 + 1));
+        table.add_counts("mode", description, rows().map(|(_, mode)| mode as u64 + 1));
         let names: Vec<String> = modes.iter().map(|mode| mode.motion.to_string()).collect();
         let description = "what moves, at the first resonance or the lowest speed";
-        table.words("name", description, rows().map(|(_, mode)| names[mode].as_str()));
+        table.add_words("name", description, rows().map(|(_, mode)| names[mode].as_str()));
         let mut add_column =
             |name: &str, unit: &str, description: &str, value: fn(&ModeAtSpeed) -> f64| {
                 let values = rows().map(|(k, mode)| Some(value(&modes[mode].at_speed[k])));
-                table.numbers(name, unit, description, values);
+                table.add_numbers(name, unit, description, values);
             };
         let description = "damped natural frequency in cycles per minute, mean over a turn";
         add_column("frequency_rpm", "rpm", description, |at| at.frequency_rpm);
@@ -173,7 +173,7 @@ impl ModeAnalysis {
             let mut add_exact_column =
                 |name: &str, unit: &str, description: &str, value: fn(&FloquetMode) -> f64| {
                     let values = rows().map(|(k, mode)| exact_modes[k][mode].as_ref().map(value));
-                    table.numbers(name, unit, description, values);
+                    table.add_numbers(name, unit, description, values);
                 };
             let description = "frequency by the linear model's Floquet exponent over whole turns, \
                                nearest to frequency_rpm; null at standstill";
@@ -185,10 +185,10 @@ impl ModeAnalysis {
         if !constants.is_empty() {
             plan["set"] = constants.clone().into();
         }
-        table.metadata(key::PLAN, &plan);
+        table.add_metadata(key::PLAN, &plan);
         let entries: Value =
             modes.iter().enumerate().map(|(k, mode)| mode_properties(k, mode)).collect();
-        table.metadata(key::MODES, &entries);
+        table.add_metadata(key::MODES, &entries);
         table
     }
 }

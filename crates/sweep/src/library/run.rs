@@ -52,10 +52,10 @@ impl EvaluationTask<'_> {
         let report = runner::run(&self.engine, &self.job, output, options, execution.interrupt)?;
         report.notes.iter().for_each(|note| tell(note));
         Ok(match report.end {
-            RunEnd::Already(..) | RunEnd::Finished(_) => {
+            RunEnd::AlreadyFinished(..) | RunEnd::Finished(_) => {
                 FileRunEnd::Complete(MemoryTable::read(output)?)
             }
-            RunEnd::Interrupted { kept: stored_rows, points, .. } => {
+            RunEnd::Interrupted { stored_points: stored_rows, points, .. } => {
                 FileRunEnd::Interrupted { stored_rows, points }
             }
             // A run has shards only if the scheduler's variables are set.

@@ -10,7 +10,7 @@ pub use sweep_engine::boundary::BoundaryOptions;
 use sweep_engine::boundary::BoundaryTask;
 use sweep_engine::commands::boundary::search as trace_boundary;
 use sweep_engine::optimise::Study;
-use sweep_engine::optimise::file::{table as study_table, trial_columns};
+use sweep_engine::optimise::file::{candidates_table, trial_columns};
 use sweep_engine::optimise::search::search;
 use sweep_engine::store::{OpenOutcome, TrialColumns, Trials};
 use sweep_engine::{Error, Job, Table};
@@ -60,7 +60,7 @@ pub fn optimise_study(
     let search = |trials| search(&study, trials, execution);
     let search_output =
         SearchOutput { job: &study.job(), columns: trial_columns(&study), output, fresh };
-    run_search(search_output, search, |candidates| study_table(&study, candidates))
+    run_search(search_output, search, |candidates| candidates_table(&study, candidates))
 }
 
 /// The output of a search and the trials that are stored with it.

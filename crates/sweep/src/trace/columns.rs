@@ -22,16 +22,16 @@ pub(super) fn add_columns(
     extras: TraceExtras,
 ) -> Vec<Vec<Option<String>>> {
     let times = runs.iter().flat_map(|run| run.times_s.iter().copied().map(Some));
-    table.numbers("time_s", "s", "time since the start", times);
+    table.add_numbers("time_s", "s", "time since the start", times);
     let speeds = runs.iter().flat_map(|run| run.spin.speeds_rpm(run.times_s.iter().copied()));
-    table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds.map(Some));
+    table.add_numbers("speed_rpm", "rpm", "spin of the shaft", speeds.map(Some));
     if extras.angle {
         let angles = runs.iter().flat_map(|run| run.spin.angles_rad(run.times_s.iter().copied()));
         // Instants of whole turns are rounded, so their angles may be just below 2 pi.
         let is_whole = |angle: f64| angle.min(TAU - angle) < WHOLE_TURN_RAD;
         let angles = angles.map(|angle| if is_whole(angle) { 0.0 } else { angle });
         let description = "angle of the drum, 0 where the unbalance is up";
-        table.numbers("drum_angle_rad", "rad", description, angles.map(Some));
+        table.add_numbers("drum_angle_rad", "rad", description, angles.map(Some));
     }
     let counts: Vec<usize> = runs.iter().map(|run| run.times_s.len()).collect();
     let models: Vec<ModelColumns<'_>> = models
@@ -79,7 +79,7 @@ impl<'a> ModelColumns<'a> {
     ) {
         let description = format!("{description}, {} model; null from where it failed", self.model);
         let values = self.instants.iter().map(|instant| instant.as_ref().map(&quantity));
-        table.numbers(name, unit, &description, values);
+        table.add_numbers(name, unit, &description, values);
     }
 
     fn add_channels(&self, table: &mut Table) {
@@ -140,7 +140,7 @@ impl<'a> ModelColumns<'a> {
             let name = format!("{force}_{}_n", self.model);
             let description =
                 format!("{description}, {} model; null from where it failed", self.model);
-            table.numbers(
+            table.add_numbers(
                 &name,
                 "N",
                 &description,

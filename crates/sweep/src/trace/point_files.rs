@@ -43,7 +43,7 @@ pub(crate) fn write_point_traces(
     files::prepare_folder(folder)?;
     remove_point_traces(folder)?;
     let methods = read::read_methods(result)?;
-    threads::pool(threads)?.install(|| {
+    threads::build_pool(threads)?.install(|| {
         methods.into_par_iter().enumerate().try_for_each(|(point, method)| {
             let point = point as u64;
             if cancel.is_requested() {

@@ -3,7 +3,7 @@
 
 use super::super::lattice::lattice_ranks;
 use super::super::*;
-use super::{SEARCH, check_edges, traced};
+use super::{SEARCH, check_side_changes, traced};
 
 /// The number of level sets that are drawn. Basis: a second of tests. Doubling it doubles that.
 const LEVEL_SETS: u64 = 400;
@@ -141,13 +141,13 @@ fn split_stretches(first: bool, changes: impl Iterator<Item = (f64, bool)>) -> V
 /// Returns the stretches of a traced row.
 fn traced_stretches(row: &BoundaryRow) -> Vec<RowStretch> {
     let is_reliable = |distance: Option<f64>| distance.is_some_and(|distance| distance < 0.0);
-    let first = match row.edges[0].bracket {
-        Some(_) => is_reliable(row.edges[0].distances[0]),
-        None => row.edges[0].kind == EdgeKind::NoneReliable,
+    let first = match row.side_changes[0].bracket {
+        Some(_) => is_reliable(row.side_changes[0].distances[0]),
+        None => row.side_changes[0].kind == SideChangeKind::NoneReliable,
     };
-    let changes = row.edges.iter().filter_map(|edge| {
-        let [low, high] = edge.bracket?;
-        Some((0.5 * (low + high), is_reliable(edge.distances[1])))
+    let changes = row.side_changes.iter().filter_map(|side_change| {
+        let [low, high] = side_change.bracket?;
+        Some((0.5 * (low + high), is_reliable(side_change.distances[1])))
     });
     split_stretches(first, changes)
 }
@@ -198,7 +198,7 @@ fn random_level_sets() {
         let level_set = LevelSet::draw(seed.wrapping_add(k));
         let distance = |x, y| Some(level_set.distance(x, y));
         let traced = traced(distance, &first_values, &SEARCH);
-        check_edges(&traced, distance, SEARCH.tolerance);
+        check_side_changes(&traced, distance, SEARCH.tolerance);
         trials += traced.trials;
         let found: Vec<Vec<RowStretch>> = traced.curves[0].iter().map(traced_stretches).collect();
         let sides: Vec<Vec<bool>> =

@@ -11,7 +11,7 @@ use sweep_parameter::Worse;
 use sweep_results::{Comparison, ResultTable, SharedRow};
 
 /// Returns the table of differences, with one row for each row that both results have.
-pub(super) fn table(
+pub(super) fn differences_table(
     args: &CompareArgs,
     comparison: &Comparison,
     tables: &[ResultTable; 2],
@@ -19,39 +19,39 @@ pub(super) fn table(
 ) -> Table {
     let mut table = Table::new(build);
     let rows = || comparison.shared.iter();
-    table.counts("point", "row of A, from 0", rows().map(|row| row.rows[0]));
+    table.add_counts("point", "row of A, from 0", rows().map(|row| row.rows[0]));
     for (k, (name, unit)) in comparison.keys.iter().zip(&comparison.key_units).enumerate() {
         let description = tables[0]
             .column(name)
             .map_or("", |column| column.metadata.description.as_str())
             .to_owned();
         let unit = if unit.is_empty() { "1" } else { unit };
-        table.numbers(name, unit, &description, rows().map(|row| Some(row.key[k])));
+        table.add_numbers(name, unit, &description, rows().map(|row| Some(row.key[k])));
     }
     let description = "greatest ratio of B over that of A; null where either has none";
-    table.numbers("ratio_change", "1", description, rows().map(SharedRow::ratio_quotient));
-    table.worse(Worse::Greater);
+    table.add_numbers("ratio_change", "1", description, rows().map(SharedRow::ratio_quotient));
+    table.set_worse(Worse::Greater);
     let description =
         "least gap of the nonlinear model in B less that in A; null where either has none";
-    table.numbers("gap_change_m", "m", description, rows().map(SharedRow::gap_difference_m));
-    table.worse(Worse::Less);
+    table.add_numbers("gap_change_m", "m", description, rows().map(SharedRow::gap_difference_m));
+    table.set_worse(Worse::Less);
     for (side, [suffix, file]) in [["a", "A"], ["b", "B"]].into_iter().enumerate() {
         let name = format!("ratio_max_{suffix}");
         let description = format!("greatest ratio of {file}");
-        table.numbers(&name, "1", &description, rows().map(|row| row.ratio[side]));
+        table.add_numbers(&name, "1", &description, rows().map(|row| row.ratio[side]));
     }
     let description = "none, lost (reliable in A alone), gained (reliable in B alone), defined \
                 (a verdict \
                 in one file alone)";
-    table.words("flip", description, rows().map(|row| row.flip.name()));
+    table.add_words("flip", description, rows().map(|row| row.flip.name()));
     let sensitive = rows().map(|row| if row.sensitive { "true" } else { "false" });
-    table.words("sensitive", "true where either file calls the row chaotic", sensitive);
+    table.add_words("sensitive", "true where either file calls the row chaotic", sensitive);
     let status = rows().map(|row| if row.ratio_quotient().is_some() { "ok" } else { "no_ratio" });
-    table.words("status", "ok, or no_ratio where either file has none", status);
+    table.add_words("status", "ok, or no_ratio where either file has none", status);
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let hashes =
         tables.each_ref().map(|table| table.file().value(key::PLAN_HASH).map(str::to_owned));
-    table.metadata(
+    table.add_metadata(
         key::DIFFERENCES,
         &json!({
             // Figures show the name under their title.

@@ -7,7 +7,7 @@ use sweep_results::{Comparison, PlanChange, ResultTable, plan_changes};
 
 /// The differences between two plans that have no effect, because an axis of both files sets these
 /// numbers.
-pub(super) struct Overridden {
+pub(super) struct OverriddenNumbers {
     /// The name of the axis.
     pub(super) axis: String,
     /// The dotted paths of the differences: `machine.body.mass_kg`.
@@ -16,10 +16,10 @@ pub(super) struct Overridden {
 
 /// Returns the differences of the plans that an axis of both files overrides. An axis with a
 /// tolerance overrides nothing, because its values follow from the plan's number.
-pub(super) fn overridden<M: Model>(
+pub(super) fn find_overridden<M: Model>(
     tables: &[ResultTable; 2],
     comparison: &Comparison,
-) -> Vec<Overridden> {
+) -> Vec<OverriddenNumbers> {
     let plans = tables.each_ref().map(|table| table.plan.as_ref());
     let [Some(first), Some(second)] = plans else { return Vec::new() };
     let [Some(first_model), Some(second_model)] = [first, second].map(without_axes::<M>) else {
@@ -43,7 +43,7 @@ pub(super) fn overridden<M: Model>(
             })
             .cloned()
             .collect();
-        (!paths.is_empty()).then(|| Overridden { axis: name.to_owned(), paths })
+        (!paths.is_empty()).then(|| OverriddenNumbers { axis: name.to_owned(), paths })
     });
     by_axis.collect()
 }

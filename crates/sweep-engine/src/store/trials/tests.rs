@@ -154,10 +154,10 @@ fn a_finished_file_of_the_same_plan_is_recognised() {
         Job { version: BUILD.version, numerics: BUILD.numerics, layout, ..job }
     });
     let mut table = Table::new(BUILD);
-    table.metadata(key::PLAN, &ours.plan);
-    table.text(key::PLAN_HASH, ours.hash().to_hex().to_string());
-    table.metadata(key::BOUNDARY, &json!({}));
-    table.counts("points", "", [1]);
+    table.add_metadata(key::PLAN, &ours.plan);
+    table.add_text(key::PLAN_HASH, ours.hash().to_hex().to_string());
+    table.add_metadata(key::BOUNDARY, &json!({}));
+    table.add_counts("points", "", [1]);
     fs::write(&output, table.into_bytes(&output).unwrap()).unwrap();
     let open = |job: &Job<'_>, fresh| Trials::open(&output, job, columns(), fresh);
     let outcome = open(&ours, false);
