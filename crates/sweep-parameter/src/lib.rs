@@ -204,7 +204,7 @@ impl RatioLimits {
 
     /// Returns how far a point with these least and greatest ratios is from the other verdict,
     /// relative to the limit.
-    pub fn margin(self, least: f64, greatest: f64) -> f64 {
+    fn margin(self, least: f64, greatest: f64) -> f64 {
         let distance = |ratio: f64, limit: f64| (ratio / limit - 1.0).abs();
         let lower_margin = self.lower.map_or(f64::INFINITY, |limit| distance(least, limit));
         distance(greatest, self.upper).min(lower_margin)
@@ -230,6 +230,9 @@ pub struct Verdict {
     pub least: Option<(usize, f64)>,
     /// Whether the ratios are between the limits; `None` where no ratio is defined.
     pub reliable: Option<bool>,
+    /// The distance from the other verdict, relative to the limit; `None` where no ratio is
+    /// defined.
+    pub margin: Option<f64>,
 }
 
 impl Verdict {
@@ -241,11 +244,10 @@ impl Verdict {
         };
         let greatest = extreme(|a, b| a > b);
         let least = extreme(|a, b| a < b);
-        let reliable = match (least, greatest) {
-            (Some((_, least)), Some((_, greatest))) => Some(limits.contain(least, greatest)),
-            _ => None,
-        };
-        Self { ratios, greatest, least, reliable }
+        let extremes = least.zip(greatest).map(|((_, least), (_, greatest))| (least, greatest));
+        let reliable = extremes.map(|(least, greatest)| limits.contain(least, greatest));
+        let margin = extremes.map(|(least, greatest)| limits.margin(least, greatest));
+        Self { ratios, greatest, least, reliable, margin }
     }
 }
 

@@ -1,7 +1,6 @@
 //! Refines a row: stores the finest trajectory of each model, and decides which level is integrated
 //! next.
 
-use sweep_parameter::{RatioLimits, Verdict};
 use washer_model::{MethodKind, ModelKind, Point, UnresolvedModes};
 
 use crate::error_control::{
@@ -283,9 +282,7 @@ impl RowRefinement {
         let errors =
             [0, 1].map(|model| self.0[model].error(refinement_rule.for_model(model, point)));
         let outcome = self.outcome(point_index, point, refinement_rule, errors);
-        let limits = refinement_rule.row_rule.limits;
-        let verdict_margin =
-            outcome.as_ref().and_then(|outcome| relative_margin(&outcome.verdict, limits));
+        let verdict_margin = outcome.as_ref().and_then(|outcome| outcome.verdict.margin);
         let error = errors[0].zip(errors[1]).map(|(nonlinear, linear)| nonlinear + linear);
         let is_verdict_certain =
             verdict_margin.zip(error).is_some_and(|(verdict_margin, error)| error < verdict_margin);
@@ -337,11 +334,6 @@ impl RowRefinement {
         }
         Some(outcome)
     }
-}
-
-/// Returns the distance of the ratios from the nearest limit, relative to the limit.
-fn relative_margin(verdict: &Verdict, limits: RatioLimits) -> Option<f64> {
-    Some(limits.margin(verdict.least?.1, verdict.greatest?.1))
 }
 
 /// Returns the greatest relative difference of the numbers that a row takes from two trajectories;

@@ -92,7 +92,7 @@ mod tests {
         );
         assert_eq!(
             verdict(&at_rest, 2, 2.0),
-            Verdict { ratios: vec![None, None], greatest: None, least: None, reliable: None }
+            Verdict { ratios: vec![None, None], ..Verdict::default() }
         );
     }
 
