@@ -5,6 +5,8 @@ pub(crate) mod active_recorders;
 mod checkpoints;
 pub(crate) mod equations;
 pub(crate) mod history;
+mod load_components;
+mod load_laws;
 pub(crate) mod loads;
 pub(crate) mod method;
 pub(crate) mod model;

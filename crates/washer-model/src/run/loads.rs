@@ -1,16 +1,13 @@
-//! Records the loads on the cabinet, on its feet and on stops, and the speeds of dampers.
-//!
-//! The force laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers
-//! for their rates. The linear model's loads are first order in its deviations from equilibrium.
+//! Records the loads on the cabinet, on its feet and on stops, and the speeds of dampers, from the
+//! components that `load_components.rs` selects.
 
-use super::suspension::{compute_forces, dual, load_on_cabinet_axes, tub_with_deviation};
-use crate::coordinates::{STATES, TUB};
+use super::load_components::LoadSelection;
+use super::load_laws::{LoadLaws, to_sample};
+use crate::coordinates::STATES;
 use crate::lanes::{InLanes as _, ToDual as _};
 use crate::machine::feet::{LOAD_COMPONENTS, LoadDistribution, MAX_FEET, turning_force_n};
-use crate::nonlinear::elements::{Elements, TubMotion};
-use crate::nonlinear::frame::{Vec3, dot};
 use crate::run::model::tub_samples;
-use crate::{COORDINATES, ModelKind, Point};
+use crate::{ModelKind, Point};
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
 
 sweep_parameter::named! {
@@ -59,162 +56,6 @@ const ROOT_SUMMAND_N2: f64 = 1e-18;
 const SLIP_INDEX: usize = MAX_FEET;
 /// The index of the margin against walking, after that against slipping.
 const WALK_INDEX: usize = MAX_FEET + 1;
-
-/// The first-order expansion of a quantity in the tub's coordinates and speeds about equilibrium.
-#[derive(Clone, Copy)]
-struct TubExpansion<T> {
-    value_at_rest: N<T>,
-    coordinate_derivatives: [N<T>; 4],
-    speed_derivatives: [N<T>; 4],
-}
-
-impl<T: Lane> TubExpansion<T> {
-    #[inline(always)]
-    fn new(zero: N<T>) -> Self {
-        Self {
-            value_at_rest: zero,
-            coordinate_derivatives: [zero; 4],
-            speed_derivatives: [zero; 4],
-        }
-    }
-
-    /// Sets the value at rest and the derivatives by coordinate `k` in one lane.
-    fn set(
-        &mut self,
-        lane: usize,
-        value_at_rest: f64,
-        k: usize,
-        coordinate_derivative: f64,
-        speed_derivative: f64,
-    ) {
-        self.value_at_rest.0.set(lane, value_at_rest);
-        self.coordinate_derivatives[k].0.set(lane, coordinate_derivative);
-        self.speed_derivatives[k].0.set(lane, speed_derivative);
-    }
-
-    #[inline(always)]
-    fn evaluate(&self, tub: &[Sample<T>; 4]) -> N<Dual<T>> {
-        let mut value = self.value_at_rest;
-        let mut slope = self.value_at_rest.lit(0.0);
-        for k in 0..4 {
-            value += self.coordinate_derivatives[k] * tub[k].value;
-            value += self.speed_derivatives[k] * tub[k].slope;
-            slope += self.coordinate_derivatives[k] * tub[k].slope;
-            slope += self.speed_derivatives[k] * tub[k].curvature;
-        }
-        N(Dual { value: value.0, slope: slope.0 })
-    }
-}
-
-/// The loads of a machine that are recorded.
-#[derive(Clone, Copy)]
-struct LoadSelection {
-    /// Whether the force on the cabinet is recorded.
-    has_cabinet_force: bool,
-    /// Whether the loads of the feet and the margins are recorded.
-    has_feet: bool,
-    /// The number of stops that are recorded.
-    stop_count: usize,
-    /// The number of dampers that are recorded.
-    damper_count: usize,
-}
-
-impl LoadSelection {
-    /// Returns the number of load components: the load on the cabinet, depth and force of each
-    /// stop, and the speed of each damper.
-    fn component_count(self) -> usize {
-        LOAD_COMPONENTS + 2 * self.stop_count + self.damper_count
-    }
-
-    /// Computes the load components by the elements' force laws. Returns the force on the tub.
-    #[inline(always)]
-    fn evaluate<T: Lane>(
-        self,
-        elements: &Elements<T>,
-        tub: &TubMotion<T>,
-        components: &mut [N<T>],
-    ) -> Vec3<T> {
-        let no_force = [tub.midpoint[0].lit(0.0); 3];
-        let mut tub_load = (no_force, no_force);
-        if self.has_cabinet_force || self.has_feet {
-            tub_load = elements.load_on_tub(tub);
-        }
-        if self.has_feet {
-            components[..LOAD_COMPONENTS].copy_from_slice(&load_on_cabinet_axes(tub, &tub_load));
-        }
-        for k in 0..self.stop_count {
-            [components[LOAD_COMPONENTS + 2 * k], components[LOAD_COMPONENTS + 2 * k + 1]] =
-                elements.stop_depth_and_force(k, tub);
-        }
-        for k in 0..self.damper_count {
-            components[LOAD_COMPONENTS + 2 * self.stop_count + k] =
-                elements.damper_motion(k, tub)[1];
-        }
-        tub_load.0
-    }
-}
-
-/// The load laws of one of the two models.
-enum LoadLaws<T> {
-    /// The machine's elements, over dual numbers for rates.
-    Nonlinear(Elements<Dual<T>>),
-    /// The expansions of the force on the cabinet and of the load components.
-    Linear { force: [TubExpansion<T>; 3], components: Vec<TubExpansion<T>> },
-}
-
-impl<T: Lane> LoadLaws<T> {
-    /// Sets the point of one lane.
-    fn set_point(&mut self, lane: usize, point: &Point, selection: LoadSelection) {
-        let (force, components) = match self {
-            Self::Nonlinear(elements) => return elements.set_lane(lane, &point.machine.elements),
-            Self::Linear { force, components } => (force, components),
-        };
-        let elements = point.machine.elements.with_viscous_friction().constant();
-        let unit_state = |state: usize| core::array::from_fn(|i| f64::from(u8::from(i == state)));
-        let components_by = |state: usize| {
-            let mut components = vec![dual(0.0, 0.0); selection.component_count()];
-            selection.evaluate(
-                &elements,
-                &tub_with_deviation(point, &unit_state(state)),
-                &mut components,
-            );
-            components
-        };
-        let cabinet_force_at =
-            |state: &[f64; STATES]| compute_forces(point, ModelKind::Linear, state).cabinet_n;
-        for k in 0..4 {
-            let [coordinate, speed] = [TUB[k], COORDINATES + TUB[k]];
-            let slopes = components_by(coordinate).into_iter().zip(components_by(speed));
-            for (component, (N(coordinate_derivative), N(speed_derivative))) in
-                components.iter_mut().zip(slopes)
-            {
-                component.set(
-                    lane,
-                    coordinate_derivative.value,
-                    k,
-                    coordinate_derivative.slope,
-                    speed_derivative.slope,
-                );
-            }
-            if selection.has_cabinet_force {
-                let force_at_rest = cabinet_force_at(&[0.0; STATES]);
-                let [at_unit_coordinate, at_unit_speed] =
-                    [coordinate, speed].map(|state| cabinet_force_at(&unit_state(state)));
-                for i in 0..3 {
-                    let coordinate_derivative = at_unit_coordinate[i] - force_at_rest[i];
-                    let speed_derivative = at_unit_speed[i] - force_at_rest[i];
-                    force[i].set(
-                        lane,
-                        force_at_rest[i],
-                        k,
-                        coordinate_derivative,
-                        speed_derivative,
-                    );
-                }
-            }
-        }
-    }
-}
 
 /// The records of one stop.
 struct StopRecord<T> {
@@ -270,16 +111,7 @@ impl<T: Lane> Loads<T> {
             stop_count: if records_elements { elements.stops.len() } else { 0 },
             damper_count: if records_dampers { elements.dampers.len() } else { 0 },
         };
-        // This is not `Option::map`, whose closure would be compiled without the kernel's
-        // instruction set.
-        let load_laws = match model {
-            ModelKind::Nonlinear => LoadLaws::Nonlinear(Elements::splat(zero.constant(), elements)),
-            ModelKind::Linear => {
-                let zero_expansion = TubExpansion::new(zero);
-                let components = vec![zero_expansion; selection.component_count()];
-                LoadLaws::Linear { force: [zero_expansion; 3], components }
-            }
-        };
+        let load_laws = LoadLaws::new(zero, model, elements, selection);
         let mut stops = Vec::with_capacity(selection.stop_count);
         for _ in 0..selection.stop_count {
             stops.push(StopRecord {
@@ -287,6 +119,8 @@ impl<T: Lane> Loads<T> {
                 contact_time: TimeAbove::new(zero),
             });
         }
+        // This is not `Option::map`, whose closure would be compiled without the kernel's
+        // instruction set.
         let distribution = match &point.feet {
             Some(feet) if selection.has_feet => {
                 Some(LoadDistribution::splat(zero, &feet.distribution))
@@ -402,34 +236,7 @@ impl<T: Lane> Loads<T> {
         lanes_in_window: T::Mask,
     ) {
         let Self { selection, load_laws, components, .. } = self;
-        let zero = tub[0].value.lit(0.0);
-        let mut force_squared = Sample::constant(zero, zero);
-        match load_laws {
-            LoadLaws::Nonlinear(elements) => {
-                let mut q = [tub[0].value.constant(); 4];
-                let mut u = q;
-                for k in 0..4 {
-                    q[k] = N(Dual { value: tub[k].value.0, slope: tub[k].slope.0 });
-                    u[k] = N(Dual { value: tub[k].slope.0, slope: tub[k].curvature.0 });
-                }
-                // The force on the tub in tub axes has the same magnitude as the force on the
-                // cabinet.
-                let force = selection.evaluate(elements, &TubMotion::new(&q, &u), components);
-                force_squared = to_sample(dot(&force, &force));
-            }
-            LoadLaws::Linear { force, components: expansions } => {
-                for expansion in force {
-                    let N(dual) = expansion.evaluate(tub);
-                    let force = N(dual.value);
-                    let rate = N(dual.slope);
-                    force_squared.value += force * force;
-                    force_squared.slope += (2.0 * force).v() * rate;
-                }
-                for (component, expansion) in components.iter_mut().zip(expansions) {
-                    *component = expansion.evaluate(tub);
-                }
-            }
-        }
+        let force_squared = load_laws.evaluate(*selection, tub, components);
         if selection.has_cabinet_force {
             record_peaks(&mut self.force_squared, step_s, &[force_squared], lanes_in_window);
         }
@@ -503,12 +310,4 @@ fn record_peaks<T: Lane, const M: usize>(
         Some(step_s) => peaks.advance_by_slopes(step_s, samples, lanes_in_window),
         None => peaks.begin(samples, lanes_in_window),
     }
-}
-
-/// Returns a dual number as a sample without curvature.
-#[inline(always)]
-fn to_sample<T: Lane>(dual: N<Dual<T>>) -> Sample<T> {
-    let value = N(dual.0.value);
-    let slope = N(dual.0.slope);
-    Sample { value, slope, curvature: value.lit(0.0) }
 }
