@@ -5,7 +5,8 @@
 
 Links must have a target. The table of contents of the guide must list every page, and the indexes
 of scripts/ and tests/ must list every file. The model page must have the sections, equations,
-tables and figures that the code cites. Requires only the standard library.
+tables and figures that the code cites. Paths and names in the recipes of CONTRIBUTING.md must
+exist. Requires only the standard library.
 """
 
 import pathlib
@@ -104,9 +105,36 @@ def citation_mistakes():
                 yield f"{name} cites {word}. {number}, which docs/equations.md does not name"
 
 
+def recipe_mistakes():
+    """Yields mistakes about paths and names in the recipes of CONTRIBUTING.md that do not exist.
+
+    A name is looked for in the files that its item names, and without such in all crates.
+    """
+    page = (ROOT / "CONTRIBUTING.md").read_text()
+    recipes = page[page.index("\n## Recipes"):page.index("\n## Fuzzing")]
+    all_sources = "\n".join(path.read_text() for path in find_files("crates/*.rs"))
+    for item in re.split(r"\n(?=\d\. |- |\n)", recipes):
+        spans = [span.replace("\n", " ") for span in re.findall(r"`([^`]+)`", item)]
+        sources = []
+        for path in (span for span in spans if span.startswith("crates/") and "NAME" not in span):
+            target = ROOT / path
+            if target.is_file():
+                sources.append(target.read_text())
+            elif not target.is_dir():
+                yield f"CONTRIBUTING.md: there is no {path}"
+        text = "\n".join(sources) if sources else all_sources
+        names = (re.fullmatch(r"([A-Za-z_]+(?:::[A-Za-z_]+)*)!?", span) for span in spans)
+        for name in (match[1] for match in names if match):
+            words = [word for word in name.split("::") if "NAME" not in word]
+            for word in words:
+                if not re.search(rf"\b{word}\b", text):
+                    yield f"CONTRIBUTING.md: no `{word}` where a recipe names it"
+
+
 def main():
     """Prints all mistakes; returns 1 if there are any."""
-    mistakes = [*link_mistakes(), *contents_mistakes(), *index_mistakes(), *citation_mistakes()]
+    mistakes = [*link_mistakes(), *contents_mistakes(), *index_mistakes(), *citation_mistakes(),
+                *recipe_mistakes()]
     for line in mistakes:
         print(line, file=sys.stderr)
     print(f"documents: {len(find_files('*.md'))} pages, {len(mistakes)} mistakes", file=sys.stderr)
