@@ -1,7 +1,7 @@
 #!/bin/sh
-# scripts/crosscheck/dwells.py with what it needs: scripts/crosscheck/dwells.sh [OPTION ...]
+# Runs scripts/crosscheck/dwells.py with its packages: scripts/crosscheck/dwells.sh [OPTION ...]
 #
-# As scripts/crosscheck/run.sh.
+# The requirements are those of scripts/crosscheck/run.sh.
 set -eu
 here=$(dirname "$0")
 venv=$("$here/../tools/venv.sh" "$here/requirements.txt")

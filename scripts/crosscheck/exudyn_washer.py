@@ -1,7 +1,8 @@
-"""A machine put together from standard parts in Exudyn: three rigid bodies in absolute coordinates,
-joints, connectors, an implicit integrator, and nothing of this project's derivation."""
+"""A machine assembled from standard parts in Exudyn: three rigid bodies in absolute coordinates,
+joints, connectors and an implicit integrator. It uses nothing of this project's derivation."""
 
 import math
+import sys
 
 import exudyn
 import numpy as np
@@ -13,12 +14,11 @@ from exudyn.utilities import (
     SensorBody,
 )
 
-RPM = math.tau / 60
+RAD_PER_S_PER_RPM = math.tau / 60
 
 
-
-def turn(axis, angle):
-    """Rotation about cabinet axis 0, 1 or 2."""
+def rotation_about(axis, angle):
+    """Returns the matrix of a rotation about the cabinet's axis 0, 1 or 2."""
     s, c = math.sin(angle), math.cos(angle)
     matrix = np.eye(3)
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -27,81 +27,88 @@ def turn(axis, angle):
     return matrix
 
 
-def spin_rate(axis_matrix, coordinates_rates):
-    """Angular velocity of a frame that is a product of elementary turns: sum of each rate about its
-    own turned axis."""
+def angular_velocity_of(axis_matrix, coordinates_rates):
+    """Returns the angular velocity of a frame that is a product of rotations about single axes: the
+    sum of each rate about its rotated axis."""
     total, frame = np.zeros(3), np.eye(3)
     for axis, angle, rate in coordinates_rates:
         total += frame[:, axis] * rate
-        frame = frame @ turn(axis, angle)
+        frame = frame @ rotation_about(axis, angle)
     assert np.allclose(frame, axis_matrix)
     return total
 
 
 def pose(q, theta):
-    """Rotations of tub, shaft and drum (the paper's Table 1), and positions of their reference
-    points."""
-    tub = turn(1, q[4]) @ turn(2, q[5])
-    shaft = turn(1, q[6]) @ turn(2, q[7]) @ turn(0, theta)
-    drum = shaft @ turn(1, q[8]) @ turn(2, q[9])
+    """Returns the rotation matrices of tub, shaft and drum (the paper's Table 1), and the positions
+    of the reference points of tub and shaft."""
+    tub = rotation_about(1, q[4]) @ rotation_about(2, q[5])
+    shaft = rotation_about(1, q[6]) @ rotation_about(2, q[7]) @ rotation_about(0, theta)
+    drum = shaft @ rotation_about(1, q[8]) @ rotation_about(2, q[9])
     return tub, shaft, drum, np.array([0, q[0], q[1]]), np.array([0, q[2], q[3]])
 
 
 def drum_with_unbalance(machine):
-    """Mass, mass centre from the hinge, and inertia about it, of bare drum and point mass: a
-    function of the mass alone."""
+    """Returns the mass, the mass centre and the inertia about the mass centre of the drum with its
+    unbalance."""
     drum, load = machine["drum"], machine["unbalance"]
     m0, mu = drum["mass_kg"], load["mass_kg"]
     arm = np.array([load["x_m"], load["radius_m"], 0.0])
-    bare = np.array([drum["centre_x_m"], 0.0, 0.0])
+    drum_centre = np.array([drum["centre_x_m"], 0.0, 0.0])
     mass = m0 + mu
-    centre = (m0 * bare + mu * arm) / mass
+    centre = (m0 * drum_centre + mu * arm) / mass
     inertia = np.diag(drum["inertia_kg_m2"])
-    for m, place in [(m0, bare), (mu, arm)]:
-        r = place - centre
+    for m, position in [(m0, drum_centre), (mu, arm)]:
+        r = position - centre
         inertia = inertia + m * (r @ r * np.eye(3) - np.outer(r, r))
     return mass, centre, inertia
 
 
-def coordinates(places, rotations):
-    """q1 to q10 from the bodies' positions and rotation matrices."""
+def compute_coordinates(positions, rotations):
+    """Computes q1 to q10 from the positions and the rotation matrices of the bodies."""
     tub, shaft, drum = (np.reshape(rotation, (3, 3)) for rotation in rotations)
 
     def angles(matrix):
         return math.atan2(-matrix[2, 0], matrix[0, 0]), math.asin(matrix[1, 0])
 
     return np.array(
-        [*places[0][1:], *places[1][1:], *angles(tub), *angles(shaft), *angles(shaft.T @ drum)]
+        [
+            *positions[0][1:],
+            *positions[1][1:],
+            *angles(tub),
+            *angles(shaft),
+            *angles(shaft.T @ drum),
+        ]
     )
 
 
 def friction_force(damper):
-    """Tension of a friction damper, for Exudyn."""
-    friction, fades = damper["friction_n"], damper["friction_speed_m_per_s"]
+    """Returns the user function of Exudyn for the tension of a friction damper."""
+    friction, friction_speed = damper["friction_n"], damper["friction_speed_m_per_s"]
 
     def force(mbs, time, item, elongation, rate, *rest):
-        return friction * rate / math.hypot(rate, fades)
+        return friction * rate / math.hypot(rate, friction_speed)
 
     return force
 
 
 def stop_force(stop):
-    """Force of a stop, for Exudyn, along the displacement: as a spring's, not as on the tub."""
-    way = np.array(stop["direction"]) / np.linalg.norm(stop["direction"])
+    """Returns the user function of Exudyn for the force of a stop. Its sign is that of a spring's
+    force along the displacement, the opposite of the force on the tub."""
+    direction = np.array(stop["direction"]) / np.linalg.norm(stop["direction"])
     stiffness, damping = stop["stiffness_n_per_m"], stop["damping_n_s_per_m"]
     clearance, softness = stop["clearance_m"], stop["softness_m"]
 
     def force(mbs, time, item, displacement, velocity, *rest):
-        depth, speed = way @ displacement - clearance, way @ velocity
-        soft = math.hypot(depth, softness)
-        push = stiffness * (depth + soft) / 2 + damping * (1 + depth / soft) / 2 * speed
-        return list(push * way)
+        depth, speed = direction @ displacement - clearance, direction @ velocity
+        root = math.hypot(depth, softness)
+        push = stiffness * (depth + root) / 2 + damping * (1 + depth / root) / 2 * speed
+        return list(push * direction)
 
     return force
 
 
 def bushing_force(bushing):
-    """Force of a bushing, for Exudyn, along the displacement."""
+    """Returns the user function of Exudyn for the force of a bushing along the displacement."""
     keys = ["stiffness_n_per_m", "cubic_n_per_m3", "damping_n_s_per_m"]
     stiffness, cubic, damping = (np.array(bushing[key]) for key in keys)
 
@@ -113,7 +120,8 @@ def bushing_force(bushing):
 
 
 class Washer:
-    """The machine in Exudyn, starting in the pose q with speeds u; theta(t) is prescribed."""
+    """A machine in Exudyn that starts in the pose `q` with speeds `u` and has the prescribed spin
+    angle `theta(t)`."""
 
     def __init__(self, machine, q, u, theta, rate):
         self.container = exudyn.SystemContainer()
@@ -122,22 +130,22 @@ class Washer:
         hinge_x = machine["drum"]["hinge_x_m"]
         tub, shaft, drum, tub_point, shaft_point = pose(q, theta(0.0))
         hinge = shaft_point + shaft[:, 0] * hinge_x
-        tub_rate = spin_rate(tub, [(1, q[4], u[4]), (2, q[5], u[5])])
-        turns = [(1, q[6], u[6]), (2, q[7], u[7]), (0, theta(0.0), rate)]
-        shaft_rate = spin_rate(shaft, turns)
-        drum_rate = spin_rate(drum, turns + [(1, q[8], u[8]), (2, q[9], u[9])])
+        tub_rate = angular_velocity_of(tub, [(1, q[4], u[4]), (2, q[5], u[5])])
+        rotations = [(1, q[6], u[6]), (2, q[7], u[7]), (0, theta(0.0), rate)]
+        shaft_rate = angular_velocity_of(shaft, rotations)
+        drum_rate = angular_velocity_of(drum, rotations + [(1, q[8], u[8]), (2, q[9], u[9])])
         shaft_velocity = np.array([0, u[2], u[3]])
 
         def body(mass, centre_x, inertia, position, rotation, velocity, angular):
-            parts = RigidBodyInertia(mass, inertia, [0, 0, 0]).Translated(
+            body_inertia = RigidBodyInertia(mass, inertia, [0, 0, 0]).Translated(
                 [centre_x[0], centre_x[1], 0]
             )
-            # The start pose is the reference pose: small rotation coordinates, and no drift in
-            # their sum with it.
+            # The start pose is the reference pose, so that the rotation coordinates are small and
+            # their sum with it has no drift.
             return mbs.CreateRigidBody(
                 referencePosition=list(position),
                 referenceRotationMatrix=rotation,
-                inertia=parts,
+                inertia=body_inertia,
                 gravity=gravity,
                 initialVelocity=list(velocity),
                 initialAngularVelocity=list(angular),
@@ -173,15 +181,15 @@ class Washer:
             drum_rate,
         )
         ground = mbs.CreateGround()
-        # Mass, and mass centre in the body's own axes.
+        # The bodies with their masses and their mass centres in body axes.
         self.masses = [
             (self.tub, t["mass_kg"], [t["centre_x_m"], 0, 0]),
             (self.shaft, s["mass_kg"], [s["centre_x_m"], 0, 0]),
             (self.drum, drum_mass, [drum_centre[0] - hinge_x, drum_centre[1], 0]),
         ]
 
-        def marker(number, place=(0, 0, 0), rotation=np.eye(3)):
-            frame = exudyn.HT(rotation=rotation, translation=list(place))
+        def marker(number, position=(0, 0, 0), rotation=np.eye(3)):
+            frame = exudyn.HT(rotation=rotation, translation=list(position))
             return mbs.AddMarker(MarkerBodyRigid(bodyNumber=number, localHT=frame))
 
         def joint(first, second, axes, offset=0):
@@ -193,23 +201,24 @@ class Washer:
                 )
             )
 
-        # One blocked rotation about x means y of the first frame across z of the second. Tub: c2 .
-        # t3 = 0, and no motion along the cabinet's own axis.
+        # A constrained rotation about x means that y of the first frame is perpendicular to z of
+        # the second. For the tub, c2 . t3 = 0; the tub does not move along c1.
         origin = marker(ground)
         joint(origin, marker(self.tub), [1, 0, 0, 1, 0, 0])
         joint(origin, marker(self.shaft), [1, 0, 0, 0, 0, 0])
-        # Prescribed spin: c2 . (s3 turned back by theta) = 0, by frames whose y is s3 and whose z
-        # is c2.
+        # The prescribed spin is c2 . (s3 rotated backwards by theta) = 0, by frames whose y is s3
+        # and whose z is c2.
         joint(
-            marker(self.shaft, rotation=turn(0, math.pi / 2)),
-            marker(ground, rotation=turn(0, -math.pi / 2)),
+            marker(self.shaft, rotation=rotation_about(0, math.pi / 2)),
+            marker(ground, rotation=rotation_about(0, -math.pi / 2)),
             [0, 0, 0, 1, 0, 0],
             lambda mbs, time, item, parameters: [0, 0, 0, -theta(time), 0, 0],
         )
-        # Universal joint: one point in common, and s2 . d3 = 0.
+        # A universal joint has a common point of shaft and drum, and s2 . d3 = 0.
         joint(marker(self.shaft, (hinge_x, 0, 0)), marker(self.drum), [1, 1, 1, 1, 0, 0])
         flexure = machine["flexure"]["stiffness_n_m_per_rad"]
-        # The connector itself: what `mbs` creates from it would take the start pose as unbent.
+        # The connector is added directly, because the function of `mbs` that creates it would
+        # assume that the hinge is unbent in the start pose.
         mbs.AddObject(
             ObjectConnectorRigidBodySpringDamper(
                 markerNumbers=[marker(self.shaft, (hinge_x, 0, 0)), marker(self.drum)],
@@ -219,12 +228,12 @@ class Washer:
             )
         )
         for end in ["front", "rear"]:
-            place = [machine["bearings"][f"{end}_x_m"], 0, 0]
+            bearing_centre = [machine["bearings"][f"{end}_x_m"], 0, 0]
             k = machine["bearings"][f"{end}_stiffness_n_per_m"]
             mbs.CreateCartesianSpringDamper(
                 itemNumbers=[self.tub, self.shaft],
-                localPosition0=place,
-                localPosition1=place,
+                localPosition0=bearing_centre,
+                localPosition1=bearing_centre,
                 stiffness=[0, k, k],
             )
         for spring in machine["springs"]:
@@ -265,29 +274,32 @@ class Washer:
         self.settings = exudyn.SimulationSettings()
         self.settings.solution.file.write = False
 
-    def rest_coordinates(self):
-        """q1 to q10 of the present configuration."""
+    def current_coordinates(self):
+        """Computes q1 to q10 of the current configuration."""
 
-        def of(body, variable):
+        def read_output(body, variable):
             return np.array(self.mbs.GetObjectOutputBody(body, variable, [0, 0, 0]))
 
-        place, rotation = (
+        position, rotation = (
             exudyn.OutputVariableType.Position,
             exudyn.OutputVariableType.RotationMatrix,
         )
         bodies = [self.tub, self.shaft, self.drum]
-        return coordinates([of(b, place) for b in bodies], [of(b, rotation) for b in bodies])
+        return compute_coordinates(
+            [read_output(body, position) for body in bodies],
+            [read_output(body, rotation) for body in bodies],
+        )
 
-    def rest(self):
-        """Static equilibrium by Newton's method."""
+    def solve_equilibrium(self):
+        """Solves the static equilibrium by Newton's method; returns its coordinates."""
         self.settings.staticSolver.newton.relativeTolerance = 1e-9
         self.settings.staticSolver.newton.absoluteTolerance = 1e-9
         self.settings.staticSolver.newton.maxIterations = 50
         self.mbs.SolveStatic(self.settings, updateInitialValues=True)
-        return self.rest_coordinates()
+        return self.current_coordinates()
 
-    def sensors(self, *variables):
-        """A sensor of each variable on each of tub, shaft and drum."""
+    def add_sensors(self, *variables):
+        """Adds a sensor of each variable to tub, shaft and drum."""
         return [
             [
                 self.mbs.AddSensor(
@@ -299,8 +311,8 @@ class Washer:
         ]
 
     def integrate(self, end_s, step_s, every_s):
-        """Fills the sensors at every multiple of `every_s`, by the generalised-alpha method on
-        index 3."""
+        """Integrates by the generalised-alpha method of index 3. Sensors record every multiple of
+        `every_s`."""
         self.mbs.Assemble()
         self.settings.solution.sensors.writePeriod = every_s
         integration = self.settings.timeIntegration
@@ -308,13 +320,13 @@ class Washer:
         integration.endTime = end_s
         integration.verboseMode = 0
         integration.newton.useModifiedNewton = True
-        # Tighter than this is below the round-off of the bearings' forces, where steps would be
-        # halved without end.
+        # Smaller tolerances would be below the rounding errors of the bearings' forces, and steps
+        # would be halved endlessly.
         integration.newton.relativeTolerance = 1e-8
         integration.newton.absoluteTolerance = 1e-8
-        # The user function gives an angle, not its rate, so index 3; on which the method is
-        # unstable without numerical damping. What 0.9 damps are the bearings' modes, far above the
-        # motion compared.
+        # The user function of the spin returns an angle and no rate, so that the index is 3. The
+        # method then needs numerical damping for stability. A spectral radius of 0.9 damps the
+        # bearings' modes, whose frequencies are far above those of the compared motion.
         integration.generalizedAlpha.useIndex2Constraints = False
         integration.generalizedAlpha.useNewmark = False
         integration.generalizedAlpha.spectralRadius = 0.9
@@ -325,61 +337,67 @@ class Washer:
             sys.exit("Exudyn's integrator did not reach the end")
 
     def run(self, end_s, step_s, every_s):
-        """Coordinates at every multiple of `every_s`."""
-        return self.motion(end_s, step_s, every_s)[0]
+        """Integrates the motion; returns the coordinates at every multiple of `every_s`."""
+        return self.run_with_centre(end_s, step_s, every_s)[0]
 
-    def motion(self, end_s, step_s, every_s):
-        """Coordinates and the mass centre of all bodies, at every multiple of `every_s`."""
+    def run_with_centre(self, end_s, step_s, every_s):
+        """Integrates the motion; returns the coordinates and the mass centre of all bodies at every
+        multiple of `every_s`."""
         position = exudyn.OutputVariableType.Position
-        sensors = self.sensors(position, exudyn.OutputVariableType.RotationMatrix)
+        sensors = self.add_sensors(position, exudyn.OutputVariableType.RotationMatrix)
         centres = [
             self.mbs.AddSensor(
                 SensorBody(
                     bodyNumber=body,
-                    localPosition=place,
+                    localPosition=centre,
                     outputVariableType=position,
                     storeInternal=True,
                 )
             )
-            for body, _, place in self.masses
+            for body, _, centre in self.masses
         ]
         self.integrate(end_s, step_s, every_s)
-        places, rotations = (
+        positions, rotations = (
             [self.mbs.GetSensorStoredData(sensor) for sensor in row] for row in sensors
         )
-        times = places[0][:, 0]
+        times = positions[0][:, 0]
         assert np.allclose(times, every_s * np.arange(len(times)))
         q = np.array(
             [
-                coordinates(
-                    [place[k, 1:] for place in places], [rotation[k, 1:] for rotation in rotations]
+                compute_coordinates(
+                    [position[k, 1:] for position in positions],
+                    [rotation[k, 1:] for rotation in rotations],
                 )
                 for k in range(len(times))
             ]
         )
         masses = [mass for _, mass, _ in self.masses]
-        weighed = zip(masses, centres)
-        total = sum(mass * self.mbs.GetSensorStoredData(centre)[:, 1:] for mass, centre in weighed)
+        total = sum(
+            mass * self.mbs.GetSensorStoredData(centre)[:, 1:]
+            for mass, centre in zip(masses, centres)
+        )
         return q, total / sum(masses)
 
-    def parting(self):
-        """Accelerations at the start of shaft against tub (two of translation, two of turning) and
-        of drum against shaft."""
-        kinds = (
+    def relative_accelerations(self):
+        """Returns the initial accelerations of the shaft relative to the tub (two of translation,
+        two of rotation) and of the drum relative to the shaft."""
+        variables = (
             exudyn.OutputVariableType.Acceleration,
             exudyn.OutputVariableType.AngularAcceleration,
         )
-        sensors = self.sensors(*kinds)
+        sensors = self.add_sensors(*variables)
         self.integrate(1e-4, 1e-4, 1e-4)
-        (tub, shaft, _), (tub_turn, shaft_turn, drum_turn) = (
+        (tub, shaft, _), (tub_angular, shaft_angular, drum_angular) = (
             [self.mbs.GetSensorStoredData(sensor)[0, 2:] for sensor in row] for row in sensors
         )
-        return np.concatenate([shaft - tub, shaft_turn - tub_turn, drum_turn - shaft_turn])
+        return np.concatenate(
+            [shaft - tub, shaft_angular - tub_angular, drum_angular - shaft_angular]
+        )
 
 
 def cycloidal(peak_rpm, ramp_s):
-    """The angle over time of Eq. 42: a cycloidal ramp from rest, then constant speed."""
-    peak = peak_rpm * RPM
+    """Returns the angle over time of Eq. 42: a cycloidal ramp from rest, then constant speed."""
+    peak = peak_rpm * RAD_PER_S_PER_RPM
 
     def theta(t):
         if t < ramp_s:
@@ -391,27 +409,28 @@ def cycloidal(peak_rpm, ramp_s):
     return theta
 
 
-# Coordinates of shaft and drum: held to the tub by bearings and flexure.
-HELD = [2, 3, 6, 7, 8, 9]
+# The coordinates of shaft and drum, which bearings and flexure couple to the tub.
+COUPLED_COORDINATES = [2, 3, 6, 7, 8, 9]
 
 
-def riding_along(machine, q, speed):
-    """The pose q and its speeds with shaft and drum displaced as the tub carries them, so that
-    bearings and flexure do not ring."""
-    still = np.zeros(10)
+def carried_pose(machine, q, speed):
+    """Returns the pose `q`, and its speeds, with shaft and drum at the positions in which they
+    accelerate as the tub does, so that bearings and flexure do not ring."""
+    zero_speeds = np.zeros(10)
 
-    def settled(start_s):
-        def parting(pose):
-            return Washer(machine, pose, still, lambda t: speed * (start_s + t), speed).parting()
+    def pose_at(start_s):
+        def relative_accelerations(pose):
+            washer = Washer(machine, pose, zero_speeds, lambda t: speed * (start_s + t), speed)
+            return washer.relative_accelerations()
 
         pose = q.copy()
         for _ in range(2):
-            here, moved = parting(pose), []
-            for index in HELD:
-                beside = pose.copy()
-                beside[index] += 1e-7
-                moved.append((parting(beside) - here) / 1e-7)
-            pose[HELD] -= np.linalg.solve(np.array(moved).T, here)
+            residual, columns = relative_accelerations(pose), []
+            for index in COUPLED_COORDINATES:
+                shifted_pose = pose.copy()
+                shifted_pose[index] += 1e-7
+                columns.append((relative_accelerations(shifted_pose) - residual) / 1e-7)
+            pose[COUPLED_COORDINATES] -= np.linalg.solve(np.array(columns).T, residual)
         return pose
 
-    return settled(0.0), (settled(1e-3) - settled(-1e-3)) / 2e-3
+    return pose_at(0.0), (pose_at(1e-3) - pose_at(-1e-3)) / 2e-3

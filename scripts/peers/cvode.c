@@ -1,4 +1,5 @@
-/* SUNDIALS CVODE: cvode bdf|adams MAX_ORDER RTOL ATOL */
+/* Integrates the trajectories of trajectory.h by SUNDIALS CVODE:
+ * cvode bdf|adams MAX_ORDER RTOL ATOL */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,8 +29,8 @@ static int jacobian(realtype t, N_Vector x, N_Vector fx, SUNMatrix j, void *mach
     return 0;
 }
 
-/* Any call that fails ends the run: a comparison with half a trajectory is none. */
-static void check(int status, const char *call) {
+/* Ends the program if a call has failed, because a part of a trajectory cannot be compared. */
+static void check_status(int status, const char *call) {
     if (status < 0) {
         fprintf(stderr, "%s: %d\n", call, status);
         exit(1);
@@ -49,22 +50,22 @@ int main(int argc, char **argv) {
     snprintf(method, sizeof method, "%s, order to %d", lmm == CV_BDF ? "BDF" : "Adams", order);
 
     SUNContext context;
-    check(SUNContext_Create(NULL, &context), "SUNContext_Create");
+    check_status(SUNContext_Create(NULL, &context), "SUNContext_Create");
     N_Vector x = N_VNew_Serial(DIMENSION, context);
     SUNMatrix matrix = SUNDenseMatrix(DIMENSION, DIMENSION, context);
     SUNLinearSolver solver = SUNLinSol_Dense(x, matrix, context);
     for (washer *machine; (machine = next_machine(N_VGetArrayPointer(x)));) {
         void *cvode = CVodeCreate(lmm, context);
-        check(CVodeInit(cvode, right_hand_side, 0.0, x), "CVodeInit");
-        check(CVodeSStolerances(cvode, rtol, atol), "CVodeSStolerances");
-        check(CVodeSetUserData(cvode, machine), "CVodeSetUserData");
-        check(CVodeSetMaxOrd(cvode, order), "CVodeSetMaxOrd");
-        check(CVodeSetMaxNumSteps(cvode, 1000000000L), "CVodeSetMaxNumSteps");
-        check(CVodeSetLinearSolver(cvode, solver, matrix), "CVodeSetLinearSolver");
-        check(CVodeSetJacFn(cvode, jacobian), "CVodeSetJacFn");
+        check_status(CVodeInit(cvode, right_hand_side, 0.0, x), "CVodeInit");
+        check_status(CVodeSStolerances(cvode, rtol, atol), "CVodeSStolerances");
+        check_status(CVodeSetUserData(cvode, machine), "CVodeSetUserData");
+        check_status(CVodeSetMaxOrd(cvode, order), "CVodeSetMaxOrd");
+        check_status(CVodeSetMaxNumSteps(cvode, 1000000000L), "CVodeSetMaxNumSteps");
+        check_status(CVodeSetLinearSolver(cvode, solver, matrix), "CVodeSetLinearSolver");
+        check_status(CVodeSetJacFn(cvode, jacobian), "CVodeSetJacFn");
         for (int i = 0; isfinite(sample_time(i)); ++i) {
-            realtype reached;
-            check(CVode(cvode, sample_time(i), x, &reached, CV_NORMAL), "CVode");
+            realtype reached_s;
+            check_status(CVode(cvode, sample_time(i), x, &reached_s, CV_NORMAL), "CVode");
             sample(i, N_VGetArrayPointer(x));
         }
         report(machine, program, method, rtol, atol);

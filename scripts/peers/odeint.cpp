@@ -1,4 +1,5 @@
-// Boost odeint's Dormand-Prince 5(4): odeint RTOL ATOL
+// Integrates the trajectories of trajectory.h by Boost odeint's Dormand-Prince 5(4):
+// odeint RTOL ATOL
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""scipy and numbalsoda on the trajectories of trajectory.h:
+"""Integrates the trajectories of trajectory.h by scipy or numbalsoda:
 python_peers.py radau|lsoda|numbalsoda RTOL ATOL"""
 
 import ctypes
@@ -15,8 +15,8 @@ import washer
 FIRST_STEP_S = 1e-5
 
 
-def load():
-    """The functions of trajectory.h."""
+def load_library():
+    """Loads the functions of trajectory.h."""
     library = ctypes.CDLL(str(washer.ROOT / "target/peers/libtrajectory.so"))
     pointer, text, number = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_double
     library.next_machine.argtypes, library.next_machine.restype = [pointer], pointer
@@ -26,8 +26,8 @@ def load():
     return library
 
 
-def compiled(library):
-    """Right-hand side and Jacobian without Python in between, as far as a solver allows."""
+def compile_equations(library):
+    """Compiles right-hand side and Jacobian for calls without Python, if the solver allows it."""
     rhs, jacobian = library.washer_rhs, library.washer_jacobian
 
     @numba.njit
@@ -45,28 +45,29 @@ def compiled(library):
     return right_hand_side, matrix
 
 
-def by_scipy(solver_class, functions, machine, x, times, rtol, atol):
-    """States at `times`, some at a time."""
+def solve_by_scipy(solver_class, functions, machine, x, times, rtol, atol):
+    """Yields the states at `times`."""
     right_hand_side, matrix = functions
     solver = solver_class(
         lambda t, x: right_hand_side(t, x, machine), 0.0, x, times[-1],
         jac=lambda t, x: matrix(t, x, machine), first_step=FIRST_STEP_S, rtol=rtol, atol=atol,
     )
-    done = 0
+    yielded_count = 0
     while solver.status == "running":
         message = solver.step()
         if solver.status == "failed":
             raise RuntimeError(message)
-        until = np.searchsorted(times, solver.t, side="right")
-        if until > done:
-            yield from solver.dense_output()(times[done:until]).T
-            done = until
+        reached_count = np.searchsorted(times, solver.t, side="right")
+        if reached_count > yielded_count:
+            yield from solver.dense_output()(times[yielded_count:reached_count]).T
+            yielded_count = reached_count
 
 
-def by_numbalsoda(function, machine, x, times, rtol, atol):
+def solve_by_numbalsoda(function, machine, x, times, rtol, atol):
+    """Returns the states at `times`."""
     from numbalsoda import lsoda
 
-    # The last argument of the right-hand side is the user's data: here the machine itself.
+    # The machine is passed as the user data of the right-hand side.
     data = np.ctypeslib.as_array((ctypes.c_double * 1).from_address(machine))
     times = np.concatenate([[0.0], times])
     states, success = lsoda(
@@ -79,28 +80,29 @@ def by_numbalsoda(function, machine, x, times, rtol, atol):
 
 def main():
     method, rtol, atol = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
-    equations, library = washer.load(), load()
-    every = map(library.sample_time, itertools.count())
-    times = np.array(list(itertools.takewhile(math.isfinite, every)))
+    equations, library = washer.load_library(), load_library()
+    sample_times = map(library.sample_time, itertools.count())
+    times = np.array(list(itertools.takewhile(math.isfinite, sample_times)))
     if method == "numbalsoda":
         program, name = "numbalsoda", "LSODA"
         function = ctypes.cast(equations.washer_rhs, ctypes.c_void_p).value
 
         def solve(machine, x, times):
-            return by_numbalsoda(function, machine, x, times, rtol, atol)
+            return solve_by_numbalsoda(function, machine, x, times, rtol, atol)
     else:
         from scipy.integrate import LSODA, Radau
 
         program, name = "scipy", {"radau": "Radau", "lsoda": "LSODA"}[method]
-        functions = compiled(equations)
+        functions = compile_equations(equations)
 
         def solve(machine, x, times):
             solver = {"radau": Radau, "lsoda": LSODA}[method]
-            return by_scipy(solver, functions, machine, x, times, rtol, atol)
+            return solve_by_scipy(solver, functions, machine, x, times, rtol, atol)
 
-    # The first call compiles.
-    other = washer.Washer(equations, {})
-    list(solve(other.handle.value, np.array(other.initial_state()), np.array([1e-4])))
+    # The first call compiles the functions.
+    default_washer = washer.Washer(equations, {})
+    initial_state = np.array(default_washer.initial_state())
+    list(solve(default_washer.handle.value, initial_state, np.array([1e-4])))
     program = f"{program} {importlib.metadata.version(program)}"
     x = np.empty(20)
     while machine := library.next_machine(x.ctypes.data):

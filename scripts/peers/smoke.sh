@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# The C ABI builds, its header is C and C++, and it gives the reference right-hand sides.
+# Builds the C ABI, compiles its header as C and as C++, and compares right-hand sides with those of
+# the reference.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-# With all crates: alone it would get other features, and its kernels be compiled once more.
+# All crates are built, because a single crate would have other features, with which its
+# dependencies would be compiled again.
 cargo build --release --locked --workspace
 for language in c c++; do
   cc -x "$language" -Wall -Wextra -Werror -fsyntax-only crates/washer-capi/include/washer.h

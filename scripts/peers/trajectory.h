@@ -1,5 +1,6 @@
-/* The work of the comparison and how its result is taken, the same for every program: a trajectory
- * per line of standard input, `MODEL UNBALANCE_MASS DAMPING`, and a line of JSON for it. */
+/* The trajectories of the comparison and the measurement of their results, the same for all
+ * programs. Each line of standard input, `MODEL UNBALANCE_MASS DAMPING`, gives a trajectory and a
+ * line of JSON. */
 #ifndef TRAJECTORY_H
 #define TRAJECTORY_H
 
@@ -11,14 +12,15 @@ extern "C" {
 
 #define DIMENSION 20
 
-/* The next line's machine, at rest at 0 s in `x`, or NULL. The clock runs from here. */
+/* Reads a line, writes the state at 0 s to `x` and starts the clock. Returns the machine, or NULL
+ * without a line. */
 washer *next_machine(double *x);
-/* When its state is wanted, by the program's own dense output: the i-th time; INFINITY after the
- * last. */
+/* Returns the i-th time of a sample, or INFINITY after the last one. Programs compute samples by
+ * their own dense output. */
 double sample_time(int i);
-/* The state then. */
+/* Records the state at the i-th time. */
 void sample(int i, const double *x);
-/* Stops the clock, prints what came of it and frees the machine. */
+/* Stops the clock, prints the result and frees the machine. */
 void report(washer *machine, const char *program, const char *method, double rtol, double atol);
 
 #ifdef __cplusplus

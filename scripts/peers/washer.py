@@ -1,4 +1,4 @@
-"""The washing machine's equations by way of their C ABI (crates/washer-capi/include/washer.h)."""
+"""Calls the machine's equations by their C ABI (crates/washer-capi/include/washer.h)."""
 
 import ctypes
 import pathlib
@@ -10,6 +10,8 @@ DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
 class Setup(ctypes.Structure):
+    """The structure `washer_setup` of the header."""
+
     _fields_ = [
         ("model", ctypes.c_char_p), ("profile", ctypes.c_char_p),
         ("peak_rpm", ctypes.c_double), ("ramp_s", ctypes.c_double),
@@ -19,7 +21,8 @@ class Setup(ctypes.Structure):
     ]
 
 
-def load(path=LIBRARY):
+def load_library(path=LIBRARY):
+    """Loads the library and declares its functions."""
     library = ctypes.CDLL(str(path))
     machine = ctypes.c_void_p
     library.washer_new.argtypes = [ctypes.POINTER(Setup), ctypes.POINTER(machine)]
@@ -35,12 +38,13 @@ def load(path=LIBRARY):
     return library
 
 
-def doubles(values):
+def to_doubles(values):
+    """Returns an array of C doubles."""
     return (ctypes.c_double * len(values))(*values)
 
 
 class Washer:
-    """One machine and its spin; `constants` are named as in `sweep parameters`."""
+    """A machine and its spin. The names of `constants` are those of `sweep parameters`."""
 
     def __init__(self, library, constants, model="nonlinear", profile="triangular",
                  peak_rpm=350.0, ramp_s=50.0, table=None):
@@ -49,8 +53,8 @@ class Washer:
         names = (ctypes.c_char_p * len(constants))(*[name.encode() for name in constants])
         setup = Setup(
             model.encode(), ("table" if table else profile).encode(), peak_rpm, ramp_s,
-            doubles(time_s), doubles(speed_rpm), len(time_s),
-            names, doubles(list(constants.values())), len(constants),
+            to_doubles(time_s), to_doubles(speed_rpm), len(time_s),
+            names, to_doubles(list(constants.values())), len(constants),
         )
         self.handle = ctypes.c_void_p()
         status = library.washer_new(ctypes.byref(setup), ctypes.byref(self.handle))
@@ -63,11 +67,13 @@ class Washer:
             self.library.washer_free(self.handle)
 
     def initial_state(self):
+        """Returns the state at the start, at equilibrium."""
         x = (ctypes.c_double * self.dimension)()
         self.library.washer_initial_state(self.handle, x)
         return list(x)
 
     def rhs(self, t_s, x):
+        """Returns the time derivative of a state."""
         dx = (ctypes.c_double * self.dimension)()
-        self.library.washer_rhs(t_s, doubles(x), dx, self.handle)
+        self.library.washer_rhs(t_s, to_doubles(x), dx, self.handle)
         return list(dx)

@@ -1,11 +1,11 @@
 #!/bin/sh
-# The WebAssembly module that live pages carry, from crates/washer-live:
+# Builds the WebAssembly module of live pages from crates/washer-live:
 # scripts/release/build_live.sh [OUTPUT]
 #
-# OUTPUT is crates/washer-plot/assets/live.wasm.gz, which is committed, so that nobody needs the
-# target to build the program. It is packed, because pages carry it as text. CI builds it once more
-# and compares what both compute (tests/browser/check_module.py): the same bits, whatever the
-# toolchain.
+# The default of OUTPUT is crates/washer-plot/assets/live.wasm.gz, which is committed, so that the
+# program can be built without the WebAssembly target. The module is compressed, because pages
+# contain it as text. CI builds the module again and checks that both modules compute the same bits
+# (tests/browser/check_module.py).
 set -eu
 cd "$(dirname "$0")/../.."
 output=${1:-crates/washer-plot/assets/live.wasm.gz}
@@ -15,6 +15,6 @@ target=wasm32-unknown-unknown
 
 cargo rustc --locked --package washer-live --profile live --target $target --crate-type cdylib
 module=${CARGO_TARGET_DIR:-target}/$target/live/washer_live.wasm
-# Without a name and a time: the same module gives the same bytes.
+# Without name and time in its header, equal modules give equal bytes.
 gzip -9 -n -c "$module" > "$output"
 echo "wrote $output: $(wc -c < "$output") bytes, unpacked $(wc -c < "$module"), $(rustc --version)"

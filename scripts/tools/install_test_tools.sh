@@ -1,8 +1,8 @@
 #!/bin/sh
-# Installs all that .ci/run needs besides a Rust toolchain, in one go; what is there already stays.
-# Each script that needs a tool also installs it for itself.
+# Installs the missing tools of .ci/run, except for the Rust toolchain. Each script that needs a
+# tool also installs it.
 #
-# Needs root or sudo where something is missing; packages are Debian's.
+# Requires root or sudo if a tool is missing. The names of packages are those of Debian.
 set -eu
 packages=
 needs() { # PROGRAM PACKAGE ...
@@ -14,7 +14,7 @@ PATH=$PATH:/usr/sbin:/sbin
 needs git git
 needs c++ g++ libc6-dev
 needs nm binutils
-# The ignored tests of `cargo test`: faults injected into system calls, disks that fill up.
+# Ignored tests of `cargo test`, which inject faults into system calls or fill a disk.
 needs strace strace
 needs unshare util-linux
 needs mount mount
@@ -31,7 +31,7 @@ needs valgrind valgrind
 # scripts/checks/check_arm.sh
 needs aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 needs qemu-aarch64 qemu-user
-# scripts/peers/run.sh; libraries, of which no program tells.
+# scripts/peers/run.sh: libraries without a program by which they could be found.
 packages="$packages libsundials-dev libboost-dev"
 # shellcheck disable=SC2086 # A list of words.
 "$(dirname "$0")/packages.sh" $packages

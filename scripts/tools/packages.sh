@@ -1,7 +1,8 @@
 #!/bin/sh
-# Installs system packages that are missing: scripts/tools/packages.sh PACKAGE ...
+# Installs missing system packages: scripts/tools/packages.sh PACKAGE ...
 #
-# Names are Debian's. Needs root or sudo; elsewhere it says what to install by other means.
+# The names of packages are those of Debian. Requires root or sudo. On other systems the script
+# prints the names of the missing packages.
 set -eu
 missing=
 for package in "$@"; do
@@ -15,7 +16,7 @@ if ! command -v apt-get > /dev/null; then
 fi
 as_root=
 [ "$(id -u)" = 0 ] || as_root=sudo
-# Another installation may be at work.
+# Waits for another installation to end.
 apt="$as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=600"
 $apt update
 # shellcheck disable=SC2086 # A list of words.

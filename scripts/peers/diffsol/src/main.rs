@@ -1,4 +1,5 @@
-//! diffsol on the trajectories of `trajectory.h`: `diffsol-peer bdf|tr_bdf2|esdirk34 RTOL ATOL`
+//! Integrates the trajectories of `trajectory.h` by diffsol:
+//! `diffsol-peer bdf|tr_bdf2|esdirk34 RTOL ATOL`
 use std::cell::RefCell;
 use std::env;
 use std::error::Error;
@@ -6,7 +7,7 @@ use std::ffi::{CString, c_char, c_int};
 
 use diffsol::{NalgebraLU, NalgebraMat, NalgebraVec, OdeBuilder, OdeEquations, OdeSolverMethod};
 
-/// Length of a state.
+/// The length of a state.
 const DIMENSION: usize = 20;
 type LuSolver = NalgebraLU<f64>;
 
@@ -33,8 +34,8 @@ unsafe extern "C" {
     );
 }
 
-/// Steps over all sampled times.
-fn run<'a, Eqn>(mut solver: impl OdeSolverMethod<'a, Eqn>) -> Result<(), Box<dyn Error>>
+/// Integrates a trajectory and records its samples.
+fn integrate<'a, Eqn>(mut solver: impl OdeSolverMethod<'a, Eqn>) -> Result<(), Box<dyn Error>>
 where
     Eqn: OdeEquations<T = f64, V = NalgebraVec<f64>> + 'a,
 {
@@ -44,7 +45,7 @@ where
         solver.step()?;
         while sample_time(next) <= solver.state().t {
             solver.interpolate_inplace(sample_time(next), &mut x)?;
-            // SAFETY: a state.
+            // SAFETY: the pointer is that of a state.
             unsafe { sample(next, x.batch_as_slice(0).as_ptr()) };
             next += 1;
         }
@@ -61,28 +62,32 @@ fn main() -> Result<(), Box<dyn Error>> {
     let atol = atol.parse::<f64>()?;
     // The manifest has a single `version = "=..."`.
     let version = include_str!("../Cargo.toml").split("\"=").nth(1).expect("a version");
-    let version = version.split('"').next().expect("its end");
-    let mut rest = [0.0; DIMENSION];
+    let version = version.split('"').next().expect("the end of the version");
+    let mut initial_state = [0.0; DIMENSION];
     loop {
-        // SAFETY: there is room for a state.
-        let machine = unsafe { next_machine(rest.as_mut_ptr()) };
+        // SAFETY: the pointer is that of an array for a state.
+        let machine = unsafe { next_machine(initial_state.as_mut_ptr()) };
         if machine.is_null() {
             return Ok(());
         }
-        // It asks for the Jacobian column by column, of one state after the other.
-        let last = RefCell::new((f64::NAN, [0.0; DIMENSION], [[0.0; DIMENSION]; DIMENSION]));
+        // diffsol requests products of the Jacobian with vectors, of one state after the other, so
+        // that the last Jacobian is kept.
+        let last_jacobian =
+            RefCell::new((f64::NAN, [0.0; DIMENSION], [[0.0; DIMENSION]; DIMENSION]));
         let mut problem = OdeBuilder::<NalgebraMat<f64>>::new()
             .rhs_implicit(
-                // SAFETY (of both): states, and room for what is asked.
+                // SAFETY: in both calls the pointers are those of a state and of an array for the
+                // result.
                 |x: &[f64], _: &[f64], t, dx: &mut [f64]| unsafe {
                     washer_rhs(t, x.as_ptr(), dx.as_mut_ptr(), machine);
                 },
                 |x: &[f64], _: &[f64], t, v: &[f64], y: &mut [f64]| {
-                    let (at, of, rows) = &mut *last.borrow_mut();
-                    if *at != t || of != x {
-                        (*at, *of) = (t, x.try_into().expect("a state"));
+                    let (last_t, last_x, rows) = &mut *last_jacobian.borrow_mut();
+                    if *last_t != t || last_x != x {
+                        *last_t = t;
+                        *last_x = x.try_into().expect("a state");
                         unsafe {
-                            washer_jacobian(t, of.as_ptr(), rows.as_mut_ptr().cast(), machine)
+                            washer_jacobian(t, last_x.as_ptr(), rows.as_mut_ptr().cast(), machine)
                         };
                     }
                     for (y, row) in y.iter_mut().zip(rows) {
@@ -90,21 +95,21 @@ fn main() -> Result<(), Box<dyn Error>> {
                     }
                 },
             )
-            .init(|_: &[f64], _, x: &mut [f64]| x.copy_from_slice(&rest), DIMENSION)
+            .init(|_: &[f64], _, x: &mut [f64]| x.copy_from_slice(&initial_state), DIMENSION)
             .rtol(rtol)
             .atol([atol])
             .h0(1e-5)
             .build()?;
-        // The limit is on a whole trajectory, not on a step.
+        // This limit counts the failures of a whole trajectory.
         problem.ode_options.max_nonlinear_solver_failures = usize::MAX;
         let name = match method.as_str() {
-            "bdf" => run(problem.bdf::<LuSolver>()?).map(|()| "BDF, order to 5")?,
-            "tr_bdf2" => run(problem.tr_bdf2::<LuSolver>()?).map(|()| "TR-BDF2")?,
-            "esdirk34" => run(problem.esdirk34::<LuSolver>()?).map(|()| "ESDIRK34")?,
+            "bdf" => integrate(problem.bdf::<LuSolver>()?).map(|()| "BDF, order to 5")?,
+            "tr_bdf2" => integrate(problem.tr_bdf2::<LuSolver>()?).map(|()| "TR-BDF2")?,
+            "esdirk34" => integrate(problem.esdirk34::<LuSolver>()?).map(|()| "ESDIRK34")?,
             _ => return Err(format!("no method {method}").into()),
         };
         let program = CString::new(format!("diffsol {version}"))?;
-        // SAFETY: texts, and the machine is not used again.
+        // SAFETY: the pointers are those of C strings, and the machine is not used again.
         unsafe { report(machine, program.as_ptr(), CString::new(name)?.as_ptr(), rtol, atol) };
     }
 }
