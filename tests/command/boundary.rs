@@ -1,4 +1,4 @@
-//! Tests of `sweep boundary`: its files, errors and interruptions.
+//! Tests of `run_sweep boundary_command`: its files, errors and interruptions.
 
 #![cfg(unix)]
 
@@ -38,7 +38,7 @@ fn folder_with(end_s: &str) -> tempfile::TempDir {
     folder
 }
 
-fn boundary(folder: &tempfile::TempDir, arguments: &[&str]) -> Command {
+fn boundary_command(folder: &tempfile::TempDir, arguments: &[&str]) -> Command {
     let mut command = Command::new(sweep_binary());
     command.current_dir(folder.path()).args(["boundary", "grid.toml"]).args(arguments);
     command
@@ -47,10 +47,11 @@ fn boundary(folder: &tempfile::TempDir, arguments: &[&str]) -> Command {
 #[test]
 fn every_combination_of_further_axes_has_a_curve() {
     let folder = folder_with("0.1");
-    let done =
-        boundary(&folder, &["--quantity", "min_gap_nonlinear_m"]).output().expect("it starts");
-    let messages = all_output(&done);
-    assert_eq!(done.status.code(), Some(0), "{messages}");
+    let completed = boundary_command(&folder, &["--quantity", "min_gap_nonlinear_m"])
+        .output()
+        .expect("it starts");
+    let messages = all_output(&completed);
+    assert_eq!(completed.status.code(), Some(0), "{messages}");
     // No gap closes in a tenth of a second, as six rows say.
     assert!(
         messages.contains("6 lines within the limit throughout") && !messages.contains("brackets"),
@@ -58,25 +59,32 @@ fn every_combination_of_further_axes_has_a_curve() {
     );
     let file = "results/grid-boundary.parquet";
     assert!(folder.path().join(file).is_file());
-    let drawn = Command::new(sweep_binary())
+    let plot_output = Command::new(sweep_binary())
         .current_dir(folder.path())
         .args(["plot", file, "-o", "curve.svg"])
         .output()
         .expect("it starts");
-    assert_eq!(drawn.status.code(), Some(0), "{}", String::from_utf8_lossy(&drawn.stderr));
-    let sweep = |arguments: &[&str]| {
-        let done = Command::new(sweep_binary()).current_dir(folder.path()).args(arguments).output();
-        let done = done.expect("it starts");
+    assert_eq!(
+        plot_output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&plot_output.stderr)
+    );
+    let run_sweep = |arguments: &[&str]| {
+        let completed =
+            Command::new(sweep_binary()).current_dir(folder.path()).args(arguments).output();
+        let completed = completed.expect("it starts");
         (
-            done.status.code(),
-            [done.stdout, done.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()),
+            completed.status.code(),
+            [completed.stdout, completed.stderr]
+                .map(|text| String::from_utf8_lossy(&text).into_owned()),
         )
     };
-    let (code, [shown, messages]) = sweep(&["show", file]);
+    let (code, [shown, messages]) = run_sweep(&["show", file]);
     assert_eq!(code, Some(0), "{messages}");
     assert!(shown.contains("6 none_in_range_reliable"), "{shown}");
     // The file has the grid's plan, but is not that grid's map.
-    let (code, [_, messages]) = sweep(&["run", "grid.toml", "--out", file]);
+    let (code, [_, messages]) = run_sweep(&["run", "grid.toml", "--out", file]);
     assert_eq!(code, Some(2), "{messages}");
     assert!(messages.contains("is no result of `sweep run`"), "{messages}");
 }
@@ -91,12 +99,13 @@ fn brackets_of_a_logarithmic_axis_are_relative() {
     let text = format!("metrics = [\"static_sag\"]\n{grid}{axes}");
     fs::write(folder.path().join("grid.toml"), text).expect("the grid is written");
     let arguments = ["--quantity", "static_sag_m", "--limit", "0.01", "--tolerance", "0.01"];
-    let done = boundary(&folder, &arguments).output().expect("it starts");
-    let messages = String::from_utf8_lossy(&done.stderr);
-    let widest = messages.split("brackets  at most ").nth(1).expect("brackets").split(' ').next();
-    let widest: f64 = widest.expect("a number").parse().expect("a number");
+    let completed = boundary_command(&folder, &arguments).output().expect("it starts");
+    let messages = String::from_utf8_lossy(&completed.stderr);
+    let widest_bracket =
+        messages.split("brackets  at most ").nth(1).expect("brackets").split(' ').next();
+    let widest_bracket: f64 = widest_bracket.expect("a number").parse().expect("a number");
     assert!(
-        widest <= 0.01 && messages.contains("of its value wide (tolerance: 0.01)"),
+        widest_bracket <= 0.01 && messages.contains("of its value wide (tolerance: 0.01)"),
         "{messages}"
     );
 }
@@ -113,9 +122,9 @@ fn quantities_without_a_boundary_are_errors_before_the_search() {
         (["--lattice", "0"], "--lattice"),
         (["--out", "notes.parquet"], "is no result of `sweep boundary`"),
     ] {
-        let refused = boundary(&folder, &arguments).output().expect("it starts");
-        let messages = String::from_utf8_lossy(&refused.stderr).into_owned();
-        assert_eq!(refused.status.code(), Some(2), "{messages}");
+        let refused_output = boundary_command(&folder, &arguments).output().expect("it starts");
+        let messages = String::from_utf8_lossy(&refused_output.stderr).into_owned();
+        assert_eq!(refused_output.status.code(), Some(2), "{messages}");
         assert!(messages.contains(expected), "{messages}");
     }
     assert_eq!(fs::read(folder.path().join("notes.parquet")).expect("still there"), b"mine");
@@ -123,7 +132,7 @@ fn quantities_without_a_boundary_are_errors_before_the_search() {
 }
 
 /// Returns the number of bytes that a search for `x.parquet` has stored.
-fn kept(folder: &tempfile::TempDir) -> u64 {
+fn stored_bytes(folder: &tempfile::TempDir) -> u64 {
     let Ok(entries) = fs::read_dir(folder.path().join("x.parquet.partial")) else { return 0 };
     let parts = entries
         .flatten()
@@ -133,18 +142,18 @@ fn kept(folder: &tempfile::TempDir) -> u64 {
 }
 
 /// Starts a search and waits until it has stored further points.
-fn at_work(folder: &tempfile::TempDir, search: &mut Command) -> Child {
-    let there = kept(folder);
-    let began = Instant::now();
+fn start_search(folder: &tempfile::TempDir, search: &mut Command) -> Child {
+    let bytes_before = stored_bytes(folder);
+    let start_instant = Instant::now();
     let child = search.stderr(Stdio::piped()).spawn().expect("it starts");
-    while kept(folder) <= there {
-        assert!(began.elapsed() < Duration::from_secs(60), "no points are kept");
+    while stored_bytes(folder) <= bytes_before {
+        assert!(start_instant.elapsed() < Duration::from_secs(60), "no points are kept");
         std::thread::sleep(Duration::from_millis(5));
     }
     child
 }
 
-fn names(folder: &tempfile::TempDir) -> Vec<String> {
+fn file_names(folder: &tempfile::TempDir) -> Vec<String> {
     let names = fs::read_dir(folder.path()).expect("the folder is there");
     let mut names: Vec<_> =
         names.map(|name| name.expect("a name").file_name().into_string().expect("UTF-8")).collect();
@@ -158,68 +167,69 @@ fn an_interrupted_search_continues_to_the_same_bytes() {
     // once a second.
     let folder = folder_with("100");
     let arguments = ["--threads", "1", "--lattice", "11", "--progress", "none", "--out"];
-    let search = |out: &str| boundary(&folder, &[&arguments, &[out][..]].concat());
-    let undisturbed = search("whole.parquet").output().expect("it starts");
-    assert_eq!(undisturbed.status.code(), Some(0), "{}", all_output(&undisturbed));
+    let search = |out: &str| boundary_command(&folder, &[&arguments, &[out][..]].concat());
+    let undisturbed_output = search("whole.parquet").output().expect("it starts");
+    assert_eq!(undisturbed_output.status.code(), Some(0), "{}", all_output(&undisturbed_output));
     for (name, code) in [("INT", 130), ("TERM", 143)] {
-        let child = at_work(&folder, &mut search("x.parquet"));
+        let child = start_search(&folder, &mut search("x.parquet"));
         signal(name, child.id());
-        let done = child.wait_with_output().expect("it ends");
-        assert_eq!(done.status.code(), Some(code), "{}", all_output(&done));
-        assert!(all_output(&done).contains("points kept"), "{}", all_output(&done));
-        let again =
+        let completed = child.wait_with_output().expect("it ends");
+        assert_eq!(completed.status.code(), Some(code), "{}", all_output(&completed));
+        assert!(all_output(&completed).contains("points kept"), "{}", all_output(&completed));
+        let repeated_output =
             "go on  sweep boundary grid.toml --threads 1 --lattice 11 --progress none --out";
-        assert!(all_output(&done).contains(again), "{}", all_output(&done));
-        assert_eq!(names(&folder), ["grid.toml", "whole.parquet", "x.parquet.partial"]);
+        assert!(all_output(&completed).contains(repeated_output), "{}", all_output(&completed));
+        assert_eq!(file_names(&folder), ["grid.toml", "whole.parquet", "x.parquet.partial"]);
     }
     // SIGKILL leaves the search no time for a message.
-    let mut child = at_work(&folder, &mut search("x.parquet"));
+    let mut child = start_search(&folder, &mut search("x.parquet"));
     child.kill().expect("it is killed");
     child.wait().expect("it ends");
-    let other =
-        boundary(&folder, &["--lattice", "2", "--out", "x.parquet"]).output().expect("it starts");
-    assert_eq!(other.status.code(), Some(2), "{}", all_output(&other));
+    let other_output = boundary_command(&folder, &["--lattice", "2", "--out", "x.parquet"])
+        .output()
+        .expect("it starts");
+    assert_eq!(other_output.status.code(), Some(2), "{}", all_output(&other_output));
     assert!(
-        all_output(&other).contains("/boundary/lattice: was 11, is 2"),
+        all_output(&other_output).contains("/boundary/lattice: was 11, is 2"),
         "{}",
-        all_output(&other)
+        all_output(&other_output)
     );
-    let done = search("x.parquet").output().expect("it starts");
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-    assert!(all_output(&done).contains("going on: "), "{}", all_output(&done));
-    let bytes = |name: &str| fs::read(folder.path().join(name)).expect("there is a file");
-    assert!(bytes("x.parquet") == bytes("whole.parquet"), "other bytes");
-    assert_eq!(names(&folder), ["grid.toml", "whole.parquet", "x.parquet"]);
+    let completed = search("x.parquet").output().expect("it starts");
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    assert!(all_output(&completed).contains("going on: "), "{}", all_output(&completed));
+    let read_bytes = |name: &str| fs::read(folder.path().join(name)).expect("there is a file");
+    assert!(read_bytes("x.parquet") == read_bytes("whole.parquet"), "other bytes");
+    assert_eq!(file_names(&folder), ["grid.toml", "whole.parquet", "x.parquet"]);
 }
 
 #[test]
 fn a_boundary_of_another_plan_is_overwritten_only_on_request() {
     let folder = folder_with("0.1");
-    let trace = |more: &[&str]| {
-        let arguments = [&["--lattice", "1", "--out", "x.parquet"][..], more].concat();
-        let done = boundary(&folder, &arguments).output().expect("it starts");
-        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
+    let trace_boundary = |options: &[&str]| {
+        let arguments = [&["--lattice", "1", "--out", "x.parquet"][..], options].concat();
+        let completed = boundary_command(&folder, &arguments).output().expect("it starts");
+        (completed.status.code(), String::from_utf8_lossy(&completed.stderr).into_owned())
     };
-    let bytes = || fs::read(folder.path().join("x.parquet")).expect("there is a file");
-    let (code, messages) = trace(&[]);
+    let read_bytes = || fs::read(folder.path().join("x.parquet")).expect("there is a file");
+    let (code, messages) = trace_boundary(&[]);
     assert_eq!(code, Some(0), "{messages}");
-    let first = bytes();
-    let (code, messages) = trace(&[]);
+    let first_bytes = read_bytes();
+    let (code, messages) = trace_boundary(&[]);
     assert_eq!(code, Some(0), "{messages}");
     assert!(messages.contains("is there already"), "{messages}");
-    for (more, expected) in [
+    for (options, expected) in [
         (["--tolerance", "3"], "/boundary/tolerance: was 0.5, is 3"),
         (["--quantity", "min_gap_linear_m"], "/boundary/quantity: was"),
         (["--set", "tub_mass_kg=31"], "/machine/tub/mass_kg: was"),
     ] {
-        let (code, messages) = trace(&more);
+        let (code, messages) = trace_boundary(&options);
         assert_eq!(code, Some(2), "{messages}");
         assert!(messages.contains("already holds the result of another plan"), "{messages}");
         assert!(messages.contains(expected) && messages.contains("--fresh"), "{messages}");
-        assert!(bytes() == first, "{more:?}");
+        assert!(read_bytes() == first_bytes, "{options:?}");
     }
-    let (code, messages) = trace(&["--quantity", "min_gap_linear_m", "--fresh"]);
+    let (code, messages) = trace_boundary(&["--quantity", "min_gap_linear_m", "--fresh"]);
     assert_eq!(code, Some(0), "{messages}");
-    assert!(bytes() != first);
-    assert_eq!(names(&folder), ["grid.toml", "x.parquet"]);
+    assert!(read_bytes() != first_bytes);
+    assert_eq!(file_names(&folder), ["grid.toml", "x.parquet"]);
 }

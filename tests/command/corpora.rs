@@ -11,12 +11,12 @@ use crate::test_folder::{TestFolder, all_output};
 mod folder;
 
 /// The files whose footers the Parquet library cannot read safely, and the error of each.
-const HOSTILE: [(&str, &str); 2] = [
+const INVALID_FILES: [(&str, &str); 2] = [
     ("footer_booleans.parquet", "its footer makes no sense"),
     ("footer_deep.parquet", "its columns are nested more than 100 deep"),
 ];
 
-fn corpus(name: &str) -> Vec<PathBuf> {
+fn corpus_paths(name: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz").join(name);
     let entries = fs::read_dir(folder).expect("there is a corpus");
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
@@ -26,8 +26,8 @@ fn corpus(name: &str) -> Vec<PathBuf> {
 
 /// Returns the files of a corpus of Parquet files.
 fn parquet_corpus(name: &str) -> Vec<PathBuf> {
-    let paths = corpus(name);
-    for (file, _) in HOSTILE {
+    let paths = corpus_paths(name);
+    for (file, _) in INVALID_FILES {
         assert!(paths.iter().any(|path| path.ends_with(file)), "{name} has no {file}");
     }
     paths
@@ -37,10 +37,14 @@ fn parquet_corpus(name: &str) -> Vec<PathBuf> {
 fn assert_ends(test_folder: &TestFolder, words: &[&str], path: &Path) {
     let output = test_folder.sweep(words);
     let messages = all_output(&output);
-    let ended = output.status.code();
-    assert!(matches!(ended, Some(0..=2)), "{words:?} {}: {ended:?} {messages}", path.display());
+    let exit_code = output.status.code();
+    assert!(
+        matches!(exit_code, Some(0..=2)),
+        "{words:?} {}: {exit_code:?} {messages}",
+        path.display()
+    );
     assert!(!messages.contains("panicked"), "{words:?} {}: {messages}", path.display());
-    for (_, expected) in HOSTILE.iter().filter(|(file, _)| path.ends_with(file)) {
+    for (_, expected) in INVALID_FILES.iter().filter(|(file, _)| path.ends_with(file)) {
         assert!(messages.contains(expected), "{words:?} {}: {messages}", path.display());
     }
 }
@@ -70,7 +74,7 @@ fn lists_of_the_corpus_load_or_give_an_error() {
 
 #[test]
 fn run_folders_of_the_corpus_do_not_change_results() {
-    for path in corpus("corpus-folder") {
+    for path in corpus_paths("corpus-folder") {
         println!("{}", path.display());
         folder::run(&fs::read(&path).expect("the file is there"));
     }

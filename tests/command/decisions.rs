@@ -14,8 +14,8 @@ use crate::test_folder::{TestFolder, all_output, grid};
 /// Returns a folder with a finished map of six points, `results/short.parquet`.
 fn folder_with_map() -> TestFolder {
     let test_folder = TestFolder::new(&grid(3, 2));
-    let done = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+    let completed = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
     test_folder
 }
 
@@ -41,28 +41,33 @@ fn report_does_not_overwrite_a_page_of_plot_and_takes_an_option_for_each_express
     let page = "results/short.html";
     assert_eq!(exit_code(&test_folder.sweep(&["plot", MAP, "-o", page])), Some(0));
     let before = fs::read(test_folder.path(page)).unwrap();
-    let written = test_folder.sweep(&["report", MAP]);
-    assert_eq!(exit_code(&written), Some(0), "{}", all_output(&written));
+    let written_output = test_folder.sweep(&["report", MAP]);
+    assert_eq!(exit_code(&written_output), Some(0), "{}", all_output(&written_output));
     assert!(fs::read(test_folder.path(page)).unwrap() == before);
     assert!(test_folder.path("results/short.report.html").exists());
     let failed = test_folder.sweep(&["report", MAP, "--require", "count(point >= 0) < 0"]);
     assert_eq!(exit_code(&failed), Some(4), "{}", all_output(&failed));
     assert!(all_output(&failed).contains("FAILS  count(point >= 0) < 0: 6\n"));
-    let refused = test_folder.sweep(&["report", MAP, "--require", "point >= 0", "point < 9"]);
-    assert_eq!(exit_code(&refused), Some(2));
-    assert!(all_output(&refused).contains("a `--require` of its own"), "{}", all_output(&refused));
+    let refused_output =
+        test_folder.sweep(&["report", MAP, "--require", "point >= 0", "point < 9"]);
+    assert_eq!(exit_code(&refused_output), Some(2));
+    assert!(
+        all_output(&refused_output).contains("a `--require` of its own"),
+        "{}",
+        all_output(&refused_output)
+    );
 }
 
 #[test]
 fn require_names_the_failing_rows_and_exits_with_4() {
     let test_folder = folder_with_map();
-    let opened =
+    let passed_gate =
         test_folder.sweep(&["require", MAP, "ratio_max < 1e6", "count(status == 'ok') == 6"]);
-    assert_eq!(exit_code(&opened), Some(0), "{}", all_output(&opened));
+    assert_eq!(exit_code(&passed_gate), Some(0), "{}", all_output(&passed_gate));
     assert!(
-        all_output(&opened).contains("holds  ratio_max < 1e6: 6 rows"),
+        all_output(&passed_gate).contains("holds  ratio_max < 1e6: 6 rows"),
         "{}",
-        all_output(&opened)
+        all_output(&passed_gate)
     );
 
     let closed =
@@ -77,9 +82,9 @@ fn require_names_the_failing_rows_and_exits_with_4() {
     assert_eq!(gate["expressions"][0]["failing"], 4);
     assert_eq!(gate["expressions"][0]["offenders"][0]["row"], 2);
 
-    let none = test_folder.sweep(&["require", MAP, "reliable", "--where", "false"]);
-    assert_eq!(exit_code(&none), Some(4));
-    assert!(all_output(&none).contains("no row"), "{}", all_output(&none));
+    let empty_selection = test_folder.sweep(&["require", MAP, "reliable", "--where", "false"]);
+    assert_eq!(exit_code(&empty_selection), Some(4));
+    assert!(all_output(&empty_selection).contains("no row"), "{}", all_output(&empty_selection));
 }
 
 #[test]
@@ -93,34 +98,34 @@ fn only_results_go_to_standard_output() {
         &["compare", MAP, MAP],
         &["modes", "--speed", "0:300:100"],
     ] {
-        let done = test_folder.sweep(words);
+        let completed = test_folder.sweep(words);
         assert!(
-            done.stdout.len() > 40 && done.stderr.is_empty(),
+            completed.stdout.len() > 40 && completed.stderr.is_empty(),
             "{words:?}: {}",
-            all_output(&done)
+            all_output(&completed)
         );
     }
     for words in [&["run", "g.toml"][..], &["plot", MAP]] {
-        let done = test_folder.sweep(words);
+        let completed = test_folder.sweep(words);
         assert!(
-            done.stdout.is_empty() && !done.stderr.is_empty(),
+            completed.stdout.is_empty() && !completed.stderr.is_empty(),
             "{words:?}: {}",
-            all_output(&done)
+            all_output(&completed)
         );
     }
 }
 
 /// Writes a result with a ratio for each of several masses.
 fn write_ratios(test_folder: &TestFolder, name: &str, ratio: impl Fn(u32) -> Option<f64>) {
-    let numbers = |of: &dyn Fn(u32) -> Option<f64>| -> ArrayRef {
-        Arc::new((0..400).map(of).collect::<Float64Array>())
+    let number_array = |value: &dyn Fn(u32) -> Option<f64>| -> ArrayRef {
+        Arc::new((0..400).map(value).collect::<Float64Array>())
     };
     let columns = [
-        ("unbalance_mass_kg", numbers(&|row| Some(0.01 * f64::from(row)))),
-        ("nonlinear_tub_yaw", numbers(&ratio)),
-        ("ratio_max", numbers(&ratio)),
-        ("min_gap_nonlinear_m", numbers(&|row| Some(0.01 * ratio(row)?))),
-        ("status", numbers(&|_| None)),
+        ("unbalance_mass_kg", number_array(&|row| Some(0.01 * f64::from(row)))),
+        ("nonlinear_tub_yaw", number_array(&ratio)),
+        ("ratio_max", number_array(&ratio)),
+        ("min_gap_nonlinear_m", number_array(&|row| Some(0.01 * ratio(row)?))),
+        ("status", number_array(&|_| None)),
     ];
     let rows = RecordBatch::try_from_iter(columns).expect("columns of one length");
     let file = File::create(test_folder.path(name)).expect("the file can be made");
@@ -139,43 +144,60 @@ fn conditions_do_not_hold_if_points_failed() {
         for gate in
             ["max(ratio_max)<2", "mean(ratio_max)<2", "min(ratio_max)>1", "count(ratio_max>=2)==0"]
         {
-            let shut = test_folder.sweep(&["require", file, gate]);
-            assert_eq!(exit_code(&shut), Some(4), "{file}: {gate}");
+            let failed_gate = test_folder.sweep(&["require", file, gate]);
+            assert_eq!(exit_code(&failed_gate), Some(4), "{file}: {gate}");
             let expected = format!("over {over} of 400 rows");
-            assert!(all_output(&shut).contains(&expected), "{}", all_output(&shut));
+            assert!(all_output(&failed_gate).contains(&expected), "{}", all_output(&failed_gate));
         }
         for gate in ["ratio=0.05", "gap=0.001"] {
-            let shut = test_folder.sweep(&["compare", "whole.parquet", file, "--fail-on", gate]);
-            assert_eq!(exit_code(&shut), Some(4), "{file}: {gate}\n{}", stdout(&shut));
-            let same = test_folder.sweep(&["compare", file, file, "--fail-on", gate]);
-            assert_eq!(exit_code(&same), Some(0), "{file}: {gate}\n{}", stdout(&same));
+            let failed_gate =
+                test_folder.sweep(&["compare", "whole.parquet", file, "--fail-on", gate]);
+            assert_eq!(
+                exit_code(&failed_gate),
+                Some(4),
+                "{file}: {gate}\n{}",
+                stdout(&failed_gate)
+            );
+            let same_output = test_folder.sweep(&["compare", file, file, "--fail-on", gate]);
+            assert_eq!(
+                exit_code(&same_output),
+                Some(0),
+                "{file}: {gate}\n{}",
+                stdout(&same_output)
+            );
         }
     }
-    let known = test_folder.sweep(&["require", "half.parquet", "max(ratio_max)<2", "--allow-null"]);
-    assert_eq!(exit_code(&known), Some(0), "{}", all_output(&known));
-    let lacks = ["compare", "half.parquet", "half.parquet", "--fail-on", "flips"];
-    let lacks = test_folder.sweep(&lacks);
-    assert_eq!(exit_code(&lacks), Some(2), "{}", all_output(&lacks));
-    assert!(all_output(&lacks).contains("two files with verdicts"), "{}", all_output(&lacks));
+    let allowed_output =
+        test_folder.sweep(&["require", "half.parquet", "max(ratio_max)<2", "--allow-null"]);
+    assert_eq!(exit_code(&allowed_output), Some(0), "{}", all_output(&allowed_output));
+    let words = ["compare", "half.parquet", "half.parquet", "--fail-on", "flips"];
+    let lacking_output = test_folder.sweep(&words);
+    assert_eq!(exit_code(&lacking_output), Some(2), "{}", all_output(&lacking_output));
+    assert!(
+        all_output(&lacking_output).contains("two files with verdicts"),
+        "{}",
+        all_output(&lacking_output)
+    );
 }
 
 #[test]
 fn all_mistakes_in_conditions_are_reported() {
     let test_folder = folder_with_map();
-    let refused = test_folder.sweep(&["require", MAP, "ratio_mx < 2", "reliable = true"]);
-    assert_eq!(exit_code(&refused), Some(2));
-    let text = all_output(&refused);
+    let refused_output = test_folder.sweep(&["require", MAP, "ratio_mx < 2", "reliable = true"]);
+    assert_eq!(exit_code(&refused_output), Some(2));
+    let text = all_output(&refused_output);
     assert!(text.contains("did you mean `ratio_max`?") && text.contains("expected `==`"), "{text}");
-    let folded = test_folder.sweep(&["require", MAP, "reliable", "--where", "max(ratio_max) > 2"]);
-    assert_eq!(exit_code(&folded), Some(2), "{}", all_output(&folded));
-    let absent = test_folder.sweep(&["require", "no.parquet", "reliable"]);
-    assert_eq!(exit_code(&absent), Some(2), "{}", all_output(&absent));
-    for wrong in ["short.parquet", "resluts/short.parquet", "results/short"] {
-        let absent = test_folder.sweep(&["show", wrong]);
+    let misplaced_extreme =
+        test_folder.sweep(&["require", MAP, "reliable", "--where", "max(ratio_max) > 2"]);
+    assert_eq!(exit_code(&misplaced_extreme), Some(2), "{}", all_output(&misplaced_extreme));
+    let absent_output = test_folder.sweep(&["require", "no.parquet", "reliable"]);
+    assert_eq!(exit_code(&absent_output), Some(2), "{}", all_output(&absent_output));
+    for invalid_name in ["short.parquet", "resluts/short.parquet", "results/short"] {
+        let absent_output = test_folder.sweep(&["show", invalid_name]);
         assert!(
-            all_output(&absent).contains("results/short.parquet is there"),
+            all_output(&absent_output).contains("results/short.parquet is there"),
             "{}",
-            all_output(&absent)
+            all_output(&absent_output)
         );
     }
     let no_grid = test_folder.sweep(&["check", MAP]);
@@ -189,7 +211,7 @@ fn all_mistakes_in_conditions_are_reported() {
 #[test]
 fn show_sorts_and_filters_rows_and_prints_json() {
     let test_folder = folder_with_map();
-    let top = json_output(&test_folder.sweep(&[
+    let top_rows = json_output(&test_folder.sweep(&[
         "show",
         MAP,
         "--top",
@@ -198,31 +220,35 @@ fn show_sorts_and_filters_rows_and_prints_json() {
         "ratio_tub_yaw",
         "--json",
     ]));
-    let rows = top.as_array().expect("rows");
+    let rows = top_rows.as_array().expect("rows");
     let ratios: Vec<f64> = rows.iter().filter_map(|row| row["ratio_tub_yaw"].as_f64()).collect();
-    assert!(ratios.len() == 2 && ratios[0] >= ratios[1], "{top}");
+    assert!(ratios.len() == 2 && ratios[0] >= ratios[1], "{top_rows}");
     // The table has every column, and counts are integers.
-    assert!(rows[0]["point"].is_u64() && rows[0]["nonlinear_tub_yaw"].is_f64(), "{top}");
-    let whole = json_output(&test_folder.sweep(&["show", MAP, "--json"]));
-    assert_eq!(whole["summary"]["points"], 6);
-    assert_eq!(whole["plan"]["name"], "short");
-    let filtered = test_folder.sweep(&["show", MAP, "--where", "damping_n_s_per_m > 200"]);
-    assert_eq!(stdout(&filtered).lines().count(), 4, "{}", stdout(&filtered));
-    let wrong = test_folder.sweep(&["show", MAP, "--by", "ratio_tub_yw"]);
-    assert_eq!(exit_code(&wrong), Some(2));
-    assert!(all_output(&wrong).contains("`ratio_tub_yaw`"), "{}", all_output(&wrong));
+    assert!(rows[0]["point"].is_u64() && rows[0]["nonlinear_tub_yaw"].is_f64(), "{top_rows}");
+    let whole_table = json_output(&test_folder.sweep(&["show", MAP, "--json"]));
+    assert_eq!(whole_table["summary"]["points"], 6);
+    assert_eq!(whole_table["plan"]["name"], "short");
+    let filtered_output = test_folder.sweep(&["show", MAP, "--where", "damping_n_s_per_m > 200"]);
+    assert_eq!(stdout(&filtered_output).lines().count(), 4, "{}", stdout(&filtered_output));
+    let invalid_output = test_folder.sweep(&["show", MAP, "--by", "ratio_tub_yw"]);
+    assert_eq!(exit_code(&invalid_output), Some(2));
+    assert!(
+        all_output(&invalid_output).contains("`ratio_tub_yaw`"),
+        "{}",
+        all_output(&invalid_output)
+    );
 }
 
 #[test]
 fn compare_reports_the_differences_of_two_maps() {
     let test_folder = folder_with_map();
-    let same = test_folder.sweep(&["compare", MAP, MAP, "--fail-on", "any"]);
-    assert_eq!(exit_code(&same), Some(0), "{}", stdout(&same));
-    assert!(stdout(&same).contains("not at all"), "{}", stdout(&same));
+    let same_output = test_folder.sweep(&["compare", MAP, MAP, "--fail-on", "any"]);
+    assert_eq!(exit_code(&same_output), Some(0), "{}", stdout(&same_output));
+    assert!(stdout(&same_output).contains("not at all"), "{}", stdout(&same_output));
 
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--name", "light"];
-    let done = test_folder.sweep(&[&light[..], &["--progress", "none"]].concat());
-    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    let completed = test_folder.sweep(&[&light[..], &["--progress", "none"]].concat());
+    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
     let shown = stdout(&test_folder.sweep(&["show", "results/light.parquet"]));
     assert!(shown.contains("--set  tub_mass_kg = 20"), "{shown}");
 
@@ -230,29 +256,30 @@ fn compare_reports_the_differences_of_two_maps() {
     let differs =
         test_folder.sweep(&[&arguments[..], &["--fail-on", "ratio=0", "--json"]].concat());
     assert_eq!(exit_code(&differs), Some(4), "{}", all_output(&differs));
-    let found = json_output(&differs);
-    let paths: Vec<&str> = found["plan"]
+    let comparison = json_output(&differs);
+    let paths: Vec<&str> = comparison["plan"]
         .as_array()
         .expect("changes")
         .iter()
         .filter_map(|change| change["path"].as_str())
         .collect();
     assert!(paths.contains(&"machine.tub.mass_kg") && paths.contains(&"set"), "{paths:?}");
-    assert_eq!(found["rows"]["in_both"], 6);
+    assert_eq!(comparison["rows"]["in_both"], 6);
 
     let markdown = stdout(&test_folder.sweep(&[&arguments[..], &["--markdown"]].concat()));
     assert!(markdown.starts_with("### `results/light.parquet` compared with"), "{markdown}");
-    let written = test_folder.sweep(&[&arguments[..], &["--out", "d.parquet"]].concat());
-    assert_eq!(exit_code(&written), Some(0), "{}", all_output(&written));
+    let written_output = test_folder.sweep(&[&arguments[..], &["--out", "d.parquet"]].concat());
+    assert_eq!(exit_code(&written_output), Some(0), "{}", all_output(&written_output));
     for (quantity, title) in [
         (None, "Greatest ratio of B over that of A"),
         (Some("gap_change_m"), "Least gap of the nonlinear model in B less that in A"),
         (Some("ratio_max_b"), "Greatest ratio of B"),
     ] {
         let option = quantity.map(|column| ["--quantity", column]);
-        let asked = option.as_ref().map_or(&[][..], |option| option);
-        let drawn = test_folder.sweep(&[&["plot", "d.parquet", "-o", "d.svg"], asked].concat());
-        assert_eq!(exit_code(&drawn), Some(0), "{}", all_output(&drawn));
+        let options = option.as_ref().map_or(&[][..], |option| option);
+        let plot_output =
+            test_folder.sweep(&[&["plot", "d.parquet", "-o", "d.svg"], options].concat());
+        assert_eq!(exit_code(&plot_output), Some(0), "{}", all_output(&plot_output));
         let picture = fs::read_to_string(test_folder.path("d.svg")).expect("it was drawn");
         assert!(picture.contains(&format!(">{title}<")), "{quantity:?}");
         // The limits of both files are unknown.
@@ -262,8 +289,8 @@ fn compare_reports_the_differences_of_two_maps() {
     let columns = shown["columns"].as_array().expect("a list").iter();
     let worse: Vec<_> = columns.filter_map(|column| column["worse"].as_str()).collect();
     assert_eq!(worse, ["greater", "less"], "of the ratio's change and of the gap's");
-    let refused = test_folder.sweep(&["compare", MAP, "d.parquet"]);
-    assert_eq!(exit_code(&refused), Some(2), "{}", all_output(&refused));
+    let refused_output = test_folder.sweep(&["compare", MAP, "d.parquet"]);
+    assert_eq!(exit_code(&refused_output), Some(2), "{}", all_output(&refused_output));
 }
 
 #[test]
@@ -278,17 +305,20 @@ fn compare_matches_points_of_tolerances_about_other_numbers() {
     for (name, mass) in [("a", "20"), ("b", "24")] {
         let mass = format!("[set]\ntub_mass_kg = {mass}\n");
         fs::write(test_folder.path("g.toml"), format!("{start}{mass}{axes}")).expect("written");
-        let done = test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
-        assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+        let completed = test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
+        assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
     }
     let arguments = ["compare", "results/a.parquet", "results/b.parquet", "--fail-on", "rows"];
-    let compared = test_folder.sweep(&arguments);
-    assert_eq!(exit_code(&compared), Some(0), "{}", all_output(&compared));
-    let text = stdout(&compared);
+    let compare_output = test_folder.sweep(&arguments);
+    assert_eq!(exit_code(&compare_output), Some(0), "{}", all_output(&compare_output));
+    let text = stdout(&compare_output);
     assert!(text.contains("4 in both") && text.contains("rows are matched by point"), "{text}");
-    let found = json_output(&test_folder.sweep(&[&arguments[..], &["--json"]].concat()));
-    assert_eq!((&found["matched_by"], &found["rows"]["in_both"]), (&"point".into(), &4.into()));
-    assert_eq!(found["overridden"].as_array().map(Vec::len), Some(0));
+    let comparison = json_output(&test_folder.sweep(&[&arguments[..], &["--json"]].concat()));
+    assert_eq!(
+        (&comparison["matched_by"], &comparison["rows"]["in_both"]),
+        (&"point".into(), &4.into())
+    );
+    assert_eq!(comparison["overridden"].as_array().map(Vec::len), Some(0));
 }
 
 #[test]
@@ -299,17 +329,17 @@ fn compare_names_differences_that_an_axis_overrides() {
     let test_folder = TestFolder::new(&format!("{start}{axis}"));
     for (name, mass) in [("a", ""), ("b", "[set]\nspring_stiffness_n_per_m = 9e3\n")] {
         fs::write(test_folder.path("g.toml"), format!("{start}{mass}{axis}")).expect("written");
-        let done = test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
-        assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+        let completed = test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
+        assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
     }
     let arguments = ["compare", "results/a.parquet", "results/b.parquet"];
     let text = stdout(&test_folder.sweep(&arguments));
-    let told = "overridden  machine.springs.1.stiffness_n_per_m: the axis \
+    let expected_text = "overridden  machine.springs.1.stiffness_n_per_m: the axis \
                 spring_1_stiffness_n_per_m sets this in both, so that the change does not show";
-    assert!(text.contains(told), "{text}");
-    let found = json_output(&test_folder.sweep(&[&arguments[..], &["--json"]].concat()));
+    assert!(text.contains(expected_text), "{text}");
+    let comparison = json_output(&test_folder.sweep(&[&arguments[..], &["--json"]].concat()));
     // The other springs are another machine's.
-    let paths = &found["overridden"][0]["paths"];
+    let paths = &comparison["overridden"][0]["paths"];
     assert_eq!(paths.as_array().map(Vec::len), Some(1), "{paths}");
     let markdown = stdout(&test_folder.sweep(&[&arguments[..], &["--markdown"]].concat()));
     assert!(markdown.contains("- overridden: machine.springs.1"), "{markdown}");
@@ -319,20 +349,23 @@ fn compare_names_differences_that_an_axis_overrides() {
 fn compare_can_limit_the_difference_of_any_column() {
     let test_folder = folder_with_map();
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--out", "light.parquet"];
-    let done = test_folder.sweep(&light);
-    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
-    let compared =
+    let completed = test_folder.sweep(&light);
+    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    let compare_output =
         |gate: &str| test_folder.sweep(&["compare", MAP, "light.parquet", "--fail-on", gate]);
-    assert_eq!(exit_code(&compared("nonlinear_tub_yaw=1e9")), Some(0));
-    let failed = compared("nonlinear_tub_yaw=0");
+    assert_eq!(exit_code(&compare_output("nonlinear_tub_yaw=1e9")), Some(0));
+    let failed = compare_output("nonlinear_tub_yaw=0");
     assert_eq!(exit_code(&failed), Some(4), "{}", all_output(&failed));
     let text = stdout(&failed);
     assert!(text.contains("--fail-on: nonlinear_tub_yaw changed by up to "), "{text}");
     assert!(text.contains("greatest changes of nonlinear_tub_yaw, rad"), "{text}");
     for unfit in ["nonlinear_tub_yow=1", "unbalance_mass_kg=1", "status=1"] {
-        let refused = compared(unfit);
-        assert_eq!(exit_code(&refused), Some(2), "{unfit}");
-        assert!(all_output(&refused).contains("a column of numbers in both files"), "{unfit}");
+        let refused_output = compare_output(unfit);
+        assert_eq!(exit_code(&refused_output), Some(2), "{unfit}");
+        assert!(
+            all_output(&refused_output).contains("a column of numbers in both files"),
+            "{unfit}"
+        );
     }
 }
 
@@ -342,8 +375,8 @@ fn compare_shows_both_ratios_of_a_changed_verdict() {
     for (name, least, mass) in [("a", "ratio_min=0.5", "20"), ("b", "ratio_min=1", "22")] {
         let mass = format!("tub_mass_kg={mass}");
         let run = ["run", "g.toml", "--name", name, "--set", least, "--set", &mass];
-        let done = test_folder.sweep(&[&run[..], &["--progress", "none"]].concat());
-        assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+        let completed = test_folder.sweep(&[&run[..], &["--progress", "none"]].concat());
+        assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
     }
     let output = stdout(&test_folder.sweep(&["compare", "results/a.parquet", "results/b.parquet"]));
     let flips = output.split("verdicts that flipped").nth(1).expect("some");
@@ -373,10 +406,11 @@ fn a_report_describes_quantities_and_both_limits() {
     let test_folder =
         TestFolder::new(&format!("metrics = [\"damper_speed\", \"static_sag\"]\n{grid}"));
     let sets = ["--set", "spin_ramp_s=0.05", "--set", "damper_1_friction_n=3"];
-    let done = test_folder.sweep(&[&["run", "g.toml", "--progress", "none"], &sets[..]].concat());
-    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
-    let written = test_folder.sweep(&["report", MAP, "-o", "r.html"]);
-    assert_eq!(exit_code(&written), Some(0), "{}", all_output(&written));
+    let completed =
+        test_folder.sweep(&[&["run", "g.toml", "--progress", "none"], &sets[..]].concat());
+    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    let written_output = test_folder.sweep(&["report", MAP, "-o", "r.html"]);
+    assert_eq!(exit_code(&written_output), Some(0), "{}", all_output(&written_output));
     let page = fs::read_to_string(test_folder.path("r.html")).expect("it was written");
     for text in [
         "is between 0.999 and 2",
@@ -406,8 +440,8 @@ fn exports_overwrite_only_files_of_the_same_kind() {
     let test_folder = folder_with_map();
     for (name, begins) in [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04")] {
         for _ in 0..2 {
-            let done = test_folder.sweep(&["export", MAP, name]);
-            assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+            let completed = test_folder.sweep(&["export", MAP, name]);
+            assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
         }
         let bytes = fs::read(test_folder.path(name)).expect("the export is there");
         assert!(bytes.starts_with(begins), "{name}");
@@ -429,9 +463,9 @@ fn a_refused_temporary_file_of_an_export_is_a_failure_of_the_system() {
     let test_folder = folder_with_map();
     let mut command = test_folder.under(&[]);
     command.args(["export", MAP, "m.xlsx"]).env("TMPDIR", test_folder.path("missing"));
-    let refused = command.output().expect("the command starts");
-    assert_eq!(exit_code(&refused), Some(1), "{}", all_output(&refused));
-    let text = all_output(&refused);
+    let refused_output = command.output().expect("the command starts");
+    assert_eq!(exit_code(&refused_output), Some(1), "{}", all_output(&refused_output));
+    let text = all_output(&refused_output);
     assert!(text.contains("cannot write a temporary file to export"), "{text}");
 }
 
@@ -504,9 +538,18 @@ fn every_scalar_of_the_grid_file_can_be_set() {
         (["--ratio-limit", "nan"], "ratio_limit"),
         (["--name", "a/b"], "expected letters"),
     ] {
-        let refused = test_folder.sweep(&[&["check", "g.toml"], &sets[..]].concat());
-        assert_eq!(exit_code(&refused), Some(2), "{sets:?}: {}", all_output(&refused));
-        assert!(all_output(&refused).contains(expected), "{sets:?}: {}", all_output(&refused));
+        let refused_output = test_folder.sweep(&[&["check", "g.toml"], &sets[..]].concat());
+        assert_eq!(
+            exit_code(&refused_output),
+            Some(2),
+            "{sets:?}: {}",
+            all_output(&refused_output)
+        );
+        assert!(
+            all_output(&refused_output).contains(expected),
+            "{sets:?}: {}",
+            all_output(&refused_output)
+        );
     }
 }
 
@@ -520,8 +563,8 @@ fn show_describes_lists_and_unfinished_runs() {
         integrator = { method = \"rk4\" }\n\
         design = { method = \"list\", file = \"list.csv\" }\n";
     fs::write(test_folder.path("list.toml"), listed).expect("written");
-    let done = test_folder.sweep(&["run", "list.toml", "--progress", "none"]);
-    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    let completed = test_folder.sweep(&["run", "list.toml", "--progress", "none"]);
+    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
     let shown = stdout(&test_folder.sweep(&["show", MAP]));
     assert!(shown.contains("design  file list.csv"), "{shown}");
     assert!(shown.contains("axis  unbalance_mass_kg\n"), "{shown}");
@@ -544,9 +587,9 @@ fn show_describes_lists_and_unfinished_runs() {
         &["export", "part.parquet", "part.csv"],
         &["compare", MAP, "part.parquet"],
     ] {
-        let refused = test_folder.sweep(words);
-        assert_eq!(exit_code(&refused), Some(2), "{words:?}");
-        let text = all_output(&refused);
+        let refused_output = test_folder.sweep(words);
+        assert_eq!(exit_code(&refused_output), Some(2), "{words:?}");
+        let text = all_output(&refused_output);
         assert!(text.contains("is not finished: 16 of 32 points done"), "{words:?}: {text}");
     }
 
@@ -558,18 +601,18 @@ fn show_describes_lists_and_unfinished_runs() {
 #[test]
 fn require_names_the_failing_part_and_the_confidence_of_shares() {
     let test_folder = TestFolder::new(&designed("monte_carlo"));
-    let done = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
-    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    let completed = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
     let text = "share(unbalance_mass_kg < 0.5) > 0.99 and count(true) == 32";
     let closed = test_folder.sweep(&["require", MAP, text]);
     assert_eq!(exit_code(&closed), Some(4), "{}", all_output(&closed));
     let output = json_output(&test_folder.sweep(&["require", MAP, text, "--json"]));
-    let whole = &output["expressions"][0];
-    let share = whole["folded"][0].as_f64().expect("a share");
-    let ends = [0, 1].map(|end| whole["intervals"][0][end].as_f64().expect("an interval"));
+    let whole_table = &output["expressions"][0];
+    let share = whole_table["folded"][0].as_f64().expect("a share");
+    let ends = [0, 1].map(|end| whole_table["intervals"][0][end].as_f64().expect("an interval"));
     assert!(ends[0] < share && share < ends[1] && ends[1] - ends[0] < 0.4, "{ends:?}");
     let holds: Vec<&Value> =
-        whole["parts"].as_array().expect("parts").iter().map(|part| &part["holds"]).collect();
+        whole_table["parts"].as_array().expect("parts").iter().map(|part| &part["holds"]).collect();
     assert_eq!(holds, [&json!(false), &json!(true)]);
     let text = stdout(&closed);
     assert!(text.contains("95 % confidence"), "{text}");
@@ -584,20 +627,24 @@ fn require_names_the_failing_part_and_the_confidence_of_shares() {
 #[test]
 fn plot_suggests_the_nearest_name_of_a_quantity() {
     let test_folder = folder_with_map();
-    let refused = test_folder.sweep(&["plot", MAP, "--quantity", "ratio_mx"]);
-    assert_eq!(exit_code(&refused), Some(2));
-    assert!(all_output(&refused).contains("is `ratio_max` meant?"), "{}", all_output(&refused));
+    let refused_output = test_folder.sweep(&["plot", MAP, "--quantity", "ratio_mx"]);
+    assert_eq!(exit_code(&refused_output), Some(2));
+    assert!(
+        all_output(&refused_output).contains("is `ratio_max` meant?"),
+        "{}",
+        all_output(&refused_output)
+    );
 }
 
 #[test]
 fn figures_show_the_constants_of_set() {
     let test_folder = folder_with_map();
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--set", "channels=tub_yaw"];
-    let done =
+    let completed =
         test_folder.sweep(&[&light[..], &["--name", "light", "--progress", "none"]].concat());
-    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
-    let drawn = test_folder.sweep(&["plot", "results/light.parquet", "-o", "light.svg"]);
-    assert_eq!(exit_code(&drawn), Some(0), "{}", all_output(&drawn));
+    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    let plot_output = test_folder.sweep(&["plot", "results/light.parquet", "-o", "light.svg"]);
+    assert_eq!(exit_code(&plot_output), Some(0), "{}", all_output(&plot_output));
     let figure = fs::read_to_string(test_folder.path("light.svg")).expect("a figure");
     assert!(figure.contains("tub_mass_kg = 20") && figure.contains("channels = tub_yaw"));
 }
@@ -630,9 +677,9 @@ fn designed(method: &str) -> String {
 fn run_recommends_a_figure_that_can_be_drawn_for_a_design() {
     for method in ["latin_hypercube", "sobol", "monte_carlo"] {
         let test_folder = TestFolder::new(&designed(method));
-        let done = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
-        assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
-        let text = all_output(&done);
+        let completed = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+        assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+        let text = all_output(&completed);
         assert!(text.contains("share  ") && text.contains("next  sweep plot "), "{text}");
         let next = test_folder.sweep(&["plot", MAP]);
         assert_eq!(exit_code(&next), Some(0), "{}", all_output(&next));
@@ -642,15 +689,19 @@ fn run_recommends_a_figure_that_can_be_drawn_for_a_design() {
             ("influence", "Rank correlation (Spearman)"),
         ] {
             for name in ["a.svg", "a.png", "a.html"] {
-                let drawn = test_folder.sweep(&["plot", MAP, "--view", view, "-o", name]);
-                assert_eq!(exit_code(&drawn), Some(0), "{}", all_output(&drawn));
+                let plot_output = test_folder.sweep(&["plot", MAP, "--view", view, "-o", name]);
+                assert_eq!(exit_code(&plot_output), Some(0), "{}", all_output(&plot_output));
             }
             let figure = fs::read_to_string(test_folder.path("a.svg")).expect("a figure");
             assert!(figure.contains(expected), "{method}, {view}");
         }
     }
     let test_folder = folder_with_map();
-    let refused = test_folder.sweep(&["plot", MAP, "--view", "influence", "-o", "a.svg"]);
-    assert_eq!(exit_code(&refused), Some(2));
-    assert!(all_output(&refused).contains("`--view` is for designs"), "{}", all_output(&refused));
+    let refused_output = test_folder.sweep(&["plot", MAP, "--view", "influence", "-o", "a.svg"]);
+    assert_eq!(exit_code(&refused_output), Some(2));
+    assert!(
+        all_output(&refused_output).contains("`--view` is for designs"),
+        "{}",
+        all_output(&refused_output)
+    );
 }

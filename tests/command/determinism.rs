@@ -61,14 +61,17 @@ fn bytes(integrator: &str, threads: u32, simd: &str) -> Option<Vec<u8>> {
 }
 
 fn same_bytes(integrator: &str) {
-    let one = bytes(integrator, 1, "scalar").expect("every machine runs scalars");
+    let single_thread_bytes = bytes(integrator, 1, "scalar").expect("every machine runs scalars");
     for threads in [2, 4] {
-        assert!(bytes(integrator, threads, "scalar").as_ref() == Some(&one), "{threads} threads");
+        assert!(
+            bytes(integrator, threads, "scalar").as_ref() == Some(&single_thread_bytes),
+            "{threads} threads"
+        );
     }
     for simd in ["avx2", "avx512", "neon"] {
         for threads in [1, 2, 4] {
             if let Some(other) = bytes(integrator, threads, simd) {
-                assert!(other == one, "{simd} on {threads} threads");
+                assert!(other == single_thread_bytes, "{simd} on {threads} threads");
             }
         }
     }
@@ -159,12 +162,12 @@ fn machine(kinds: u64, numbers: &mut Numbers) -> String {
 
 /// Returns the rows of a result as text, without the point's number.
 fn rows(folder: &std::path::Path, name: &str) -> Vec<String> {
-    let done = Command::new(sweep_binary())
+    let completed = Command::new(sweep_binary())
         .current_dir(folder)
         .args(["export", name, "rows.csv"])
         .output()
         .expect("the command starts");
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(completed.status.success(), "{}", String::from_utf8_lossy(&completed.stderr));
     let text = fs::read_to_string(folder.join("rows.csv")).expect("it was written");
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     let without_point = |line: &str| line.split_once(',').map(|(_, rest)| rest.to_owned());
@@ -225,17 +228,21 @@ fn rows_of_random_machines_do_not_depend_on_other_points() {
         let plane = plane + second;
         fs::write(test_folder.path().join("plane.toml"), plane).expect("it is written");
         let three = speeds.map(|speed| speed.to_string()).join(",");
-        let one = speeds[1].to_string();
+        let single_thread_bytes = speeds[1].to_string();
         let search = ["--starts", "1", "--longest", "2"];
         // Each command runs with other points; commands with rows of points and speeds also run
         // with a single point.
         let commands: [(&str, Vec<&str>, Vec<&str>); 4] = [
             ("run", vec!["all.toml"], vec!["few.toml"]),
-            ("stability", vec!["all.toml", "--speed", &three], vec!["few.toml", "--speed", &one]),
+            (
+                "stability",
+                vec!["all.toml", "--speed", &three],
+                vec!["few.toml", "--speed", &single_thread_bytes],
+            ),
             (
                 "dwell",
                 [&["all.toml", "--speed", three.as_str()][..], &search].concat(),
-                [&["few.toml", "--speed", one.as_str()][..], &search].concat(),
+                [&["few.toml", "--speed", single_thread_bytes.as_str()][..], &search].concat(),
             ),
             ("boundary", vec!["plane.toml"], Vec::new()),
         ];
@@ -245,19 +252,22 @@ fn rows_of_random_machines_do_not_depend_on_other_points() {
                 break;
             }
             let (verb, together, alone) = &commands[(first + k) % commands.len()];
-            let make = |asked: &[&str], threads: &str, name: &str| {
+            let make = |options: &[&str], threads: &str, name: &str| {
                 let out = &format!("{verb}-{name}.parquet");
-                let done = Command::new(sweep_binary())
+                let completed = Command::new(sweep_binary())
                     .current_dir(test_folder.path())
                     .arg(verb)
-                    .args(asked)
+                    .args(options)
                     .args(["--fresh", "--progress", "none", "--threads", threads, "--out", out])
                     .env_remove("SLURM_ARRAY_TASK_ID")
                     .env_remove("JOB_COMPLETION_INDEX")
                     .output()
                     .expect("the command starts");
-                let messages = String::from_utf8_lossy(&done.stderr);
-                assert!(done.status.success(), "{verb} {asked:?} of {kinds:05b}: {messages}");
+                let messages = String::from_utf8_lossy(&completed.stderr);
+                assert!(
+                    completed.status.success(),
+                    "{verb} {options:?} of {kinds:05b}: {messages}"
+                );
                 fs::read(test_folder.path().join(out)).expect("it was written")
             };
             let whole = make(together, "1", "one");

@@ -36,11 +36,11 @@ fn sweep(folder: &tempfile::TempDir, arguments: &[&str], simd: Option<&str>) -> 
 #[test]
 fn every_motion_of_a_held_speed_has_a_row() {
     let folder = folder();
-    let done = sweep(&folder, &["dwell", "grid.toml", "--speed", "250,297.5"], None);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+    let completed = sweep(&folder, &["dwell", "grid.toml", "--speed", "250,297.5"], None);
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
     let file = "results/grid-dwell.parquet";
-    let shown = all_output(&sweep(&folder, &["show", file], None));
-    for messages in [&all_output(&done), &shown] {
+    let shown_text = all_output(&sweep(&folder, &["show", file], None));
+    for messages in [&all_output(&completed), &shown_text] {
         for line in [
             "4 at 4 points and speeds: 2 periodic, 1 periodic 2, 1 quasi periodic",
             "tub yaw 152.3 mrad, quasi periodic, at unbalance_mass_kg 0.4, 250 rpm",
@@ -59,8 +59,8 @@ fn every_motion_of_a_held_speed_has_a_row() {
     let gate = ["require", file, "nonlinear_tub_yaw < 0.1"];
     assert_eq!(sweep(&folder, &gate, None).status.code(), Some(4));
     let at = "unbalance_mass_kg=0.4";
-    let drawn = sweep(&folder, &["plot", file, "--at", at, "-o", "a.svg"], None);
-    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
+    let plot_output = sweep(&folder, &["plot", file, "--at", at, "-o", "a.svg"], None);
+    assert_eq!(plot_output.status.code(), Some(0), "{}", all_output(&plot_output));
     let picture = fs::read_to_string(folder.path().join("a.svg")).expect("it is there");
     assert!(picture.contains("motion at a held speed: two frequencies"));
 }
@@ -71,23 +71,24 @@ fn at_can_replace_an_axis() {
     let files = [("--at", "a.parquet"), ("--set", "b.parquet")].map(|(option, file)| {
         let point = [option, "unbalance_mass_kg=0.4"];
         let dwell = ["dwell", "grid.toml", "--speed", "250", "--starts", "1", "--out", file];
-        let done = sweep(&folder, &[&dwell[..], &point].concat(), None);
+        let completed = sweep(&folder, &[&dwell[..], &point].concat(), None);
         assert!(
-            all_output(&done).contains("1 at 1 point and speed: 1 quasi periodic"),
+            all_output(&completed).contains("1 at 1 point and speed: 1 quasi periodic"),
             "{}",
-            all_output(&done)
+            all_output(&completed)
         );
         fs::read(folder.path().join(file)).expect("it is there")
     });
     assert!(files[0] == files[1]);
-    let of = |more: &[&str]| {
+    let dwell_output = |more: &[&str]| {
         let stability = ["stability", "grid.toml", "--speed", "250", "--fresh"];
         all_output(&sweep(&folder, &[&stability[..], more].concat(), None))
     };
-    assert!(of(&[]).contains("unbalance_mass_kg 0.4: 250 rpm, quasi periodic"));
-    assert!(of(&["--at", "unbalance_mass_kg=0.4"]).contains("unstable  250 rpm, quasi"));
-    let twice = of(&["--at", "unbalance_mass_kg=0.4", "--set", "unbalance_mass_kg=0.1"]);
-    assert!(twice.contains("given twice"), "{twice}");
+    assert!(dwell_output(&[]).contains("unbalance_mass_kg 0.4: 250 rpm, quasi periodic"));
+    assert!(dwell_output(&["--at", "unbalance_mass_kg=0.4"]).contains("unstable  250 rpm, quasi"));
+    let contradictory_output =
+        dwell_output(&["--at", "unbalance_mass_kg=0.4", "--set", "unbalance_mass_kg=0.1"]);
+    assert!(contradictory_output.contains("given twice"), "{contradictory_output}");
 }
 
 #[test]
@@ -95,21 +96,25 @@ fn peaks_of_attractors_are_a_metric_of_maps() {
     let folder = folder();
     let grid = format!("metrics = [\"dwell\"]\n{GRID}\n[stability]\nspeed_rpm = \"250,297.5\"\n");
     fs::write(folder.path().join("map.toml"), grid).expect("it is written");
-    let ran = sweep(&folder, &["run", "map.toml"], None);
-    assert_eq!(ran.status.code(), Some(0), "{}", all_output(&ran));
+    let run_output = sweep(&folder, &["run", "map.toml"], None);
+    assert_eq!(run_output.status.code(), Some(0), "{}", all_output(&run_output));
     let file = "results/map.parquet";
     let columns = "dwell_tub_yaw,dwell_tub_pitch,dwell_speed_rpm,dwell_kind";
     let rows = ["show", file, "--top", "2", "--by", "dwell_tub_yaw", "--columns", columns];
     let messages = all_output(&sweep(&folder, &rows, None));
     // The greatest yaw is that at 250 rpm, the greatest pitch that at 297.5 rpm, which is greater.
-    let first = messages.lines().find(|line| line.contains("0.152"));
-    let first = first.unwrap_or_else(|| panic!("{messages}"));
-    assert!(first.contains("0.1637") && first.contains("297.5") && first.contains("periodic_2"));
+    let first_line = messages.lines().find(|line| line.contains("0.152"));
+    let first_line = first_line.unwrap_or_else(|| panic!("{messages}"));
+    assert!(
+        first_line.contains("0.1637")
+            && first_line.contains("297.5")
+            && first_line.contains("periodic_2")
+    );
     let gate = ["require", file, "dwell_tub_yaw < 0.02"];
     assert_eq!(sweep(&folder, &gate, None).status.code(), Some(4));
     let map = ["plot", file, "--quantity", "dwell_tub_yaw", "-o", "m.svg"];
-    let drawn = sweep(&folder, &map, None);
-    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
+    let plot_output = sweep(&folder, &map, None);
+    assert_eq!(plot_output.status.code(), Some(0), "{}", all_output(&plot_output));
     let without = sweep(&folder, &["run", "grid.toml", "--set", "metrics=dwell"], None);
     assert!(
         all_output(&without).contains("the metric `dwell` needs speeds"),
@@ -126,21 +131,21 @@ fn motions_have_sections_and_metrics_and_can_be_compared() {
     let dwell = |damping: &str, more: &[&str], out: &str| {
         let at = ["--at", "unbalance_mass_kg=0.4", "--set", damping, "--starts", "1"];
         let dwell = ["dwell", "grid.toml", "--speed", "250,280", "--out", out];
-        let done = sweep(&folder, &[&dwell[..], &at, more].concat(), None);
-        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-        all_output(&done)
+        let completed = sweep(&folder, &[&dwell[..], &at, more].concat(), None);
+        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+        all_output(&completed)
     };
     let messages = dwell("damping_n_s_per_m=140", &["--sections", "64"], "a.parquet");
     assert!(messages.contains("2 at 2 points and speeds"), "{messages}");
-    let shown = all_output(&sweep(&folder, &["show", "a.parquet", "--all"], None));
+    let shown_text = all_output(&sweep(&folder, &["show", "a.parquet", "--all"], None));
     for column in ["turn", "q5_rad", "u10_rad_per_s", "cabinet_force_nonlinear_n"] {
-        assert!(shown.contains(column), "{column}\n{shown}");
+        assert!(shown_text.contains(column), "{column}\n{shown_text}");
     }
-    assert!(shown.contains("rows  128"), "64 states of each of two motions\n{shown}");
-    assert!(!shown.contains("clash_time"), "a motion that goes on has no such time");
+    assert!(shown_text.contains("rows  128"), "64 states of each of two motions\n{shown_text}");
+    assert!(!shown_text.contains("clash_time"), "a motion that goes on has no such time");
     let view = ["plot", "a.parquet", "--view", "sections", "-o", "s.html"];
-    let drawn = sweep(&folder, &view, None);
-    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
+    let plot_output = sweep(&folder, &view, None);
+    assert_eq!(plot_output.status.code(), Some(0), "{}", all_output(&plot_output));
     dwell("damping_n_s_per_m=140", &[], "b.parquet");
     dwell("damping_n_s_per_m=240", &[], "c.parquet");
     let gate = ["compare", "b.parquet", "c.parquet", "--fail-on", "any"];
@@ -158,23 +163,27 @@ fn bytes_do_not_depend_on_threads_instruction_set_or_shards() {
             [&["dwell", "grid.toml", "--speed", "240:300:30"], search, more].concat()
         };
         let bytes = |more: &[&'static str], simd| {
-            let done = sweep(&folder, &arguments(more), simd);
-            assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+            let completed = sweep(&folder, &arguments(more), simd);
+            assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
             more.last().map(|name| fs::read(folder.path().join(name)).unwrap_or_default())
         };
-        let first = bytes(&["--threads", "1", "--out", "a.parquet"], None);
-        assert!(first == bytes(&["--threads", "2", "--out", "b.parquet"], Some("scalar")));
+        let first_line = bytes(&["--threads", "1", "--out", "a.parquet"], None);
+        assert!(first_line == bytes(&["--threads", "2", "--out", "b.parquet"], Some("scalar")));
         for shard in [["--shard", "1/2"], ["--shard", "2/2"]] {
             bytes(&[shard[0], shard[1], "--out", "c.parquet"], None);
         }
-        let of = ["grid.toml", "--speed", "240:300:30", "--dwell", "--out", "c.parquet"];
-        let asked = |verb| sweep(&folder, &[&[verb][..], &of, search].concat(), None);
+        let search_words = ["grid.toml", "--speed", "240:300:30", "--dwell", "--out", "c.parquet"];
+        let run_verb = |verb| sweep(&folder, &[&[verb][..], &search_words, search].concat(), None);
         let next = "next  sweep merge grid.toml --out c.parquet --dwell --speed 240:300:30";
-        assert!(all_output(&asked("status")).contains(next), "{}", all_output(&asked("status")));
-        let merged = asked("merge");
+        assert!(
+            all_output(&run_verb("status")).contains(next),
+            "{}",
+            all_output(&run_verb("status"))
+        );
+        let merged = run_verb("merge");
         assert_eq!(merged.status.code(), Some(0), "{}", all_output(&merged));
         let joined = fs::read(folder.path().join("c.parquet")).expect("it is there");
-        assert!(first == Some(joined));
+        assert!(first_line == Some(joined));
         for name in ["a.parquet", "b.parquet", "c.parquet"] {
             fs::remove_file(folder.path().join(name)).expect("it is there");
         }
@@ -192,9 +201,13 @@ fn contradictory_options_are_errors() {
         (&["--speed", "250", "--carry", "sideways"], "up or down"),
         (&["--speed", "250", "--carry", "up", "--threshold"], "cannot be used with"),
     ] {
-        let refused = sweep(&folder, &[&["dwell", "grid.toml"], more].concat(), None);
-        assert_eq!(refused.status.code(), Some(2), "{more:?}");
-        assert!(all_output(&refused).contains(expected), "{more:?}: {}", all_output(&refused));
+        let refused_output = sweep(&folder, &[&["dwell", "grid.toml"], more].concat(), None);
+        assert_eq!(refused_output.status.code(), Some(2), "{more:?}");
+        assert!(
+            all_output(&refused_output).contains(expected),
+            "{more:?}: {}",
+            all_output(&refused_output)
+        );
     }
 }
 
@@ -205,9 +218,9 @@ fn the_summary_has_a_line_for_each_motion() {
     let dwell = ["dwell", "grid.toml", "--speed", "250,280", "--at", "unbalance_mass_kg=0.4"];
     let messages = all_output(&sweep(&folder, &[&dwell[..], &["--starts", "6"]].concat(), None));
     let lines = |name: &str| {
-        let named =
+        let expected_message =
             messages.lines().filter(|line| line.trim_start().starts_with(&format!("{name} ")));
-        named.map(str::to_owned).collect::<Vec<_>>()
+        expected_message.map(str::to_owned).collect::<Vec<_>>()
     };
     let motions = lines("motion");
     assert_eq!(motions.len(), 2, "{messages}");
@@ -245,32 +258,34 @@ fn held_speeds_do_not_depend_on_the_spin() {
 fn dots_of_one_speed_are_whole() {
     let folder = folder();
     let dwell = ["dwell", "grid.toml", "--speed", "280", "--at", "unbalance_mass_kg=0.4"];
-    let done = sweep(&folder, &[&dwell[..], &["--starts", "1"]].concat(), None);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-    let drawn = sweep(&folder, &["plot", "results/grid-dwell.parquet", "-o", "one.svg"], None);
-    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
+    let completed = sweep(&folder, &[&dwell[..], &["--starts", "1"]].concat(), None);
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let plot_output =
+        sweep(&folder, &["plot", "results/grid-dwell.parquet", "-o", "one.svg"], None);
+    assert_eq!(plot_output.status.code(), Some(0), "{}", all_output(&plot_output));
     let picture = fs::read_to_string(folder.path().join("one.svg")).expect("it is there");
     let number = |text: &str| -> f64 {
         let end = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
         text[..end].parse().expect("a number")
     };
-    let path = |text: &str| text.split_once("d=\"M").map(|(_, path)| path.to_owned());
-    let after = |text: &str, mark: char| text.split_once(mark).map(|(_, rest)| number(rest));
+    let curve_path =
+        |text: &str| text.split_once("d=\"M").map(|(_, curve_path)| curve_path.to_owned());
+    let number_after = |text: &str, mark: char| text.split_once(mark).map(|(_, rest)| number(rest));
     // The path of a panel's frame is M LEFT TOP h WIDTH v HEIGHT.
-    let frames = picture.lines().filter(|line| line.contains("<clipPath")).filter_map(path);
+    let frames = picture.lines().filter(|line| line.contains("<clipPath")).filter_map(curve_path);
     let frames: Vec<[f64; 4]> = frames
         .map(|frame| {
-            let sizes = ['h', 'v'].map(|mark| after(&frame, mark).expect("a size"));
-            [number(&frame), after(&frame, ' ').expect("its top"), sizes[0], sizes[1]]
+            let sizes = ['h', 'v'].map(|mark| number_after(&frame, mark).expect("a size"));
+            [number(&frame), number_after(&frame, ' ').expect("its top"), sizes[0], sizes[1]]
         })
         .collect();
     let middle = frames[0][0] + 0.5 * frames[0][2];
     let is_dot = |line: &&str| !line.contains("stroke") && line.ends_with("z\" fill=\"#0072b2\"/>");
-    let dots = picture.lines().filter(is_dot).filter_map(path);
+    let dots = picture.lines().filter(is_dot).filter_map(curve_path);
     // The dots of the legend are below all frames.
     let is_framed = |y: f64| frames.iter().any(|[_, top, _, height]| y > *top && y < top + height);
-    let dots = dots.filter(|path| after(path, ' ').is_some_and(is_framed));
-    let dots: Vec<f64> = dots.map(|path| number(&path)).collect();
+    let dots = dots.filter(|curve_path| number_after(curve_path, ' ').is_some_and(is_framed));
+    let dots: Vec<f64> = dots.map(|curve_path| number(&curve_path)).collect();
     assert!(dots.len() >= frames.len(), "{picture}");
     for x in dots {
         assert!((x - middle).abs() < 1.0, "{x}, not {middle}");

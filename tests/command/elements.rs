@@ -74,39 +74,42 @@ fn columns_of_stops_and_feet_agree_with_the_trace() {
     // With a fixed step map and trace have the same trajectory, and every step is an instant.
     let grid = format!("{GRID}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-4\n");
     fs::write(test_folder.path("g.toml"), grid).expect("the grid is written");
-    let csv_of = |words: &[&str], file: &str| {
-        let done = test_folder.sweep(&[words, &["--out", &format!("{file}.parquet")]].concat());
-        assert!(done.status.success(), "{}", all_output(&done));
+    let export_csv = |words: &[&str], file: &str| {
+        let completed =
+            test_folder.sweep(&[words, &["--out", &format!("{file}.parquet")]].concat());
+        assert!(completed.status.success(), "{}", all_output(&completed));
         let [from, to] = ["parquet", "csv"].map(|ending| format!("{file}.{ending}"));
         assert!(test_folder.sweep(&["export", &from, &to]).status.success());
         fs::read_to_string(test_folder.path(&to)).expect("it was written")
     };
-    let map = csv_of(&["run", "g.toml"], "map");
+    let map = export_csv(&["run", "g.toml"], "map");
     let at = "unbalance_mass_kg=1";
-    let trace = csv_of(&["trace", "g.toml", "--at", at, "--every", "1e-4", "--forces"], "trace");
+    let trace =
+        export_csv(&["trace", "g.toml", "--at", at, "--every", "1e-4", "--forces"], "trace");
     let cell = |name: String| column(&map, &name)[1];
     for model in ["nonlinear", "linear"] {
-        let close = |what: String, traced: f64, found: f64, allowed: f64| {
-            assert!(
-                (traced - found).abs() < allowed,
-                "{what}: {traced} traced, {found} in the map"
-            );
-        };
+        let assert_close =
+            |what: String, traced_value: f64, recorded_value: f64, tolerance: f64| {
+                assert!(
+                    (traced_value - recorded_value).abs() < tolerance,
+                    "{what}: {traced_value} traced, {recorded_value} in the map"
+                );
+            };
         let pushes: Vec<f64> = (1..=3).map(|k| cell(format!("stop_{k}_force_{model}_n"))).collect();
         let loads: Vec<f64> = (1..=4).map(|k| cell(format!("foot_{k}_load_{model}_n"))).collect();
         let contacts: Vec<f64> =
             (1..=3).map(|k| cell(format!("stop_{k}_contact_{model}_s"))).collect();
         for (k, push) in (1..).zip(&pushes) {
             let name = format!("stop_{k}_force_{model}_n");
-            let traced = extreme(&trace, &name, f64::max);
-            close(name, traced, *push, 2e-3 * push.max(1.0));
+            let traced_value = extreme(&trace, &name, f64::max);
+            assert_close(name, traced_value, *push, 2e-3 * push.max(1.0));
         }
         for (k, load) in (1..).zip(&loads) {
             let name = format!("foot_{k}_load_{model}_n");
-            close(name.clone(), extreme(&trace, &name, f64::min), *load, 0.5);
+            assert_close(name.clone(), extreme(&trace, &name, f64::min), *load, 0.5);
         }
         let name = format!("slip_margin_{model}_n");
-        close(name.clone(), extreme(&trace, &name, f64::min), cell(name), 0.5);
+        assert_close(name.clone(), extreme(&trace, &name, f64::min), cell(name), 0.5);
         let extreme_of_all = |values: &[f64], extreme: fn(f64, f64) -> f64| {
             values.iter().copied().reduce(extreme).expect("there are some")
         };
@@ -116,28 +119,38 @@ fn columns_of_stops_and_feet_agree_with_the_trace() {
         let differ = |values: &[f64]| values.windows(2).all(|pair| pair[0] != pair[1]);
         assert!(differ(&pushes) && differ(&loads), "{pushes:?} N, {loads:?} N");
     }
-    let closed = |k: usize| cell(format!("stop_{k}_contact_nonlinear_s"));
-    assert!(closed(1) > 0.01 && closed(2) > 0.01 && closed(1) != closed(2));
+    let contact_s = |k: usize| cell(format!("stop_{k}_contact_nonlinear_s"));
+    assert!(contact_s(1) > 0.01 && contact_s(2) > 0.01 && contact_s(1) != contact_s(2));
 
-    let drawn = |stop: &str| {
+    let plot_output = |stop: &str| {
         let column = format!("{stop}_force_nonlinear_n");
         test_folder.sweep(&["plot", "map.parquet", "-o", "map.svg", "--quantity", &column])
     };
-    assert!(drawn("stop_2").status.success());
+    assert!(plot_output("stop_2").status.success());
     let picture = fs::read_to_string(test_folder.path("map.svg")).expect("it was written");
     assert!(picture.contains("Stop 2 force"));
-    let refused = drawn("stop_4");
-    assert_eq!(refused.status.code(), Some(2), "{}", all_output(&refused));
-    assert!(all_output(&refused).contains("stop_3_force_nonlinear_n"), "{}", all_output(&refused));
-    let met = test_folder.sweep(&["require", "map.parquet", "stop_3_contact_nonlinear_s == 0"]);
-    assert_eq!(met.status.success(), closed(3) == 0.0, "{}", all_output(&met));
+    let refused_output = plot_output("stop_4");
+    assert_eq!(refused_output.status.code(), Some(2), "{}", all_output(&refused_output));
+    assert!(
+        all_output(&refused_output).contains("stop_3_force_nonlinear_n"),
+        "{}",
+        all_output(&refused_output)
+    );
+    let require_output =
+        test_folder.sweep(&["require", "map.parquet", "stop_3_contact_nonlinear_s == 0"]);
+    assert_eq!(
+        require_output.status.success(),
+        contact_s(3) == 0.0,
+        "{}",
+        all_output(&require_output)
+    );
 }
 
 #[test]
 fn metrics_of_missing_stops_and_feet_are_errors() {
     let text = example();
-    let bare = text.split("[[stops]]").next().expect("a first part");
-    let test_folder = test_folder(bare);
+    let machine_without_stops = text.split("[[stops]]").next().expect("a first part");
+    let test_folder = test_folder(machine_without_stops);
     let run = test_folder.sweep(&["run", "g.toml"]);
     assert_eq!(run.status.code(), Some(2), "{}", all_output(&run));
     let messages = all_output(&run);
@@ -149,15 +162,17 @@ fn metrics_of_missing_stops_and_feet_are_errors() {
 #[test]
 fn feet_that_do_not_support_the_cabinet_are_an_error() {
     let text = example();
-    let lifted = text.replace("centre_m = [0.18, -0.1, 0.0] ", "centre_m = [1.8, -0.1, 0.0] ");
+    let machine_with_lifted_foot =
+        text.replace("centre_m = [0.18, -0.1, 0.0] ", "centre_m = [1.8, -0.1, 0.0] ");
     let two = text.rsplitn(3, "[[feet]]").last().expect("a first part");
     let (before, after) = text.split_once("[cabinet]").expect("a cabinet");
     let (_, feet) = after.split_once("[[feet]]").expect("feet");
     let without = format!("{before}[[feet]]{feet}");
-    let uneven = text.replace("foot_m = [-0.07, -0.45, 0.26]", "foot_m = [-0.07, -0.43, 0.26]");
+    let machine_on_uneven_feet =
+        text.replace("foot_m = [-0.07, -0.45, 0.26]", "foot_m = [-0.07, -0.43, 0.26]");
     for (machine, expected) in [
-        (lifted.as_str(), "lifts at rest"),
-        (uneven.as_str(), "foot 3 stands 0.02 m higher than foot 1"),
+        (machine_with_lifted_foot.as_str(), "lifts at rest"),
+        (machine_on_uneven_feet.as_str(), "foot 3 stands 0.02 m higher than foot 1"),
         (two, "the cabinet stands on 2 feet"),
         (without.as_str(), "feet without a cabinet"),
     ] {
@@ -171,11 +186,11 @@ fn feet_that_do_not_support_the_cabinet_are_an_error() {
 #[test]
 fn machines_with_friction_and_stops_have_responses_and_growth() {
     let test_folder = test_folder(&example());
-    let done =
+    let completed =
         test_folder.sweep(&["stability", "g.toml", "--speed", "240:260:10", "--out", "s.parquet"]);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-    let met = test_folder.sweep(&["require", "s.parquet", "count(status == 'ok') > 0"]);
-    assert_eq!(met.status.code(), Some(0), "{}", all_output(&met));
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let require_output = test_folder.sweep(&["require", "s.parquet", "count(status == 'ok') > 0"]);
+    assert_eq!(require_output.status.code(), Some(0), "{}", all_output(&require_output));
 }
 
 #[test]
@@ -187,9 +202,10 @@ fn friction_has_the_speed_amplitude_of_the_linear_motion() {
     let summary = all_output(&run);
     assert!(summary.contains("greatest  friction_speed_off 1"), "{summary}");
     assert!(!summary.contains(" above 2"), "{summary}");
-    let held = ["friction_speed_off >= 1", "friction_speed_off < 1.01"];
-    let met = test_folder.sweep(&[&["require", "map.parquet"][..], &held].concat());
-    assert_eq!(met.status.code(), Some(0), "{}", all_output(&met));
+    let conditions = ["friction_speed_off >= 1", "friction_speed_off < 1.01"];
+    let require_output =
+        test_folder.sweep(&[&["require", "map.parquet"][..], &conditions].concat());
+    assert_eq!(require_output.status.code(), Some(0), "{}", all_output(&require_output));
 
     // Traces and modes have the same linear model as the row.
     let at = ["--at", "unbalance_mass_kg=1"];
@@ -206,19 +222,23 @@ fn friction_has_the_speed_amplitude_of_the_linear_motion() {
     let csv = fs::read_to_string(test_folder.path("map.csv")).expect("it was written");
     for damper in 1..=2 {
         let row = column(&csv, &format!("damper_{damper}_speed_linear_m_per_s"))[1];
-        let taken = &modes["friction_speeds_m_per_s"][format!("damper_{damper}")];
-        let off = taken.as_f64().expect("a speed") / row;
-        assert!((off - 1.0).abs() < 0.01, "{taken} for {row} m/s");
+        let linear_speed = &modes["friction_speeds_m_per_s"][format!("damper_{damper}")];
+        let speed_ratio = linear_speed.as_f64().expect("a speed") / row;
+        assert!((speed_ratio - 1.0).abs() < 0.01, "{linear_speed} for {row} m/s");
     }
 
-    let slow = ["--set", "friction_linear_speed_m_per_s=0.02"];
-    let given =
-        test_folder.sweep(&[&["run", "g.toml", "--out", "given.parquet"], &slow[..]].concat());
-    assert!(all_output(&given).contains("; 1 row above 2\n"), "{}", all_output(&given));
-    let shown = test_folder.sweep(&["show", "given.parquet"]);
-    let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
-    assert!(shown.contains("greatest  friction_speed_off "), "{shown}");
-    assert!(shown.contains("; 1 row above 2\n"), "{shown}");
+    let slow_speed = ["--set", "friction_linear_speed_m_per_s=0.02"];
+    let given_output = test_folder
+        .sweep(&[&["run", "g.toml", "--out", "given.parquet"], &slow_speed[..]].concat());
+    assert!(
+        all_output(&given_output).contains("; 1 row above 2\n"),
+        "{}",
+        all_output(&given_output)
+    );
+    let shown_text = test_folder.sweep(&["show", "given.parquet"]);
+    let shown_text = String::from_utf8_lossy(&shown_text.stdout).into_owned();
+    assert!(shown_text.contains("greatest  friction_speed_off "), "{shown_text}");
+    assert!(shown_text.contains("; 1 row above 2\n"), "{shown_text}");
 }
 
 /// With a given speed amplitude friction may stop the linear model, but not the machine.
@@ -228,8 +248,17 @@ fn a_given_speed_of_friction_is_compared_with_both_motions() {
     let test_folder =
         TestFolder::new(&grid.replace("metrics = [", "metrics = [\"damper_speed\", "));
     fs::write(test_folder.path("machine.toml"), example()).expect("the folder can be written");
-    let given = ["friction_n=80", "friction_linear_speed_m_per_s=0.02"];
-    let words = ["run", "g.toml", "--out", "m.parquet", "--set", given[0], "--set", given[1]];
+    let friction_settings = ["friction_n=80", "friction_linear_speed_m_per_s=0.02"];
+    let words = [
+        "run",
+        "g.toml",
+        "--out",
+        "m.parquet",
+        "--set",
+        friction_settings[0],
+        "--set",
+        friction_settings[1],
+    ];
     let run = test_folder.sweep(&words);
     assert!(all_output(&run).contains("; 1 row above 2\n"), "{}", all_output(&run));
     let export = test_folder.sweep(&["export", "m.parquet", "m.csv"]);
@@ -237,25 +266,28 @@ fn a_given_speed_of_friction_is_compared_with_both_motions() {
     let csv = fs::read_to_string(test_folder.path("m.csv")).expect("it was written");
     let factor = |model: &str| {
         let speed = |damper| column(&csv, &format!("damper_{damper}_speed_{model}_m_per_s"))[1];
-        let off = |damper| speed(damper).max(4.0 * 0.01 / std::f64::consts::PI) / 0.02;
-        [off(1), off(2)].map(|off| off.max(1.0 / off)).into_iter().fold(1.0, f64::max)
+        let speed_ratio = |damper| speed(damper).max(4.0 * 0.01 / std::f64::consts::PI) / 0.02;
+        [speed_ratio(1), speed_ratio(2)]
+            .map(|speed_ratio| speed_ratio.max(1.0 / speed_ratio))
+            .into_iter()
+            .fold(1.0, f64::max)
     };
     assert!(factor("linear") < 2.0 && factor("nonlinear") > 5.0, "{csv}");
-    let off = column(&csv, "friction_speed_off")[1];
-    assert!((off / factor("nonlinear") - 1.0).abs() < 1e-12, "{off}");
+    let speed_ratio = column(&csv, "friction_speed_off")[1];
+    assert!((speed_ratio / factor("nonlinear") - 1.0).abs() < 1e-12, "{speed_ratio}");
 }
 
 #[test]
 fn live_pages_exist_for_a_single_axis_and_for_designs() {
     let test_folder = test_folder(&example());
-    let page = |words: &[&str], map: &str| {
+    let write_page = |words: &[&str], map: &str| {
         let run = test_folder.sweep(&[words, &["--out", map]].concat());
         assert!(run.status.success(), "{}", all_output(&run));
         let plot = test_folder.sweep(&["plot", map, "-o", "page.html", "--live"]);
         assert!(plot.status.success(), "{}", all_output(&plot));
         fs::read_to_string(test_folder.path("page.html")).expect("it was written")
     };
-    let one_axis = page(&["run", "g.toml"], "map.parquet");
+    let one_axis = write_page(&["run", "g.toml"], "map.parquet");
     for part in ["\"kind\":\"chart\"", "\"setup\":", "with friction of 50 N", "a cabinet of 35 kg"]
     {
         assert!(one_axis.contains(part), "{part}");
@@ -274,7 +306,7 @@ fn live_pages_exist_for_a_single_axis_and_for_designs() {
     fs::write(test_folder.path("l.toml"), list).expect("the grid is written");
     // The figure of a design over one parameter has curves.
     for (grid, kind) in [("d.toml", "chart"), ("l.toml", "design")] {
-        let text = page(&["run", grid], &format!("{grid}.parquet"));
+        let text = write_page(&["run", grid], &format!("{grid}.parquet"));
         assert!(text.contains(&format!("\"kind\":\"{kind}\"")), "{grid}");
         let slider =
             "\"axis\":true,\"description\":\"friction of all dampers (F_f)\",\"from\":20.0";
@@ -289,28 +321,34 @@ fn responses_with_friction_are_followed_through_folds() {
     let test_folder = test_folder(&example());
     let (head, _) = GRID.split_once("[[axis]]").expect("an axis");
     let (_, run) = head.split_once("[spin]").expect("a spin");
-    let set = "machine = \"machine.toml\"\nset = { unbalance_mass_kg = 1.0, friction_n = 60.0 }";
-    fs::write(test_folder.path("g.toml"), format!("{set}\n[spin]{run}"))
+    let set_options =
+        "machine = \"machine.toml\"\nset = { unbalance_mass_kg = 1.0, friction_n = 60.0 }";
+    fs::write(test_folder.path("g.toml"), format!("{set_options}\n[spin]{run}"))
         .expect("the grid is written");
     // The first machine has the defaults. The second has friction that stops the linear model, so
     // that the linear response is no estimate of the nonlinear one.
-    for given in [&[][..], &["--set", "friction_linear_speed_m_per_s=0.01"]] {
-        let asked = ["stability", "g.toml", "--speed", "255:256:1", "--fresh", "--out"];
-        let found = test_folder.sweep(&[&asked[..], &["s.parquet"], given].concat());
-        assert!(found.status.success(), "{}", all_output(&found));
-        let shown = ["show", "s.parquet", "--columns", "branch,nonlinear_tub_yaw,on_curve"];
-        let shown = String::from_utf8(test_folder.sweep(&shown).stdout).expect("it is text");
+    for set_words in [&[][..], &["--set", "friction_linear_speed_m_per_s=0.01"]] {
+        let options = ["stability", "g.toml", "--speed", "255:256:1", "--fresh", "--out"];
+        let stability_output =
+            test_folder.sweep(&[&options[..], &["s.parquet"], set_words].concat());
+        assert!(stability_output.status.success(), "{}", all_output(&stability_output));
+        let shown_text = ["show", "s.parquet", "--columns", "branch,nonlinear_tub_yaw,on_curve"];
+        let shown_text =
+            String::from_utf8(test_folder.sweep(&shown_text).stdout).expect("it is text");
         let number = |word: &str| word.parse::<f64>().expect("a number");
-        let rows = shown.lines().skip(1).map(|row| row.split_whitespace().collect::<Vec<_>>());
-        let (on_curve, beside): (Vec<_>, Vec<_>) = rows.partition(|row| row[2] == "true");
-        let branches: Vec<f64> = on_curve.iter().map(|row| number(row[0])).collect();
-        assert_eq!(branches, [0.0, 1.0, 2.0, 0.0, 1.0, 2.0], "{given:?}");
+        let rows = shown_text.lines().skip(1).map(|row| row.split_whitespace().collect::<Vec<_>>());
+        let (curve_rows, off_curve_rows): (Vec<_>, Vec<_>) = rows.partition(|row| row[2] == "true");
+        let branches: Vec<f64> = curve_rows.iter().map(|row| number(row[0])).collect();
+        assert_eq!(branches, [0.0, 1.0, 2.0, 0.0, 1.0, 2.0], "{set_words:?}");
         let has_yaw_within = |rows: &[Vec<&str>], range: std::ops::Range<f64>| {
             rows.iter().all(|row| range.contains(&number(row[1])))
         };
-        assert!(has_yaw_within(&on_curve, 0.045..0.055), "{given:?}: {on_curve:?}");
+        assert!(has_yaw_within(&curve_rows, 0.045..0.055), "{set_words:?}: {curve_rows:?}");
         // A search from the linear response finds other responses, with half of this yaw.
-        assert!(has_yaw_within(&beside, 0.02..0.03) && !beside.is_empty(), "{given:?}: {beside:?}");
+        assert!(
+            has_yaw_within(&off_curve_rows, 0.02..0.03) && !off_curve_rows.is_empty(),
+            "{set_words:?}: {off_curve_rows:?}"
+        );
     }
 }
 
@@ -324,24 +362,25 @@ fn growth_with_friction_vanishes_at_the_boundary() {
                 [[axis]]\nparameter = \"friction_n\"\nvalues = [20.0, 40.0]\n";
     let test_folder = TestFolder::new(&format!("{point}{axes}"));
     fs::write(test_folder.path("point.toml"), point).expect("the grid is written");
-    let asked = ["--quantity", "growth_per_s", "--tolerance", "1", "--out", "b.parquet"];
-    let traced = test_folder.sweep(&[&["boundary", "g.toml"], &asked[..]].concat());
-    assert!(traced.status.success(), "{}", all_output(&traced));
-    let shown = |file: &str, columns: &str| {
-        let shown = test_folder.sweep(&["show", file, "--columns", columns]);
-        let text = String::from_utf8(shown.stdout).expect("it is text");
+    let options = ["--quantity", "growth_per_s", "--tolerance", "1", "--out", "b.parquet"];
+    let boundary_output = test_folder.sweep(&[&["boundary", "g.toml"], &options[..]].concat());
+    assert!(boundary_output.status.success(), "{}", all_output(&boundary_output));
+    let show_row = |file: &str, columns: &str| {
+        let show_output = test_folder.sweep(&["show", file, "--columns", columns]);
+        let text = String::from_utf8(show_output.stdout).expect("it is text");
         let row = text.lines().nth(1).expect("a row").split_whitespace();
         row.map(|word| word.parse::<f64>().expect("a number")).collect::<Vec<_>>()
     };
-    let bracket = shown("b.parquet", "friction_low_n,friction_high_n");
+    let bracket = show_row("b.parquet", "friction_low_n,friction_high_n");
     assert!(bracket[1] - bracket[0] <= 1.0, "{bracket:?}");
     for (friction_n, grows) in [(bracket[0], true), (bracket[1], false)] {
-        let set = ["unbalance_mass_kg=0.35".to_owned(), format!("friction_n={friction_n}")];
-        let set = ["--set", &set[0], "--set", &set[1], "--fresh", "--out", "s.parquet"];
-        let found =
-            test_folder.sweep(&[&["stability", "point.toml", "--speed", "250"], &set[..]].concat());
-        assert!(found.status.success(), "{}", all_output(&found));
-        let growth_per_s = shown("s.parquet", "growth_per_s")[0];
+        let set_options = ["unbalance_mass_kg=0.35".to_owned(), format!("friction_n={friction_n}")];
+        let set_options =
+            ["--set", &set_options[0], "--set", &set_options[1], "--fresh", "--out", "s.parquet"];
+        let stability_output = test_folder
+            .sweep(&[&["stability", "point.toml", "--speed", "250"], &set_options[..]].concat());
+        assert!(stability_output.status.success(), "{}", all_output(&stability_output));
+        let growth_per_s = show_row("s.parquet", "growth_per_s")[0];
         assert_eq!(growth_per_s > 0.0, grows, "{growth_per_s} /s at {friction_n} N");
     }
 }

@@ -35,21 +35,24 @@ fn explain(grid: &str, arguments: &[&str]) -> Output {
     command.output().expect("it starts")
 }
 
-fn within(value: &Value, expected: f64, tolerance: f64) {
+fn assert_within(value: &Value, expected: f64, tolerance: f64) {
     let value = value.as_f64().expect("a number");
     assert!((value - expected).abs() <= tolerance, "{value}, not {expected} +- {tolerance}");
 }
 
 #[test]
 fn tongues_of_the_papers_machine_agree_with_the_reference() {
-    let more = ["--json", "--ratio-limit", "2.5", "--name", "own", "--progress", "none"];
-    let arguments = [&["--at", "damping_n_s_per_m=140"], &more[..]].concat();
-    let done = explain(&grid(PAPER, AXES), &arguments);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
-    assert_eq!(found["swept"]["reliable"], true);
-    assert_eq!((&found["swept"]["ratio_limit"], &found["name"]), (&2.5.into(), &"own".into()));
-    let tongues = found["tongues"].as_array().expect("a list");
+    let options = ["--json", "--ratio-limit", "2.5", "--name", "own", "--progress", "none"];
+    let arguments = [&["--at", "damping_n_s_per_m=140"], &options[..]].concat();
+    let completed = explain(&grid(PAPER, AXES), &arguments);
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let explanation: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    assert_eq!(explanation["swept"]["reliable"], true);
+    assert_eq!(
+        (&explanation["swept"]["ratio_limit"], &explanation["name"]),
+        (&2.5.into(), &"own".into())
+    );
+    let tongues = explanation["tongues"].as_array().expect("a list");
     assert_eq!(tongues.len(), 2);
     // The edges, growth and critical damping are those of an independent program, in
     // stability.json.
@@ -59,9 +62,9 @@ fn tongues_of_the_papers_machine_agree_with_the_reference() {
     ];
     for (tongue, (kind, [from, to], damping, modes)) in tongues.iter().zip(reference) {
         assert_eq!(tongue["kind"], kind);
-        within(&tongue["from_rpm"], from, 0.1);
-        within(&tongue["to_rpm"], to, 0.1);
-        within(&tongue["closed_by"]["damping_n_s_per_m"], damping, 1.0);
+        assert_within(&tongue["from_rpm"], from, 0.1);
+        assert_within(&tongue["to_rpm"], to, 0.1);
+        assert_within(&tongue["closed_by"]["damping_n_s_per_m"], damping, 1.0);
         assert_eq!(tongue["resonance"]["modes"], serde_json::json!(modes));
         let sum = tongue["resonance"]["sum_cpm"].as_f64().expect("a number");
         let speed = tongue["growth_at_rpm"].as_f64().expect("a number");
@@ -69,14 +72,14 @@ fn tongues_of_the_papers_machine_agree_with_the_reference() {
         // The run passes once at 7 rpm/s, because the window ends where the spin turns.
         let crossed = tongue["crossed"].as_array().expect("a list");
         assert_eq!(crossed.len(), 1);
-        within(&crossed[0]["from_s"], from / 7.0, 0.02);
-        within(&crossed[0]["to_s"], to / 7.0, 0.02);
+        assert_within(&crossed[0]["from_s"], from / 7.0, 0.02);
+        assert_within(&crossed[0]["to_s"], to / 7.0, 0.02);
         let e_folds = crossed[0]["e_folds"].as_f64().expect("a number");
         let amplification = crossed[0]["amplification"].as_f64().expect("a number");
         // Disturbances grow at least as the exponents say, but for the effect of the ramp.
         assert!(e_folds > 0.3 && amplification > 0.9 * e_folds.exp(), "{e_folds} {amplification}");
     }
-    assert!(found["entered_on_responses"]["ratio_max"].as_f64().expect("a number") < 2.0);
+    assert!(explanation["entered_on_responses"]["ratio_max"].as_f64().expect("a number") < 2.0);
 }
 
 /// The response of this corner of Fig. 12 folds back. It has one wide unstable band, and its
@@ -85,14 +88,14 @@ fn tongues_of_the_papers_machine_agree_with_the_reference() {
 fn a_folded_response_has_one_band_with_a_jump() {
     let axes = AXES.replace("[0.4]", "[1.0]").replace("100.0, 140.0", "60.0, 140.0");
     let at = ["--at", "damping_n_s_per_m=60", "--speed", "200:350:1", "--json"];
-    let done = explain(&grid(PAPER, &axes), &at);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
-    within(&found["speeds"]["jumps_rpm"][0], 243.06, 0.1);
-    let tongues = found["tongues"].as_array().expect("a list");
+    let completed = explain(&grid(PAPER, &axes), &at);
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let explanation: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    assert_within(&explanation["speeds"]["jumps_rpm"][0], 243.06, 0.1);
+    let tongues = explanation["tongues"].as_array().expect("a list");
     assert_eq!(tongues.len(), 2, "{tongues:?}");
-    within(&tongues[0]["to_rpm"], 243.06, 0.1);
-    within(&tongues[1]["from_rpm"], 243.06, 0.1);
+    assert_within(&tongues[0]["to_rpm"], 243.06, 0.1);
+    assert_within(&tongues[1]["from_rpm"], 243.06, 0.1);
     for tongue in tongues {
         let closed = &tongue["closed_by"];
         // With the critical damping nothing grows near the band.
@@ -101,27 +104,28 @@ fn a_folded_response_has_one_band_with_a_jump() {
             let [from, to] = [0, 1].map(|end| closed["nothing_grows_from_to_rpm"][end].to_string());
             let speed = format!("{from}:{to}:1");
             let at = format!("damping_n_s_per_m={damping}");
-            let done = explain(&grid(PAPER, &axes), &["--at", &at, "--speed", &speed, "--json"]);
-            let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
-            assert_eq!(found["tongues"], serde_json::json!([]), "{damping}");
+            let completed =
+                explain(&grid(PAPER, &axes), &["--at", &at, "--speed", &speed, "--json"]);
+            let explanation: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+            assert_eq!(explanation["tongues"], serde_json::json!([]), "{damping}");
         }
     }
 }
 
 #[test]
 fn a_stable_machine_has_no_tongues() {
-    let done =
+    let completed =
         explain(&grid(PAPER, AXES), &["--at", "damping_n_s_per_m=300", "--speed", "200:340:5"]);
-    let messages = all_output(&done);
-    assert_eq!(done.status.code(), Some(0), "{messages}");
+    let messages = all_output(&completed);
+    assert_eq!(completed.status.code(), Some(0), "{messages}");
     for line in ["stable at every speed from 200 to 340 rpm", "and the models agree"] {
         assert!(messages.contains(line), "{line}\n{messages}");
     }
     // The summary has the limits, because the vertical motion is less with friction.
     let strict = format!("{}[reliability]\nratio_min = 0.98\n", grid(PAPER, AXES));
     let at = ["--at", "damping_n_s_per_m=300", "--at", "friction_n=60", "--speed", "300:340:20"];
-    let done = explain(&strict, &at);
-    let messages = all_output(&done);
+    let completed = explain(&strict, &at);
+    let messages = all_output(&completed);
     for line in ["0.98 and 2", "over-estimates: a ratio is below 0.98"] {
         assert!(messages.contains(line), "{line}\n{messages}");
     }
@@ -131,16 +135,25 @@ fn a_stable_machine_has_no_tongues() {
 #[test]
 fn contradictory_options_are_errors_before_the_computation() {
     let paper = grid(PAPER, AXES);
-    let still = "profile = \"table\"\ntime_s = [0]\nspeed_rpm = [0]";
+    let standing_spin = "profile = \"table\"\ntime_s = [0]\nspeed_rpm = [0]";
     for (grid, arguments, expected) in [
         (&paper, &[][..], "damping_n_s_per_m"),
         (&paper, &["--at", "damping_n_s_per_m=140", "--at", "tub_mas_kg=1"][..], "tub_mass_kg"),
         (&paper, &["--at", "damping_n_s_per_m=140", "--speed", "0:9:1"][..], "above 0 rpm"),
-        (&grid(still, ""), &[][..], "a profile that exceeds"),
+        (&grid(standing_spin, ""), &[][..], "a profile that exceeds"),
     ] {
-        let refused = explain(grid, arguments);
-        assert_eq!(refused.status.code(), Some(2), "{arguments:?}: {}", all_output(&refused));
-        assert!(all_output(&refused).contains(expected), "{expected}: {}", all_output(&refused));
+        let refused_output = explain(grid, arguments);
+        assert_eq!(
+            refused_output.status.code(),
+            Some(2),
+            "{arguments:?}: {}",
+            all_output(&refused_output)
+        );
+        assert!(
+            all_output(&refused_output).contains(expected),
+            "{expected}: {}",
+            all_output(&refused_output)
+        );
     }
 }
 
@@ -151,19 +164,19 @@ fn a_spin_may_reverse_and_pause() {
     let cycle = "profile = \"table\"\ntime_s = [0, 20, 22, 30, 50]\n\
                  speed_rpm = [0, 280, 0, 0, -280]";
     let arguments = ["--at", "damping_n_s_per_m=140", "--speed", "225:275:5", "--json"];
-    let of = |more: &[&str]| {
-        let done = explain(&grid(cycle, AXES), &[&arguments, more].concat());
-        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-        serde_json::from_slice::<Value>(&done.stdout).expect("it is JSON")
+    let explain_json = |options: &[&str]| {
+        let completed = explain(&grid(cycle, AXES), &[&arguments, options].concat());
+        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+        serde_json::from_slice::<Value>(&completed.stdout).expect("it is JSON")
     };
-    let found = of(&[]);
-    assert_eq!(found["speeds"], found["speeds_backwards"]);
-    let tongues = found["tongues"].as_array().expect("a list");
+    let explanation = explain_json(&[]);
+    assert_eq!(explanation["speeds"], explanation["speeds_backwards"]);
+    let tongues = explanation["tongues"].as_array().expect("a list");
     let [forward, backward] = &tongues[..] else { panic!("{tongues:?}") };
     assert_eq!([&forward["is_backward"], &backward["is_backward"]], [false, true]);
     for name in ["from_rpm", "to_rpm", "growth_per_s"] {
         let forward = forward[name].as_f64().expect("a number");
-        within(&backward[name], forward, 1e-3);
+        assert_within(&backward[name], forward, 1e-3);
     }
     let at_s = |tongue: &Value, crossing: usize| {
         tongue["crossed"][crossing]["from_s"].as_f64().expect("a number")
@@ -172,10 +185,10 @@ fn a_spin_may_reverse_and_pause() {
     let crossed = [forward, backward].map(|tongue| tongue["crossed"].as_array().map(Vec::len));
     assert_eq!(crossed, [Some(2), Some(1)]);
     assert!(at_s(forward, 0) < 20.0 && at_s(forward, 1) < 22.0 && at_s(backward, 0) > 45.0);
-    let entry = backward["crossed"][0]["departure_j"][0].as_f64().expect("a number");
-    assert!(entry > 0.0);
-    let uneven = of(&["--at", "spring_1_stiffness_n_per_m=10000"]);
-    let edges: Vec<f64> = uneven["tongues"]
+    let departure_j = backward["crossed"][0]["departure_j"][0].as_f64().expect("a number");
+    assert!(departure_j > 0.0);
+    let asymmetric_machine = explain_json(&["--at", "spring_1_stiffness_n_per_m=10000"]);
+    let edges: Vec<f64> = asymmetric_machine["tongues"]
         .as_array()
         .expect("a list")
         .iter()
@@ -188,20 +201,20 @@ fn a_spin_may_reverse_and_pause() {
 /// passes the end of the last tongue late, where disturbances grow little.
 #[test]
 fn tongues_that_are_passed_late_are_not_causes() {
-    let of = |mass: &str, speed: &str| {
+    let explain_json = |mass: &str, speed: &str| {
         let axes = AXES.replace("[0.4]", &format!("[{mass}]"));
         let arguments = ["--at", "damping_n_s_per_m=100", "--speed", speed, "--json"];
-        let done = explain(&grid(PAPER, &axes), &arguments);
-        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-        serde_json::from_slice::<Value>(&done.stdout).expect("it is JSON")
+        let completed = explain(&grid(PAPER, &axes), &arguments);
+        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+        serde_json::from_slice::<Value>(&completed.stdout).expect("it is JSON")
     };
-    let whole = of("0.4", "225:325:5");
-    let deviation = &whole["deviation"];
+    let whole_range = explain_json("0.4", "225:325:5");
+    let deviation = &whole_range["deviation"];
     assert_eq!(deviation["tongues_are_the_cause"], true, "{deviation}");
     assert!(deviation["ratio_without_tongues"].as_f64().expect("a number") < 2.0, "{deviation}");
     // The only unstable one of these speeds is the end of the last tongue.
-    let part = of("0.4", "315:325:1");
-    let deviation = &part["deviation"];
+    let last_speeds = explain_json("0.4", "315:325:1");
+    let deviation = &last_speeds["deviation"];
     assert_eq!(deviation["tongues_are_the_cause"], false, "{deviation}");
     assert!(deviation["e_folds_of_tongues"].as_f64().expect("a number") < 0.2, "{deviation}");
     assert!(deviation["ratio_without_tongues"].as_f64().expect("a number") > 2.0, "{deviation}");

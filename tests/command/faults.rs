@@ -33,13 +33,13 @@ impl TestFolder {
     /// Returns the arguments of a run. It has a single thread, so that the order of system calls is
     /// always the same. Paths are absolute, because messages shall show them so.
     fn words(&self) -> Vec<String> {
-        let [grid, output] = [self.path("g.toml"), self.output()].map(text);
+        let [grid, output] = [self.path("g.toml"), self.output()].map(read_text);
         ["run", &grid, "--threads", "1", "--out", &output].map(str::to_owned).to_vec()
     }
 
     /// Returns a run as a command line of a shell.
-    fn line(&self) -> String {
-        [vec![text(sweep_binary())], self.words()].concat().join("' '")
+    fn shell_line(&self) -> String {
+        [vec![read_text(sweep_binary())], self.words()].concat().join("' '")
     }
 
     fn run(&self) -> Command {
@@ -65,40 +65,45 @@ impl TestFolder {
     /// Asserts that the output is complete or missing, and that one more run completes it.
     fn assert_recovers(&self, after: &str) {
         if let Ok(bytes) = fs::read(self.output()) {
-            assert!(bytes == undisturbed(), "{after}: a broken result stands at the output");
+            assert!(bytes == undisturbed_output(), "{after}: a broken result stands at the output");
         }
-        let again = output(&mut self.run());
-        assert_eq!(again.status.code(), Some(0), "{after}: {}", all_output(&again));
+        let repeated_output = output(&mut self.run());
+        assert_eq!(
+            repeated_output.status.code(),
+            Some(0),
+            "{after}: {}",
+            all_output(&repeated_output)
+        );
         let bytes = fs::read(self.output()).expect("a finished run has an output");
-        assert!(bytes == undisturbed(), "{after}: other bytes than the undisturbed run's");
+        assert!(bytes == undisturbed_output(), "{after}: other bytes than the undisturbed run's");
         assert!(!self.partial().exists(), "{after}: the folder stays behind");
     }
 }
 
-fn text(path: PathBuf) -> String {
+fn read_text(path: PathBuf) -> String {
     path.into_os_string().into_string().expect("temporary folders are UTF-8")
 }
 
 /// Returns the bytes of an undisturbed run.
-fn undisturbed() -> &'static [u8] {
+fn undisturbed_output() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
         let test_folder = fresh_folder();
-        let done = output(&mut test_folder.run());
-        assert!(done.status.success(), "{}", all_output(&done));
+        let completed = output(&mut test_folder.run());
+        assert!(completed.status.success(), "{}", all_output(&completed));
         fs::read(test_folder.output()).expect("a finished run has an output")
     })
 }
 
 fn output(command: &mut Command) -> Output {
-    command.output().unwrap_or_else(|error| missing(command, &error))
+    command.output().unwrap_or_else(|error| fail_to_start(command, &error))
 }
 
 fn spawn(command: &mut Command) -> Child {
-    command.stderr(Stdio::piped()).spawn().unwrap_or_else(|error| missing(command, &error))
+    command.stderr(Stdio::piped()).spawn().unwrap_or_else(|error| fail_to_start(command, &error))
 }
 
-fn missing<T>(command: &Command, error: &std::io::Error) -> T {
+fn fail_to_start<T>(command: &Command, error: &std::io::Error) -> T {
     panic!(
         "{:?} does not start ({error}): scripts/tools/install_test_tools.sh installs what \
          tests need",
@@ -132,13 +137,13 @@ fn delayed_run(test_folder: &TestFolder, seconds: u32) -> Child {
 
 #[test]
 fn killed_at_thirty_random_instants() {
-    undisturbed();
+    undisturbed_output();
     let test_folder = fresh_folder();
     let started = Instant::now();
     assert!(output(&mut test_folder.run()).status.success());
-    let whole = started.elapsed();
+    let run_duration = started.elapsed();
     let mut random = 0x2545_f491_4f6c_dd1d_u64;
-    let mut killed = 0;
+    let mut killed_count = 0;
     for round in 0.. {
         let test_folder = fresh_folder();
         // Each run continues the one that was killed before.
@@ -147,17 +152,17 @@ fn killed_at_thirty_random_instants() {
             random ^= random >> 7;
             random ^= random << 17;
             let mut run = spawn(&mut test_folder.run());
-            std::thread::sleep(whole.mul_f64((random % 1000) as f64 / 1000.0));
+            std::thread::sleep(run_duration.mul_f64((random % 1000) as f64 / 1000.0));
             // The run may have ended before.
             let _ = run.kill();
             let status = run.wait().expect("a child can be waited for");
-            killed += u32::from(status.code().is_none());
+            killed_count += u32::from(status.code().is_none());
         }
         test_folder.assert_recovers(&format!("round {round}"));
-        if killed >= 30 {
+        if killed_count >= 30 {
             return;
         }
-        assert!(round < 40, "only {killed} of {} kills met a run", 6 * round);
+        assert!(round < 40, "only {killed_count} of {} kills met a run", 6 * round);
     }
 }
 
@@ -167,10 +172,10 @@ fn at_every_call(calls: &str, what: &str, check: impl Fn(&Output, u32)) {
         let test_folder = fresh_folder();
         let tamper = format!("inject={calls}:{what}:when={when}");
         let run = output(&mut test_folder.run_with_faults(&[&format!("trace={calls}"), &tamper]));
-        let untouched = run.status.success();
+        let has_no_fault = run.status.success();
         check(&run, when);
         test_folder.assert_recovers(&format!("{what} at {calls} {when}"));
-        if untouched {
+        if has_no_fault {
             assert!(when > 3, "a run has more than {when} of {calls}");
             return;
         }
@@ -242,7 +247,7 @@ fn disk_full_at_every_write() {
 #[ignore = "needs unshare and mount; .ci/run runs it"]
 fn a_full_disk_is_an_error_and_the_run_continues_on_a_larger_one() {
     let test_folder = fresh_folder();
-    let run = test_folder.line();
+    let run = test_folder.shell_line();
     let out = test_folder.output();
     // The file system exists in a namespace of its own, from which only the result is copied.
     let script = format!(
@@ -257,7 +262,7 @@ fn a_full_disk_is_an_error_and_the_run_continues_on_a_larger_one() {
         run.replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet"),
         run.replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet"),
     );
-    let mut full = 0;
+    let mut full_disk_count = 0;
     for pages in [1, 2, 3, 4, 5, 6, 8, 10, 12, 16] {
         let disk = test_folder.path("disk");
         let result = test_folder.path("result");
@@ -268,34 +273,34 @@ fn a_full_disk_is_an_error_and_the_run_continues_on_a_larger_one() {
         let run = output(&mut command);
         let messages = all_output(&run);
         assert!(run.status.success(), "{pages} pages: {messages}");
-        let first = String::from_utf8_lossy(&run.stdout).into_owned();
-        if first.contains("first 1") {
-            full += 1;
+        let first_run = String::from_utf8_lossy(&run.stdout).into_owned();
+        if first_run.contains("first 1") {
+            full_disk_count += 1;
             assert!(
                 messages.contains("the disk is full: free some space"),
                 "{pages} pages: {messages}"
             );
         } else {
-            assert!(first.contains("first 0"), "{pages} pages: {first} {messages}");
+            assert!(first_run.contains("first 0"), "{pages} pages: {first_run} {messages}");
         }
         assert!(
-            fs::read(&result).expect("a result") == undisturbed(),
+            fs::read(&result).expect("a result") == undisturbed_output(),
             "{pages} pages: other bytes"
         );
     }
-    assert!(full >= 4, "only {full} disks were too small");
+    assert!(full_disk_count >= 4, "only {full_disk_count} disks were too small");
 }
 
 #[test]
 fn a_file_size_limit_is_an_error_and_the_run_continues_without_it() {
-    let mut limited = 0;
+    let mut limited_count = 0;
     // The limits, in blocks of 512 bytes, are too small for the plan, a chunk and the result.
     for blocks in [1, 2, 4, 8, 16, 24, 32] {
         let test_folder = fresh_folder();
         let limit = format!("ulimit -f {blocks}; exec \"$@\"");
         let run = output(&mut test_folder.run_under(&["sh", "-c", &limit, "sh"]));
         if !run.status.success() {
-            limited += 1;
+            limited_count += 1;
             assert_error_message(&run, blocks);
             assert!(
                 all_output(&run).contains("a file-size limit was hit"),
@@ -305,7 +310,7 @@ fn a_file_size_limit_is_an_error_and_the_run_continues_without_it() {
         }
         test_folder.assert_recovers(&format!("{blocks} blocks"));
     }
-    assert!(limited >= 3, "only {limited} limits were met");
+    assert!(limited_count >= 3, "only {limited_count} limits were met");
 }
 
 #[test]
@@ -321,7 +326,7 @@ fn a_flipped_bit_and_a_truncation_are_errors_and_repaired() {
         let run = output(&mut test_folder.run());
         assert!(run.status.success(), "{}", all_output(&run));
         assert!(all_output(&run).contains("part-00000002.parquet.damaged"), "{}", all_output(&run));
-        assert!(fs::read(test_folder.output()).expect("a result") == undisturbed());
+        assert!(fs::read(test_folder.output()).expect("a result") == undisturbed_output());
     };
     break_part(&|bytes| {
         let middle = bytes.len() / 2;
@@ -351,7 +356,7 @@ fn a_system_without_random_numbers_is_an_error() {
 #[ignore = "needs strace; .ci/run runs it"]
 fn a_second_run_names_the_process_of_the_first_unless_it_was_killed() {
     let test_folder = fresh_folder();
-    let mut first = delayed_run(&test_folder, 3);
+    let mut first_run = delayed_run(&test_folder, 3);
     let process = holder_with_chunk(&test_folder);
     let second = output(&mut test_folder.run());
     assert_eq!(second.status.code(), Some(75), "{}", all_output(&second));
@@ -360,13 +365,13 @@ fn a_second_run_names_the_process_of_the_first_unless_it_was_killed() {
         "{}",
         all_output(&second)
     );
-    assert!(first.wait().expect("a child can be waited for").success());
+    assert!(first_run.wait().expect("a child can be waited for").success());
     test_folder.assert_recovers("two runners");
 
     let test_folder = fresh_folder();
-    let mut first = delayed_run(&test_folder, 30);
+    let mut first_run = delayed_run(&test_folder, 30);
     signal("KILL", holder_with_chunk(&test_folder));
-    first.wait().expect("a child can be waited for");
+    first_run.wait().expect("a child can be waited for");
     test_folder.assert_recovers("a killed runner");
 }
 
@@ -390,11 +395,11 @@ fn a_second_signal_ends_the_run_at_once() {
     // Nobody reads the messages of the run, and the pipe is full, so that the run blocks on its
     // message about the first signal.
     const PIPE_BYTES: usize = 1 << 16;
-    let (_reader, mut full) = std::io::pipe().expect("a pipe can be made");
-    full.write_all(&[b' '; PIPE_BYTES]).expect("a pipe takes as much");
+    let (_reader, mut full_pipe) = std::io::pipe().expect("a pipe can be made");
+    full_pipe.write_all(&[b' '; PIPE_BYTES]).expect("a pipe takes as much");
     let test_folder = fresh_folder();
     test_folder.write_slow_list();
-    let mut run = test_folder.run().stderr(full).spawn().expect("the command starts");
+    let mut run = test_folder.run().stderr(full_pipe).spawn().expect("the command starts");
     let begun = Instant::now();
     while !test_folder.partial().join("plan.json").exists() {
         assert!(begun.elapsed() < Duration::from_secs(60), "no run starts");
@@ -417,9 +422,9 @@ fn a_second_signal_ends_the_run_at_once() {
 #[test]
 fn a_folder_that_cannot_be_written_is_an_error() {
     let test_folder = fresh_folder();
-    let blocked = test_folder.path("g.toml/sub/x.parquet");
+    let blocked_path = test_folder.path("g.toml/sub/x.parquet");
     let words = test_folder.words();
-    let run = output(test_folder.under(&[]).args(&words[..words.len() - 1]).arg(&blocked));
+    let run = output(test_folder.under(&[]).args(&words[..words.len() - 1]).arg(&blocked_path));
     assert_eq!(run.status.code(), Some(1), "{}", all_output(&run));
     assert!(all_output(&run).contains("or give another path"), "{}", all_output(&run));
     assert!(Path::new(&test_folder.path("g.toml")).is_file());
@@ -432,7 +437,7 @@ fn a_read_only_folder_is_an_error_and_the_run_continues_once_it_is_writable() {
     let disk = test_folder.path("disk");
     fs::create_dir(&disk).expect("a mount point");
     let out = test_folder.output();
-    let run = test_folder.line().replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet");
+    let run = test_folder.shell_line().replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet");
     // A read-only mount stops root too, which permissions do not.
     let script = format!(
         "set -eu\n\
@@ -452,7 +457,7 @@ fn a_read_only_folder_is_an_error_and_the_run_continues_once_it_is_writable() {
     assert!(run.status.success(), "{}", all_output(&run));
     assert!(String::from_utf8_lossy(&run.stdout).contains("read-only 1"), "{}", all_output(&run));
     assert!(all_output(&run).contains("give this user the right to it"), "{}", all_output(&run));
-    assert!(fs::read(test_folder.path("result")).expect("a result") == undisturbed());
+    assert!(fs::read(test_folder.path("result")).expect("a result") == undisturbed_output());
 }
 
 #[test]
@@ -467,8 +472,9 @@ fn failed_points_are_rows_and_fail_the_run_only_on_request() {
     assert_eq!(run.status.code(), Some(0), "{}", all_output(&run));
     assert!(all_output(&run).contains("failed  40 no_equilibrium"), "{}", all_output(&run));
     // Every command with rows says why.
-    let held = test_folder.sweep(&["stability", "g.toml", "--speed", "100", "--out", "p.parquet"]);
-    for summary in [&run, &held].map(all_output) {
+    let stability_output =
+        test_folder.sweep(&["stability", "g.toml", "--speed", "100", "--out", "p.parquet"]);
+    for summary in [&run, &stability_output].map(all_output) {
         assert!(summary.contains("    reason  no_equilibrium at "), "{summary}");
         assert!(summary.contains("the machine has no stable static equilibrium"), "{summary}");
     }
@@ -478,7 +484,7 @@ fn failed_points_are_rows_and_fail_the_run_only_on_request() {
         assert_eq!(run.status.code(), Some(3), "{fresh:?}: {}", all_output(&run));
     }
     // A shard reports its own rows, and the merge all rows.
-    let sharded =
+    let run_sharded =
         |words: &[&str]| test_folder.sweep(&[words, &["g.toml", "--out", "s.parquet"]].concat());
     for (words, code) in [
         (&["run", "--shard", "1/2", "--fail-on-error"][..], 3),
@@ -486,20 +492,38 @@ fn failed_points_are_rows_and_fail_the_run_only_on_request() {
         (&["merge", "--fail-on-error"], 3),
         (&["merge"], 0),
     ] {
-        let done = sharded(words);
-        assert_eq!(done.status.code(), Some(code), "{words:?}: {}", all_output(&done));
-        assert!(all_output(&done).contains(" no_equilibrium"), "{words:?}: {}", all_output(&done));
+        let completed = run_sharded(words);
+        assert_eq!(completed.status.code(), Some(code), "{words:?}: {}", all_output(&completed));
+        assert!(
+            all_output(&completed).contains(" no_equilibrium"),
+            "{words:?}: {}",
+            all_output(&completed)
+        );
     }
-    let last = test_folder.sweep(&["run", "g.toml", "--shard", "12/12", "--out", "t.parquet"]);
-    let idle = "with 10 chunks of 8 points, the run leaves 2 of the 12 shards without work";
-    assert!(all_output(&last).contains(idle), "{}", all_output(&last));
-    let checked = test_folder.sweep(&["check", "g.toml"]);
-    assert!(all_output(&checked).contains(" no_equilibrium, of "), "{}", all_output(&checked));
-    assert!(all_output(&checked).contains("takes       about "), "{}", all_output(&checked));
-    let checked = test_folder.sweep(&["check", "g.toml", "--at", "spring_stiffness_n_per_m=1"]);
-    assert_eq!(checked.status.code(), Some(1), "{}", all_output(&checked));
-    let unknown = "takes       not known: none of the ";
-    assert!(all_output(&checked).contains(unknown), "{}", all_output(&checked));
-    let whole = output(fresh_folder().run().arg("--fail-on-error"));
-    assert_eq!(whole.status.code(), Some(0), "{}", all_output(&whole));
+    let idle_shard_output =
+        test_folder.sweep(&["run", "g.toml", "--shard", "12/12", "--out", "t.parquet"]);
+    let idle_message = "with 10 chunks of 8 points, the run leaves 2 of the 12 shards without work";
+    assert!(
+        all_output(&idle_shard_output).contains(idle_message),
+        "{}",
+        all_output(&idle_shard_output)
+    );
+    let check_output = test_folder.sweep(&["check", "g.toml"]);
+    assert!(
+        all_output(&check_output).contains(" no_equilibrium, of "),
+        "{}",
+        all_output(&check_output)
+    );
+    assert!(
+        all_output(&check_output).contains("takes       about "),
+        "{}",
+        all_output(&check_output)
+    );
+    let check_output =
+        test_folder.sweep(&["check", "g.toml", "--at", "spring_stiffness_n_per_m=1"]);
+    assert_eq!(check_output.status.code(), Some(1), "{}", all_output(&check_output));
+    let unknown_duration = "takes       not known: none of the ";
+    assert!(all_output(&check_output).contains(unknown_duration), "{}", all_output(&check_output));
+    let complete_output = output(fresh_folder().run().arg("--fail-on-error"));
+    assert_eq!(complete_output.status.code(), Some(0), "{}", all_output(&complete_output));
 }

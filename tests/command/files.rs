@@ -26,8 +26,8 @@ fn fresh_folder() -> TestFolder {
     static MAP: OnceLock<Vec<u8>> = OnceLock::new();
     let test_folder = TestFolder::new(&grid(5, 8));
     let map = MAP.get_or_init(|| {
-        let done = test_folder.sweep(&["run", "g.toml", "--out", "map.parquet"]);
-        assert!(done.status.success(), "{}", all_output(&done));
+        let completed = test_folder.sweep(&["run", "g.toml", "--out", "map.parquet"]);
+        assert!(completed.status.success(), "{}", all_output(&completed));
         fs::remove_file(test_folder.path("map.run.json")).expect("there is a sidecar");
         fs::read(test_folder.path("map.parquet")).expect("there is a map")
     });
@@ -36,7 +36,7 @@ fn fresh_folder() -> TestFolder {
 }
 
 /// Runs a standard program of Linux.
-fn run(program: &str, words: &[&Path]) {
+fn run_program(program: &str, words: &[&Path]) {
     let status = Command::new(program).args(words).status().expect("the program starts");
     assert!(status.success(), "{program} {words:?}");
 }
@@ -58,10 +58,10 @@ fn no_command_overwrites_files_of_other_kinds() {
     for writer in WRITERS {
         let test_folder = fresh_folder();
         let ending = if writer[0] == "plot" { ".svg" } else { ".parquet" };
-        let named = |name: &str| format!("{name}{ending}");
+        let with_ending = |name: &str| format!("{name}{ending}");
         let [fifo, folder, link, dangling, hard, mine] =
-            ["fifo", "folder", "link", "dangling", "hard", "mine"].map(named);
-        run("mkfifo", &[&test_folder.path(&fifo)]);
+            ["fifo", "folder", "link", "dangling", "hard", "mine"].map(with_ending);
+        run_program("mkfifo", &[&test_folder.path(&fifo)]);
         fs::create_dir(test_folder.path(&folder)).expect("a folder is made");
         fs::write(test_folder.path("thesis.tex"), "mine").expect("a file is written");
         std::os::unix::fs::symlink("thesis.tex", test_folder.path(&link)).expect("a link is made");
@@ -121,8 +121,9 @@ fn errors_about_files_of_another_kind_name_the_kind() {
         let run = test_folder.sweep(&words);
         let messages = all_output(&run);
         assert_eq!(run.status.code(), Some(2), "{words:?}: {messages}");
-        let one = messages.contains("1 mistake,") && messages.contains(&format!("this is {kind}"));
-        assert!(one && messages.contains(help), "{words:?}: {messages}");
+        let has_one_mistake =
+            messages.contains("1 mistake,") && messages.contains(&format!("this is {kind}"));
+        assert!(has_one_mistake && messages.contains(help), "{words:?}: {messages}");
     }
     assert!(test_folder.sweep(&["check", "gm.toml"]).status.success());
 }
@@ -175,20 +176,21 @@ fn every_command_overwrites_its_own_files_and_removes_those_of_killed_processes(
             let mut bytes = Vec::new();
             for round in 0..2 {
                 // A process that is killed during a write leaves such a file.
-                let left = test_folder.path("new").join(sweep_files::atomic::temporary_name());
-                fs::write(&left, "half").expect("a leftover is written");
+                let leftover_path =
+                    test_folder.path("new").join(sweep_files::atomic::temporary_name());
+                fs::write(&leftover_path, "half").expect("a leftover is written");
                 // A run has a folder for such files, which it deletes.
                 let is_run = writer[0] == "run";
                 if is_run {
-                    fs::remove_file(&left).expect("the leftover goes");
+                    fs::remove_file(&leftover_path).expect("the leftover goes");
                 }
-                let done = test_folder.sweep(&[*writer, &[&path]].concat());
+                let completed = test_folder.sweep(&[*writer, &[&path]].concat());
                 assert!(
-                    done.status.success(),
+                    completed.status.success(),
                     "{writer:?} {output} round {round}: {}",
-                    all_output(&done)
+                    all_output(&completed)
                 );
-                assert!(!left.exists(), "{writer:?} {output}");
+                assert!(!leftover_path.exists(), "{writer:?} {output}");
                 let written = fs::read(test_folder.path(&path)).expect("there is an output");
                 assert!(round == 0 || written == bytes, "{writer:?} {output}: other bytes");
                 bytes = written;
@@ -206,11 +208,11 @@ fn a_file_size_limit_does_not_damage_the_old_file() {
         [(WRITERS[3], "x.parquet"), (WRITERS[4], "x.parquet"), (WRITERS[6], "x.svg")]
     {
         let test_folder = fresh_folder();
-        let limited = |output: &str| {
+        let run_limited = |output: &str| {
             let limit = ["sh", "-c", "ulimit -f 1; exec \"$@\"", "sh"];
             test_folder.under(&limit).args(writer).arg(output).output().expect("sh starts")
         };
-        let run = limited(output);
+        let run = run_limited(output);
         assert_eq!(run.status.code(), Some(1), "{writer:?}: {}", all_output(&run));
         assert!(
             all_output(&run).contains("a file-size limit was hit"),
@@ -219,10 +221,10 @@ fn a_file_size_limit_does_not_damage_the_old_file() {
         );
         assert_eq!(test_folder.names(), ["g.toml", "map.parquet"], "{writer:?}");
 
-        let whole = test_folder.sweep(&[writer, &[output]].concat());
-        assert!(whole.status.success(), "{}", all_output(&whole));
+        let whole_output = test_folder.sweep(&[writer, &[output]].concat());
+        assert!(whole_output.status.success(), "{}", all_output(&whole_output));
         let before = fs::read(test_folder.path(output)).expect("there is an output");
-        assert_eq!(limited(output).status.code(), Some(1));
+        assert_eq!(run_limited(output).status.code(), Some(1));
         assert!(
             fs::read(test_folder.path(output)).expect("there is an output") == before,
             "{writer:?}"
@@ -263,30 +265,30 @@ fn kept_traces_are_the_trajectories_of_their_rows() {
 }
 
 /// Calls a function while a bit of a file is flipped.
-fn with_flipped_bit<T>(path: &Path, at: u64, bit: u8, read: impl FnOnce() -> T) -> T {
+fn with_flipped_bit<T>(path: &Path, byte_offset: u64, bit: u8, read: impl FnOnce() -> T) -> T {
     let flip = || {
         let mut file =
             fs::OpenOptions::new().read(true).write(true).open(path).expect("the file opens");
         let mut byte = [0];
-        file.seek(std::io::SeekFrom::Start(at)).expect("a place in the file");
+        file.seek(std::io::SeekFrom::Start(byte_offset)).expect("a place in the file");
         file.read_exact(&mut byte).expect("a byte is read");
-        file.seek(std::io::SeekFrom::Start(at)).expect("a place in the file");
+        file.seek(std::io::SeekFrom::Start(byte_offset)).expect("a place in the file");
         file.write_all(&[byte[0] ^ (1 << bit)]).expect("a byte is written");
     };
     flip();
-    let seen = read();
+    let result = read();
     flip();
-    seen
+    result
 }
 
 #[test]
 fn every_command_detects_a_flipped_bit_in_its_input() {
     let test_folder = fresh_folder();
     let map = test_folder.path("map.parquet");
-    let whole = fs::read(&map).expect("the map");
+    let map_bytes = fs::read(&map).expect("the map");
     for writer in [WRITERS[3], WRITERS[4], WRITERS[5]] {
-        let done = test_folder.sweep(&[writer, &[&format!("{}.parquet", writer[0])]].concat());
-        assert!(done.status.success(), "{}", all_output(&done));
+        let completed = test_folder.sweep(&[writer, &[&format!("{}.parquet", writer[0])]].concat());
+        assert!(completed.status.success(), "{}", all_output(&completed));
     }
     let readers: [&[&str]; 9] = [
         &["run", "g.toml", "--out", "map.parquet"],
@@ -308,18 +310,18 @@ fn every_command_detects_a_flipped_bit_in_its_input() {
             random ^= random << 13;
             random ^= random >> 7;
             random ^= random << 17;
-            let at = random % length;
+            let byte_offset = random % length;
             let bit = (random >> 40) as u8 % 8;
-            let seen = with_flipped_bit(&path, at, bit, || test_folder.sweep(reader));
-            let text = all_output(&seen);
+            let result = with_flipped_bit(&path, byte_offset, bit, || test_folder.sweep(reader));
+            let text = all_output(&result);
             assert!(
-                matches!(seen.status.code(), Some(1 | 2)),
-                "{reader:?}, bit {bit} of {at}: {text}"
+                matches!(result.status.code(), Some(1 | 2)),
+                "{reader:?}, bit {bit} of {byte_offset}: {text}"
             );
             assert!(text.contains("parquet") && !text.contains("panicked"), "{reader:?}: {text}");
         }
     }
-    assert!(fs::read(&map).expect("the map") == whole);
+    assert!(fs::read(&map).expect("the map") == map_bytes);
     for picture in ["map.svg", "trace.html", "modes.png"] {
         assert!(!test_folder.path(picture).exists(), "{picture}");
     }
@@ -346,7 +348,7 @@ fn status_reports_a_file_that_is_no_result() {
 #[test]
 fn special_files_are_not_read() {
     let test_folder = fresh_folder();
-    run("mkfifo", &[&test_folder.path("fifo.parquet")]);
+    run_program("mkfifo", &[&test_folder.path("fifo.parquet")]);
     for words in
         [&["show", "fifo.parquet"] as &[&str], &["plot", "fifo.parquet"], &["show", "/dev/zero"]]
     {

@@ -20,8 +20,8 @@ fn folder_with_measurement() -> TestFolder {
     let test_folder = TestFolder::new(GRID);
     let at = ["--at", "damping_n_s_per_m=180", "--at", "unbalance_mass_kg=0.35"];
     let words = [&["trace", "g.toml", "--rates", "-o", "t.parquet"], &at[..]].concat();
-    let traced = test_folder.sweep(&words);
-    assert!(traced.status.success(), "{}", all_output(&traced));
+    let trace_output = test_folder.sweep(&words);
+    assert!(trace_output.status.success(), "{}", all_output(&trace_output));
     let file = ParquetFile::open(&test_folder.path("t.parquet")).expect("it is there");
     let all = (0..file.schema().fields().len()).collect();
     let batches = file.batches(all).expect("it is read");
@@ -61,10 +61,10 @@ fn a_fit_writes_a_machine_file_that_runs() {
     let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m,unbalance_mass_kg"];
     let more = ["--json", "--draws", "4", "--out", "bench.toml", "--curves", "fit.parquet"];
     let more = [&more[..], &["--set", "unbalance_mass_kg=0.3", "--name", "monday"]].concat();
-    let done = test_folder.sweep(&[&words[..], &more].concat());
-    assert!(done.status.success(), "{}", all_output(&done));
-    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
-    for (parameter, (name, truth)) in found["parameters"]
+    let completed = test_folder.sweep(&[&words[..], &more].concat());
+    assert!(completed.status.success(), "{}", all_output(&completed));
+    let estimate: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    for (parameter, (name, truth)) in estimate["parameters"]
         .as_array()
         .expect("a list")
         .iter()
@@ -76,26 +76,28 @@ fn a_fit_writes_a_machine_file_that_runs() {
         assert!(from < truth && truth < to, "{parameter}");
         assert!((number(&parameter["value"]) / truth - 1.0).abs() < 0.01, "{parameter}");
     }
-    let offset = found["offset"]["tub_front_y_m_per_s2"].as_f64().expect("a number");
-    assert!((offset - 9.81).abs() < 0.05, "{found}");
+    let offset = estimate["offset"]["tub_front_y_m_per_s2"].as_f64().expect("a number");
+    assert!((offset - 9.81).abs() < 0.05, "{estimate}");
     for key in ["correlations", "noise", "shift_s", "residual_rms", "explained", "verdict"] {
-        assert!(!found[key].is_null(), "{key}: {found}");
+        assert!(!estimate[key].is_null(), "{key}: {estimate}");
     }
     // The machine file has the fitted numbers to the last bit.
     let grid = format!("machine = \"bench.toml\"\n{GRID}");
     fs::write(test_folder.path("own.toml"), grid).expect("it is written");
-    let listed = test_folder.sweep(&["parameters", "own.toml", "--json"]);
-    let listed: Value = serde_json::from_slice(&listed.stdout).expect("it is JSON");
-    let mass = listed.as_array().expect("a list").iter();
+    let parameter_output = test_folder.sweep(&["parameters", "own.toml", "--json"]);
+    let parameter_output: Value =
+        serde_json::from_slice(&parameter_output.stdout).expect("it is JSON");
+    let mass = parameter_output.as_array().expect("a list").iter();
     let mut mass = mass.filter(|parameter| parameter["name"] == "unbalance_mass_kg");
     let value = mass.next().map(|parameter| &parameter["value"]);
-    assert_eq!(value, Some(&found["parameters"][1]["value"]));
+    assert_eq!(value, Some(&estimate["parameters"][1]["value"]));
     assert!(!test_folder.path("bench.toml.partial").exists());
     for (view, picture) in
         [("time", "t.svg"), ("passages", "p.html"), ("profiles", "c.svg"), ("spectrum", "s.svg")]
     {
-        let drawn = test_folder.sweep(&["plot", "fit.parquet", "--view", view, "-o", picture]);
-        assert!(drawn.status.success(), "{view}: {}", all_output(&drawn));
+        let plot_output =
+            test_folder.sweep(&["plot", "fit.parquet", "--view", view, "-o", picture]);
+        assert!(plot_output.status.success(), "{view}: {}", all_output(&plot_output));
     }
     // The figure shows the fitted numbers, not the initial ones.
     let picture = fs::read_to_string(test_folder.path("t.svg")).expect("it is text");
@@ -103,11 +105,15 @@ fn a_fit_writes_a_machine_file_that_runs() {
     assert!(picture.contains("monday"));
     assert!(!picture.contains("unbalance_mass_kg = 0.3"));
     // A fit overwrites a fit, and no other file.
-    let again = test_folder.sweep(&[&words[..], &more].concat());
-    assert!(again.status.success(), "{}", all_output(&again));
-    let over = test_folder.sweep(&[&words[..], &["--out", "own.toml"]].concat());
-    assert_eq!(over.status.code(), Some(2), "{}", all_output(&over));
-    assert!(all_output(&over).contains("own.toml cannot be an output"), "{}", all_output(&over));
+    let repeated_output = test_folder.sweep(&[&words[..], &more].concat());
+    assert!(repeated_output.status.success(), "{}", all_output(&repeated_output));
+    let overwrite_output = test_folder.sweep(&[&words[..], &["--out", "own.toml"]].concat());
+    assert_eq!(overwrite_output.status.code(), Some(2), "{}", all_output(&overwrite_output));
+    assert!(
+        all_output(&overwrite_output).contains("own.toml cannot be an output"),
+        "{}",
+        all_output(&overwrite_output)
+    );
 }
 
 #[test]
@@ -115,24 +121,24 @@ fn a_number_that_differs_from_damper_to_damper_needs_a_range() {
     let test_folder = folder_with_measurement();
     let apart = ["--set", "damper_1_friction_n=20", "--set", "damper_2_friction_n=30"];
     let words = ["fit", "g.toml", "run.csv", "--free", "friction_n"];
-    let refused = test_folder.sweep(&[&words[..], &apart].concat());
-    assert_eq!(refused.status.code(), Some(2), "{}", all_output(&refused));
+    let refused_output = test_folder.sweep(&[&words[..], &apart].concat());
+    assert_eq!(refused_output.status.code(), Some(2), "{}", all_output(&refused_output));
     assert!(
-        all_output(&refused).contains("`friction_n` differs from part to part"),
+        all_output(&refused_output).contains("`friction_n` differs from part to part"),
         "{}",
-        all_output(&refused)
+        all_output(&refused_output)
     );
 }
 
 #[test]
 fn a_fit_uses_the_given_point() {
     let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m", "--draws", "0"];
-    let done = folder_with_measurement()
+    let completed = folder_with_measurement()
         .sweep(&[&words[..], &["--json", "--at", "unbalance_mass_kg=0.35"]].concat());
-    assert!(done.status.success(), "{}", all_output(&done));
-    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
-    let value = found["parameters"][0]["value"].as_f64().expect("a number");
-    assert!((value / 180.0 - 1.0).abs() < 0.01, "{found}");
+    assert!(completed.status.success(), "{}", all_output(&completed));
+    let estimate: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    let value = estimate["parameters"][0]["value"].as_f64().expect("a number");
+    assert!((value / 180.0 - 1.0).abs() < 0.01, "{estimate}");
 }
 
 #[test]
@@ -140,12 +146,12 @@ fn mistakes_in_a_measurement_are_reported_with_their_place() {
     let test_folder = TestFolder::new(GRID);
     fs::write(test_folder.path("run.csv"), "time_s,tub_front_x_m\n0,1\n1,2\n0.5,3\n")
         .expect("written");
-    let done = test_folder.sweep(&["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m"]);
-    assert_eq!(done.status.code(), Some(2));
+    let completed = test_folder.sweep(&["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m"]);
+    assert_eq!(completed.status.code(), Some(2));
     for said_of in
         ["run.csv:1:8", "does not name a channel", "run.csv:4:1", "time goes back: 0.5 s after 1 s"]
     {
-        assert!(all_output(&done).contains(said_of), "{said_of}: {}", all_output(&done));
+        assert!(all_output(&completed).contains(said_of), "{said_of}: {}", all_output(&completed));
     }
     let gone = test_folder.sweep(&["fit", "g.toml", "gone.csv", "--free", "damping_n_s_per_m"]);
     assert_eq!(gone.status.code(), Some(2), "{}", all_output(&gone));
@@ -166,22 +172,22 @@ fn times_since_1970_are_relative_to_the_first_row() {
     fs::write(test_folder.path("epoch.csv"), &shifted).expect("it is written");
     let at = ["--draws", "0", "--json", "--at", "unbalance_mass_kg=0.35"];
     let words = ["fit", "g.toml", "epoch.csv", "--free", "damping_n_s_per_m"];
-    let done = test_folder.sweep(&[&words[..], &at].concat());
-    assert!(done.status.success(), "{}", all_output(&done));
-    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
-    let value = found["parameters"][0]["value"].as_f64().expect("a number");
-    assert!((value / 180.0 - 1.0).abs() < 0.01, "{found}");
-    let note = found["notes"][0].as_str().expect("a note");
+    let completed = test_folder.sweep(&[&words[..], &at].concat());
+    assert!(completed.status.success(), "{}", all_output(&completed));
+    let estimate: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    let value = estimate["parameters"][0]["value"].as_f64().expect("a number");
+    assert!((value / 180.0 - 1.0).abs() < 0.01, "{estimate}");
+    let note = estimate["notes"][0].as_str().expect("a note");
     assert!(note.contains("its clock reads 1700000000 s at the first row"), "{note}");
 
     fs::write(test_folder.path("stray.csv"), text + "100000,9.81,0,0\n").expect("it is written");
     let words = ["fit", "g.toml", "stray.csv", "--free", "damping_n_s_per_m"];
-    let done = test_folder.sweep(&words);
-    assert_eq!(done.status.code(), Some(2), "{}", all_output(&done));
+    let completed = test_folder.sweep(&words);
+    assert_eq!(completed.status.code(), Some(2), "{}", all_output(&completed));
     assert!(
-        all_output(&done).contains("time jumps by 99997 s, from 3 to 100000 s"),
+        all_output(&completed).contains("time jumps by 99997 s, from 3 to 100000 s"),
         "{}",
-        all_output(&done)
+        all_output(&completed)
     );
 }
 
@@ -189,13 +195,17 @@ fn times_since_1970_are_relative_to_the_first_row() {
 #[test]
 fn a_fifo_is_an_error() {
     let test_folder = TestFolder::new(GRID);
-    let made = std::process::Command::new("mkfifo").arg(test_folder.path("fifo")).status();
-    assert!(made.expect("mkfifo starts").success());
+    let fifo_status = std::process::Command::new("mkfifo").arg(test_folder.path("fifo")).status();
+    assert!(fifo_status.expect("mkfifo starts").success());
     fs::write(test_folder.path("machine.toml"), "machine = \"fifo\"\n").expect("it is written");
     for words in [&["fit", "g.toml", "fifo"][..], &["check", "fifo"], &["check", "machine.toml"]] {
-        let done =
+        let completed =
             test_folder.under(&["timeout", "20"]).args(words).output().expect("timeout starts");
-        assert_eq!(done.status.code(), Some(2), "{words:?}: {}", all_output(&done));
-        assert!(all_output(&done).contains("it is a FIFO"), "{words:?}: {}", all_output(&done));
+        assert_eq!(completed.status.code(), Some(2), "{words:?}: {}", all_output(&completed));
+        assert!(
+            all_output(&completed).contains("it is a FIFO"),
+            "{words:?}: {}",
+            all_output(&completed)
+        );
     }
 }

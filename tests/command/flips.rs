@@ -19,7 +19,7 @@ const COMMANDS: [&[&str]; 5] = [
 
 /// The exit code of a command, its output, and the files that it wrote.
 #[derive(PartialEq)]
-struct Left {
+struct RemainingFiles {
     output: Output,
     result: Vec<u8>,
     picture: Option<Vec<u8>>,
@@ -35,14 +35,14 @@ pub(super) fn finished() -> TestFolder {
 
 impl TestFolder {
     /// Runs a command with these bytes as the result.
-    fn run_on(&self, bytes: &[u8], words: &[&str]) -> Left {
+    fn run_on(&self, bytes: &[u8], words: &[&str]) -> RemainingFiles {
         fs::write(self.path("x.parquet"), bytes).expect("the result is written");
         // The figure exists only if a command drew it before.
         let _ = fs::remove_file(self.path("x.svg"));
         let output = self.sweep(words);
         let read = |path: &Path| fs::read(path).ok();
         let result = read(&self.path("x.parquet")).expect("nobody removes a result");
-        Left { output, result, picture: read(&self.path("x.svg")) }
+        RemainingFiles { output, result, picture: read(&self.path("x.svg")) }
     }
 }
 
@@ -57,35 +57,47 @@ fn random(seed: u64) -> u64 {
 #[test]
 fn a_flipped_bit_of_a_result_is_an_error_or_without_effect() {
     let test_folder = finished();
-    let whole = fs::read(test_folder.path("x.parquet")).expect("there is a result");
-    let mut undisturbed = Vec::new();
+    let whole_file = fs::read(test_folder.path("x.parquet")).expect("there is a result");
+    let mut undisturbed_output = Vec::new();
     for words in COMMANDS {
-        let left = test_folder.run_on(&whole, words);
-        assert!(left.output.status.success(), "{words:?}: {}", all_output(&left.output));
-        undisturbed.push(left);
+        let remaining_files = test_folder.run_on(&whole_file, words);
+        assert!(
+            remaining_files.output.status.success(),
+            "{words:?}: {}",
+            all_output(&remaining_files.output)
+        );
+        undisturbed_output.push(remaining_files);
     }
-    let mut refused = [0_u64; COMMANDS.len()];
+    let mut refused_output = [0_u64; COMMANDS.len()];
     for flip in 0..FLIPS {
-        let bit = random(flip + 1) % (8 * whole.len() as u64);
-        let mut bytes = whole.clone();
+        let bit = random(flip + 1) % (8 * whole_file.len() as u64);
+        let mut bytes = whole_file.clone();
         bytes[(bit / 8) as usize] ^= 1 << (bit % 8);
         for (k, words) in COMMANDS.iter().enumerate() {
-            let left = test_folder.run_on(&bytes, words);
-            let messages = all_output(&left.output);
-            if left.output.status.success() {
-                let same = Left { result: whole.clone(), ..left };
-                assert!(same == undisturbed[k], "bit {bit}: {words:?} took it: {messages}");
+            let remaining_files = test_folder.run_on(&bytes, words);
+            let messages = all_output(&remaining_files.output);
+            if remaining_files.output.status.success() {
+                let expected_files =
+                    RemainingFiles { result: whole_file.clone(), ..remaining_files };
+                assert!(
+                    expected_files == undisturbed_output[k],
+                    "bit {bit}: {words:?} took it: {messages}"
+                );
                 continue;
             }
-            refused[k] += 1;
+            refused_output[k] += 1;
             let is_named = messages.contains("error: ") && messages.contains("x.parquet");
             assert!(is_named && !messages.contains("panicked"), "bit {bit}, {words:?}: {messages}");
-            assert_eq!(left.output.status.code(), Some(2), "bit {bit}, {words:?}: {messages}");
+            assert_eq!(
+                remaining_files.output.status.code(),
+                Some(2),
+                "bit {bit}, {words:?}: {messages}"
+            );
             assert!(
-                left.result == bytes && left.picture.is_none(),
+                remaining_files.result == bytes && remaining_files.picture.is_none(),
                 "bit {bit}, {words:?}: {messages}"
             );
         }
     }
-    println!("{FLIPS} flips; refused by run, show, plot, status, merge: {refused:?}");
+    println!("{FLIPS} flips; refused by run, show, plot, status, merge: {refused_output:?}");
 }

@@ -42,13 +42,13 @@ const TABULATED: [&str; 3] = ["map by rk4", "map by additive", "map by rk4-mass-
 const MODES_TOLERANCE: f64 = 1e-9;
 
 /// Returns the path of the record.
-fn record() -> PathBuf {
+fn record_path() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/goldens.json")
 }
 
 /// Runs a command in `test_folder` and returns what it prints.
 fn sweep(test_folder: &TempDir, words: &[&str]) -> Vec<u8> {
-    let done = Command::new(sweep_binary())
+    let completed = Command::new(sweep_binary())
         .args(words)
         .current_dir(test_folder.path())
         .env_remove("SLURM_ARRAY_TASK_ID")
@@ -56,13 +56,17 @@ fn sweep(test_folder: &TempDir, words: &[&str]) -> Vec<u8> {
         .env_remove("JOB_COMPLETION_INDEX")
         .output()
         .expect("the command starts");
-    assert!(done.status.success(), "{words:?}: {}", String::from_utf8_lossy(&done.stderr));
-    done.stdout
+    assert!(
+        completed.status.success(),
+        "{words:?}: {}",
+        String::from_utf8_lossy(&completed.stderr)
+    );
+    completed.stdout
 }
 
 /// Returns the path of the readable record.
 fn readable_record() -> PathBuf {
-    record().with_extension("csv")
+    record_path().with_extension("csv")
 }
 
 /// The file that a command has written for a grid, in its folder.
@@ -95,7 +99,7 @@ fn readable(goldens: &BTreeMap<&'static str, Golden>) -> String {
         let csv = csv.expect("the export is there");
         let lines = csv.lines().filter(|line| !line.starts_with('#'));
         for (k, line) in lines.enumerate() {
-            let cells: Vec<String> = line.split(',').map(rounded).collect();
+            let cells: Vec<String> = line.split(',').map(round_cell).collect();
             match k {
                 0 if table.is_empty() => table = format!("golden,{}\n", cells.join(",")),
                 0 => {}
@@ -107,7 +111,7 @@ fn readable(goldens: &BTreeMap<&'static str, Golden>) -> String {
 }
 
 /// Returns a number with six significant digits, and any other text as it is.
-fn rounded(cell: &str) -> String {
+fn round_cell(cell: &str) -> String {
     match cell.parse::<f64>() {
         Ok(number) if number.fract() != 0.0 => format!("{number:.5e}"),
         _ => cell.to_owned(),
@@ -127,10 +131,13 @@ fn changes(before: &str, now: &str) -> String {
     let mut text = String::new();
     for (column, name) in header.iter().enumerate() {
         let mut greatest = 0.0_f64;
-        for (row, was) in now.iter().zip(&before).skip(1) {
-            let share = match (row[column].parse::<f64>(), was[column].parse::<f64>()) {
-                (Ok(is), Ok(was)) => (is - was).abs() / was.abs().max(f64::MIN_POSITIVE),
-                _ => f64::from(u8::from(row[column] != was[column])),
+        for (row, recorded_value) in now.iter().zip(&before).skip(1) {
+            let share = match (row[column].parse::<f64>(), recorded_value[column].parse::<f64>()) {
+                (Ok(computed_value), Ok(recorded_value)) => {
+                    (computed_value - recorded_value).abs()
+                        / recorded_value.abs().max(f64::MIN_POSITIVE)
+                }
+                _ => f64::from(u8::from(row[column] != recorded_value[column])),
             };
             greatest = greatest.max(share);
         }
@@ -180,8 +187,8 @@ fn goldens() -> BTreeMap<&'static str, Golden> {
 fn modes() -> Vec<f64> {
     let test_folder = tempfile::tempdir().expect("a temporary folder");
     let printed = sweep(&test_folder, &["modes", "--speed", "0:400:200", "--json"]);
-    let found: Value = serde_json::from_slice(&printed).expect("the modes are JSON");
-    let modes = found["modes"].as_array().expect("a list of modes");
+    let modes_json: Value = serde_json::from_slice(&printed).expect("the modes are JSON");
+    let modes = modes_json["modes"].as_array().expect("a list of modes");
     modes
         .iter()
         .flat_map(|mode| mode["at_speed"].as_array().expect("a list of speeds"))
@@ -206,20 +213,28 @@ fn bytes_change_only_with_the_version_of_the_numerics() {
         "modes": modes,
     });
     let update = std::env::var_os("UPDATE_GOLDENS").is_some();
-    let text = fs::read_to_string(record()).unwrap_or_default();
-    let was: Value = serde_json::from_str(&text).unwrap_or_default();
-    let same_build = was["version"] == now["version"] && was["numerics"] == now["numerics"];
+    let text = fs::read_to_string(record_path()).unwrap_or_default();
+    let recorded_value: Value = serde_json::from_str(&text).unwrap_or_default();
+    let same_build = recorded_value["version"] == now["version"]
+        && recorded_value["numerics"] == now["numerics"];
 
     let mut changed: Vec<&str> = hashes
         .iter()
-        .filter(|(name, hash)| was["hashes"][**name] != ***hash)
+        .filter(|(name, hash)| recorded_value["hashes"][**name] != ***hash)
         .map(|(name, _)| *name)
         .collect();
-    let recorded = was["modes"].as_array().cloned().unwrap_or_default();
-    let near = |was: &Value, is: &f64| {
-        was.as_f64().is_some_and(|was| (was - is).abs() <= MODES_TOLERANCE * was.abs().max(1e-3))
+    let recorded = recorded_value["modes"].as_array().cloned().unwrap_or_default();
+    let is_near = |recorded_value: &Value, computed_value: &f64| {
+        recorded_value.as_f64().is_some_and(|recorded_value| {
+            (recorded_value - computed_value).abs()
+                <= MODES_TOLERANCE * recorded_value.abs().max(1e-3)
+        })
     };
-    if recorded.len() != modes.len() || !recorded.iter().zip(&modes).all(|(was, is)| near(was, is))
+    if recorded.len() != modes.len()
+        || !recorded
+            .iter()
+            .zip(&modes)
+            .all(|(recorded_value, computed_value)| is_near(recorded_value, computed_value))
     {
         changed.push("modes");
     }
@@ -243,9 +258,9 @@ fn bytes_change_only_with_the_version_of_the_numerics() {
         "tests/goldens.json is of sweep {}, numerics {}; this is sweep {VERSION}, numerics \
          {NUMERICS_VERSION}.\n\
          Write its hashes by UPDATE_GOLDENS=1 cargo test --release -p sweep --test command goldens",
-        was["version"], was["numerics"]
+        recorded_value["version"], recorded_value["numerics"]
     );
-    fs::write(record(), format!("{now:#}\n")).expect("tests/goldens.json is written");
+    fs::write(record_path(), format!("{now:#}\n")).expect("tests/goldens.json is written");
     fs::write(readable_record(), &table).expect("tests/goldens.csv is written");
 }
 

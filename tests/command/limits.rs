@@ -27,7 +27,7 @@ fn under(test_folder: &TestFolder, wrapper: &[&str], words: &[&str]) -> Output {
     test_folder.under(wrapper).args(words).output().expect("the command starts")
 }
 
-fn undisturbed() -> &'static [u8] {
+fn undisturbed_output() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
         let test_folder = TestFolder::new(&grid(24, 0));
@@ -48,12 +48,12 @@ fn assert_no_panic(output: &Output, what: &str) {
 /// Asserts that one more run ends with the bytes of the undisturbed run.
 fn assert_recovers(test_folder: &TestFolder, what: &str) {
     if let Ok(bytes) = fs::read(test_folder.path("x.parquet")) {
-        assert!(bytes == undisturbed(), "{what}: a broken result stands at the output");
+        assert!(bytes == undisturbed_output(), "{what}: a broken result stands at the output");
     }
-    let again = test_folder.sweep(RUN);
-    assert!(again.status.success(), "{what}: {}", all_output(&again));
+    let repeated_output = test_folder.sweep(RUN);
+    assert!(repeated_output.status.success(), "{what}: {}", all_output(&repeated_output));
     assert!(
-        fs::read(test_folder.path("x.parquet")).expect("a result") == undisturbed(),
+        fs::read(test_folder.path("x.parquet")).expect("a result") == undisturbed_output(),
         "{what}: other bytes"
     );
 }
@@ -110,16 +110,16 @@ fn a_folder_that_cannot_be_closed_is_an_error() {
 #[test]
 fn little_address_space_loses_no_rows() {
     let program = fs::metadata(env!("CARGO_BIN_EXE_sweep")).expect("the program is built").len();
-    let mut refused = 0;
+    let mut failed_count = 0;
     for more in [4_000, 12_000, 28_000, 60_000, 370_000] {
         let test_folder = fresh_folder();
         let kilobytes = program / 1000 + more;
         let limit = format!("ulimit -v {kilobytes}; exec \"$@\"");
         let run = under(&test_folder, &["sh", "-c", &limit, "sh"], RUN);
-        refused += u32::from(!run.status.success());
+        failed_count += u32::from(!run.status.success());
         assert_recovers(&test_folder, &format!("{kilobytes} kB"));
     }
-    assert!((1..5).contains(&refused), "{refused} of 5 limits were too small");
+    assert!((1..5).contains(&failed_count), "{failed_count} of 5 limits were too small");
 }
 
 #[test]
@@ -137,8 +137,8 @@ fn more_cores_than_possible_are_an_error_at_once() {
             all_output(&run)
         );
     }
-    let given = under(&test_folder, &["env", "SLURM_CPUS_PER_TASK=99999999"], RUN);
-    assert!(given.status.success(), "--threads counts: {}", all_output(&given));
+    let threads_output = under(&test_folder, &["env", "SLURM_CPUS_PER_TASK=99999999"], RUN);
+    assert!(threads_output.status.success(), "--threads counts: {}", all_output(&threads_output));
 }
 
 #[test]
@@ -170,10 +170,14 @@ fn a_signal_stops_a_run_within_a_trajectory() {
         );
         fs::write(test_folder.path("g.toml"), grid).expect("the grid is written");
         let script = "\"$@\" & sweep=$!\nsleep 2\nkill -TERM $sweep; wait $sweep";
-        let began = Instant::now();
+        let start_instant = Instant::now();
         let run = under(&test_folder, &["sh", "-c", script, "sh"], RUN);
         assert_eq!(run.status.code(), Some(143), "{method}: {}", all_output(&run));
-        assert!(began.elapsed() < Duration::from_secs(30), "{method}: {:?}", began.elapsed());
+        assert!(
+            start_instant.elapsed() < Duration::from_secs(30),
+            "{method}: {:?}",
+            start_instant.elapsed()
+        );
     }
 }
 

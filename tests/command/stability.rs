@@ -49,11 +49,11 @@ fn stability(folder: &tempfile::TempDir, speed: &str, more: &[&str]) -> Output {
 #[test]
 fn both_tongues_of_the_papers_machine_are_found_and_named() {
     let folder = folder_with("");
-    let done = stability(&folder, "230:325:1", &[]);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+    let completed = stability(&folder, "230:325:1", &[]);
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
     let file = "results/grid-stability.parquet";
-    let shown = all_output(&sweep(&folder, &["show", file]).output().expect("it starts"));
-    for messages in [&all_output(&done), &shown] {
+    let shown_text = all_output(&sweep(&folder, &["show", file]).output().expect("it starts"));
+    for messages in [&all_output(&completed), &shown_text] {
         for line in [
             "43 not, 0 without a response; 2 points",
             "damping_n_s_per_m 140: 239 to 259 rpm, quasi periodic, up to 0.39",
@@ -64,8 +64,8 @@ fn both_tongues_of_the_papers_machine_are_found_and_named() {
             assert!(messages.contains(line), "{line}\n{messages}");
         }
     }
-    let drawn = sweep(&folder, &["plot", file]).output().expect("it starts");
-    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
+    let plot_output = sweep(&folder, &["plot", file]).output().expect("it starts");
+    assert_eq!(plot_output.status.code(), Some(0), "{}", all_output(&plot_output));
     // A map does not overwrite it.
     let run = sweep(&folder, &["run", "grid.toml", "--out", file]).output().expect("it starts");
     assert_eq!(run.status.code(), Some(2), "{}", all_output(&run));
@@ -80,14 +80,14 @@ fn bytes_do_not_depend_on_threads_or_instruction_set() {
         if let Some(simd) = simd {
             command.env("SWEEP_SIMD", simd);
         }
-        let done = command.output().expect("it starts");
-        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+        let completed = command.output().expect("it starts");
+        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
         fs::read(folder.path().join(name)).expect("it is there")
     };
-    let first = bytes("a.parquet", "1", None);
-    assert!(first == bytes("b.parquet", "2", None));
-    assert!(first == bytes("c.parquet", "2", Some("scalar")));
-    assert!(first == bytes("a.parquet", "2", None));
+    let first_bytes = bytes("a.parquet", "1", None);
+    assert!(first_bytes == bytes("b.parquet", "2", None));
+    assert!(first_bytes == bytes("c.parquet", "2", Some("scalar")));
+    assert!(first_bytes == bytes("a.parquet", "2", None));
 }
 
 #[test]
@@ -96,18 +96,31 @@ fn contradictory_options_are_errors_before_the_computation() {
     for (speed, expected) in
         [("0:100:1", "above 0 rpm"), ("-5:100:1", "0 rpm or more"), ("fast", "FROM:TO:STEP")]
     {
-        let refused = stability(&folder, speed, &[]);
-        assert_eq!(refused.status.code(), Some(2), "{speed}");
-        assert!(all_output(&refused).contains(expected), "{speed}: {}", all_output(&refused));
+        let refused_output = stability(&folder, speed, &[]);
+        assert_eq!(refused_output.status.code(), Some(2), "{speed}");
+        assert!(
+            all_output(&refused_output).contains(expected),
+            "{speed}: {}",
+            all_output(&refused_output)
+        );
     }
     for (parameter, value, expected) in [
         ("spin_peak_rpm", "300.0", "without the axis `spin_peak_rpm`"),
         ("window_from_s", "31.0", "without the axis `window_from_s`"),
     ] {
         let axis = format!("[[axis]]\nparameter = \"{parameter}\"\nvalues = [{value}]\n");
-        let refused = stability(&folder_with(&axis), "60:100:1", &[]);
-        assert_eq!(refused.status.code(), Some(2), "{parameter}: {}", all_output(&refused));
-        assert!(all_output(&refused).contains(expected), "{parameter}: {}", all_output(&refused));
+        let refused_output = stability(&folder_with(&axis), "60:100:1", &[]);
+        assert_eq!(
+            refused_output.status.code(),
+            Some(2),
+            "{parameter}: {}",
+            all_output(&refused_output)
+        );
+        assert!(
+            all_output(&refused_output).contains(expected),
+            "{parameter}: {}",
+            all_output(&refused_output)
+        );
     }
 }
 
@@ -122,26 +135,32 @@ fn an_interrupted_run_continues_to_the_same_bytes() {
     let is_part = |entry: std::io::Result<fs::DirEntry>| {
         entry.is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with("part-"))
     };
-    let began = Instant::now();
+    let start_instant = Instant::now();
     while !fs::read_dir(&partial).is_ok_and(|mut entries| entries.any(is_part)) {
-        assert!(began.elapsed() < Duration::from_secs(60), "no part is kept");
+        assert!(start_instant.elapsed() < Duration::from_secs(60), "no part is kept");
         std::thread::sleep(Duration::from_millis(20));
     }
     signal("TERM", child.id());
-    let ended = child.wait_with_output().expect("it ends");
-    assert_eq!(ended.status.code(), Some(143), "{}", all_output(&ended));
-    assert!(all_output(&ended).contains("sweep stability grid.toml --speed 60:360:0.05"));
+    let interrupted_output = child.wait_with_output().expect("it ends");
+    assert_eq!(interrupted_output.status.code(), Some(143), "{}", all_output(&interrupted_output));
+    assert!(
+        all_output(&interrupted_output).contains("sweep stability grid.toml --speed 60:360:0.05")
+    );
     let status = sweep(&folder, &["status", "grid.toml", "--speed", "60:360:0.05"]).output();
     assert!(all_output(&status.expect("it starts")).contains("unfinished"));
-    let done = sweep(&folder, &arguments).output().expect("it starts");
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-    assert!(all_output(&done).contains("going on: "), "{}", all_output(&done));
-    let whole = sweep(&folder, &arguments).args(["--out", "whole.parquet"]).output();
-    assert_eq!(whole.expect("it starts").status.code(), Some(0));
+    let completed = sweep(&folder, &arguments).output().expect("it starts");
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    assert!(all_output(&completed).contains("going on: "), "{}", all_output(&completed));
+    let whole_output = sweep(&folder, &arguments).args(["--out", "whole.parquet"]).output();
+    assert_eq!(whole_output.expect("it starts").status.code(), Some(0));
     let bytes = |name: &str| fs::read(folder.path().join(name)).expect("it is there");
     assert!(bytes("results/grid-stability.parquet") == bytes("whole.parquet"));
-    let again = sweep(&folder, &arguments).output().expect("it starts");
-    assert!(all_output(&again).contains("there already"), "{}", all_output(&again));
+    let repeated_output = sweep(&folder, &arguments).output().expect("it starts");
+    assert!(
+        all_output(&repeated_output).contains("there already"),
+        "{}",
+        all_output(&repeated_output)
+    );
 }
 
 #[test]
@@ -149,17 +168,17 @@ fn joined_shards_have_the_same_bytes() {
     let folder = folder_with("");
     let speed = ["--speed", "210:330:0.5"];
     let run = |more: &[&str]| {
-        let done = sweep(&folder, &[&["stability", "grid.toml"], &speed[..], more].concat());
-        let done = { done }.output().expect("it starts");
-        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-        done
+        let completed = sweep(&folder, &[&["stability", "grid.toml"], &speed[..], more].concat());
+        let completed = { completed }.output().expect("it starts");
+        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+        completed
     };
     for shard in ["1/3", "3/3", "2/3"] {
         run(&["--shard", shard]);
     }
-    let merged = sweep(&folder, &[&["merge", "grid.toml"], &speed[..]].concat()).output();
-    let merged = merged.expect("it starts");
-    assert_eq!(merged.status.code(), Some(0), "{}", all_output(&merged));
+    let merge_output = sweep(&folder, &[&["merge", "grid.toml"], &speed[..]].concat()).output();
+    let merge_output = merge_output.expect("it starts");
+    assert_eq!(merge_output.status.code(), Some(0), "{}", all_output(&merge_output));
     run(&["--out", "whole.parquet"]);
     let bytes = |name: &str| fs::read(folder.path().join(name)).expect("it is there");
     assert!(bytes("results/grid-stability.parquet") == bytes("whole.parquet"));
@@ -174,23 +193,30 @@ fn growth_is_a_metric_of_maps_and_a_quantity_of_boundaries() {
     let grid =
         grid.replace("values = [140.0, 300.0]", "range = { from = 240, to = 270, count = 2 }");
     fs::write(folder.path().join("grid.toml"), grid).expect("it is written");
-    let done = sweep(&folder, &["run", "grid.toml"]).output().expect("it starts");
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-    let shown = sweep(&folder, &["show", "results/grid.parquet"]).output().expect("it starts");
+    let completed = sweep(&folder, &["run", "grid.toml"]).output().expect("it starts");
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let shown_text = sweep(&folder, &["show", "results/grid.parquet"]).output().expect("it starts");
     for column in ["growth_per_s", "growth_speed_rpm", "growth_kind", "growth_mode_1_name"] {
-        assert!(all_output(&shown).contains(column), "{column}: {}", all_output(&shown));
+        assert!(all_output(&shown_text).contains(column), "{column}: {}", all_output(&shown_text));
     }
-    assert!(all_output(&shown).contains("period_doubling"), "{}", all_output(&shown));
-    let traced = sweep(&folder, &["boundary", "grid.toml", "--quantity", "growth_per_s"]).output();
-    let traced = traced.expect("it starts");
-    assert_eq!(traced.status.code(), Some(0), "{}", all_output(&traced));
-    assert!(all_output(&traced).contains("1 crossing"), "{}", all_output(&traced));
-    let plain = folder_with("");
-    let refused = sweep(&plain, &["boundary", "grid.toml", "--quantity", "growth_per_s"]).output();
-    let refused = refused.expect("it starts");
-    assert_eq!(refused.status.code(), Some(2), "{}", all_output(&refused));
+    assert!(all_output(&shown_text).contains("period_doubling"), "{}", all_output(&shown_text));
+    let boundary_output =
+        sweep(&folder, &["boundary", "grid.toml", "--quantity", "growth_per_s"]).output();
+    let boundary_output = boundary_output.expect("it starts");
+    assert_eq!(boundary_output.status.code(), Some(0), "{}", all_output(&boundary_output));
+    assert!(
+        all_output(&boundary_output).contains("1 crossing"),
+        "{}",
+        all_output(&boundary_output)
+    );
+    let folder_without_growth = folder_with("");
+    let refused_output =
+        sweep(&folder_without_growth, &["boundary", "grid.toml", "--quantity", "growth_per_s"])
+            .output();
+    let refused_output = refused_output.expect("it starts");
+    assert_eq!(refused_output.status.code(), Some(2), "{}", all_output(&refused_output));
     let expected = "`--quantity growth_per_s`: expected [stability] in the grid file";
-    assert!(all_output(&refused).contains(expected), "{}", all_output(&refused));
+    assert!(all_output(&refused_output).contains(expected), "{}", all_output(&refused_output));
 }
 
 /// Between the folds the machine has three responses. A search without the curve finds only one, at
@@ -202,61 +228,70 @@ fn coexisting_responses_have_rows() {
     let grid = grid.replace("values = [140.0, 300.0]", "values = [30.0, 140.0]");
     fs::write(folder.path().join("grid.toml"), grid).expect("it is written");
     let speed = "254:259:0.5";
-    let done = stability(&folder, speed, &[]);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+    let completed = stability(&folder, speed, &[]);
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
     let file = "results/grid-stability.parquet";
-    let shown = all_output(&sweep(&folder, &["show", file]).output().expect("it starts"));
+    let shown_text = all_output(&sweep(&folder, &["show", file]).output().expect("it starts"));
     let jump = "damping_n_s_per_m 30: at 255.36 rpm, running up";
     for line in ["6 of 44 rows", "4 further rows", jump] {
-        assert!(shown.contains(line) || all_output(&done).contains(line), "{line}\n{shown}");
+        assert!(
+            shown_text.contains(line) || all_output(&completed).contains(line),
+            "{line}\n{shown_text}"
+        );
     }
     let csv = sweep(&folder, &["export", file, "rows.csv"]).output().expect("it starts");
     assert_eq!(csv.status.code(), Some(0), "{}", all_output(&csv));
     let text = fs::read_to_string(folder.path().join("rows.csv")).expect("it is there");
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().expect("a header").split(',').collect();
-    let place = |name: &str| names.iter().position(|known| known.starts_with(name)).expect(name);
-    let [point, rpm, growth, branch] = ["point", "speed_rpm", "growth_per_s", "branch"].map(place);
+    let column_index =
+        |name: &str| names.iter().position(|known| known.starts_with(name)).expect(name);
+    let [point, rpm, growth, branch] =
+        ["point", "speed_rpm", "growth_per_s", "branch"].map(column_index);
     // The comma in the name of a mode does not separate fields.
-    let unquoted = |line: &str| -> String {
+    let without_quoted_commas = |line: &str| -> String {
         let pieces = line.split('"').enumerate();
         pieces
             .map(|(k, piece)| if k % 2 == 1 { piece.replace(',', ";") } else { piece.into() })
             .collect()
     };
-    let lines: Vec<String> = lines.map(unquoted).collect();
+    let lines: Vec<String> = lines.map(without_quoted_commas).collect();
     let rows: Vec<Vec<&str>> = lines.iter().map(|line| line.split(',').collect()).collect();
-    let at = |speed: &str| -> Vec<&Vec<&str>> {
+    let rows_at_speed = |speed: &str| -> Vec<&Vec<&str>> {
         rows.iter().filter(|row| row[point] == "0" && row[rpm] == speed).collect()
     };
-    let branches: Vec<&str> = at("255").iter().map(|row| row[branch]).collect();
+    let branches: Vec<&str> = rows_at_speed("255").iter().map(|row| row[branch]).collect();
     assert_eq!(branches, ["0", "1", "2"]);
     for speed in ["256.5", "257", "257.5"] {
-        let [row] = at(speed)[..] else { panic!("one response at {speed} rpm: {text}") };
+        let [row] = rows_at_speed(speed)[..] else { panic!("one response at {speed} rpm: {text}") };
         assert!(row[growth].parse::<f64>().expect("a number") > 2.9, "{row:?}");
     }
     // The further rows are also in shards, and in the comparison of a file with itself.
     for shard in ["2/2", "1/2"] {
-        let done = stability(&folder, speed, &["--out", "joined.parquet", "--shard", shard]);
-        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+        let completed = stability(&folder, speed, &["--out", "joined.parquet", "--shard", shard]);
+        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
     }
     let merge = ["merge", "grid.toml", "--speed", speed, "--out", "joined.parquet"];
-    let merged = sweep(&folder, &merge).output().expect("it starts");
-    assert_eq!(merged.status.code(), Some(0), "{}", all_output(&merged));
+    let merge_output = sweep(&folder, &merge).output().expect("it starts");
+    assert_eq!(merge_output.status.code(), Some(0), "{}", all_output(&merge_output));
     let bytes = |name: &str| fs::read(folder.path().join(name)).expect("it is there");
     assert!(bytes("joined.parquet") == bytes(file));
-    let compared = sweep(&folder, &["compare", file, "joined.parquet"]).output();
-    let compared = compared.expect("it starts");
-    assert!(all_output(&compared).contains("differ  not at all"), "{}", all_output(&compared));
+    let compare_output = sweep(&folder, &["compare", file, "joined.parquet"]).output();
+    let compare_output = compare_output.expect("it starts");
+    assert!(
+        all_output(&compare_output).contains("differ  not at all"),
+        "{}",
+        all_output(&compare_output)
+    );
 }
 
 /// The integration of a turn of so slow a drum would take hours.
 #[test]
 fn a_drum_that_is_too_slow_has_a_status_at_once() {
     let folder = folder_with("");
-    let done = stability(&folder, "0.01:0.02:0.01", &[]);
-    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
-    let shown = sweep(&folder, &["show", "--all", "results/grid-stability.parquet"]).output();
-    let shown = all_output(&shown.expect("it starts"));
-    assert!(shown.contains("too_slow"), "{shown}");
+    let completed = stability(&folder, "0.01:0.02:0.01", &[]);
+    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let shown_text = sweep(&folder, &["show", "--all", "results/grid-stability.parquet"]).output();
+    let shown_text = all_output(&shown_text.expect("it starts"));
+    assert!(shown_text.contains("too_slow"), "{shown_text}");
 }
