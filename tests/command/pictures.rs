@@ -139,7 +139,7 @@ fn assert_bounded_figures(values_per_axis: u64, noise_factor: f64) {
     for name in ["map.svg", "map.png", "map.html"] {
         let run = plot_within(MAX_MEMORY_BYTES, folder.path(), &["map.parquet", "-o", name]);
         let messages = String::from_utf8_lossy(&run.stderr);
-        assert!(run.status.success(), "{values_per_axis} by {values_per_axis}, {name}: {messages}");
+        assert!(run.status.success(), "{values_per_axis} per axis, noise factor {noise_factor}: {bytes} bytes of {name}"
         let bytes = fs::metadata(folder.path().join(name)).expect("a figure").len();
         assert!(
             bytes < MAX_FIGURE_BYTES,
