@@ -139,11 +139,11 @@ fn assert_bounded_figures(values_per_axis: u64, noise_factor: f64) {
     for name in ["map.svg", "map.png", "map.html"] {
         let run = plot_within(MAX_MEMORY_BYTES, folder.path(), &["map.parquet", "-o", name]);
         let messages = String::from_utf8_lossy(&run.stderr);
-        assert!(run.status.success(), "{values_per_axis} per axis, noise factor {noise_factor}: {bytes} bytes of {name}"
+        assert!(run.status.success(), "{values_per_axis} by {values_per_axis}, {name}: {messages}");
         let bytes = fs::metadata(folder.path().join(name)).expect("a figure").len();
         assert!(
             bytes < MAX_FIGURE_BYTES,
-            "{values_per_axis} values per axis, noise factor {noise_factor}: {name} has {bytes} bytes"
+            "{values_per_axis} per axis, noise factor {noise_factor}: {bytes} bytes of {name}"
         );
         if let Some(output_folder) = std::env::var_os("SHOTS") {
             let output_folder =
