@@ -1,19 +1,19 @@
-"""A page of dots in headless Chromium: those at the ends of the x axis are whole.
+"""Checks a page of dots in headless Chromium: dots at the ends of the x axis must not be clipped.
 
     python check_dots.py PAGE.html [--screenshots FOLDER]
 
-Looks at the canvas on both sides of the panels' left and right edges, in a narrow window and in a
-wide one. Exits with 1 at the first thing that is wrong.
+The script reads the canvas on both sides of the panels' left and right edges, in a narrow and in a
+wide window. Exits with 1 at the first mistake.
 """
 
 import argparse
 
 from check_chart import Chart
-from check_page import check, stands_alone
+from check_page import check, check_self_contained
 
-# Pixels of the canvas that have a hue, 2 px without and within the panels' left and right edges.
-# Lines, ticks and words are grey; shades are pale.
-HUED = """
+# Counts the coloured pixels of the canvas 2 px outside and inside of the panels' left and right
+# edges. Lines, ticks and texts are grey, and shaded regions are pale.
+COLOURED_PIXELS = """
     const canvas = document.querySelector("#main .figure canvas");
     const { width, height } = canvas;
     const copy = new OffscreenCanvas(width, height).getContext("2d");
@@ -32,28 +32,29 @@ HUED = """
 """
 
 
-def dots_are_whole(page):
-    """Half of each dot at an end of the axis lies without the panel."""
-    seen = []
+def check_dots(page):
+    """Checks that half of each dot at an end of the axis lies outside of the panel."""
+    counts_by_width = []
     for width in (400, 1200):
-        page.window(width, "light")
-        counts = page.driver.execute_script(HUED)
-        seen.append(f"{counts} pixels at {width} px")
-        check(min(counts) > 3, f"dots are cut: {seen[-1]} beside the edges, without and within")
-        page.shot(f"dots-{width}")
-    return ", ".join(seen)
+        page.set_window(width, "light")
+        counts = page.driver.execute_script(COLOURED_PIXELS)
+        counts_by_width.append(f"{counts} pixels at {width} px")
+        check(min(counts) > 3,
+              f"dots are clipped: {counts_by_width[-1]} outside and inside of the edges")
+        page.save_screenshot(f"dots-{width}")
+    return ", ".join(counts_by_width)
 
 
 def main():
-    """Run every check on one page."""
+    """Runs all checks on a page."""
     parser = argparse.ArgumentParser(description="Check a page of dots in headless Chromium.")
     parser.add_argument("page")
-    parser.add_argument("--screenshots", help="folder for pictures of what was seen")
+    parser.add_argument("--screenshots", help="folder for screenshots")
     arguments = parser.parse_args()
     page = Chart(arguments.page, arguments.screenshots)
     page.run([
-        ("alone", lambda: stands_alone(page)),
-        ("dots", lambda: dots_are_whole(page)),
+        ("alone", lambda: check_self_contained(page)),
+        ("dots", lambda: check_dots(page)),
     ])
 
 

@@ -1,10 +1,10 @@
-"""What pages compute of constant speeds, in headless Chromium, held against the program's rows.
+"""Compares the results of live pages at constant speeds, in headless Chromium, with rows.
 
     python check_held.py SWEEP_BINARY [--screenshots FOLDER]
 
-Two maps have the metrics growth and dwell at two speeds: of the machine of the paper, and of one
-with friction. Each point is typed into the map's live page, which then computes both. Exits with 1
-if a number is off by more than the rows of one motion are.
+Two maps, of the paper's machine and of a machine with friction, have the metrics growth and dwell
+at two speeds. Each point is typed into the map's live page, which computes both metrics. Exits with
+1 if a number differs by more than the results of two trajectories of a motion.
 """
 
 import argparse
@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import tempfile
 
-from check_live import LONGEST_CHECK_S, Live, opens
+from check_live import LIMIT_OF_CHECK_S, Live, check_module
 from check_page import Map, check
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -31,39 +31,39 @@ values = [0.3]
 parameter = "tub_mass_kg"
 values = [24.0, 25.0]
 """
-# Growth, 1/s; deviations, as a share: two trajectories of one motion (`SAME` in dwell.rs).
+# The bounds of the difference of growth (1/s) and of the relative difference of deviations.
 BOUNDS = {"growth": 1e-5, "dwell": 1e-2}
 
 
-def numbers(page, metric):
-    """What the page says of a metric, once it is there."""
+def wait_for_metric(page, metric):
+    """Waits for the numbers of a metric on the page, and returns them."""
     script = "return document.getElementById('held')?.dataset[arguments[0]] ?? ''"
-    page.until(lambda: page.driver.execute_script(script, metric), f"no {metric}")
+    page.wait_until(lambda: page.driver.execute_script(script, metric), f"no {metric}")
     return [float(text) for text in page.driver.execute_script(script, metric).split()]
 
 
-def differences(page, data):
-    """How far growth (1/s) and deviations (a share) are from the rows, at most."""
-    worst = {"growth": 0.0, "dwell": 0.0}
+def max_differences(page, data):
+    """Returns the greatest difference of growth (1/s) and relative difference of deviations."""
+    greatest = {"growth": 0.0, "dwell": 0.0}
     for row in data.rows:
-        page.computed({axis: row[axis] for axis in data.axes})
+        page.compute({axis: row[axis] for axis in data.axes})
         button = "return Boolean(document.querySelector('#held button'))"
-        page.until(lambda: page.driver.execute_script(button), "no button")
+        page.wait_until(lambda: page.driver.execute_script(button), "no button")
         page.driver.execute_script("document.querySelector('#held button').click()")
-        growth, = numbers(page, "growth")
-        worst["growth"] = max(worst["growth"], abs(growth - row["growth_per_s"]))
+        growth, = wait_for_metric(page, "growth")
+        greatest["growth"] = max(greatest["growth"], abs(growth - row["growth_per_s"]))
         names = [channel["name"] for channel in page.live["channels"]]
-        for name, deviation in zip(names, numbers(page, "dwell"), strict=True):
-            true = row.get(f"dwell_{name}", math.nan)
-            worst["dwell"] = max(worst["dwell"], abs(deviation / true - 1))
-    return worst
+        for name, deviation in zip(names, wait_for_metric(page, "dwell"), strict=True):
+            file_value = row.get(f"dwell_{name}", math.nan)
+            greatest["dwell"] = max(greatest["dwell"], abs(deviation / file_value - 1))
+    return greatest
 
 
 def main():
-    """Compare, and say what was found."""
-    parser = argparse.ArgumentParser(description="Hold constant speeds of live pages to rows.")
+    """Compares both maps and prints the differences."""
+    parser = argparse.ArgumentParser(description="Compare constant speeds of live pages with rows.")
     parser.add_argument("sweep")
-    parser.add_argument("--screenshots", help="folder for pictures of what was seen")
+    parser.add_argument("--screenshots", help="folder for screenshots")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -71,22 +71,25 @@ def main():
         for machine in ("paper", "friction.toml"):
             plan, result, html = (folder / f"held.{end}" for end in ("toml", "parquet", "html"))
             plan.write_text(GRID.replace("MACHINE", machine))
-            quiet = {"check": True, "capture_output": True}
-            subprocess.run([arguments.sweep, "run", plan, "--out", result, "--fresh"], **quiet)
-            subprocess.run([arguments.sweep, "plot", result, "--live", "-o", html], **quiet)
+            run_options = {"check": True, "capture_output": True}
+            command = [arguments.sweep, "run", plan, "--out", result, "--fresh"]
+            subprocess.run(command, **run_options)
+            subprocess.run([arguments.sweep, "plot", result, "--live", "-o", html], **run_options)
             page = Live(html, arguments.screenshots)
             try:
-                page.driver.set_script_timeout(LONGEST_CHECK_S)
-                opens(page)
-                worst = differences(page, Map(result))
-                page.shot(f"live-held-{machine}")
-                said = page.text("held")
+                page.driver.set_script_timeout(LIMIT_OF_CHECK_S)
+                check_module(page)
+                greatest = max_differences(page, Map(result))
+                page.save_screenshot(f"live-held-{machine}")
+                panel_text = page.text("held")
             finally:
                 page.close()
             for metric, bound in BOUNDS.items():
-                check(worst[metric] <= bound, f"{machine}: {metric} is off by {worst[metric]:.1e}")
-            print(f"{machine}: growth within {worst['growth']:.0e}/s, deviations of dwells within "
-                  f"{worst['dwell']:.0e}: {said}")
+                check(greatest[metric] <= bound,
+                      f"{machine}: {metric} is off by {greatest[metric]:.1e}")
+            print(f"{machine}: growth within {greatest['growth']:.0e}/s, "
+                  "deviations of dwells within "
+                  f"{greatest['dwell']:.0e}: {panel_text}")
 
 
 if __name__ == "__main__":

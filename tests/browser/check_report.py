@@ -1,8 +1,8 @@
-"""A report in headless Chromium: one sheet of paper, and nothing clipped on a small screen.
+"""Checks a report in headless Chromium: it fits a sheet of paper and a small screen.
 
     python check_report.py REPORT.html
 
-Exits with 1 at the first thing that is wrong.
+Exits with 1 at the first mistake.
 """
 
 import argparse
@@ -16,12 +16,13 @@ PAPERS_CM = {"A4": (21.0, 29.7), "letter": (21.59, 27.94)}
 
 
 class Report(Page):
-    """A page without scripts."""
+    """A report, which is a page without scripts."""
 
-    def drawn(self):
+    def is_drawn(self):
         return self.driver.find_elements(By.CSS_SELECTOR, "figure img")
 
-    def one_page(self):
+    def check_paper(self):
+        """Checks that the report fits a sheet of each size."""
         for paper, (width, height) in PAPERS_CM.items():
             options = {"paperWidth": width / 2.54, "paperHeight": height / 2.54}
             pdf = base64.b64decode(self.driver.execute_cdp_cmd("Page.printToPDF", options)["data"])
@@ -29,7 +30,8 @@ class Report(Page):
             check(pages == 1, f"{pages} pages of {paper}")
         return " and ".join(PAPERS_CM)
 
-    def nothing_clipped(self):
+    def check_small_screen(self):
+        """Checks that nothing is outside of a screen of 400 px."""
         size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         outside = self.driver.execute_script(
@@ -40,7 +42,8 @@ class Report(Page):
         check(not outside, f"beyond 400 px: {outside[:3]}")
         return "within 400 px"
 
-    def folded(self):
+    def check_fold(self):
+        """Checks that digests are hidden in a closed fold."""
         fold = self.driver.find_element(By.TAG_NAME, "details")
         check(fold.get_attribute("open") is None, "the fold of digests is open")
         check("sweep.digest" not in self.driver.find_element(By.TAG_NAME, "body").text, "digests")
@@ -50,13 +53,13 @@ class Report(Page):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("report")
-    parser.add_argument("--screenshots", help="folder for pictures of what was seen")
-    asked = parser.parse_args()
-    page = Report(asked.report, asked.screenshots)
+    parser.add_argument("--screenshots", help="folder for screenshots")
+    arguments = parser.parse_args()
+    page = Report(arguments.report, arguments.screenshots)
     page.run([
-        ("printed", page.one_page),
-        ("small", page.nothing_clipped),
-        ("folded", page.folded),
+        ("printed", page.check_paper),
+        ("small", page.check_small_screen),
+        ("folded", page.check_fold),
     ])
 
 

@@ -1,10 +1,9 @@
-"""What the schemas cannot see: a manifest with a mistake is refused, and the commands are ones that
-the program takes.
+"""Checks that a manifest with a mistake is refused, and runs the commands of the manifests.
 
 usage: check.py SWEEP_BINARY FOLDER
 
-The shards are run here with the index that Kubernetes would give each, in its containers'
-environment, and then merged.
+The shards run on this machine, each with the index that Kubernetes would set in the environment of
+its container. Then they are merged.
 """
 
 import os
@@ -16,7 +15,7 @@ from pathlib import Path
 import kubernetes_validate
 import yaml
 
-# Two points a shard, of trajectories that take no time.
+# Each shard has two points, whose trajectories are short.
 GRID = """
 [spin]
 profile = "triangular"
@@ -41,25 +40,27 @@ def main(binary: str, folder: Path):
     misspelt["spec"]["completionmode"] = misspelt["spec"].pop("completionMode")
     try:
         kubernetes_validate.validate(misspelt, "1.37", strict=True)
-        sys.exit("a misspelt field was let through: the schema is not being applied")
+        sys.exit("a misspelt field was accepted: the schema is not applied")
     except kubernetes_validate.ValidationError:
         pass
 
     with tempfile.TemporaryDirectory() as home:
         Path(home, "fig12.toml").write_text(GRID)
-        run(binary, merge, home, expect=1)
+        run_job(binary, merge, home, expected_code=1)
         for index in range(sweep["spec"]["completions"]):
-            run(binary, sweep, home, {"JOB_COMPLETION_INDEX": str(index)})
-        run(binary, merge, home)
+            run_job(binary, sweep, home, {"JOB_COMPLETION_INDEX": str(index)})
+        run_job(binary, merge, home)
         assert Path(home, "results/fig12.parquet").is_file()
     print("kubernetes: manifests valid, their commands compute and merge a sweep")
 
 
-def run(binary: str, job: dict, home: str, environment: dict[str, str] = {}, expect: int = 0):
+def run_job(
+    binary: str, job: dict, home: str, environment: dict[str, str] = {}, expected_code: int = 0
+):
     (container,) = job["spec"]["template"]["spec"]["containers"]
     command, *arguments = container["command"]
     assert command == "sweep"
-    done = subprocess.run(
+    completed = subprocess.run(
         [binary, *arguments],
         cwd=home,
         env={**os.environ, **environment},
@@ -67,8 +68,8 @@ def run(binary: str, job: dict, home: str, environment: dict[str, str] = {}, exp
         text=True,
     )
     assert (
-        done.returncode == expect
-    ), f"{arguments} {environment} ended with {done.returncode}: {done.stderr}"
+        completed.returncode == expected_code
+    ), f"{arguments} {environment} ended with {completed.returncode}: {completed.stderr}"
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-"""A Slurm cluster of two virtual nodes on this host, without systemd: daemons as child processes,
-killed one by one."""
+"""A Slurm cluster of two virtual nodes on this host. Its daemons are child processes that tests can
+kill."""
 
 import os
 import pwd
@@ -12,9 +12,11 @@ from pathlib import Path
 
 
 class Cluster:
+    """A running cluster. Leaving its context stops the daemons."""
+
     def __init__(self, folder: Path, patience: float):
         self.folder = folder
-        # How many times the usual seconds it is waited.
+        # The factor of all times for which the cluster waits.
         self.patience = patience
         self.munge = folder / "munge"
         self.processes: dict[str, subprocess.Popen] = {}
@@ -40,7 +42,7 @@ class Cluster:
         self.stop()
 
     def configure(self):
-        # Munge's own user must reach its folder.
+        # The user of munge must have access to its folder.
         for folder in (self.folder.parent, self.folder):
             folder.chmod(0o755)
         for name in ("state", "spool-n1", "spool-n2", "munge"):
@@ -84,7 +86,9 @@ class Cluster:
     def start_controller(self):
         self.start("slurmctld", ["/usr/sbin/slurmctld", "-D"])
         self.wait_for(
-            "the controller", lambda: "is UP" in self.ask("scontrol", "ping", check=False), 20
+            "the controller",
+            lambda: "is UP" in self.run_command("scontrol", "ping", check=False),
+            20,
         )
 
     def start_node(self, node: str):
@@ -92,24 +96,25 @@ class Cluster:
 
     def start(self, name: str, command: list[str]):
         log = open(self.folder / f"{name}.out", "ab")
-        # A session of its own: what a node starts can be told from what another one started.
+        # Each daemon has its own session, so that its descendants can be identified.
         self.processes[name] = subprocess.Popen(
             command, env=self.environment, stdout=log, stderr=log, start_new_session=True
         )
 
     def kill(self, name: str):
-        """Ends a daemon as a crash would."""
+        """Kills a daemon, which simulates a crash."""
         process = self.processes.pop(name)
         process.send_signal(signal.SIGKILL)
         process.wait()
 
     def kill_node(self, node: str):
-        """Ends a node as a power cut would: its daemon, the steps it had started, and whatever
-        those had started."""
+        """Kills the daemon, the steps and all their descendants on a node, which simulates a power
+        failure. Returns the killed processes."""
         steps = [
             pid
             for pid, words in processes()
-            if words[0].startswith("slurmstepd") and f"SLURMD_NODENAME={node}" in of_any_child(pid)
+            if words[0].startswith("slurmstepd")
+            and f"SLURMD_NODENAME={node}" in environment_of_descendants(pid)
         ]
         self.kill(node)
         victims = [pid for step in steps for pid in [step, *descendants(step)]]
@@ -127,57 +132,60 @@ class Cluster:
                 process.kill()
                 process.wait()
 
-    def ask(self, *command: str, check: bool = True, **options) -> str:
-        # On a busy host the controller now and then drops a connection; asking again is harmless,
-        # submitting again is not.
+    def run_command(self, *command: str, check: bool = True, **options) -> str:
+        # On a busy host the controller sometimes drops a connection. Queries are repeated;
+        # submissions are not, because they might have been received.
         attempts = 5 if command[0] in ("squeue", "sinfo", "scontrol") and check else 1
         for attempt in range(attempts):
-            done = subprocess.run(
+            completed = subprocess.run(
                 command, env=self.environment, capture_output=True, text=True, **options
             )
-            if done.returncode == 0 or not check:
-                return done.stdout
+            if completed.returncode == 0 or not check:
+                return completed.stdout
             time.sleep(0.2 * (attempt + 1))
-        raise AssertionError(f"{' '.join(command)} failed: {done.stderr}")
+        raise AssertionError(f"{' '.join(command)} failed: {completed.stderr}")
 
     def node_states(self) -> list[str]:
-        return self.ask("sinfo", "-h", "-N", "-o", "%T").split()
+        return self.run_command("sinfo", "-h", "-N", "-o", "%T").split()
 
     def tasks(self, job: str) -> dict[str, dict[str, str]]:
-        """State and node of each task of an array (of a job without tasks: N/A) that the controller
-        still knows."""
-        lines = self.ask("squeue", "-h", "-r", "-t", "all", "-o", "%F|%K|%T|%N").splitlines()
-        rows = (line.split("|") for line in lines)
-        return {task: {"state": state, "node": node} for of, task, state, node in rows if of == job}
+        """Returns the state and the node of each task of an array that the controller knows. A job
+        without tasks has the task N/A."""
+        output = self.run_command("squeue", "-h", "-r", "-t", "all", "-o", "%F|%K|%T|%N")
+        rows = (line.split("|") for line in output.splitlines())
+        return {
+            task: {"state": state, "node": node}
+            for row_job, task, state, node in rows
+            if row_job == job
+        }
 
     def is_over(self, job: str) -> bool:
-        """Whether no task of a job will do anything any more; so it is with one that the controller
-        has lost."""
-        ended = {"COMPLETED", "FAILED", "CANCELLED", "TIMEOUT", "NODE_FAIL"}
-        return all(task["state"] in ended for task in self.tasks(job).values())
+        """Returns whether all tasks of a job have ended. Lost tasks count as ended."""
+        final_states = {"COMPLETED", "FAILED", "CANCELLED", "TIMEOUT", "NODE_FAIL"}
+        return all(task["state"] in final_states for task in self.tasks(job).values())
 
     def wait_for_job(self, job: str, seconds: float) -> dict[str, str]:
-        """The end state of each task."""
+        """Waits for a job; returns the final state of each task."""
         self.wait_for(
             f"end of job {job}", lambda: self.is_over(job), seconds, lambda: self.tasks(job)
         )
         return {task: facts["state"] for task, facts in self.tasks(job).items()}
 
     def wait_until_saved(self, since: float):
-        """Waits until the controller has written its record of the jobs anew, which it does some
-        seconds after a change."""
+        """Waits until the controller has saved the state of jobs again, some seconds after a
+        change."""
         state = self.folder / "state/job_state"
-        # Half a second for the snapshot that was under way.
+        # A snapshot that began before the change is saved within half a second.
         self.wait_for(
             "record of the jobs", lambda: state.exists() and state.stat().st_mtime > since + 0.5, 60
         )
 
-    def wait_for(self, what, condition, seconds, show=lambda: ""):
+    def wait_for(self, event, condition, seconds, describe=lambda: ""):
         seconds = self.patience * seconds
-        until = time.monotonic() + seconds
+        end = time.monotonic() + seconds
         while not condition():
-            if time.monotonic() > until:
-                raise AssertionError(f"no {what} after {seconds} s {show()}\n{self.logs()}")
+            if time.monotonic() > end:
+                raise AssertionError(f"no {event} after {seconds} s {describe()}\n{self.logs()}")
             time.sleep(0.05)
 
     def logs(self) -> str:
@@ -199,7 +207,7 @@ def free_ports(count: int) -> list[int]:
 
 
 def processes():
-    """Every process with its command line."""
+    """Yields all processes with their command lines."""
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
@@ -230,7 +238,7 @@ def environment(pid: int) -> dict[str, str]:
     return dict(pair.split("=", 1) for pair in text.split("\0") if "=" in pair)
 
 
-def of_any_child(pid: int) -> set[str]:
+def environment_of_descendants(pid: int) -> set[str]:
     return {f"{k}={v}" for child in descendants(pid) for k, v in environment(child).items()}
 
 

@@ -1,9 +1,9 @@
 #!/bin/sh
-# A sweep on a real Slurm cluster of two virtual nodes on this host:
+# Tests sweeps on a Slurm cluster of two virtual nodes on this host:
 # tests/slurm/run.sh [--tasks N] [SCENARIO ...]
 #
-# Debian's slurm-wlm and munge, without systemd; installed here where they are missing. The daemons
-# need root. SWEEP names another binary than the release build.
+# Requires root for the daemons, and Debian's packages slurm-wlm and munge, which the script
+# installs if they are missing. SWEEP names the binary, by default that of the release build.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)
