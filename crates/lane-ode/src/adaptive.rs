@@ -1,7 +1,7 @@
 //! Times, steps and segments of the lanes in adaptive methods. Each lane has its own time, step and
 //! segment.
 
-use crate::control::StepControl;
+use crate::control::{ControlExponents, StepControl};
 use crate::{Failure, Lane, MAX_LANES, N, SegmentEnd, StepCount, Task, Tolerance};
 
 /// The current segment of one lane.
@@ -24,10 +24,10 @@ pub(crate) struct AdaptiveLanes<T> {
 impl<T: Lane> AdaptiveLanes<T> {
     /// Creates lanes without a segment.
     #[inline(always)]
-    pub(crate) fn new(zero: N<T>) -> Self {
+    pub(crate) fn new(zero: N<T>, exponents: ControlExponents) -> Self {
         Self {
             time: zero,
-            control: StepControl::new(zero),
+            control: StepControl::new(zero, exponents),
             segments: [AdaptiveSegment::default(); MAX_LANES],
             segment_ends: [Some(SegmentEnd::Idle); MAX_LANES],
         }
@@ -63,11 +63,13 @@ impl<T: Lane> AdaptiveLanes<T> {
         self.segments[..T::LANES].iter().any(|segment| segment.is_active)
     }
 
-    /// Returns the steps to try. A step that would end beyond its segment's end, or just before it,
-    /// is changed to end there.
+    /// Returns the steps to try, of at most the tolerance's longest step. A step that would end
+    /// beyond its segment's end, or just before it, is changed to end there.
     #[inline(always)]
-    pub(crate) fn steps(&self) -> N<T> {
-        let mut h = self.control.step;
+    pub(crate) fn steps(&self, tolerance: &Tolerance) -> N<T> {
+        let step = self.control.step;
+        let longest = step.lit(tolerance.longest_step_s.unwrap_or(f64::INFINITY));
+        let mut h = step.where_less(longest, step, longest);
         for (lane, segment) in self.segments[..T::LANES].iter().enumerate() {
             let remaining_s = segment.end_s - self.time.0.get(lane);
             if segment.is_active && h.0.get(lane) * 1.01 >= remaining_s {

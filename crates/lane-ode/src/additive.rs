@@ -14,7 +14,7 @@
 //! (2016) 975. The tests measure the resulting order.
 
 use crate::adaptive::AdaptiveLanes;
-use crate::control::pad_rows;
+use crate::control::{ControlExponents, pad_rows};
 use crate::{Lane, N, ObservedStep, SemiImplicit, System as _, Task, Tolerance};
 
 /// Number of stages.
@@ -138,7 +138,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut lanes = AdaptiveLanes::new(zero);
+    let mut lanes = AdaptiveLanes::new(zero, ControlExponents::Order5);
     let mut k = [[zero; D]; STAGES];
     let mut start_state = x;
     let mut start_slope = x;
@@ -169,7 +169,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         }
         is_start = false;
 
-        let h = lanes.steps();
+        let h = lanes.steps(tolerance);
         // The equations of an idle lane need a positive g as well.
         let g = N((h * GAMMA).v().0.larger(zero.lit(f64::MIN_POSITIVE.sqrt()).0));
         let mut y = x;

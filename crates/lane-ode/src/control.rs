@@ -11,6 +11,8 @@ pub struct Tolerance {
     pub absolute: f64,
     /// The greatest number of steps of one segment, accepted and rejected ones together.
     pub max_steps: u64,
+    /// The longest step (s), if there is one, such as the limit of stability.
+    pub longest_step_s: Option<f64>,
 }
 
 impl Tolerance {
@@ -51,12 +53,20 @@ pub(crate) const fn pad_rows<const ROWS: usize, const COLUMNS: usize>(
     matrix
 }
 
+/// The exponents of the step control for the order of a method. They are sums of powers of one
+/// half, so that they need square roots only and the bits are the same everywhere.
+#[derive(Clone, Copy)]
+pub(crate) enum ControlExponents {
+    /// alpha = 11/64 = 0.172, beta = 5/128 = 0.039 (`dopri5.f`: 0.17 and 0.04).
+    Order5,
+    /// alpha = 1/8, beta = 0 (`dop853.f`).
+    Order8,
+}
+
 /// Proportional-integral step control (Hairer and Wanner II, section IV.2): h is multiplied by 0.9
 /// err^-alpha err_before^beta, within 0.2 to 5.
-///
-/// The exponents are sums of powers of one half, so that they need square roots only and the bits
-/// are the same everywhere.
 pub(crate) struct StepControl<T> {
+    exponents: ControlExponents,
     /// The step to try next.
     pub(crate) step: N<T>,
     /// The factor err^beta of the last accepted step.
@@ -97,8 +107,8 @@ const MIN_ERROR: f64 = 1e-10;
 
 impl<T: Lane> StepControl<T> {
     #[inline(always)]
-    pub(crate) fn new(zero: N<T>) -> Self {
-        Self { step: zero, error_memory: zero.lit(1.0), rejected_lanes: 0 }
+    pub(crate) fn new(zero: N<T>, exponents: ControlExponents) -> Self {
+        Self { exponents, step: zero, error_memory: zero.lit(1.0), rejected_lanes: 0 }
     }
 
     /// Starts a segment in a lane. The memory of the lane's earlier trajectories is discarded, so
@@ -118,20 +128,20 @@ impl<T: Lane> StepControl<T> {
         let error = error.lit(MIN_ERROR).where_less(error, error, error.lit(MIN_ERROR));
         let root_2 = error.sqrt();
         let root_8 = root_2.sqrt().sqrt();
-        let root_32 = root_8.sqrt().sqrt();
-        let root_64 = root_32.sqrt();
-        let root_128 = root_64.sqrt();
-        // alpha = 11/64 = 0.172, beta = 5/128 = 0.039 (dopri5.f: 0.17 and 0.04).
-        let alpha = (root_8 * (root_32 * root_64)).v();
-        let beta = (root_32 * root_128).v();
+        let [alpha_power, beta_power] = match self.exponents {
+            ControlExponents::Order5 => {
+                let root_32 = root_8.sqrt().sqrt();
+                let root_64 = root_32.sqrt();
+                let root_128 = root_64.sqrt();
+                [(root_8 * (root_32 * root_64)).v(), (root_32 * root_128).v()]
+            }
+            ControlExponents::Order8 => [root_8, error.lit(1.0)],
+        };
+        let accepted_factor = SAFETY_FACTOR * self.error_memory / alpha_power;
         Proposals {
-            step_if_accepted: (h * clamp_factor(
-                SAFETY_FACTOR * self.error_memory / alpha,
-                MAX_STEP_FACTOR,
-            ))
-            .v(),
-            step_if_rejected: (h * clamp_factor(SAFETY_FACTOR / alpha, 1.0)).v(),
-            error_memory_if_accepted: beta,
+            step_if_accepted: (h * clamp_factor(accepted_factor, MAX_STEP_FACTOR)).v(),
+            step_if_rejected: (h * clamp_factor(SAFETY_FACTOR / alpha_power, 1.0)).v(),
+            error_memory_if_accepted: beta_power,
         }
     }
 

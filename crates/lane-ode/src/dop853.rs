@@ -2,7 +2,7 @@
 //!
 //! Coefficients: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5,
 //! and its program `dop853.f`. The formula's error estimate is omitted, because callers compare
-//! whole trajectories.
+//! whole trajectories; [`dop853_adaptive`](crate::dop853_adaptive) has it.
 //!
 //! On the imaginary axis the method is stable up to |h w| = 5.96. This is half a radian per stage,
 //! against 0.71 of the classical method of order 4. The method is cheaper than the classical one
@@ -19,7 +19,7 @@ pub const DOP853_STABILITY_LIMIT: f64 = 5.96;
 pub const DOP853_STAGES: usize = 12;
 
 /// Nodes.
-const C: [f64; DOP853_STAGES] = [
+pub(crate) const C: [f64; DOP853_STAGES] = [
     0.0,
     0.526001519587677318785587544488e-1,
     0.789002279381515978178381316732e-1,
@@ -35,10 +35,10 @@ const C: [f64; DOP853_STAGES] = [
 ];
 
 /// The nonzero coefficients of a row, each with the index of its stage before it.
-type SparseRow = &'static [(usize, f64)];
+pub(crate) type SparseRow = &'static [(usize, f64)];
 
 /// Rows of the matrix, from the second stage on.
-const A: [SparseRow; DOP853_STAGES - 1] = [
+pub(crate) const A: [SparseRow; DOP853_STAGES - 1] = [
     &[(0, 5.26001519587677318785587544488e-2)],
     &[(0, 1.97250569845378994544595329183e-2), (1, 5.91751709536136983633785987549e-2)],
     &[(0, 2.95875854768068491816892993775e-2), (2, 8.87627564304205475450678981324e-2)],
@@ -106,7 +106,7 @@ const A: [SparseRow; DOP853_STAGES - 1] = [
 ];
 
 /// Weights of order 8.
-const B: SparseRow = &[
+pub(crate) const B: SparseRow = &[
     (0, 5.42937341165687622380535766363e-2),
     (5, 4.450_312_892_752_408_881_441_139_505_66),
     (6, 1.891_517_899_314_500_383_042_815_990_44),
@@ -211,7 +211,7 @@ const SUMS_IN_REGISTERS: usize = 10;
 /// stores it as state `target_index`.
 #[expect(clippy::manual_memcpy, reason = "sums are registers, not memory")]
 #[inline(always)]
-fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
+pub(crate) fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
     h: N<T>,
     row: SparseRow,
     slopes: &[[N<T>; D]; K],

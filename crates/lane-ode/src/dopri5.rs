@@ -5,7 +5,7 @@
 //! sections II.4 to II.6.
 
 use crate::adaptive::AdaptiveLanes;
-use crate::control::pad_rows;
+use crate::control::{ControlExponents, pad_rows};
 use crate::{Lane, N, ObservedStep, System as _, Task, Tolerance};
 
 /// Number of stages.
@@ -73,7 +73,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 ) {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut lanes = AdaptiveLanes::new(zero);
+    let mut lanes = AdaptiveLanes::new(zero, ControlExponents::Order5);
     let mut k = [[zero; D]; STAGES];
     let mut is_start = true;
 
@@ -82,7 +82,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         if task.cancel().is_requested() || !lanes.has_active_lane() {
             return;
         }
-        let h = lanes.steps();
+        let h = lanes.steps(tolerance);
 
         // The last stage of a step is the first of the next, except after the start of a segment.
         let mut y = x;

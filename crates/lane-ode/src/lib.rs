@@ -18,9 +18,10 @@
 //! 3. [`Kernel`]: the computation as a whole. [`Simd::dispatch`] is compiled for every instruction
 //!    set and runs the kernel on one.
 //!
-//! The methods are [`rk4`] (classical, fixed step), [`dop853`] (order 8, fixed step), [`dopri5`]
-//! (Dormand-Prince 5(4), adaptive, with dense output) and [`additive`] (Kennedy and Carpenter's
-//! ARK5(4), adaptive, for systems with a stiff linear part).
+//! The methods are [`rk4`] (classical, fixed step), [`dop853`] (order 8, fixed step),
+//! [`dop853_adaptive`] (the same formula, adaptive), [`dopri5`] (Dormand-Prince 5(4), adaptive, with
+//! dense output) and [`additive`] (Kennedy and Carpenter's ARK5(4), adaptive, for systems with a
+//! stiff linear part).
 //!
 //! # Example
 //!
@@ -125,6 +126,7 @@ pub mod additive;
 mod cancel;
 mod control;
 pub mod dop853;
+pub mod dop853_adaptive;
 pub mod dopri5;
 mod dual;
 mod fixed;

@@ -12,7 +12,7 @@ mod trig;
 
 use crate::{
     Kernel, Lane, MAX_LANES, N, ObservedStep, Segment, SegmentEnd, SemiImplicit, Simd, StepCount,
-    System, Task, Tolerance, additive, dop853, dopri5, rk4,
+    System, Task, Tolerance, additive, dop853, dop853_adaptive, dopri5, rk4,
 };
 use core::marker::PhantomData;
 
@@ -50,6 +50,7 @@ struct TestTrajectory<const D: usize, const P: usize> {
 enum TestMethod {
     Rk4,
     Dop853,
+    Dop853Adaptive(Tolerance),
     Dopri5(Tolerance),
     Additive(Tolerance),
 }
@@ -124,6 +125,9 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for SolveKernel<'
         let heap = allocation_counter::measure(|| match self.method {
             TestMethod::Rk4 => rk4::integrate(zero, &mut batch),
             TestMethod::Dop853 => dop853::integrate(zero, &mut batch),
+            TestMethod::Dop853Adaptive(tolerance) => {
+                dop853_adaptive::integrate(zero, &mut batch, &tolerance)
+            }
             TestMethod::Dopri5(tolerance) => dopri5::integrate(zero, &mut batch, &tolerance),
             TestMethod::Additive(tolerance) => additive::integrate(zero, &mut batch, &tolerance),
         });

@@ -74,7 +74,12 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Ker
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Vec<ModelRun<C>> {
-        let tolerance = |relative, absolute| Tolerance { relative, absolute, max_steps: MAX_STEPS };
+        let tolerance = |relative, absolute| Tolerance {
+            relative,
+            absolute,
+            max_steps: MAX_STEPS,
+            longest_step_s: None,
+        };
         match self.method {
             OscillatorMethod::Rk4(step_s) => {
                 let mut task = Trajectories::new(zero, &self, step_s);

@@ -69,13 +69,15 @@ fn thousand_steps(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
 /// Measures a second of the run-up by Dormand-Prince.
 #[divan::bench(args = kernels())]
 fn second_by_dopri5(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
-    let tolerance = Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX };
+    let tolerance =
+        Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX, longest_step_s: None };
     trajectory(bencher, model, simd, 1.0, &Method::dopri5(tolerance));
 }
 
 #[divan::bench(args = kernels())]
 fn second_by_additive(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
-    let tolerance = Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX };
+    let tolerance =
+        Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX, longest_step_s: None };
     trajectory(bencher, model, simd, 1.0, &Method::additive(tolerance));
 }
 

@@ -115,7 +115,7 @@ fn descriptions(channels: &[Channel]) -> Vec<sweep_parameter::Channel> {
 /// Returns the columns of the verdict, with the levels of this model's methods.
 fn verdict_columns(comparison: &ComparisonColumns<'_, Outcome>) -> Vec<WasherColumn> {
     let text = "the method of the row's nonlinear numbers; with the fast method its level: \
-                capped_0 to capped_5, rk4, additive or dop853";
+                capped_0 to capped_5, rk4, additive, dop853_adaptive or dop853";
     comparison.verdict(MethodKind::ALL.map(MethodKind::name).to_vec(), text)
 }
 

@@ -58,7 +58,12 @@ pub(crate) fn direct(integrator: &Integrator) -> Option<Method> {
     match (method.kind.adapts_steps(), &integrator.settings()[..]) {
         (false, &[(_, step_s)]) => method.step_s = step_s,
         (true, &[(_, relative), (_, absolute)]) => {
-            method.tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
+            method.tolerance = Tolerance {
+                relative,
+                absolute,
+                max_steps: MAX_ADAPTIVE_STEPS,
+                longest_step_s: None,
+            };
         }
         _ => return None,
     }

@@ -155,10 +155,11 @@ fn walk_method(walk: &mut NumberWalk<'_>, method: &mut Method) -> Option<()> {
     }
     let Method { kind, step_s, caps, tolerance } = method;
     if kind.adapts_steps() {
-        let Tolerance { relative, absolute, max_steps } = tolerance;
+        let Tolerance { relative, absolute, max_steps, longest_step_s } = tolerance;
         let mut max_step_count = *max_steps as f64;
         walk.walk_numbers([relative, absolute, &mut max_step_count])?;
         *max_steps = max_step_count as u64;
+        walk.walk_optional(longest_step_s)?;
         return Some(());
     }
     walk.walk_numbers([step_s])?;

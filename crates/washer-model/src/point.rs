@@ -41,6 +41,13 @@ pub struct Timing {
 /// less than one.
 const PERTURBATION: f64 = 1e-10;
 
+/// The greatest deviation of a machine at rest, relative to the clearance between drum and tub (for
+/// angles, to the clearance over a lever of one metre).
+///
+/// Basis: rounding of an equilibrium leaves about 1e-15 of the clearance, and a billionth of it has
+/// no effect on any machine. Doubling it changes no row.
+const REST_SHARE: f64 = 1e-9;
+
 /// The error of a machine without a stable static equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the machine has no stable static equilibrium: {}", self.reason())]
@@ -145,6 +152,11 @@ impl Point {
     /// Returns the gap between drum and tub at rest (m).
     pub const fn clearance_m(&self) -> f64 {
         self.machine.bodies.clearance.0
+    }
+
+    /// Returns the greatest deviation of a machine at rest (m; rad for angles).
+    pub fn rest_limit_m(&self) -> f64 {
+        REST_SHARE * self.clearance_m()
     }
 
     /// Returns the edges of the window (s).

@@ -52,9 +52,10 @@ const MIN_STEP_SHARE: f64 = 0.01;
 /// Doubling it is unstable.
 const CAP_STABILITY_SHARE: f64 = 0.9;
 
-/// The number of binary digits of a step after the first. Basis: the last digits of an eigenvalue
-/// depend on the processor. Doubling it would keep more of them.
-const STEP_BITS: u32 = 8;
+/// The number of binary digits of a step after the first. Basis: with one, points of a map have
+/// equal steps and share the lanes of a batch, and a step is at most a third shorter than
+/// necessary. Doubling it divides batches further.
+const STEP_BITS: u32 = 1;
 
 /// The number of binary digits of a decay after the first. Basis: the last digits of an eigenvalue
 /// depend on the processor. Doubling it would keep such digits.

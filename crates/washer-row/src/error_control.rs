@@ -11,15 +11,18 @@
 //! Richardson's (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, II.4) without
 //! its extrapolation: the difference of two levels bounds the error of the finer one where the step
 //! shrinks by enough. The second term is for two levels that agree by chance: c is the contraction
-//! of the error from level to level, 1.5 where the step shrinks ([`STEP_CONTRACTION`]), and 10
-//! where the tolerance does or another method begins ([`TOLERANCE_RATIO`]).
+//! of the error from level to level: 1.5 where the step shrinks ([`STEP_CONTRACTION`]), 10 where
+//! the tolerance does ([`TOLERANCE_RATIO`]), and 100 where another method begins, which is at least
+//! as accurate as two further tolerances of the method before.
 //!
 //! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge's
 //!    mode is not capped, and limits the first step.
 //! 2. Two more levels have no capped modes. They are of order 4, which is stable at long steps at
 //!    the least cost.
-//! 3. With friction and stops, no modes are capped: the first levels are the additive method's at
-//!    falling tolerances, then come three of order 8 at falling steps.
+//! 3. With friction and stops, no modes are capped, and steps are adaptive, because they are short
+//!    at corners of forces only. The first two levels are the additive method's, whose steps may be
+//!    long against the bearings' periods, then come three of order 8, each with a tolerance of a
+//!    tenth of that of the level before.
 //! 4. The last two levels resolve the bearings' modes. They are for rows in which bearings that
 //!    ring after a jump of the drum's acceleration matter.
 //!
@@ -41,7 +44,7 @@
 use lane_ode::Tolerance;
 use washer_model::{Formula, Method, MethodKind, ModelKind, StepSelector, capped_method};
 
-use crate::levels::{FamilyStart, RESOLVING_LEVELS, RefinementLevels};
+use crate::levels::{FamilyStart, RefinementLevels};
 use crate::separation::Separation;
 
 /// Safety factor: the estimated error of a level, divided by its difference from the level before.
@@ -61,42 +64,26 @@ const STEP_CONTRACTION: f64 = 1.0 + 1.0 / SAFETY_FACTOR;
 /// proportional to its inverse square, and the cap to the inverse step.
 const CAPPED_ORDER: f64 = 2.0;
 
-/// The order with which errors decrease with the step where steps cross corners of forces.
-const CORNER_ORDER: f64 = 1.0;
-
-/// The ratio of the additive method's relative tolerance at a level to that at the level before;
-/// the first tolerance is the accuracy times this ratio.
+/// The ratio of the relative tolerance at a level to that at the level before. The first tolerance
+/// of a method is the accuracy times this ratio.
 ///
 /// Basis: `sweeps/friction.toml`, where the error of a trajectory is about ten times its tolerance
 /// per step and proportional to it. Doubling it saves a third of the first level's time and sends
 /// more rows to the next level.
 const TOLERANCE_RATIO: f64 = 0.1;
 
-/// The least relative tolerance of the additive method.
-///
-/// Basis: a row of `sweeps/friction.toml` takes 22 ms at 1e-6 and 40 ms at 1e-7, where order 8 at
-/// [`CORNER_STEP_S`] takes 31 ms. Doubling it removes a level at an accuracy of 1e-3.
-const LEAST_TOLERANCE: f64 = 1e-6;
-
-/// The absolute tolerance (m, rad, m/s, rad/s) of the additive method, divided by the relative one.
+/// The absolute tolerance (m, rad, m/s, rad/s) of adaptive methods, divided by the relative one.
 ///
 /// Basis: for a motion of 2 cm both are equal. Doubling it lengthens the steps of smaller motions.
 const ABSOLUTE_TO_RELATIVE: f64 = 2e-2;
 
-/// The longest step (s) of order 8 where forces have corners.
-///
-/// Basis: corners are 3 ms wide, and order 8 needs about six steps to resolve one. Doubling it
-/// makes the first of these levels useless: its median error grows from 7e-8 to that of the levels
-/// before.
-const CORNER_STEP_S: f64 = 5e-4;
-
-/// The number of levels without capped modes: two give one difference.
-const UNCAPPED_LEVELS: usize = 2;
+/// The number of levels of a method: two give one difference.
+pub(crate) const LEVELS_PER_METHOD: usize = 2;
 
 /// The number of levels of order 8 at corners.
 ///
-/// Basis: corners leave errors of first order, for which one difference is not reliable, but two
-/// are. Each further level takes as long as all others together in rows that do not converge.
+/// Basis: in `sweeps/friction.toml` two levels leave 9 rows of 120 not converged, three leave 6 at a
+/// tenth more time. Doubling it takes longer in the rows that do not converge.
 const CORNER_LEVELS: usize = 3;
 
 /// The product of the first step that resolves the bearings' modes and their frequency (rad), for
@@ -114,6 +101,9 @@ const RESOLVING_RAD: [f64; 2] = [1.4, 0.2];
 /// Doubling it doubles the time until such a row fails.
 pub const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
 
+/// The step (s) for a machine whose modes are unknown, whose rows fail. It decides nothing.
+const UNKNOWN_STEP_S: f64 = 1e-3;
+
 /// Returns the ratio of one level's step to the next one's, for errors that decrease with this
 /// order.
 fn step_ratio(order: f64) -> f64 {
@@ -128,9 +118,8 @@ fn step_ratio(order: f64) -> f64 {
 pub(crate) fn contraction(kind: MethodKind, start: FamilyStart) -> f64 {
     match (start, kind) {
         (FamilyStart::Modes, _) => f64::INFINITY,
-        (FamilyStart::Method, _) | (FamilyStart::None, MethodKind::Additive) => {
-            1.0 / TOLERANCE_RATIO
-        }
+        (FamilyStart::Method, _) => 1.0 / (TOLERANCE_RATIO * TOLERANCE_RATIO),
+        (FamilyStart::None, kind) if kind.adapts_steps() => 1.0 / TOLERANCE_RATIO,
         (FamilyStart::None, _) => STEP_CONTRACTION,
     }
 }
@@ -172,9 +161,9 @@ pub fn refinement_levels(
         return levels_at_corners(steps, accuracy);
     }
     let mut levels = Vec::new();
-    let first_s = steps.plain_step_s(Formula::Rk4).unwrap_or(CORNER_STEP_S);
+    // The rows of a machine whose modes are unknown report that themselves, at any step.
+    let first_s = steps.plain_step_s(Formula::Rk4).unwrap_or(UNKNOWN_STEP_S);
     let ratio = step_ratio(CAPPED_ORDER);
-    // The rows of a machine whose modes are unknown report that themselves.
     if let Ok(Some(longest_s)) = steps.capped_step_s(model) {
         let mut step_s = longest_s;
         for kind in MethodKind::CAPPED {
@@ -185,7 +174,7 @@ pub fn refinement_levels(
             step_s /= ratio;
         }
     }
-    let following_s = push_uncapped(&mut levels, UNCAPPED_LEVELS, Method::rk4, [first_s, ratio]);
+    let following_s = push_uncapped(&mut levels, Method::rk4, [first_s, ratio]);
     push_resolving(&mut levels, steps, model, following_s);
     RefinementLevels::checked(levels, None)
 }
@@ -193,22 +182,25 @@ pub fn refinement_levels(
 /// Returns the levels of the nonlinear model for a machine with friction or stops, whose forces
 /// have corners.
 fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevels {
-    let mut levels = Vec::new();
-    let mut relative = TOLERANCE_RATIO * accuracy;
-    // Rounding may leave the product of powers of ten slightly below the least tolerance.
-    while relative > 0.999 * LEAST_TOLERANCE {
-        let absolute = ABSOLUTE_TO_RELATIVE * relative;
-        let tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
-        levels.push(Method::additive(tolerance));
-        relative *= TOLERANCE_RATIO;
-    }
-    let first_s = match steps.plain_step_s(Formula::Dop853) {
-        Some(stable_s) => stable_s.min(CORNER_STEP_S),
-        None => CORNER_STEP_S,
+    let longest_s = steps.plain_step_s(Formula::Dop853).unwrap_or(UNKNOWN_STEP_S);
+    let tolerance = |level: usize| {
+        let relative = accuracy * TOLERANCE_RATIO.powi(level as i32 + 1);
+        Tolerance {
+            relative,
+            absolute: ABSOLUTE_TO_RELATIVE * relative,
+            max_steps: MAX_ADAPTIVE_STEPS,
+            longest_step_s: None,
+        }
     };
-    let ratio = step_ratio(CORNER_ORDER);
-    let following_s = push_uncapped(&mut levels, CORNER_LEVELS, Method::dop853, [first_s, ratio]);
-    push_resolving(&mut levels, steps, ModelKind::Nonlinear, following_s);
+    let mut levels = Vec::new();
+    for level in 0..LEVELS_PER_METHOD {
+        levels.push(Method::additive(tolerance(level)));
+    }
+    for level in 0..CORNER_LEVELS {
+        let longest_step_s = Some(longest_s);
+        levels.push(Method::dop853_adaptive(Tolerance { longest_step_s, ..tolerance(level) }));
+    }
+    push_resolving(&mut levels, steps, ModelKind::Nonlinear, longest_s);
     RefinementLevels::checked(levels, Some(AT_CORNERS.to_owned()))
 }
 
@@ -228,19 +220,18 @@ fn push_resolving(
         None => longest_s,
     };
     let first_s = resolving_s.min(longest_s);
-    push_uncapped(levels, RESOLVING_LEVELS, method, [first_s, step_ratio(CAPPED_ORDER)]);
+    push_uncapped(levels, method, [first_s, step_ratio(CAPPED_ORDER)]);
 }
 
-/// Adds levels without capped modes, the first with a step of `first_s`, each other with the step
-/// before divided by `ratio`. Returns the step after the last.
+/// Adds levels without capped modes in fixed steps, the first with a step of `first_s`, each other
+/// with the step before divided by `ratio`. Returns the step after the last.
 fn push_uncapped(
     levels: &mut Vec<Method>,
-    count: usize,
     method: fn(f64) -> Method,
     [first_s, ratio]: [f64; 2],
 ) -> f64 {
     let mut step_s = first_s;
-    for _ in 0..count {
+    for _ in 0..LEVELS_PER_METHOD {
         levels.push(method(step_s));
         step_s /= ratio;
     }
@@ -275,7 +266,8 @@ mod tests {
     #[test]
     fn a_new_family_contracts_the_error_more_than_a_shorter_step() {
         assert_eq!(contraction(MethodKind::Dop853, FamilyStart::None), 1.5);
-        assert_eq!(contraction(MethodKind::Dop853, FamilyStart::Method), 10.0);
+        assert_eq!(contraction(MethodKind::Dop853Adaptive, FamilyStart::None), 10.0);
+        assert!((contraction(MethodKind::Dop853Adaptive, FamilyStart::Method) - 100.0) < 1e-9);
         assert_eq!(contraction(MethodKind::Dop853, FamilyStart::Modes), f64::INFINITY);
         assert_eq!(contraction(MethodKind::Additive, FamilyStart::None), 10.0);
     }
@@ -283,15 +275,13 @@ mod tests {
     /// Levels whose errors decrease at least by the ratio have errors of at most the estimate.
     #[test]
     fn the_step_ratio_bounds_errors_of_the_order_that_it_is_made_for() {
-        for order in [CAPPED_ORDER, CORNER_ORDER] {
-            let ratio = step_ratio(order);
-            for steeper in [0.0, 0.5, 1.0, 4.0, 8.0] {
-                let error = |level: i32| ratio.powf(-f64::from(level) * (order + steeper));
-                let [first, second] = [1, 2].map(|level| error(level - 1) - error(level));
-                assert!(error_of_level(first, 0.0).unwrap() >= 0.999_999 * error(1));
-                let contracted = first / contraction(MethodKind::Capped1, FamilyStart::None);
-                assert!(error_of_level(second, contracted).unwrap() >= 0.999_999 * error(2));
-            }
+        let ratio = step_ratio(CAPPED_ORDER);
+        for steeper in [0.0, 0.5, 1.0, 4.0, 8.0] {
+            let error = |level: i32| ratio.powf(-f64::from(level) * (CAPPED_ORDER + steeper));
+            let [first, second] = [1, 2].map(|level| error(level - 1) - error(level));
+            assert!(error_of_level(first, 0.0).unwrap() >= 0.999_999 * error(1));
+            let contracted = first / contraction(MethodKind::Capped1, FamilyStart::None);
+            assert!(error_of_level(second, contracted).unwrap() >= 0.999_999 * error(2));
         }
     }
 }

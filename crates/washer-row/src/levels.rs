@@ -2,8 +2,7 @@
 
 use washer_model::{Method, MethodKind, UnresolvedModes};
 
-/// The number of levels that resolve the bearings' modes, which come last. Two give one difference.
-pub(crate) const RESOLVING_LEVELS: usize = 2;
+use crate::error_control::LEVELS_PER_METHOD;
 
 /// The change by which a level starts a family, whose errors have other terms than those of the
 /// level before.
@@ -62,9 +61,10 @@ impl RefinementLevels {
         }
     }
 
-    /// Returns the index of the first level whose steps resolve the bearings' modes.
+    /// Returns the index of the first level whose steps resolve the bearings' modes. The levels of
+    /// that method come last.
     pub const fn first_resolving(&self) -> usize {
-        self.levels.len().saturating_sub(RESOLVING_LEVELS)
+        self.levels.len().saturating_sub(LEVELS_PER_METHOD)
     }
 
     /// Returns the modes that a level does not resolve, if there are any.

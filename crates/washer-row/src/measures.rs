@@ -7,13 +7,6 @@ use crate::metrics::{LeastScale, Metric, MetricProperties, MetricSource, PartKin
 use crate::outcome::{Deviations, Outcome};
 use crate::verdict::verdict;
 
-/// The greatest deviation of a machine at rest, relative to the clearance between drum and tub (for
-/// angles, to the clearance over a lever of one metre).
-///
-/// Basis: rounding of an equilibrium leaves about 1e-15 of the clearance, and a billionth of it has
-/// no effect on any machine. Doubling it changes no row.
-pub(crate) const REST_SHARE: f64 = 1e-9;
-
 /// The least deviation (m, rad) in the ratio of the models' deviations in a turn; smaller
 /// deviations are replaced by it.
 ///

@@ -7,7 +7,7 @@ use crate::error_control::{
     amplification, contraction, difference_of_levels, error_of_chaos, error_of_level,
 };
 use crate::levels::{FamilyStart, RefinementLevels};
-use crate::measures::{REST_SHARE, TURN_FLOOR};
+use crate::measures::TURN_FLOOR;
 use crate::metrics::Metric;
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::run::{LevelRun, RowRule};
@@ -62,7 +62,7 @@ impl ModelRule<'_> {
         let Some(run) = &refinement.run else { return 0.0 };
         let Some(unresolved) = self.levels.unresolved_modes(level) else { return 0.0 };
         let amplitude_bounds = self.point.ringing(unresolved);
-        let at_rest_m = REST_SHARE * self.point.clearance_m();
+        let at_rest_m = self.point.rest_limit_m();
         let mut greatest_ringing = amplitude_bounds.gap_m / self.point.clearance_m();
         for (channel, amplitude) in self.rule.channels.iter().zip(&run.trajectory.amplitudes) {
             let bound = amplitude_bounds.channels[channel.index()];
@@ -90,6 +90,8 @@ struct ModelRefinement {
     differences: Vec<LevelDifference>,
     /// The difference of the first two levels; zero before there are two.
     first_difference: f64,
+    /// Whether the last two levels follow different motions.
+    is_separated: bool,
     /// The comparison with a perturbed run, once it has run.
     perturbed: Option<PerturbedComparison>,
 }
@@ -152,6 +154,7 @@ impl ModelRefinement {
         if self.differences.len() == 1 && self.level == 0 {
             self.first_difference = relative.unwrap_or(f64::INFINITY);
         }
+        self.is_separated = separation.is_complete();
         self.level = level;
         self.run = Some(run);
     }
@@ -204,9 +207,10 @@ impl ModelRefinement {
         let is_finest_useful = self.level + 1 == levels.levels.len()
             || self.level + 1 == levels.first_resolving() && has_little_ringing(&self.level);
         if is_finest_useful {
-            // A chaotic motion does not converge at any step. A perturbed run tells such a motion
-            // from one that needs finer steps.
-            let may_be_chaos = !is_converged && rule.kind == ModelKind::Nonlinear;
+            // A chaotic motion does not converge at any step, and its levels separate, because they
+            // differ by more than a perturbed run does. A perturbed run tells such a motion from
+            // one that needs finer steps.
+            let may_be_chaos = !is_converged && self.is_separated;
             let needs_perturbed_run = may_be_chaos && self.perturbed.is_none();
             return needs_perturbed_run.then(|| levels.perturbed_index(self.level));
         }

@@ -7,7 +7,6 @@ use washer_model::{
     simulate_until,
 };
 
-use crate::measures::REST_SHARE;
 use crate::{Criterion, Deviations, Measures, Status, Trajectory};
 
 /// The numbers that rows take from trajectories, and their accuracy.
@@ -57,7 +56,7 @@ impl LevelRun {
             Criterion::Peak | Criterion::Envelope => record.amplitudes,
             Criterion::Rms => reading.root_mean_squares.unwrap_or(record.amplitudes),
         };
-        let rest_limit = REST_SHARE * point.clearance_m();
+        let rest_limit = point.rest_limit_m();
         let amplitudes = amplitudes.map(|value| if value < rest_limit { 0.0 } else { value });
         let trajectory = trajectory(record, reading, &amplitudes, rule);
         Self { trajectory, amplitudes, checkpoints }

@@ -44,8 +44,13 @@ fn fast() -> TestTrajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, 100.0, 1e4])
 }
 
-const TOLERANCE: Tolerance = Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 };
-const ADAPTIVE: [TestMethod; 2] = [TestMethod::Dopri5(TOLERANCE), TestMethod::Additive(TOLERANCE)];
+const TOLERANCE: Tolerance =
+    Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000, longest_step_s: None };
+const ADAPTIVE: [TestMethod; 3] = [
+    TestMethod::Dop853Adaptive(TOLERANCE),
+    TestMethod::Dopri5(TOLERANCE),
+    TestMethod::Additive(TOLERANCE),
+];
 
 /// Solves failing trajectories among regular ones in several orders, and asserts that the regular
 /// ones have the same bits as without failing ones. Returns the outcomes of the failing ones.

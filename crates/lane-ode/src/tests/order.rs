@@ -9,7 +9,12 @@ const END_S: f64 = 6.0;
 
 /// A tolerance that accepts any step. With segments of one step each, an adaptive method then has a
 /// fixed step.
-const ACCEPT_ALL: Tolerance = Tolerance { relative: 1e30, absolute: 1e30, max_steps: u64::MAX };
+const ACCEPT_ALL: Tolerance = tolerance(1e30, u64::MAX);
+
+/// Creates an equal relative and absolute tolerance.
+const fn tolerance(relative: f64, max_steps: u64) -> Tolerance {
+    Tolerance { relative, absolute: relative, max_steps, longest_step_s: None }
+}
 
 /// Returns the error at the end and the largest error inside a step, for each number of steps.
 fn errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
@@ -19,7 +24,7 @@ fn errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
             TestMethod::Rk4 | TestMethod::Dop853 => {
                 TestTrajectory::swing(1.0, END_S, 1, END_S / f64::from(n))
             }
-            TestMethod::Dopri5(_) | TestMethod::Additive(_) => {
+            TestMethod::Dop853Adaptive(_) | TestMethod::Dopri5(_) | TestMethod::Additive(_) => {
                 TestTrajectory::swing(1.0, END_S, n, END_S)
             }
         })
@@ -68,8 +73,10 @@ fn rk4_and_the_cubic_inside_its_steps_have_order_4() {
 
 #[test]
 fn dop853_has_order_8_and_its_coefficients_are_consistent() {
-    let [order, _] = slopes("dop853", TestMethod::Dop853, &[10, 14, 20, 28]);
-    assert!((7.7..9.3).contains(&order), "order {order}");
+    for method in [TestMethod::Dop853, TestMethod::Dop853Adaptive(ACCEPT_ALL)] {
+        let [order, _] = slopes(&format!("{method:?}"), method, &[10, 14, 20, 28]);
+        assert!((7.7..9.3).contains(&order), "order {order}");
+    }
 }
 
 #[test]
@@ -107,8 +114,8 @@ fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
     // frequency of sqrt(1/2).
     let segments = vec![Segment { start_s: 0.0, end_s: 10.0, step_s: 1e-4 }];
     let trajectory = TestTrajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], segments };
-    for tolerance in [1e-4, 1e-6] {
-        let tolerances = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 5_000 };
+    for relative in [1e-4, 1e-6] {
+        let tolerances = tolerance(relative, 5_000);
         let (outcomes, _) = solve::<CoupledEquation, 4, 1>(
             Simd::best(),
             TestMethod::Additive(tolerances),
@@ -117,36 +124,63 @@ fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
         let TestOutcome { end, x, count, .. } = outcomes[0];
         assert!(matches!(end, SegmentEnd::Completed(_)), "{end:?}");
         let error = (x[0] - (10.0 * 0.5_f64.sqrt()).cos()).abs();
-        eprintln!("additive at {tolerance:e}: error {error:.1e}, {count:?}");
-        assert!(error < 10.0 * tolerance, "{tolerance:e} gave {error:e}");
+        eprintln!("additive at {relative:e}: error {error:.1e}, {count:?}");
+        assert!(error < 10.0 * relative, "{relative:e} gave {error:e}");
         // An explicit formula would need about 5e4 steps.
         assert!(count.accepted + count.rejected < 1_000, "{count:?}");
     }
 }
 
-#[test]
-fn steps_of_dopri5_are_proportional_to_the_fifth_root_of_the_tolerance() {
+/// Integrates a swing at four tolerances, each a hundredth of the one before, and checks that
+/// errors are below 30 times the tolerance. Returns the ratios of the numbers of steps.
+fn ratios_of_steps(method: fn(Tolerance) -> TestMethod) -> Vec<f64> {
     let trajectory = TestTrajectory::swing(1.0, 20.0, 1, 1e-3);
     let exact = SwingEquation::exact(&[1.0], 20.0);
     let mut steps = Vec::new();
-    for tolerance in [1e-5, 1e-7, 1e-9, 1e-11] {
-        let tolerances = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 100_000 };
+    for relative in [1e-5, 1e-7, 1e-9, 1e-11] {
+        let tolerance = tolerance(relative, 100_000);
         let (outcomes, _) = solve::<SwingEquation, 3, 1>(
             Simd::best(),
-            TestMethod::Dopri5(tolerances),
+            method(tolerance),
             core::slice::from_ref(&trajectory),
         );
-        let TestOutcome { end, x, count, error_inside, .. } = outcomes[0];
+        let TestOutcome { end, x, count, .. } = outcomes[0];
         assert!(matches!(end, SegmentEnd::Completed(_)));
-        let error = (0..3).map(|i| (x[i] - exact[i]).abs()).fold(error_inside, f64::max);
-        eprintln!("dopri5 at {tolerance:e}: error {error:.2e}, {count:?}");
-        assert!(error < 30.0 * tolerance, "{tolerance:e} gave {error:e}");
+        let error = (0..3).map(|i| (x[i] - exact[i]).abs()).fold(0.0, f64::max);
+        eprintln!("{:?}: error {error:.2e}, {count:?}", method(tolerance));
+        assert!(error < 30.0 * relative, "{relative:e} gave {error:e}");
         steps.push(count.accepted as f64);
     }
-    // The local error is proportional to h^5: a hundredth of the tolerance takes 100^(1/5) = 2.51
-    // times as many steps.
-    for pair in steps.windows(2) {
-        assert!((2.1..2.9).contains(&(pair[1] / pair[0])), "{steps:?}");
+    steps.windows(2).map(|pair| pair[1] / pair[0]).collect()
+}
+
+#[test]
+fn steps_follow_the_tolerance_by_the_order_of_the_error_estimate() {
+    // The local error of dopri5 is proportional to h^5: a hundredth of the tolerance takes
+    // 100^(1/5) = 2.51 times as many steps.
+    let ratios = ratios_of_steps(TestMethod::Dopri5);
+    assert!(ratios.iter().all(|ratio| (2.1..2.9).contains(ratio)), "{ratios:?}");
+    // That of dop853 is proportional to h^8 if steps are short: 100^(1/8) = 1.78.
+    let ratios = ratios_of_steps(TestMethod::Dop853Adaptive);
+    assert!(ratios.iter().all(|ratio| (1.4..2.1).contains(ratio)), "{ratios:?}");
+}
+
+#[test]
+fn no_step_is_longer_than_the_longest() {
+    let trajectory = TestTrajectory::swing(1.0, 20.0, 1, 1e-3);
+    for longest_step_s in [0.02, 0.05] {
+        let tolerance = Tolerance { longest_step_s: Some(longest_step_s), ..ACCEPT_ALL };
+        for method in [TestMethod::Dop853Adaptive(tolerance), TestMethod::Additive(tolerance)] {
+            let (outcomes, _) = solve::<SwingEquation, 3, 1>(
+                Simd::best(),
+                method,
+                core::slice::from_ref(&trajectory),
+            );
+            // Steps grow from the first one at most by a factor of 5, and the last one is shorter.
+            let accepted = outcomes[0].count.accepted as f64;
+            let least = 20.0 / longest_step_s;
+            assert!((least..least + 4.0).contains(&accepted), "{method:?}: {accepted}");
+        }
     }
 }
 
@@ -157,8 +191,9 @@ fn every_segment_ends_exactly_at_its_end() {
     for method in [
         TestMethod::Rk4,
         TestMethod::Dop853,
-        TestMethod::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
-        TestMethod::Additive(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
+        TestMethod::Dop853Adaptive(tolerance(1e-6, 100_000)),
+        TestMethod::Dopri5(tolerance(1e-6, 100_000)),
+        TestMethod::Additive(tolerance(1e-6, 100_000)),
     ] {
         let trajectories: Vec<_> = end_times
             .into_iter()

@@ -11,19 +11,18 @@ const COMPARED_COORDINATES: usize = COORDINATES - 2;
 impl Point {
     /// Computes the separation of two runs of the nonlinear model at their common checkpoints.
     /// Returns for each instant (s) the greatest difference of any coordinate except the hinge's,
-    /// relative to the greatest deviation of this coordinate from equilibrium in the whole run `b`.
+    /// relative to the greatest deviation of this coordinate from equilibrium in the whole run `b`,
+    /// or to the least amplitude of a motion ([`Self::rest_limit_m`]) if that is greater.
     pub fn separations(&self, a: &Checkpoints, b: &Checkpoints) -> Vec<(f64, f64)> {
-        let mut largest_deviations = [0.0_f64; COMPARED_COORDINATES];
+        let mut largest_deviations = [self.rest_limit_m(); COMPARED_COORDINATES];
         for checkpoint in b {
             for (i, largest) in largest_deviations.iter_mut().enumerate() {
                 *largest = largest.max((checkpoint.coordinates[i] - self.equilibrium[i]).abs());
             }
         }
         let separation = |((a, b), segment): ((&Checkpoint, &Checkpoint), &PlannedSegment)| {
-            let relative_difference = |i: usize| {
-                let difference = (a.coordinates[i] - b.coordinates[i]).abs();
-                if difference == 0.0 { 0.0 } else { difference / largest_deviations[i] }
-            };
+            let relative_difference =
+                |i: usize| (a.coordinates[i] - b.coordinates[i]).abs() / largest_deviations[i];
             (segment.end_s, (0..COMPARED_COORDINATES).map(relative_difference).fold(0.0, f64::max))
         };
         a.iter().zip(b).zip(&*self.segments).map(separation).collect()

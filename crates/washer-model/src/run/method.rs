@@ -8,7 +8,7 @@ use crate::nonlinear::coupling::Coupling;
 use crate::point::PlannedSegment;
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::{Caps, Formula, ModelKind, Point};
-use lane_ode::{Lane, N, Segment, Task, Tolerance, additive, dop853, dopri5, rk4};
+use lane_ode::{Lane, N, Segment, Task, Tolerance, additive, dop853, dop853_adaptive, dopri5, rk4};
 
 sweep_parameter::named! {
     /// The kinds of methods. The position in this list is the code in results and pages, so that
@@ -42,6 +42,9 @@ sweep_parameter::named! {
         /// Dormand and Prince's formula of order 8 with fixed steps, without capped modes. The
         /// linear model uses classical Runge-Kutta instead.
         Dop853 = "dop853",
+        /// The same formula with adaptive steps up to the limit of stability. The linear model uses
+        /// [`Self::Dopri5`]'s instead.
+        Dop853Adaptive = "dop853_adaptive",
     }
 }
 
@@ -65,7 +68,7 @@ impl MethodKind {
 
     /// Whether each lane has its own steps, which follow the error estimate.
     pub const fn adapts_steps(self) -> bool {
-        matches!(self, Self::Dopri5 | Self::Additive)
+        matches!(self, Self::Dopri5 | Self::Additive | Self::Dop853Adaptive)
     }
 }
 
@@ -97,7 +100,12 @@ impl Method {
             kind,
             step_s: if kind.adapts_steps() { FIRST_STEP_S } else { 0.0 },
             caps: Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None },
-            tolerance: Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 },
+            tolerance: Tolerance {
+                relative: 0.0,
+                absolute: 0.0,
+                max_steps: 0,
+                longest_step_s: None,
+            },
         }
     }
 
@@ -109,6 +117,11 @@ impl Method {
     /// Returns the formula of order 8 in fixed steps (s).
     pub const fn dop853(step_s: f64) -> Self {
         Self { step_s, ..Self::new(MethodKind::Dop853) }
+    }
+
+    /// Returns the formula of order 8 in adaptive steps.
+    pub const fn dop853_adaptive(tolerance: Tolerance) -> Self {
+        Self { tolerance, ..Self::new(MethodKind::Dop853Adaptive) }
     }
 
     /// Returns a capped kind in fixed steps (s).
@@ -154,6 +167,7 @@ impl Method {
         match self.kind {
             MethodKind::Rk4 => visitor.visit(Rk4Stepper),
             MethodKind::Dopri5 => visitor.visit(Dopri5Stepper(self.tolerance)),
+            MethodKind::Dop853Adaptive => visitor.visit(F::adaptive_stepper(self.tolerance)),
             MethodKind::Additive => visitor.visit(AdditiveStepper(self.tolerance)),
             MethodKind::Capped0
             | MethodKind::Capped1
@@ -199,8 +213,12 @@ pub(crate) trait ModelFamily {
     type OnLanes<T: Lane>: LaneModel<T>;
     /// The stepper of capped kinds and of [`MethodKind::Dop853`], by the model's formula.
     type FixedStepStepper: FixedStepper;
+    /// The stepper of [`MethodKind::Dop853Adaptive`].
+    type AdaptiveStepper: Stepper;
     /// The model as a value.
     const KIND: ModelKind;
+    /// Returns the stepper of [`MethodKind::Dop853Adaptive`] with its tolerance.
+    fn adaptive_stepper(tolerance: Tolerance) -> Self::AdaptiveStepper;
 }
 
 /// The nonlinear model over any lanes.
@@ -210,12 +228,22 @@ pub(crate) enum LinearFamily {}
 impl ModelFamily for NonlinearFamily {
     type OnLanes<T: Lane> = Nonlinear<T>;
     type FixedStepStepper = Dop853Stepper;
+    type AdaptiveStepper = Dop853AdaptiveStepper;
     const KIND: ModelKind = ModelKind::Nonlinear;
+
+    fn adaptive_stepper(tolerance: Tolerance) -> Dop853AdaptiveStepper {
+        Dop853AdaptiveStepper(tolerance)
+    }
 }
 impl ModelFamily for LinearFamily {
     type OnLanes<T: Lane> = Linear<T>;
     type FixedStepStepper = Rk4Stepper;
+    type AdaptiveStepper = Dopri5Stepper;
     const KIND: ModelKind = ModelKind::Linear;
+
+    fn adaptive_stepper(tolerance: Tolerance) -> Dopri5Stepper {
+        Dopri5Stepper(tolerance)
+    }
 }
 
 /// An integrator of a task whose lanes are trajectories.
@@ -253,6 +281,8 @@ macro_rules! steppers {
 steppers! {
     Rk4Stepper = |self, zero, task| rk4::integrate(zero, task);
     Dop853Stepper = |self, zero, task| dop853::integrate(zero, task);
+    Dop853AdaptiveStepper(Tolerance) =
+        |self, zero, task| dop853_adaptive::integrate(zero, task, &self.0);
     Dopri5Stepper(Tolerance) = |self, zero, task| dopri5::integrate(zero, task, &self.0);
     AdditiveStepper(Tolerance) = |self, zero, task| additive::integrate(zero, task, &self.0);
 }

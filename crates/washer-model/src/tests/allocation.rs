@@ -6,7 +6,8 @@ use lane_ode::{Simd, Tolerance};
 
 #[test]
 fn a_long_trajectory_allocates_no_more_than_a_short_one() {
-    let tolerance = Tolerance { relative: 1e-4, absolute: 1e-7, max_steps: 1_000_000 };
+    let tolerance =
+        Tolerance { relative: 1e-4, absolute: 1e-7, max_steps: 1_000_000, longest_step_s: None };
     let allocations = |simd, model, method: &Method, recorders, end_s| {
         // There are more points than lanes, so that lanes start further points.
         let points: Vec<_> = (0..11)

@@ -19,8 +19,18 @@ const METHODS: [Method; 5] = [
     Method::rk4(1e-4),
     Method::capped(MethodKind::Capped0, 1e-3, CAPS),
     Method::dop853(4e-4),
-    Method::dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
-    Method::additive(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
+    Method::dopri5(Tolerance {
+        relative: 1e-5,
+        absolute: 1e-8,
+        max_steps: 1_000_000,
+        longest_step_s: None,
+    }),
+    Method::additive(Tolerance {
+        relative: 1e-5,
+        absolute: 1e-8,
+        max_steps: 1_000_000,
+        longest_step_s: None,
+    }),
 ];
 
 /// Returns eleven scenarios, so that some of four or eight lanes stay idle: the corners, the
@@ -215,7 +225,8 @@ fn every_method_stops_within_a_segment() {
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 },
     );
     let point = prepare(Simd::best(), &[scenario], &timing).remove(0).unwrap();
-    let tolerance = Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000 };
+    let tolerance =
+        Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000, longest_step_s: None };
     let dop853 = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
     let adaptive = [Method::dopri5(tolerance), Method::additive(tolerance)];
     for method in [Method::rk4(2e-5), dop853].into_iter().chain(adaptive) {

@@ -124,7 +124,12 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
 fn val_histories_with_every_element_match_those_of_independent_programs() {
     for name in ["friction", "stops", "gasket_cubic", "second_unbalance", "all"] {
         let rk4 = Method::rk4;
-        let tolerance = Tolerance { relative: 1e-7, absolute: 1e-9, max_steps: 10_000_000 };
+        let tolerance = Tolerance {
+            relative: 1e-7,
+            absolute: 1e-9,
+            max_steps: 10_000_000,
+            longest_step_s: None,
+        };
         let methods = [rk4(1e-4), rk4(5e-5), Method::additive(tolerance)];
         let [coarse, fine, additive] = reference_errors(name, methods);
         eprintln!(

@@ -122,7 +122,8 @@ fn readings_agree_with_densely_sampled_histories() {
 #[test]
 fn readings_do_not_depend_on_the_method() {
     let point = point();
-    let tolerance = Tolerance { relative: 1e-7, absolute: 1e-10, max_steps: 1_000_000 };
+    let tolerance =
+        Tolerance { relative: 1e-7, absolute: 1e-10, max_steps: 1_000_000, longest_step_s: None };
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let run = |method| {
             simulate_with(Simd::best(), model, &method, &[&point], ALL_RECORDERS).1.remove(0)

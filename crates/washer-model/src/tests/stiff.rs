@@ -19,7 +19,7 @@ fn point(bearing_stiffness_n_per_m: f64) -> Point {
 }
 
 fn tolerance(relative: f64) -> Tolerance {
-    Tolerance { relative, absolute: 1e-3 * relative, max_steps: 1_000_000 }
+    Tolerance { relative, absolute: 1e-3 * relative, max_steps: 1_000_000, longest_step_s: None }
 }
 
 fn simulate_point(model: ModelKind, method: &Method, point: &Point) -> Record {

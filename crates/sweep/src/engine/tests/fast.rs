@@ -189,7 +189,7 @@ fn rows_agree_with_rk4_on_machines_with_friction_stops_and_gasket() {
         let why = engine.levels()[0].note.clone().unwrap();
         assert!(why.starts_with("no modes are capped, because friction and stops"), "{why}");
         let is_by = |level| rows.iter().any(|row| row.method == level);
-        assert!(is_by(MethodKind::Additive) && is_by(MethodKind::Dop853), "{set}");
+        assert!(is_by(MethodKind::Additive) && is_by(MethodKind::Dop853Adaptive), "{set}");
         assert!(rows.iter().all(|row| !row.method.is_capped()), "{set}");
     }
 }

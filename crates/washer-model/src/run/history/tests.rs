@@ -75,7 +75,12 @@ fn a_trajectory_does_not_depend_on_the_instants() {
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 },
         1.0,
     );
-    let adaptive = lane_ode::Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: 1_000_000 };
+    let adaptive = lane_ode::Tolerance {
+        relative: 1e-6,
+        absolute: 1e-9,
+        max_steps: 1_000_000,
+        longest_step_s: None,
+    };
     for method in [Method::rk4(2e-4), Method::dopri5(adaptive), Method::additive(adaptive)] {
         let sample = |every_s: f64| {
             history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), every_s)
