@@ -1,15 +1,15 @@
 //! `sweep fit`: fits parameters of the machine to measurements, and computes their errors and the
 //! verdict of the fitted machine.
 //!
-//! `measured`, `pulses` and `speed` read a measurement. `model` compares it with the model and its
-//! derivatives, `search` finds the least cost, `statistics` computes the errors of the fitted
+//! `measurement`, `pulses` and `speed` read a measurement. `model` compares it with the model and
+//! its derivatives, `search` finds the least cost, `statistics` computes the errors of the fitted
 //! numbers, and `report` holds the results. `evaluations` stores the evaluations of a fit.
 
 mod algebra;
 mod curves;
 mod evaluations;
-mod known;
-mod measured;
+mod fixed_numbers;
+mod measurement;
 mod model;
 mod pulses;
 mod report;
@@ -35,26 +35,26 @@ use sweep_engine::config::{Diagnostic, Location, Report as Mistakes};
 use sweep_engine::design::{DesignRule, DistributionShape};
 use sweep_engine::{Design, Diagnostics, Distribution, Error};
 
-use algebra::Symmetric;
+use algebra::EigenDecomposition;
 pub(crate) use evaluations::Evaluations;
-use known::FixedNumbers;
-pub(crate) use measured::Measurement;
-use measured::REST_SPEED_RATIO;
+use fixed_numbers::FixedNumbers;
+pub(crate) use measurement::Measurement;
+use measurement::REST_SPEED_RATIO;
 pub(crate) use model::FitCase;
 use model::{FreeParameter, NormalEquations, Problem, SignalComparison};
 pub(crate) use report::FitReport;
-use search::{Descent, DescentEnd, MAX_EVALUATIONS, descend};
+use search::{Descent, DescentError, MAX_EVALUATIONS, descend};
 use statistics::Statistics;
 
 /// The range of additional starting values of a parameter without a given range, relative to its
 /// first starting value. Basis: a data sheet is seldom wrong by more. Doubling the width tries more
 /// distant minima with fewer starts near the first.
-const START_RANGE: [f64; 2] = [0.3, 1.7];
+const START_RATIO_RANGE: [f64; 2] = [0.3, 1.7];
 /// The greatest number of starting points from which a descent begins. Those with the least cost
 /// are taken. Basis: the test data have two minima. Doubling it doubles the time of a fit with
 /// `--starts`.
 const MAX_DESCENTS: usize = 3;
-/// The seed of all draws.
+/// The seed of all random numbers.
 const SEED: u64 = 1;
 /// The greatest change of a fitted parameter by half the integration step, in standard errors.
 /// Basis: it adds some five percent to an error. Doubling it adds four times as much.
@@ -67,10 +67,10 @@ const MAX_STEP_HALVINGS: usize = 2;
 /// The options of a fit.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FitOptions {
-    /// Parameters to fit, each perhaps between two values; separated by commas
+    /// Parameters to fit, each optionally with bounds; separated by commas
     #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
     pub free: Vec<String>,
-    /// Parameters of which every file has its own
+    /// Parameters with a separate value for every file
     #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
     pub own: Vec<String>,
     /// Fit the nonlinear model, or the linear one
@@ -84,7 +84,7 @@ pub struct FitOptions {
     #[arg(long, value_name = "N", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub starts: u32,
-    /// Fit again so many times with resampled residuals
+    /// Number of further fits, to resampled residuals
     #[arg(long, value_name = "N", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub bootstrap: u32,
@@ -119,7 +119,7 @@ impl FitOptions {
 }
 
 /// A finished fit.
-pub(crate) struct Fitted<'a> {
+pub(crate) struct FinishedFit<'a> {
     pub(crate) problem: Problem<'a>,
     pub(crate) x: Vec<f64>,
     comparisons: Vec<SignalComparison>,
@@ -133,7 +133,7 @@ pub(crate) struct FitContext<'a> {
     /// The cancellation. The result of a cancelled fit means nothing.
     pub(crate) cancel: Cancel<'a>,
     /// A function that is called after every evaluation with the number of evaluations.
-    pub(crate) count_evaluations: &'a (dyn Fn(usize) + Sync),
+    pub(crate) report_evaluations: &'a (dyn Fn(usize) + Sync),
     /// The machine file beside which evaluations are stored.
     pub(crate) output: Option<&'a Path>,
     /// Whether to discard stored evaluations.
@@ -144,7 +144,7 @@ pub(crate) struct FitContext<'a> {
 ///
 /// # Errors
 /// Returns mistakes in the grid and the constants. An axis without a constant has its middle value.
-pub(crate) fn case(
+pub(crate) fn prepare_case(
     grid: &WasherGridInput,
     constants: &[String],
     mut measurement: Measurement,
@@ -173,19 +173,20 @@ fn middle_constants(
 }
 
 /// Reads the free parameters of `--free` and `--own`.
-fn free_parameters(
+fn read_free_parameters(
     options: &FitOptions,
     cases: &[FitCase],
 ) -> Result<Vec<FreeParameter>, Diagnostics> {
     let mistakes = Mistakes::default();
     let mut free: Vec<FreeParameter> = Vec::new();
-    let shared = options.free.iter().map(|text| (text, "--free", &cases[..1]));
-    let own = options.own.iter().map(|text| (text, "--own", cases));
-    for (text, option, cases) in shared.chain(own) {
+    let shared_texts = options.free.iter().map(|text| (text, "--free", &cases[..1]));
+    let own_texts = options.own.iter().map(|text| (text, "--own", cases));
+    for (text, option, cases) in shared_texts.chain(own_texts) {
         let location = Location::new(mistakes.add(option, text.as_str()), 0..text.len());
         for (k, case) in cases.iter().enumerate() {
             let earlier_parameters: &[FreeParameter] = if cases.len() == 1 { &free } else { &[] };
-            let Some(read) = free_parameter(text, case, earlier_parameters, (&location, &mistakes))
+            let Some(read) =
+                read_free_parameter(text, case, earlier_parameters, (&location, &mistakes))
             else {
                 break;
             };
@@ -195,8 +196,9 @@ fn free_parameters(
     mistakes.finish(Some(free))
 }
 
-/// Reads a free parameter of a case, in addition to `known` ones, and reports its mistakes.
-fn free_parameter(
+/// Reads a free parameter of a case, which must differ from the earlier ones, and reports its
+/// mistakes.
+fn read_free_parameter(
     text: &str,
     case: &FitCase,
     earlier_parameters: &[FreeParameter],
@@ -228,20 +230,20 @@ fn free_parameter(
     if earlier_parameters.iter().any(|free| free.parameter == parameter) {
         return refuse(format!("`{name}` is free twice"), "expected each once");
     }
-    let allowed = parameter.range().bounds();
-    let parsed = range.map(|range| {
+    let allowed_bounds = parameter.range().bounds();
+    let parsed_range = range.map(|range| {
         let (from, to) = range.split_once(':')?;
         let [from, to] = [from.trim().parse().ok()?, to.trim().parse().ok()?];
-        let within = allowed[0] <= from && from < to && to <= allowed[1];
+        let within = allowed_bounds[0] <= from && from < to && to <= allowed_bounds[1];
         (within && f64::is_finite(from) && f64::is_finite(to)).then_some([from, to])
     });
-    let Some(range) = parsed.unwrap_or(Some(allowed)) else {
+    let Some(range) = parsed_range.unwrap_or(Some(allowed_bounds)) else {
         let expected = "expected NAME=FROM:TO with FROM below TO, both allowed";
         return refuse(format!("`{text}` is no range"), expected);
     };
     let value = parameter.get(machine, spin).filter(|value| (range[0]..=range[1]).contains(value));
     let start = match value {
-        _ if parsed.is_some() => Some(value.unwrap_or(0.5 * (range[0] + range[1]))),
+        _ if parsed_range.is_some() => Some(value.unwrap_or(0.5 * (range[0] + range[1]))),
         value => value.filter(|value| *value != 0.0),
     };
     let Some(start) = start else {
@@ -261,11 +263,11 @@ pub(crate) fn fit<'a>(
     cases: Vec<FitCase>,
     options: &FitOptions,
     context: &FitContext<'a>,
-) -> Result<Option<Fitted<'a>>, Error> {
+) -> Result<Option<FinishedFit<'a>>, Error> {
     match run_fit(cases, options, context) {
         Ok(fitted) => Ok(Some(fitted)),
-        Err(DescentEnd::Stopped) => Ok(None),
-        Err(DescentEnd::Refused(error)) => Err(error),
+        Err(DescentError::Cancelled) => Ok(None),
+        Err(DescentError::Refused(error)) => Err(error),
     }
 }
 
@@ -273,16 +275,16 @@ fn run_fit<'a>(
     cases: Vec<FitCase>,
     options: &FitOptions,
     context: &FitContext<'a>,
-) -> Result<Fitted<'a>, DescentEnd> {
-    let free = free_parameters(options, &cases)?;
+) -> Result<FinishedFit<'a>, DescentError> {
+    let free = read_free_parameters(options, &cases)?;
     let fixed_numbers = FixedNumbers::read(&options.known, &cases[0], &free)?;
-    let method = Problem::method(&cases).map_err(Error::model)?;
+    let method = Problem::select_method(&cases).map_err(Error::model)?;
     let model = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
     let simd = simd_from_environment()?;
     let fits_shift = !options.no_shift;
     let cancel = context.cancel;
     let mut problem = Problem { cases, free, model, fits_shift, method, simd, cancel };
-    let samples: usize = problem.cases.iter().map(|case| case.measurement.count()).sum();
+    let samples: usize = problem.cases.iter().map(|case| case.measurement.count_samples()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
     if unknowns >= samples {
         let expected = "expected more samples, or fewer `--free`";
@@ -301,25 +303,25 @@ fn run_fit<'a>(
     }
     let open_evaluations = |output| Evaluations::open(output, &problem, context.fresh);
     let stored_evaluations = context.output.map(open_evaluations).transpose()?;
-    let evaluations_made = AtomicUsize::new(0);
+    let evaluation_count = AtomicUsize::new(0);
     // A fit to data in a wrong unit takes long and does not converge, so it is tried with few
     // evaluations first.
-    let mut unit_suspicions = units::find_suspicions(&problem)?;
-    let is_suspect = unit_suspicions.iter().any(Option::is_some);
+    let mut suspected_unit_by_case = units::find_suspected_units(&problem)?;
+    let is_suspect = suspected_unit_by_case.iter().any(Option::is_some);
     let search = MinimumSearch {
         problem: &problem,
-        stored: stored_evaluations.as_ref(),
+        stored_evaluations: stored_evaluations.as_ref(),
         context,
-        evaluations_made: &evaluations_made,
-        max_evaluations: if is_suspect { units::TRIAL_EVALUATIONS } else { MAX_EVALUATIONS },
+        evaluation_count: &evaluation_count,
+        max_evaluations: if is_suspect { units::MAX_TRIAL_EVALUATIONS } else { MAX_EVALUATIONS },
     };
     let starts = u64::from(options.starts);
-    let mut minima = search.minima(starts);
-    let is_explained = |minima: &Vec<Descent>| {
-        minima.first().is_some_and(|best| units::is_explained(&problem, best))
+    let mut minima = search.find_minima(starts);
+    let explains_record = |minima: &Vec<Descent>| {
+        minima.first().is_some_and(|best| units::explains_record(&problem, best))
     };
-    if is_suspect && minima.as_ref().is_ok_and(is_explained) {
-        minima = MinimumSearch { max_evaluations: MAX_EVALUATIONS, ..search }.minima(starts);
+    if is_suspect && minima.as_ref().is_ok_and(explains_record) {
+        minima = MinimumSearch { max_evaluations: MAX_EVALUATIONS, ..search }.find_minima(starts);
     }
     stored_evaluations.as_ref().map_or(Ok(()), Evaluations::write)?;
     let mut minima = minima?;
@@ -328,14 +330,14 @@ fn run_fit<'a>(
     // An integration step that is too long for the corners of forces changes the fitted
     // parameters; then the step is halved.
     for _ in 0..=MAX_STEP_HALVINGS {
-        if problem.method.kind != MethodKind::Rk4 || !best.is_settled {
+        if problem.method.kind != MethodKind::Rk4 || !best.is_converged {
             break;
         }
         let step_s = problem.method.step_s;
-        let comparisons = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
+        let comparisons = problem.compare(&best.x).ok_or(DescentError::Cancelled)?;
         problem.method = Method::rk4(0.5 * step_s);
-        let finer_comparisons = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
-        let inverse_normal = algebra::inverse(&best.equations.normal);
+        let finer_comparisons = problem.compare(&best.x).ok_or(DescentError::Cancelled)?;
+        let inverse_normal = algebra::pseudo_inverse(&best.equations.normal);
         let changes = standardised_changes(
             &inverse_normal,
             &best.equations,
@@ -348,18 +350,18 @@ fn run_fit<'a>(
             problem.method = Method::rk4(step_s);
             break;
         }
-        let search = MinimumSearch::further(&problem, context, &evaluations_made);
-        best = search.from(&best.x)?.ok_or_else(failed_start_error)?;
+        let search = MinimumSearch::without_store(&problem, context, &evaluation_count);
+        best = search.descend_from(&best.x)?.ok_or_else(failed_start_error)?;
         minima[0] = best.clone();
     }
-    let evaluations = evaluations_made.load(Ordering::Relaxed);
-    let comparisons = problem.compare(&best.x).ok_or(DescentEnd::Stopped)?;
+    let evaluations = evaluation_count.load(Ordering::Relaxed);
+    let comparisons = problem.compare(&best.x).ok_or(DescentError::Cancelled)?;
     // A wrong unit may change the numbers so much that only the start shows the unit.
     let start_comparisons =
-        problem.compare(&problem.start()).unwrap_or_else(|| comparisons.clone());
-    let mut statistics = Statistics::at_end(&problem, &comparisons, &best.equations);
-    let by_tachometer = covariance_by_tachometer(&problem, &best, &comparisons);
-    statistics::add(&mut statistics.covariance, &by_tachometer, 1.0);
+        problem.compare(&problem.start_point()).unwrap_or_else(|| comparisons.clone());
+    let mut statistics = Statistics::from_comparisons(&problem, &comparisons, &best.equations);
+    let tachometer_covariance = compute_tachometer_covariance(&problem, &best, &comparisons);
+    statistics::add_scaled(&mut statistics.covariance, &tachometer_covariance, 1.0);
     if problem.model == ModelKind::Linear {
         // The numbers may compensate for the terms that the linear model lacks, without a residual.
         problem.model = ModelKind::Nonlinear;
@@ -368,36 +370,36 @@ fn run_fit<'a>(
         });
         problem.model = ModelKind::Linear;
     }
-    let mut resampled = None;
-    if options.bootstrap > 0 && best.is_settled {
-        resampled =
+    let mut bootstrap_fits = None;
+    if options.bootstrap > 0 && best.is_converged {
+        bootstrap_fits =
             Some(bootstrap(&mut problem, &best.x, &comparisons, options.bootstrap, context)?);
     }
-    if best.is_settled && statistics.objection(&problem).is_none() {
+    if best.is_converged && statistics.objection(&problem).is_none() {
         let variances = statistics.variances(&best.equations);
         statistics.influences =
             fixed_numbers.influences(&problem, &best.x, &comparisons, &best.equations, &variances);
     }
     if statistics.worst_explained().is_none() {
-        unit_suspicions.fill(None);
+        suspected_unit_by_case.fill(None);
     }
     let report_data = report::ReportData {
         problem: &problem,
-        unit_suspicions: &unit_suspicions,
+        suspected_unit_by_case: &suspected_unit_by_case,
         minima: &minima,
         comparisons: &comparisons,
         start_comparisons: &start_comparisons,
         statistics: &statistics,
         evaluations,
         step_effect,
-        resampled: resampled.as_deref(),
+        bootstrap_fits: bootstrap_fits.as_deref(),
         draws: options.draws.into(),
     };
     let report = report_data.report()?;
     if cancel.is_requested() {
-        return Err(DescentEnd::Stopped);
+        return Err(DescentError::Cancelled);
     }
-    Ok(Fitted { problem, x: best.x, comparisons, report, evaluations: stored_evaluations })
+    Ok(FinishedFit { problem, x: best.x, comparisons, report, evaluations: stored_evaluations })
 }
 
 /// Returns the error of a start at which the model fails.
@@ -426,7 +428,7 @@ fn standardised_changes(
             *rhs -= algebra::dot(slope, &difference) / (sigma * sigma);
         }
     }
-    let inverse_normal = algebra::inverse(&equations.normal);
+    let inverse_normal = algebra::pseudo_inverse(&equations.normal);
     let standardised_change = |k: usize| {
         let variance = covariance[k][k];
         let change = algebra::dot(&inverse_normal[k], &rhs);
@@ -436,19 +438,19 @@ fn standardised_changes(
 }
 
 /// Computes the part of the unknowns' covariance that is due to the noise of the tachometers.
-fn covariance_by_tachometer(
+fn compute_tachometer_covariance(
     problem: &Problem<'_>,
     best: &Descent,
     comparisons: &[SignalComparison],
 ) -> Vec<Vec<f64>> {
     let n = problem.unknowns();
-    let inverse_normal = algebra::inverse(&best.equations.normal);
+    let inverse_normal = algebra::pseudo_inverse(&best.equations.normal);
     let mut covariance = vec![vec![0.0; n]; n];
     for (case, fit_case) in problem.cases.iter().enumerate() {
         let random_spins =
             fit_case.smoothed_spin.as_ref().map(|spin| &spin.random_spins[..]).unwrap_or_default();
         let sigma = &best.equations.sigma[..];
-        let right_sides = problem.right_sides(
+        let right_sides = problem.compute_right_sides(
             case,
             &best.x,
             (comparisons, sigma),
@@ -475,7 +477,7 @@ fn bootstrap(
     comparisons: &[SignalComparison],
     count: u32,
     context: &FitContext<'_>,
-) -> Result<Vec<Vec<f64>>, DescentEnd> {
+) -> Result<Vec<Vec<f64>>, DescentError> {
     /// The number of samples in a block of the block bootstrap. Basis: residuals of the test data
     /// are correlated over some ten samples. Doubling it preserves slower correlations, but leaves
     /// fewer blocks.
@@ -503,9 +505,9 @@ fn bootstrap(
                 signal.values[row] = comparison.model[row] + comparison.offset + residual;
             }
         }
-        let evaluations_made = AtomicUsize::new(0);
-        let search = MinimumSearch::further(problem, context, &evaluations_made);
-        let refit = search.from(x)?.filter(|refit| refit.is_settled);
+        let evaluation_count = AtomicUsize::new(0);
+        let search = MinimumSearch::without_store(problem, context, &evaluation_count);
+        let refit = search.descend_from(x)?.filter(|refit| refit.is_converged);
         fits.extend(refit.map(|refit| refit.x[..problem.free.len()].to_vec()));
     }
     problem.cases = original_cases;
@@ -515,50 +517,59 @@ fn bootstrap(
 /// A search for the least cost of a problem.
 struct MinimumSearch<'a> {
     problem: &'a Problem<'a>,
-    stored: Option<&'a Evaluations>,
+    stored_evaluations: Option<&'a Evaluations>,
     context: &'a FitContext<'a>,
     /// The number of evaluations so far.
-    evaluations_made: &'a AtomicUsize,
+    evaluation_count: &'a AtomicUsize,
     /// The greatest number of evaluations of a descent.
     max_evaluations: usize,
 }
 
 impl<'a> MinimumSearch<'a> {
     /// Returns a search whose evaluations are not stored.
-    fn further(
+    fn without_store(
         problem: &'a Problem<'a>,
         context: &'a FitContext<'a>,
-        evaluations_made: &'a AtomicUsize,
+        evaluation_count: &'a AtomicUsize,
     ) -> Self {
-        Self { problem, stored: None, context, evaluations_made, max_evaluations: MAX_EVALUATIONS }
+        Self {
+            problem,
+            stored_evaluations: None,
+            context,
+            evaluation_count,
+            max_evaluations: MAX_EVALUATIONS,
+        }
     }
 
     /// Computes the normal equations at a point, or reads stored ones.
-    fn evaluate(&self, x: &[f64]) -> Result<Option<NormalEquations>, DescentEnd> {
+    fn evaluate(&self, x: &[f64]) -> Result<Option<NormalEquations>, DescentError> {
         let find = || {
             let comparisons = self.problem.compare(x);
             if self.problem.cancel.is_requested() {
-                return Err(DescentEnd::Stopped);
+                return Err(DescentError::Cancelled);
             }
             Ok(comparisons.map(|comparisons| self.problem.normal_equations(&comparisons)))
         };
-        let equations = self.stored.map_or_else(find, |stored| stored.find_or_compute(x, find))?;
-        (self.context.count_evaluations)(1 + self.evaluations_made.fetch_add(1, Ordering::Relaxed));
+        let equations =
+            self.stored_evaluations.map_or_else(find, |stored| stored.find_or_compute(x, find))?;
+        (self.context.report_evaluations)(
+            1 + self.evaluation_count.fetch_add(1, Ordering::Relaxed),
+        );
         Ok(equations)
     }
 
     /// Runs a descent from a starting point, and returns its end; `None` if the model fails at the
     /// start.
-    fn from(&self, start: &[f64]) -> Result<Option<Descent>, DescentEnd> {
+    fn descend_from(&self, start: &[f64]) -> Result<Option<Descent>, DescentError> {
         let ranges: Vec<[f64; 2]> =
-            (0..self.problem.unknowns()).map(|k| self.problem.range(k)).collect();
+            (0..self.problem.unknowns()).map(|k| self.problem.unknown_range(k)).collect();
         descend(start, &ranges, self.max_evaluations, &|x| self.evaluate(x))
     }
 
     /// Finds the distinct minima of descents from `start_count` starting points, and returns them
     /// in ascending order of cost.
-    fn minima(&self, start_count: u64) -> Result<Vec<Descent>, DescentEnd> {
-        let start = self.problem.start();
+    fn find_minima(&self, start_count: u64) -> Result<Vec<Descent>, DescentError> {
+        let start = self.problem.start_point();
         let without_influence = |equations: &NormalEquations| {
             let has_no_influence = |k: &usize| equations.normal[*k][*k] == 0.0;
             let parameters = (0..self.problem.free.len()).filter(has_no_influence);
@@ -571,8 +582,8 @@ impl<'a> MinimumSearch<'a> {
                             leave it out of `--free`";
             Error::Refused(format!("the measurement does not depend on {names}: {expected}"))
         };
-        let idle_at_start = self.evaluate(&start)?.as_ref().and_then(without_influence);
-        if let (Some(names), 1) = (&idle_at_start, start_count) {
+        let names_without_influence = self.evaluate(&start)?.as_ref().and_then(without_influence);
+        if let (Some(names), 1) = (&names_without_influence, start_count) {
             return Err(no_influence_error(names).into());
         }
         let mut start_points = vec![start.clone()];
@@ -584,7 +595,7 @@ impl<'a> MinimumSearch<'a> {
             };
             let draw_start = |point: u64, k: usize| {
                 let FreeParameter { range, start, .. } = &self.problem.free[k];
-                let range_of_starts = START_RANGE.map(|share| share * start);
+                let range_of_starts = START_RATIO_RANGE.map(|share| share * start);
                 let is_bounded = range.iter().all(|end| end.is_finite());
                 let [from, to] = if is_bounded {
                     *range
@@ -600,27 +611,29 @@ impl<'a> MinimumSearch<'a> {
                     x
                 })
                 .collect();
-            let costs = self.problem.costs(&candidates);
+            let costs = self.problem.compute_costs(&candidates);
             let mut by_cost: Vec<usize> =
                 (0..candidates.len()).filter(|&k| costs[k].is_finite()).collect();
             by_cost.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
             start_points
                 .extend(by_cost.into_iter().take(MAX_DESCENTS - 1).map(|k| candidates[k].clone()));
         }
-        let descents: Vec<_> = start_points.par_iter().map(|start| self.from(start)).collect();
+        let descents: Vec<_> =
+            start_points.par_iter().map(|start| self.descend_from(start)).collect();
         let mut minima: Vec<Descent> = Vec::new();
         for descent in descents {
             minima.extend(descent?);
         }
         minima.sort_by(|a, b| a.equations.cost.total_cmp(&b.equations.cost));
         // A parameter without influence at the first start may have one at the end of a descent.
-        let is_idle = |minimum: &Descent| without_influence(&minimum.equations).is_some();
-        if let Some(names) = idle_at_start.filter(|_| minima.iter().all(is_idle)) {
+        let has_no_influence = |minimum: &Descent| without_influence(&minimum.equations).is_some();
+        if let Some(names) = names_without_influence.filter(|_| minima.iter().all(has_no_influence))
+        {
             return Err(no_influence_error(&names).into());
         }
         let mut distinct: Vec<Descent> = Vec::new();
         for minimum in minima {
-            if !distinct.iter().any(|other| self.is_same(other, &minimum)) {
+            if !distinct.iter().any(|other| self.is_same_minimum(other, &minimum)) {
                 distinct.push(minimum);
             }
         }
@@ -628,8 +641,8 @@ impl<'a> MinimumSearch<'a> {
     }
 
     /// Whether two descents ended in one minimum: within a few standard errors, or a thousandth.
-    fn is_same(&self, a: &Descent, b: &Descent) -> bool {
-        let inverse_normal = algebra::inverse(&a.equations.normal);
+    fn is_same_minimum(&self, a: &Descent, b: &Descent) -> bool {
+        let inverse_normal = algebra::pseudo_inverse(&a.equations.normal);
         (0..self.problem.free.len()).all(|k| {
             let tolerance = (5.0 * inverse_normal[k][k].max(0.0).sqrt()).max(1e-3 * a.x[k].abs());
             (a.x[k] - b.x[k]).abs() <= tolerance
@@ -637,26 +650,31 @@ impl<'a> MinimumSearch<'a> {
     }
 }
 
-/// Returns a function of a draw and k: the k-th component of one of `count` draws from the standard
-/// normal distribution by a Latin hypercube.
-fn normal_draws(count: u64) -> impl Fn(u64, usize) -> f64 {
+/// Returns a function of a sample's number and k, which returns the k-th component of one of
+/// `count` samples of the standard normal distribution, drawn from a Latin hypercube.
+fn normal_sampler(count: u64) -> impl Fn(u64, usize) -> f64 {
     let design = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed: SEED };
     let shape = DistributionShape::Normal { mean: 0.0, sd: 1.0 };
     let normal = Distribution { shape, from: -6.0, to: 6.0 };
     move |point, k| normal.quantile(design.position(point, k).unwrap_or(0.5))
 }
 
-/// Draws values of the free parameters from the fitted distribution by a low-discrepancy sequence,
-/// each within its range.
-fn draws(problem: &Problem<'_>, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
-    let normal = normal_draws(count);
-    let (unit, scale) = algebra::scaled(covariance);
-    let eigen = Symmetric::from_matrix(&unit);
+/// Draws sets of the free parameters from the fitted distribution by Latin hypercube sampling, each
+/// value within its range.
+fn draw_parameters(
+    problem: &Problem<'_>,
+    x: &[f64],
+    covariance: &[Vec<f64>],
+    count: u64,
+) -> Vec<Vec<f64>> {
+    let normal = normal_sampler(count);
+    let (unit, scale) = algebra::scale_to_unit_diagonal(covariance);
+    let eigen = EigenDecomposition::from_matrix(&unit);
     let draw = |point: u64| {
         let standard_normal: Vec<f64> = (0..scale.len()).map(|k| normal(point, k)).collect();
         let correlated = eigen.apply(&standard_normal, |value| value.max(0.0).sqrt());
         let value = |k: usize| {
-            let [from, to] = problem.range(k);
+            let [from, to] = problem.unknown_range(k);
             (x[k] + scale[k] * correlated[k]).clamp(from, to)
         };
         (0..scale.len()).map(value).collect()

@@ -68,7 +68,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
         let (path, constants) = split_constants(text);
         let measurement = Measurement::read(path, &columns)?;
         measurement.notes.iter().for_each(|note| tell(&format!("{}: {note}", measurement.name)));
-        cases.push(fit::case(&grid, &constants, measurement)?);
+        cases.push(fit::prepare_case(&grid, &constants, measurement)?);
     }
     for (header, _) in &args.columns {
         let has_header = |case: &fit::FitCase| {
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let cancel = Cancel::Flag(interrupt.flag());
     let output = args.out.as_deref();
     let context =
-        FitContext { cancel, count_evaluations: &report_progress, output, fresh: args.fresh };
+        FitContext { cancel, report_evaluations: &report_progress, output, fresh: args.fresh };
     let threads = threads::choose_count(args.execution.threads, &threads::read_variable)?;
     let fit_result =
         threads::build_pool(threads)?.install(|| fit::fit(cases, &args.options, &context))?;
@@ -108,7 +108,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     };
     if let (Some(path), Some(out)) = (&args.out, out) {
         let (machine, _) = fit_result.problem.machine(0, &fit_result.x);
-        let text = config::machine_file(&machine, &fit_result.problem.written());
+        let text = config::machine_file(&machine, &fit_result.problem.number_sources());
         out.finish(
             format!("{MODEL_FILE_START}fitted to {:?}\n{text}", args.measurement.join(" "))
                 .as_bytes(),
@@ -123,7 +123,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
         tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));
     }
     let report = &fit_result.report;
-    show(&if args.json { format!("{:#}\n", serde_json::json!(report)) } else { report.text() })
+    show(&if args.json { format!("{:#}\n", serde_json::json!(report)) } else { report.to_text() })
 }
 
 /// Parses `HEADER=NAME`, a column's header and the name of its quantity. The header may contain an

@@ -1,14 +1,14 @@
 //! Small symmetric matrices by their eigenvalues.
 
 /// A symmetric matrix as its eigenvalues and eigenvectors.
-pub(crate) struct Symmetric {
+pub(crate) struct EigenDecomposition {
     /// The eigenvalues in ascending order.
     pub(crate) values: Vec<f64>,
     /// The eigenvector of each eigenvalue, of unit length.
     pub(crate) vectors: Vec<Vec<f64>>,
 }
 
-impl Symmetric {
+impl EigenDecomposition {
     /// Decomposes a matrix by Jacobi's rotations, to the same bits on any machine.
     ///
     /// G. H. Golub, C. F. Van Loan, Matrix Computations, section 8.5.
@@ -70,7 +70,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Scales a matrix to a unit diagonal, and returns it with the square roots of its diagonal. A row
 /// of zeros stays, with the scale 1.
-pub(crate) fn scaled(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
+pub(crate) fn scale_to_unit_diagonal(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let scale: Vec<f64> = (0..matrix.len())
         .map(|i| if matrix[i][i] > 0.0 { matrix[i][i].sqrt() } else { 1.0 })
         .collect();
@@ -82,9 +82,9 @@ pub(crate) fn scaled(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
 
 /// Returns the pseudo-inverse of a symmetric matrix. Once its diagonal is one, eigenvalues below
 /// 1e-13 count as zero, because rounding errors are as large.
-pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let (unit, scale) = scaled(matrix);
-    let eigen = Symmetric::from_matrix(&unit);
+pub(crate) fn pseudo_inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let (unit, scale) = scale_to_unit_diagonal(matrix);
+    let eigen = EigenDecomposition::from_matrix(&unit);
     let column = |j: usize| {
         let mut e = vec![0.0; unit.len()];
         e[j] = 1.0 / scale[j];
@@ -95,21 +95,21 @@ pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Subtracts the mean from numbers, and returns them with the mean.
-pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
+pub(super) fn subtract_mean(mut values: Vec<f64>) -> (Vec<f64>, f64) {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     values.iter_mut().for_each(|value| *value -= mean);
     (values, mean)
 }
 
-/// Returns the quantile of some numbers below which a part of them lies; `None` without numbers.
-pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
+/// Returns the quantile of some numbers at a probability; `None` without numbers.
+pub(super) fn quantile(values: impl Iterator<Item = f64>, probability: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
-    values.get((part * (values.len() as f64 - 1.0)).round() as usize).copied()
+    values.get((probability * (values.len() as f64 - 1.0)).round() as usize).copied()
 }
 
 /// Returns the quantiles of some numbers between which 95 % of them lie; `None` without numbers.
-pub(super) fn middle_95(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]> {
+pub(super) fn interval_95(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]> {
     Some([quantile(values.clone(), 0.025)?, quantile(values, 0.975)?])
 }
 
@@ -136,7 +136,7 @@ mod tests {
                 (0..4).map(entry).collect()
             })
             .collect();
-        let inverse = inverse(&matrix);
+        let inverse = pseudo_inverse(&matrix);
         for i in 0..4 {
             for j in 0..4 {
                 let product = dot(&matrix[i], &inverse[j]) * scales[j] / scales[i];
@@ -144,7 +144,7 @@ mod tests {
                 assert!((product - expected).abs() < 1e-11, "{i} {j}: {product}");
             }
         }
-        let eigen = Symmetric::from_matrix(&[vec![2.0, 1.0], vec![1.0, 2.0]]);
+        let eigen = EigenDecomposition::from_matrix(&[vec![2.0, 1.0], vec![1.0, 2.0]]);
         assert!((eigen.values[0] - 1.0).abs() < 1e-15 && (eigen.values[1] - 3.0).abs() < 1e-15);
     }
 }

@@ -4,30 +4,30 @@ use serde_json::{Value, json};
 use sweep_engine::Table;
 use sweep_files::key;
 
-use super::algebra::inverse;
-use super::measured::usual_step;
+use super::algebra::pseudo_inverse;
+use super::measurement::usual_step;
 use super::model::SignalComparison;
-use super::spectrum::spectrum;
-use super::{Fitted, Problem};
+use super::spectrum::compute_spectrum;
+use super::{FinishedFit, Problem};
 
 /// The greatest distance of a profile's points from the best value, in half standard errors. Basis:
 /// three standard errors include every interval of 95 %. Doubling it doubles the evaluations.
-const PROFILE_REACH: i32 = 6;
+const PROFILE_HALF_STEPS: i32 = 6;
 
-impl Fitted<'_> {
+impl FinishedFit<'_> {
     /// Computes the rise of the cost about the best value of each free number, with the others
     /// fitted again to first order.
     fn profiles(&self) -> Value {
         let Problem { free, .. } = &self.problem;
         let equations = self.problem.normal_equations(&self.comparisons);
-        let inverse_normal = inverse(&equations.normal);
+        let inverse_normal = pseudo_inverse(&equations.normal);
         let deviations: Vec<f64> =
-            (-PROFILE_REACH..=PROFILE_REACH).map(|k| 0.5 * f64::from(k)).collect();
+            (-PROFILE_HALF_STEPS..=PROFILE_HALF_STEPS).map(|k| 0.5 * f64::from(k)).collect();
         let values_at_deviation = |k: usize, deviation: f64| -> Vec<f64> {
             let step = deviation / inverse_normal[k][k].max(f64::MIN_POSITIVE).sqrt();
             (0..self.x.len())
                 .map(|j| {
-                    let [from, to] = self.problem.range(j);
+                    let [from, to] = self.problem.unknown_range(j);
                     (self.x[j] + step * inverse_normal[k][j]).clamp(from, to)
                 })
                 .collect()
@@ -36,7 +36,7 @@ impl Fitted<'_> {
             .flat_map(|k| deviations.iter().map(move |deviation| (k, *deviation)))
             .map(|(k, deviation)| values_at_deviation(k, deviation))
             .collect();
-        let costs = self.problem.costs(&value_sets);
+        let costs = self.problem.compute_costs(&value_sets);
         let profile = |k: usize| {
             let indices = k * deviations.len()..(k + 1) * deviations.len();
             let cost_increases: Vec<f64> =
@@ -63,7 +63,7 @@ impl Fitted<'_> {
                 let mut with_zeros = vec![0.0; measurement.time_s.len()];
                 signal.samples().zip(values).for_each(|((row, _), value)| with_zeros[row] = *value);
                 let density;
-                (frequencies_hz, density) = spectrum(&with_zeros, step_s);
+                (frequencies_hz, density) = compute_spectrum(&with_zeros, step_s);
                 density
             };
             json!({

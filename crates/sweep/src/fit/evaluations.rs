@@ -18,7 +18,7 @@ use super::model::{NormalEquations, Problem};
 
 /// The time of an evaluation that is written at once. Basis: a write takes some milliseconds.
 /// Doubling it doubles the computing time that a killed process may lose.
-const MIN_TIME_OF_IMMEDIATE_WRITE: Duration = Duration::from_millis(100);
+const IMMEDIATE_WRITE_TIME: Duration = Duration::from_millis(100);
 
 /// The evaluations of a problem, in the store.
 #[derive(Debug)]
@@ -39,7 +39,7 @@ impl Evaluations {
         fresh: bool,
     ) -> Result<Self, StoreError> {
         let OpenOutcome::Open(mut trials) =
-            Trials::open(output, &job(problem), columns(problem), fresh)?
+            Trials::open(output, &evaluation_job(problem), evaluation_columns(problem), fresh)?
         else {
             let path = output.display();
             return Err(StoreError::Refused(format!("{path} is the result of another command")));
@@ -56,20 +56,20 @@ impl Evaluations {
     /// Returns the normal equations at some unknowns, stored or computed now.
     ///
     /// # Errors
-    /// Returns the errors of `find` and of the file system.
+    /// Returns the errors of `compute` and of the file system.
     pub(crate) fn find_or_compute<E: From<StoreError>>(
         &self,
         x: &[f64],
-        find: impl FnOnce() -> Result<Option<NormalEquations>, E>,
+        compute: impl FnOnce() -> Result<Option<NormalEquations>, E>,
     ) -> Result<Option<NormalEquations>, E> {
         let key: TrialKey = x.iter().map(|x| x.to_bits()).collect();
         if let Some(cells) = lock(&self.trials).find_response(&key) {
             return Ok(self.read_equations(cells));
         }
         let start_time = Instant::now();
-        let equations = find()?;
-        let is_costly = start_time.elapsed() >= MIN_TIME_OF_IMMEDIATE_WRITE;
-        let cells = self.cells(equations.as_ref());
+        let equations = compute()?;
+        let is_costly = start_time.elapsed() >= IMMEDIATE_WRITE_TIME;
+        let cells = self.to_cells(equations.as_ref());
         let mut trials = lock(&self.trials);
         trials.add(key, cells)?;
         if is_costly || trials.is_due() {
@@ -93,8 +93,8 @@ impl Evaluations {
         sweep_files::panics::unlocked(self.trials).complete()
     }
 
-    /// Returns the cells of normal equations, in the order of [`columns`].
-    fn cells(&self, equations: Option<&NormalEquations>) -> RowCells {
+    /// Returns the cells of normal equations, in the order of [`evaluation_columns`].
+    fn to_cells(&self, equations: Option<&NormalEquations>) -> RowCells {
         let Some(NormalEquations { cost, sigma, normal, rhs }) = equations else {
             return vec![None; 1 + self.signals + (self.unknowns + 1) * self.unknowns];
         };
@@ -119,7 +119,7 @@ impl Evaluations {
 }
 
 /// Returns the columns of evaluations: the unknowns, then the cost and the normal equations.
-fn columns(problem: &Problem<'_>) -> TrialColumns {
+fn evaluation_columns(problem: &Problem<'_>) -> TrialColumns {
     let mut keys = Vec::new();
     for free in &problem.free {
         let parameter = &free.parameter;
@@ -158,7 +158,7 @@ fn columns(problem: &Problem<'_>) -> TrialColumns {
 }
 
 /// Returns the job of a problem: the plans of its cases, and a hash of the measurements.
-fn job<'a>(problem: &'a Problem<'_>) -> Job<'a> {
+fn evaluation_job<'a>(problem: &'a Problem<'_>) -> Job<'a> {
     let mut measurement = blake3::Hasher::new();
     for case in &problem.cases {
         measurement.update(format!("{:?}", case.measurement).as_bytes());

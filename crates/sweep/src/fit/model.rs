@@ -12,8 +12,8 @@ use washer_model::{
     Timing, prepare, simulate_until,
 };
 
-use super::algebra::{centred, dot};
-use super::measured::{Measurement, Signal, SignalQuantity};
+use super::algebra::{dot, subtract_mean};
+use super::measurement::{Measurement, Signal, SignalQuantity};
 use super::speed::SmoothedSpin;
 use crate::engine::reference_step_s;
 use crate::method::direct;
@@ -84,7 +84,7 @@ pub(crate) struct FreeParameter {
 
 impl FreeParameter {
     pub(crate) fn belongs_to(&self, case: usize) -> bool {
-        self.case.is_none_or(|own| own == case)
+        self.case.is_none_or(|parameter_case| parameter_case == case)
     }
 }
 
@@ -136,7 +136,7 @@ pub(crate) struct NormalEquations {
 impl Problem<'_> {
     /// Selects the integration method: that of the grid if it is a method of fixed steps, or else
     /// Runge and Kutta's with the step of references, which depends on the machine at the start.
-    pub(crate) fn method(cases: &[FitCase]) -> Result<Method, washer_model::NoEquilibrium> {
+    pub(crate) fn select_method(cases: &[FitCase]) -> Result<Method, washer_model::NoEquilibrium> {
         if let Some(method) = cases.iter().find_map(|case| direct(&case.plan.integrator)) {
             return Ok(method);
         }
@@ -158,12 +158,12 @@ impl Problem<'_> {
     }
 
     /// Returns the range of an unknown.
-    pub(crate) fn range(&self, unknown: usize) -> [f64; 2] {
+    pub(crate) fn unknown_range(&self, unknown: usize) -> [f64; 2] {
         self.free.get(unknown).map_or([-MAX_SHIFT_S, MAX_SHIFT_S], |free| free.range)
     }
 
     /// Returns the unknowns at the start.
-    pub(crate) fn start(&self) -> Vec<f64> {
+    pub(crate) fn start_point(&self) -> Vec<f64> {
         let shifts = self.unknowns() - self.free.len();
         self.free.iter().map(|free| free.start).chain(std::iter::repeat_n(0.0, shifts)).collect()
     }
@@ -191,17 +191,17 @@ impl Problem<'_> {
     }
 
     /// Returns the sources of the numbers of the first case's machine.
-    pub(crate) fn written(&self) -> NumberSources {
+    pub(crate) fn number_sources(&self) -> NumberSources {
         let plan = &self.cases[0].plan;
-        let mut written = plan.sources.clone();
+        let mut number_sources = plan.sources.clone();
         for free in self.free.iter().filter(|free| free.belongs_to(0)) {
             let files = self.cases.iter().enumerate().filter(|(case, _)| free.belongs_to(*case));
             let files: Vec<&str> = files.map(|(_, case)| &*case.measurement.name).collect();
             let source = format!("fit to {}", files.join(", "));
             let single_names = free.parameter.single_names(&plan.model.machine).into_iter();
-            written.0.extend(single_names.map(|part| (part.into_owned(), source.clone())));
+            number_sources.0.extend(single_names.map(|part| (part.into_owned(), source.clone())));
         }
-        written
+        number_sources
     }
 
     /// Whether an unknown matters to a case.
@@ -219,7 +219,7 @@ impl Problem<'_> {
             let size = x[unknown].abs().max(free.start.abs());
             DIFFERENCE_RATIO * if width.is_finite() { size.max(0.01 * width) } else { size }
         });
-        if x[unknown] + step > self.range(unknown)[1] { -step } else { step }
+        if x[unknown] + step > self.unknown_range(unknown)[1] { -step } else { step }
     }
 
     /// Returns the run of a case at some unknowns.
@@ -246,15 +246,17 @@ impl Problem<'_> {
             let runs = group.iter().map(|&k| machine_and_shift(k)).enumerate();
             let valid_runs = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
             let (shifts, machines): (Vec<(usize, f64)>, Vec<(Machine, Spin)>) = valid_runs
-                .map(|(place, (machine, spin, shift_s))| ((place, shift_s), (machine, spin)))
+                .map(|(run_index, (machine, spin, shift_s))| {
+                    ((run_index, shift_s), (machine, spin))
+                })
                 .unzip();
             let points: Vec<(usize, Point)> = shifts
                 .into_iter()
                 .zip(prepare(self.simd, &machines, &timing))
-                .filter_map(|((place, shift_s), point)| {
+                .filter_map(|((run_index, shift_s), point)| {
                     let instants: Arc<[f64]> =
                         measurement.time_s.iter().map(|time| (time + shift_s).max(0.0)).collect();
-                    Some((place, point.ok()?.with_snapshots_at(instants)))
+                    Some((run_index, point.ok()?.with_snapshots_at(instants)))
                 })
                 .collect();
             let point_references: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
@@ -269,15 +271,16 @@ impl Problem<'_> {
             );
             let extras = simulated.map_or_else(Vec::new, |(_, extras)| extras);
             let mut results: Vec<Option<T>> = group.iter().map(|_| None).collect();
-            for ((place, point), extra) in points.iter().zip(extras) {
+            for ((run_index, point), extra) in points.iter().zip(extras) {
                 let snapshots = extra.snapshots;
                 if snapshots.len() < measurement.time_s.len() {
                     continue;
                 }
                 let values = |signal: &Signal| -> Vec<f64> {
-                    snapshots.iter().map(|shot| self.value(shot, signal, point)).collect()
+                    snapshots.iter().map(|snapshot| self.value(snapshot, signal, point)).collect()
                 };
-                results[*place] = Some(reduce(measurement.signals.iter().map(values).collect()));
+                results[*run_index] =
+                    Some(reduce(measurement.signals.iter().map(values).collect()));
             }
             results
         };
@@ -328,12 +331,12 @@ impl Problem<'_> {
             let slope = |shifted: &Option<Vec<Vec<f64>>>, step: f64| -> Vec<f64> {
                 let Some(shifted) = shifted else { return Vec::new() };
                 let slope_at = |(row, _)| (shifted[s][row] - model[row]) / step;
-                centred(signal.samples().map(slope_at).collect()).0
+                subtract_mean(signal.samples().map(slope_at).collect()).0
             };
             let slopes = shifted.iter().zip(&steps).map(|(shifted, step)| slope(shifted, *step));
             let slopes = slopes.collect();
             let difference = signal.samples().map(|(row, measurement)| measurement - model[row]);
-            let (residual, offset) = centred(difference.collect());
+            let (residual, offset) = subtract_mean(difference.collect());
             SignalComparison { case, signal: s, model, offset, residual, slopes }
         };
         Some(self.signals().map(compare_signal).collect())
@@ -342,7 +345,7 @@ impl Problem<'_> {
     /// Computes the differences that each of `count` changes of a case's machine and spin makes to
     /// its signals at their samples, and reduces them; `None` for a run that fails. `comparisons`
     /// is the comparison without a change.
-    pub(crate) fn changes<T: Send>(
+    pub(crate) fn compute_changes<T: Send>(
         &self,
         case: usize,
         x: &[f64],
@@ -370,7 +373,7 @@ impl Problem<'_> {
     /// Computes for each of `count` changes of a case's machine and spin the change of the normal
     /// equations' right side; `None` for a run that fails. `comparisons` is the comparison
     /// without a change, and `sigma` the noise of each signal.
-    pub(crate) fn right_sides(
+    pub(crate) fn compute_right_sides(
         &self,
         case: usize,
         x: &[f64],
@@ -393,19 +396,19 @@ impl Problem<'_> {
             }
             rhs_change
         };
-        self.changes(case, x, comparisons, (count, change), rhs_change)
+        self.compute_changes(case, x, comparisons, (count, change), rhs_change)
     }
 
     /// Computes the costs of many sets of unknowns, without derivatives. The cost of a run that
     /// fails is infinite.
-    pub(crate) fn costs(&self, unknowns: &[Vec<f64>]) -> Vec<f64> {
+    pub(crate) fn compute_costs(&self, unknowns: &[Vec<f64>]) -> Vec<f64> {
         let case_costs = |case: usize| {
             let cost = |models: Vec<Vec<f64>>| -> f64 {
                 let signals = self.cases[case].measurement.signals.iter().zip(models);
                 let signal_cost = |(signal, model): (&Signal, Vec<f64>)| {
                     let difference = signal.samples().map(|(row, value)| value - model[row]);
-                    let (residual, _) = centred(difference.collect());
-                    likelihood(&residual, signal).0
+                    let (residual, _) = subtract_mean(difference.collect());
+                    signal_cost_and_noise(&residual, signal).0
                 };
                 signals.map(signal_cost).sum()
             };
@@ -436,7 +439,7 @@ impl Problem<'_> {
             rhs: vec![0.0; n],
         };
         for ((.., signal), comparisons) in self.signals().zip(comparisons) {
-            let (cost, sigma) = likelihood(&comparisons.residual, signal);
+            let (cost, sigma) = signal_cost_and_noise(&comparisons.residual, signal);
             equations.cost += cost;
             equations.sigma.push(sigma);
             let weight = 1.0 / (sigma * sigma);
@@ -457,10 +460,10 @@ impl Problem<'_> {
 
 /// Returns the part of the cost of a signal, and the standard deviation of its noise, which is that
 /// of the residual, and at least a millionth of the signal's.
-fn likelihood(residual: &[f64], signal: &Signal) -> (f64, f64) {
-    let swing = signal.centred_values();
+fn signal_cost_and_noise(residual: &[f64], signal: &Signal) -> (f64, f64) {
+    let centred_values = signal.centred_values();
     let count = residual.len() as f64;
-    let least_square = 1e-12 * dot(&swing, &swing) + f64::MIN_POSITIVE;
+    let least_square = 1e-12 * dot(&centred_values, &centred_values) + f64::MIN_POSITIVE;
     let mean_square = (dot(residual, residual) + least_square) / count;
     (count * libm::log(mean_square), mean_square.sqrt())
 }

@@ -5,9 +5,9 @@ use washer_model::Spin;
 
 use super::speed::{SmoothedSpin, smooth_spin};
 
-/// The least number of pulses, or of readings of a counter, that give a course of the speed. Basis:
+/// The least number of pulses, or of readings of a counter, from which speeds are computed. Basis:
 /// three give two speeds. Doubling it refuses records of a few turns.
-const MIN_EDGES: usize = 3;
+const MIN_PULSES: usize = 3;
 /// The least number of rows from a pulse to the next. Basis: pulses at half of the sampling rate
 /// are two rows apart, and faster ones look slower than they are. Doubling it refuses signals that
 /// are clear.
@@ -15,7 +15,7 @@ const MIN_ROWS_PER_PULSE: usize = 3;
 /// The greatest standard error of a speed from a count, as a part of the speed. Basis: one pulse in
 /// a hundred, as a tachometer shows it. Doubling it doubles the noise of the speeds, and the number
 /// of speeds in a second.
-const COUNTED_SPEED_ERROR: f64 = 0.01;
+const MAX_COUNT_SPEED_ERROR: f64 = 0.01;
 /// The number of values of counters that start again at 0, by their number of bits: 16 and 32.
 const COUNTER_RANGES: [f64; 2] = [65_536.0, 4_294_967_296.0];
 /// The greatest increment of a counter that starts again at 0, in units of the greatest increment
@@ -41,7 +41,7 @@ impl PulseSignal {
         let name = name.strip_prefix("tacho_")?;
         let first_letter = name.find(|letter: char| !letter.is_ascii_digit())?;
         let (digits, name) = name.split_at(first_letter);
-        let (per_turn, name) = match digits {
+        let (pulses_per_turn, name) = match digits {
             "" => (1, name),
             _ => (digits.parse().ok().filter(|count| *count > 0)?, name.strip_prefix('_')?),
         };
@@ -51,7 +51,7 @@ impl PulseSignal {
             "count_per_row" => Self::CountPerRow,
             _ => return None,
         };
-        Some((signal, per_turn))
+        Some((signal, pulses_per_turn))
     }
 }
 
@@ -63,18 +63,18 @@ pub(super) enum PulseError {
     /// Too few times at which the number of turns is known: this number.
     FewReadings(usize),
     /// A pulse in this row that follows the previous one too soon.
-    Fast(usize),
+    TooFast(usize),
     /// A count that falls in this row.
-    Falling(usize),
+    FallingCount(usize),
     /// A missing number of pulses in this row.
-    Missing(usize),
+    MissingCount(usize),
 }
 
 /// The pulses of a tachometer.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Pulses {
     /// The times of pulses (s), which rise.
-    pub(super) edges_s: Vec<f64>,
+    pub(super) pulse_times_s: Vec<f64>,
     /// The number of turns at these times, from an arbitrary one on.
     turns: Vec<f64>,
 }
@@ -84,38 +84,42 @@ impl Pulses {
     pub(super) fn read(
         time_s: &[f64],
         signal: &[f64],
-        (kind, per_turn): (PulseSignal, u32),
+        (kind, pulses_per_turn): (PulseSignal, u32),
     ) -> Result<Self, PulseError> {
         match kind {
-            PulseSignal::Voltage => Self::from_voltage(time_s, signal, per_turn),
-            PulseSignal::Count => Self::from_count(time_s, signal, per_turn),
+            PulseSignal::Voltage => Self::from_voltage(time_s, signal, pulses_per_turn),
+            PulseSignal::Count => Self::from_count(time_s, signal, pulses_per_turn),
             PulseSignal::CountPerRow => {
                 if let Some(row) = signal.iter().position(|pulses| pulses.is_nan()) {
-                    return Err(PulseError::Missing(row));
+                    return Err(PulseError::MissingCount(row));
                 }
                 if let Some(row) = signal.iter().position(|pulses| *pulses < 0.0) {
-                    return Err(PulseError::Falling(row));
+                    return Err(PulseError::FallingCount(row));
                 }
                 let add_pulses = |sum: &mut f64, pulses: &f64| {
                     *sum += pulses;
                     Some(*sum)
                 };
                 let count: Vec<f64> = signal.iter().scan(0.0, add_pulses).collect();
-                Self::from_count(time_s, &count, per_turn)
+                Self::from_count(time_s, &count, pulses_per_turn)
             }
         }
     }
 
-    /// Finds the edges at which a voltage rises through half of its range; before the next, the
+    /// Finds the pulses, at which a voltage rises through half of its range; before the next, the
     /// voltage has to fall below a quarter. NaN is a missing sample.
-    fn from_voltage(time_s: &[f64], voltage: &[f64], per_turn: u32) -> Result<Self, PulseError> {
+    fn from_voltage(
+        time_s: &[f64],
+        voltage: &[f64],
+        pulses_per_turn: u32,
+    ) -> Result<Self, PulseError> {
         let samples: Vec<(usize, f64)> =
             voltage.iter().copied().enumerate().filter(|(_, value)| !value.is_nan()).collect();
         let lowest = samples.iter().fold(f64::INFINITY, |low, (_, value)| low.min(*value));
         let highest = samples.iter().fold(f64::NEG_INFINITY, |high, (_, value)| high.max(*value));
         let [quarter_level, half_level] =
             [0.25, 0.5].map(|fraction| lowest + fraction * (highest - lowest));
-        let mut edges_s = Vec::new();
+        let mut pulse_times_s = Vec::new();
         let mut last_sample = None;
         let mut is_low = false;
         for (sample, pair) in samples.windows(2).enumerate() {
@@ -126,32 +130,34 @@ impl Pulses {
                 continue;
             }
             if last_sample.is_some_and(|last| sample - last < MIN_ROWS_PER_PULSE) {
-                return Err(PulseError::Fast(next_row));
+                return Err(PulseError::TooFast(next_row));
             }
             let fraction = (half_level - value) / (next_value - value);
-            edges_s.push(time_s[row] + fraction * (time_s[next_row] - time_s[row]));
+            pulse_times_s.push(time_s[row] + fraction * (time_s[next_row] - time_s[row]));
             last_sample = Some(sample);
             is_low = false;
         }
-        if edges_s.len() < MIN_EDGES {
-            return Err(PulseError::FewPulses(edges_s.len()));
+        if pulse_times_s.len() < MIN_PULSES {
+            return Err(PulseError::FewPulses(pulse_times_s.len()));
         }
-        let turns = (0..edges_s.len()).map(|edge| edge as f64 / f64::from(per_turn)).collect();
-        Ok(Self { edges_s, turns })
+        let turns =
+            (0..pulse_times_s.len()).map(|edge| edge as f64 / f64::from(pulses_per_turn)).collect();
+        Ok(Self { pulse_times_s, turns })
     }
 
     /// Reads the count at rows that are so far apart that the speed between them is known to
     /// [`COUNTED_SPEED_ERROR`]. The last of `n` pulses between two rows is taken to come half of an
     /// `n`th of their distance before the later row. NaN is a missing sample.
-    fn from_count(time_s: &[f64], count: &[f64], per_turn: u32) -> Result<Self, PulseError> {
+    fn from_count(time_s: &[f64], count: &[f64], pulses_per_turn: u32) -> Result<Self, PulseError> {
         let samples: Vec<(usize, f64)> =
             count.iter().copied().enumerate().filter(|(_, value)| !value.is_nan()).collect();
-        let greatest_count = samples.iter().fold(0.0_f64, |most, (_, value)| most.max(*value));
+        let greatest_count =
+            samples.iter().fold(0.0_f64, |greatest, (_, value)| greatest.max(*value));
         let greatest_increment =
-            samples.windows(2).fold(1.0_f64, |most, pair| most.max(pair[1].1 - pair[0].1));
+            samples.windows(2).fold(1.0_f64, |greatest, pair| greatest.max(pair[1].1 - pair[0].1));
         let range = COUNTER_RANGES.into_iter().find(|range| *range > greatest_count);
         let mut pulses = 0.0;
-        let mut edges_s: Vec<f64> = Vec::new();
+        let mut pulse_times_s: Vec<f64> = Vec::new();
         let mut turns = Vec::new();
         for pair in samples.windows(2) {
             let (row, value) = pair[0];
@@ -161,7 +167,7 @@ impl Pulses {
                 increment += range.unwrap_or(0.0);
                 let limit = MAX_OVERFLOW_INCREMENT * greatest_increment;
                 if !(0.0..=limit).contains(&increment) {
-                    return Err(PulseError::Falling(next_row));
+                    return Err(PulseError::FallingCount(next_row));
                 }
             }
             if increment == 0.0 {
@@ -169,27 +175,28 @@ impl Pulses {
             }
             pulses += increment;
             let spacing_s = (time_s[next_row] - time_s[row]) / increment.max(1.0);
-            let edge_s = time_s[next_row] - 0.5 * spacing_s;
+            let pulse_time_s = time_s[next_row] - 0.5 * spacing_s;
             // The difference of two times, each distributed evenly over the spacing.
             let error_s = spacing_s / 6.0_f64.sqrt();
-            let is_known = |last_s: &f64| error_s <= COUNTED_SPEED_ERROR * (edge_s - last_s);
-            if edges_s.last().is_none_or(is_known) {
-                edges_s.push(edge_s);
-                turns.push(pulses / f64::from(per_turn));
+            let is_known =
+                |last_s: &f64| error_s <= MAX_COUNT_SPEED_ERROR * (pulse_time_s - last_s);
+            if pulse_times_s.last().is_none_or(is_known) {
+                pulse_times_s.push(pulse_time_s);
+                turns.push(pulses / f64::from(pulses_per_turn));
             }
         }
-        if edges_s.len() < MIN_EDGES {
-            return Err(PulseError::FewReadings(edges_s.len()));
+        if pulse_times_s.len() < MIN_PULSES {
+            return Err(PulseError::FewReadings(pulse_times_s.len()));
         }
-        Ok(Self { edges_s, turns })
+        Ok(Self { pulse_times_s, turns })
     }
 
     /// Returns the mean speeds between pulses (rpm), at the times in the middle between them (s).
     fn speeds(&self) -> (Vec<f64>, Vec<f64>) {
-        let spans = self.edges_s.windows(2).zip(self.turns.windows(2));
-        let speed = |(edges_s, turns): (&[f64], &[f64])| {
-            let speed_rpm = 60.0 * (turns[1] - turns[0]) / (edges_s[1] - edges_s[0]);
-            (0.5 * (edges_s[0] + edges_s[1]), speed_rpm)
+        let spans = self.pulse_times_s.windows(2).zip(self.turns.windows(2));
+        let speed = |(pulse_times_s, turns): (&[f64], &[f64])| {
+            let speed_rpm = 60.0 * (turns[1] - turns[0]) / (pulse_times_s[1] - pulse_times_s[0]);
+            (0.5 * (pulse_times_s[0] + pulse_times_s[1]), speed_rpm)
         };
         spans.map(speed).unzip()
     }
@@ -256,11 +263,11 @@ mod tests {
             let volts = 2.5 + 2.4 * (std::f64::consts::TAU * 12.0 * turns(t)).sin();
             if (1000.0 * t) as u32 % 7 == 3 { f64::NAN } else { volts }
         };
-        for (per_turn, signal) in
+        for (pulses_per_turn, signal) in
             [(1, &one_pulse_voltage as &dyn Fn(f64) -> f64), (12, &twelve_teeth_voltage)]
         {
             let signal: Vec<f64> = time_s.iter().map(|t| signal(*t)).collect();
-            let signal_kind = (PulseSignal::Voltage, per_turn);
+            let signal_kind = (PulseSignal::Voltage, pulses_per_turn);
             let pulses = Pulses::read(&time_s, &signal, signal_kind).unwrap();
             let [first_rpm, greatest_rpm] = pulses.first_and_greatest_rpm(0.0);
             assert!(first_rpm < 5.0 && (greatest_rpm - 350.0).abs() < 7.0, "{pulses:?}");
@@ -271,7 +278,11 @@ mod tests {
                 greatest_error = greatest_error.max((angle - turns(*t)).abs());
                 angle += speed / 60.0 * 0.001;
             }
-            assert!(greatest_error < 0.02, "{per_turn}: {greatest_error} {:?}", smoothed.spin);
+            assert!(
+                greatest_error < 0.02,
+                "{pulses_per_turn}: {greatest_error} {:?}",
+                smoothed.spin
+            );
         }
     }
 
@@ -287,9 +298,9 @@ mod tests {
         assert_eq!(read_voltage(&[1.0; 40]), Err(PulseError::FewPulses(0)));
         let count: Vec<f64> = (0..40).map(f64::from).collect();
         assert_eq!(read_voltage(&count), Err(PulseError::FewPulses(1)));
-        assert_eq!(read_voltage(&signal(2, 40)), Err(PulseError::Fast(3)));
+        assert_eq!(read_voltage(&signal(2, 40)), Err(PulseError::TooFast(3)));
         let pulses = read_voltage(&signal(4, 40)).unwrap();
-        assert!((pulses.edges_s[0] - 0.025).abs() < 1e-12, "{pulses:?}");
+        assert!((pulses.pulse_times_s[0] - 0.025).abs() < 1e-12, "{pulses:?}");
         assert!(pulses.speeds().1.iter().all(|speed| (speed - 1500.0).abs() < 1e-6), "{pulses:?}");
     }
 
@@ -312,24 +323,30 @@ mod tests {
 
     #[test]
     fn the_spin_by_a_count_keeps_the_drums_angle() {
-        for (step_s, per_turn) in [(0.001, 1), (0.001, 60), (0.01, 60), (0.05, 60), (0.01, 1024)] {
+        for (step_s, pulses_per_turn) in
+            [(0.001, 1), (0.001, 60), (0.01, 60), (0.05, 60), (0.01, 1024)]
+        {
             let rows = (26.0 / step_s) as u32;
             let time_s: Vec<f64> = (0..rows).map(|k| step_s * f64::from(k)).collect();
-            let pulses = |t: &f64| (f64::from(per_turn) * (turns(*t) + 0.7)).floor();
+            let pulses = |t: &f64| (f64::from(pulses_per_turn) * (turns(*t) + 0.7)).floor();
             let count: Vec<f64> = time_s.iter().map(pulses).collect();
-            let error = angle_error(&time_s, &count, (PulseSignal::Count, per_turn));
-            assert!(error < 0.1, "{step_s} {per_turn}: {error}");
+            let error = angle_error(&time_s, &count, (PulseSignal::Count, pulses_per_turn));
+            assert!(error < 0.1, "{step_s} {pulses_per_turn}: {error}");
             // A counter of 16 bits overflows, and misses a row.
             let mut wrapped: Vec<f64> =
                 count.iter().map(|count| (count + 64_000.0) % 65_536.0).collect();
             wrapped[7] = f64::NAN;
-            let wrapped_error = angle_error(&time_s, &wrapped, (PulseSignal::Count, per_turn));
-            assert!(wrapped_error < 0.1, "{step_s} {per_turn}: {wrapped_error}");
+            let wrapped_error =
+                angle_error(&time_s, &wrapped, (PulseSignal::Count, pulses_per_turn));
+            assert!(wrapped_error < 0.1, "{step_s} {pulses_per_turn}: {wrapped_error}");
             let per_row: Vec<f64> =
                 (0..count.len()).map(|k| count[k] - count[k.saturating_sub(1)]).collect();
             let [by_count, by_rows] =
-                [(PulseSignal::Count, &count), (PulseSignal::CountPerRow, &per_row)]
-                    .map(|(kind, signal)| Pulses::read(&time_s, signal, (kind, per_turn)).unwrap());
+                [(PulseSignal::Count, &count), (PulseSignal::CountPerRow, &per_row)].map(
+                    |(kind, signal)| {
+                        Pulses::read(&time_s, signal, (kind, pulses_per_turn)).unwrap()
+                    },
+                );
             assert_eq!(by_count.speeds(), by_rows.speeds());
         }
     }
@@ -342,21 +359,24 @@ mod tests {
             Pulses::read(&time_s, &signal, (kind, 1))
         };
         let sawtooth = |k: u32| f64::from(k % 10);
-        assert_eq!(read_signal(PulseSignal::Count, &sawtooth), Err(PulseError::Falling(10)));
+        assert_eq!(read_signal(PulseSignal::Count, &sawtooth), Err(PulseError::FallingCount(10)));
         // A reset, which no overflow explains.
         let reset_counter = |k: u32| if k < 20 { 40_000.0 + f64::from(k) } else { f64::from(k) };
-        assert_eq!(read_signal(PulseSignal::Count, &reset_counter), Err(PulseError::Falling(20)));
+        assert_eq!(
+            read_signal(PulseSignal::Count, &reset_counter),
+            Err(PulseError::FallingCount(20))
+        );
         let single_step = |k: u32| if k < 20 { 0.0 } else { 1.0 };
         assert_eq!(read_signal(PulseSignal::Count, &single_step), Err(PulseError::FewReadings(1)));
         let with_negative = |k: u32| if k == 3 { -1.0 } else { 1.0 };
         assert_eq!(
             read_signal(PulseSignal::CountPerRow, &with_negative),
-            Err(PulseError::Falling(3))
+            Err(PulseError::FallingCount(3))
         );
         let with_missing = |k: u32| if k == 3 { f64::NAN } else { 1.0 };
         assert_eq!(
             read_signal(PulseSignal::CountPerRow, &with_missing),
-            Err(PulseError::Missing(3))
+            Err(PulseError::MissingCount(3))
         );
     }
 }

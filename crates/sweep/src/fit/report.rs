@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 use washer_model::MethodKind;
 
-use super::algebra::{centred, dot, middle_95};
+use super::algebra::{dot, interval_95, subtract_mean};
 use super::model::{Problem, SignalComparison};
 use super::search::Descent;
 use super::speed::SmoothedSpin;
@@ -24,7 +24,7 @@ const UNIT_SLACK: f64 = 1.5;
 /// The ratio of the error of a fixed number after the fit to its tolerance, below which the report
 /// says that the record limits the error. Basis: a ratio nearer to 1 does not change two digits of
 /// an interval. At twice this ratio the report says so of every number.
-const SEEN_RATIO: f64 = 0.9;
+const RECORD_LIMIT_RATIO: f64 = 0.9;
 /// The objection to a fit whose search did not converge.
 const UNFINISHED_SEARCH: &str = "not known: the search did not come to its end, so no \
                                  intervals; expected a nearer start (`--set NAME=VALUE`), ranges, \
@@ -45,7 +45,8 @@ pub(crate) struct FitReport {
     /// The rows of the correlation matrix, in the order of the parameters.
     pub(crate) correlations: Vec<Vec<f64>>,
     /// Descriptions of the combinations of parameters that the data do not determine.
-    pub(crate) untold: Vec<String>,
+    #[serde(rename = "untold")]
+    pub(crate) undetermined: Vec<String>,
     /// The number of fixed numbers that have a tolerance.
     pub(crate) fixed_numbers: usize,
     /// The report of the first file, which is also the first entry of `files`.
@@ -54,8 +55,9 @@ pub(crate) struct FitReport {
     pub(crate) files: Vec<FileReport>,
     /// All minima, the least first.
     pub(crate) minima: Vec<Minimum>,
-    /// Whether the search came to its end.
-    pub(crate) settled: bool,
+    /// Whether the search converged.
+    #[serde(rename = "settled")]
+    pub(crate) is_converged: bool,
     /// The number of points at which the model and its derivatives were computed.
     pub(crate) evaluations: usize,
     /// The integration's step (s), if it is fixed.
@@ -87,7 +89,8 @@ pub(crate) struct FittedNumber {
     /// The 95 % interval from fits to resampled residuals (`--bootstrap`).
     pub(crate) bootstrap_95: Option<[f64; 2]>,
     /// Whether the value is at a limit of its range.
-    pub(crate) at_bound: bool,
+    #[serde(rename = "at_bound")]
+    pub(crate) is_at_bound: bool,
 }
 
 /// The dependence of a fitted number on a fixed one.
@@ -124,11 +127,13 @@ pub(crate) struct FileReport {
     pub(crate) shift_s: Option<f64>,
     pub(crate) residual_rms: ByColumn<f64>,
     /// The part of the variance that the model explains.
-    pub(crate) explained: ByColumn<f64>,
+    #[serde(rename = "explained")]
+    pub(crate) explained_ratio: ByColumn<f64>,
     /// The correlation of neighbouring residuals.
     pub(crate) autocorrelation: ByColumn<f64>,
     /// The variance inflation factor of correlated residuals.
-    pub(crate) widening: ByColumn<f64>,
+    #[serde(rename = "widening")]
+    pub(crate) variance_inflation: ByColumn<f64>,
     /// The noise (rpm) and the knots of the measured spin.
     pub(crate) spin: Option<SmoothedSpin>,
     pub(crate) gaps_s: Vec<[f64; 2]>,
@@ -151,14 +156,14 @@ pub(super) struct ReportData<'a> {
     pub(super) problem: &'a Problem<'a>,
     /// For each case, the statement that its speed or time seems to be in another unit; `None` if
     /// it does not.
-    pub(super) unit_suspicions: &'a [Option<String>],
+    pub(super) suspected_unit_by_case: &'a [Option<String>],
     pub(super) minima: &'a [Descent],
     pub(super) comparisons: &'a [SignalComparison],
     pub(super) start_comparisons: &'a [SignalComparison],
     pub(super) statistics: &'a Statistics,
     pub(super) evaluations: usize,
     pub(super) step_effect: Option<f64>,
-    pub(super) resampled: Option<&'a [Vec<f64>]>,
+    pub(super) bootstrap_fits: Option<&'a [Vec<f64>]>,
     /// The number of samples drawn from the fitted distribution for the verdict's probability.
     pub(super) draws: u64,
 }
@@ -168,17 +173,18 @@ impl ReportData<'_> {
     pub(super) fn report(&self) -> Result<FitReport, Error> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
-        let suspected_units: Vec<String> = self.unit_suspicions.iter().flatten().cloned().collect();
+        let suspected_units: Vec<String> =
+            self.suspected_unit_by_case.iter().flatten().cloned().collect();
         // If a unit is suspected, the search is limited to a few evaluations. Its early end is then
         // no reason to reject the fit.
-        let is_unfinished = !best.is_settled && suspected_units.is_empty();
+        let is_unfinished = !best.is_converged && suspected_units.is_empty();
         let unfinished = is_unfinished.then(|| UNFINISHED_SEARCH.to_owned());
         let objection = unfinished.or_else(|| statistics.objection(problem));
         let follows = objection.is_none();
         let covariance = statistics.free_covariance(problem);
-        let by_noise = statistics.by_noise(problem);
+        let noise_covariance = statistics.noise_covariance(problem);
         let error = |k: usize| covariance[k][k].max(0.0).sqrt();
-        let noise_error = |k: usize| by_noise[k][k].max(0.0).sqrt();
+        let noise_error = |k: usize| noise_covariance[k][k].max(0.0).sqrt();
         let free_count = problem.free.len();
         let correlation = |i: usize, j: usize| match error(i) * error(j) {
             _ if i == j => 1.0,
@@ -204,13 +210,13 @@ impl ReportData<'_> {
             follows,
             objection,
             correlations: (0..free_count).map(correlations).collect(),
-            untold: statistics.untold(problem, &best.x),
+            undetermined: statistics.describe_undetermined(problem, &best.x),
             fixed_numbers: statistics.influences().len(),
             first: files[0].clone(),
             files,
             minima: self.minima.iter().map(minimum).collect(),
             parameters,
-            settled: best.is_settled,
+            is_converged: best.is_converged,
             evaluations: self.evaluations,
             step_s: (problem.method.kind == MethodKind::Rk4).then_some(problem.method.step_s),
             step_effect: self.step_effect,
@@ -222,9 +228,9 @@ impl ReportData<'_> {
     fn parameter(&self, k: usize, [error, noise_error]: [f64; 2], follows: bool) -> FittedNumber {
         let free_parameter = &self.problem.free[k];
         let value = self.minima[0].x[k];
-        let at_bound = free_parameter.range.contains(&value);
-        let has_interval = follows && !at_bound && error > 0.0;
-        let [least, most] = self.problem.range(k);
+        let is_at_bound = free_parameter.range.contains(&value);
+        let has_interval = follows && !is_at_bound && error > 0.0;
+        let [least, most] = self.problem.unknown_range(k);
         let noise_half_width = self.statistics.quantiles[k] * noise_error;
         let fixed_variance = Z_975 * Z_975 * (error * error - noise_error * noise_error).max(0.0);
         let half_width = (noise_half_width * noise_half_width + fixed_variance).sqrt();
@@ -240,9 +246,9 @@ impl ReportData<'_> {
             depends_on: has_interval.then(|| self.dependence(k)).flatten(),
             interval_95: has_interval.then_some(interval),
             bootstrap_95: self
-                .resampled
-                .and_then(|resampled_fits| middle_95(resampled_fits.iter().map(|x| x[k]))),
-            at_bound,
+                .bootstrap_fits
+                .and_then(|bootstrap_fits| interval_95(bootstrap_fits.iter().map(|x| x[k]))),
+            is_at_bound,
         }
     }
 
@@ -282,16 +288,16 @@ impl ReportData<'_> {
         };
         Ok(FileReport {
             file: measurement.name.clone(),
-            samples: measurement.count(),
+            samples: measurement.count_samples(),
             noise: by_column(&|k, comparison| {
-                rms(comparison) * (1.0 - self.statistics.motion[k][0]).sqrt()
+                rms(comparison) * (1.0 - self.statistics.motion_ratios[k][0]).sqrt()
             }),
             offset: by_column(&|_, comparison| comparison.offset),
             shift_s: problem.fits_shift.then(|| problem.shift_s(case, x)),
             residual_rms: by_column(&|_, comparison| rms(comparison)),
-            explained: by_column(&|k, _| self.statistics.explained[k]),
-            autocorrelation: by_column(&|k, _| self.statistics.neighbours[k]),
-            widening: by_column(&|k, _| self.statistics.widening[k]),
+            explained_ratio: by_column(&|k, _| self.statistics.explained_ratios[k]),
+            autocorrelation: by_column(&|k, _| self.statistics.neighbour_correlations[k]),
+            variance_inflation: by_column(&|k, _| self.statistics.variance_inflation[k]),
             spin: problem.cases[case].smoothed_spin.clone(),
             gaps_s: measurement.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
@@ -311,16 +317,16 @@ impl ReportData<'_> {
             self.problem.signals().zip(self.comparisons.iter().zip(self.start_comparisons));
         for ((case, _, signal), (end, start)) in signals {
             // A model at wrong speeds does not show the unit of a channel.
-            if self.unit_suspicions[case].is_some() {
+            if self.suspected_unit_by_case[case].is_some() {
                 continue;
             }
             let (unit, unit_by_mistake) = signal.quantity.units();
             let Some((other, factor)) = unit_by_mistake else { continue };
-            let swing = signal.centred_values();
+            let centred_values = signal.centred_values();
             let size = |comparison: &SignalComparison| {
                 let model_values = signal.samples().map(|(row, _)| comparison.model[row]);
-                let (model_values, _) = centred(model_values.collect());
-                (dot(&swing, &swing) / dot(&model_values, &model_values)).sqrt()
+                let (model_values, _) = subtract_mean(model_values.collect());
+                (dot(&centred_values, &centred_values) / dot(&model_values, &model_values)).sqrt()
             };
             let sizes = [Some(size(end)), considers_start.then(|| size(start))];
             let is_near_factor =
@@ -349,8 +355,8 @@ impl ReportData<'_> {
                     measurement.name
                 ));
             }
-            if measurement.early > 0 {
-                let rows = format_count(measurement.early, "row");
+            if measurement.rows_before_start > 0 {
+                let rows = format_count(measurement.rows_before_start, "row");
                 notes.push(format!("{}: {rows} before time 0 left out", measurement.name));
             }
             for [from, to] in &measurement.gaps_s {
@@ -370,7 +376,7 @@ impl ReportData<'_> {
 
 impl FitReport {
     /// Formats the report as a command prints it.
-    pub(crate) fn text(&self) -> String {
+    pub(crate) fn to_text(&self) -> String {
         let format_short = |value: f64| {
             if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
                 let digits = (5 - value.abs().log10().floor().clamp(-4.0, 5.0) as i32).max(0);
@@ -381,7 +387,7 @@ impl FitReport {
         };
         let format_interval = |ends| format_range(ends, format_short);
         let row = |fit: &FittedNumber| {
-            let unknown = if fit.at_bound { "at its bound" } else { "not known" };
+            let unknown = if fit.is_at_bound { "at its bound" } else { "not known" };
             let interval_text = fit.interval_95.map_or_else(|| unknown.to_owned(), format_interval);
             let error = fit.standard_error.map_or_else(|| "-".to_owned(), format_short);
             let mut row =
@@ -410,12 +416,12 @@ impl FitReport {
             text.push_str(&format_table(&headings, &rows, ""));
         }
         let mut push_line = |what: &str, text_of_line: &str| text.line(what, text_of_line);
-        self.untold.iter().for_each(|untold| push_line("untold", untold));
+        self.undetermined.iter().for_each(|text| push_line("untold", text));
         for fit in &self.parameters {
             let Some(fixed) = &fit.depends_on else { continue };
             let error = format!("{} {}", format_short(fixed.error), fixed.unit);
             // An error that is clearly below the tolerance shows that the record limits it.
-            let limit = if fixed.error < SEEN_RATIO * fixed.tolerance {
+            let limit = if fixed.error < RECORD_LIMIT_RATIO * fixed.tolerance {
                 format!(" (of {}: the record limits it)", format_short(fixed.tolerance))
             } else {
                 String::new()
@@ -440,8 +446,8 @@ impl FitReport {
         }
         for file in &self.files {
             let column = |(column, noise): (&String, &f64)| {
-                let explained = file.explained.get(column).copied().unwrap_or_default();
-                let residual = 100.0 * (1.0 - explained).max(0.0).sqrt();
+                let explained_ratio = file.explained_ratio.get(column).copied().unwrap_or_default();
+                let residual = 100.0 * (1.0 - explained_ratio).max(0.0).sqrt();
                 format!("{column} {} ({residual:.1} %)", format_short(*noise))
             };
             let columns: Vec<String> = file.noise.iter().map(column).collect();

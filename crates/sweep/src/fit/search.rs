@@ -3,7 +3,7 @@
 //! D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, Journal of
 //! the Society for Industrial and Applied Mathematics 11 (1963), 431-441.
 
-use super::algebra::{Symmetric, dot, scaled};
+use super::algebra::{EigenDecomposition, dot, scale_to_unit_diagonal};
 use super::model::NormalEquations;
 use sweep_engine::Error;
 
@@ -11,7 +11,7 @@ use sweep_engine::Error;
 /// standard error. Doubling it ends descents a little earlier.
 const MIN_DECREASE: f64 = 2e-4;
 /// The greatest predicted decrease of the cost at the end of a descent in which no step achieves
-/// it. Basis: a third of a standard error. Doubling it calls rougher ends settled.
+/// it. Basis: a third of a standard error. Doubling it accepts rougher ends as converged.
 const MAX_UNACHIEVED_DECREASE: f64 = 0.1;
 /// The greatest step of a number, as a part of the number or of a tenth of its range. Basis: the
 /// linearisation does not hold for longer steps. Doubling it makes descents shorter, and more of
@@ -31,7 +31,7 @@ pub(crate) struct Descent {
     /// The number of points at which the model and its derivatives were computed.
     pub(crate) evaluations: usize,
     /// Whether no step decreases the cost further.
-    pub(crate) is_settled: bool,
+    pub(crate) is_converged: bool,
 }
 
 /// Descends from a start within ranges; `None` if the model fails at the start.
@@ -39,15 +39,15 @@ pub(crate) fn descend(
     start: &[f64],
     ranges: &[[f64; 2]],
     max_evaluations: usize,
-    evaluate: &dyn Fn(&[f64]) -> Result<Option<NormalEquations>, DescentEnd>,
-) -> Result<Option<Descent>, DescentEnd> {
+    evaluate: &dyn Fn(&[f64]) -> Result<Option<NormalEquations>, DescentError>,
+) -> Result<Option<Descent>, DescentError> {
     let Some(mut current) = evaluate(start)? else { return Ok(None) };
     let mut x = start.to_vec();
     let mut evaluations = 1;
     let mut damping = 1e-3;
     let mut step_scale = 1.0;
-    let finish = |x, equations, evaluations, is_settled| {
-        Ok(Some(Descent { x, equations, evaluations, is_settled }))
+    let finish = |x, equations, evaluations, is_converged| {
+        Ok(Some(Descent { x, equations, evaluations, is_converged }))
     };
     loop {
         // A number at an end of its range stays if the step would leave the range.
@@ -63,8 +63,8 @@ pub(crate) fn descend(
             .iter()
             .map(|&i| free_indices.iter().map(|&j| current.normal[i][j]).collect())
             .collect();
-        let (unit, scale) = scaled(&free_normal);
-        let eigen = Symmetric::from_matrix(&unit);
+        let (unit, scale) = scale_to_unit_diagonal(&free_normal);
+        let eigen = EigenDecomposition::from_matrix(&unit);
         let rhs: Vec<f64> =
             free_indices.iter().zip(&scale).map(|(&k, s)| current.rhs[k] / s).collect();
         let solve = |damping: f64| eigen.apply(&rhs, |value| 1.0 / (value.max(0.0) + damping));
@@ -77,11 +77,11 @@ pub(crate) fn descend(
             let solution = solve(damping);
             let step: Vec<f64> = solution.iter().zip(&scale).map(|(step, s)| step / s).collect();
             let step_length =
-                free_indices.iter().zip(&step).fold(step_scale, |share: f64, (&k, step)| {
+                free_indices.iter().zip(&step).fold(step_scale, |scale_limit: f64, (&k, step)| {
                     let width = ranges[k][1] - ranges[k][0];
                     let width = if width.is_finite() { 0.1 * width } else { 0.0 };
                     let size = x[k].abs().max(start[k].abs()).max(width);
-                    share.min(MAX_STEP_RATIO * size / step.abs())
+                    scale_limit.min(MAX_STEP_RATIO * size / step.abs())
                 });
             let mut trial = x.clone();
             for (&k, step) in free_indices.iter().zip(&step) {
@@ -118,14 +118,14 @@ pub(crate) fn descend(
 
 /// The reason why a search has no result.
 #[derive(Debug)]
-pub(crate) enum DescentEnd {
+pub(crate) enum DescentError {
     /// The work was cancelled.
-    Stopped,
+    Cancelled,
     /// A request that cannot be answered.
     Refused(Error),
 }
 
-impl<E: Into<Error>> From<E> for DescentEnd {
+impl<E: Into<Error>> From<E> for DescentError {
     fn from(error: E) -> Self {
         Self::Refused(error.into())
     }
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     /// Rosenbrock's valley as residuals 10 (b - a^2) and 1 - a of noise 1.
-    fn valley(x: &[f64]) -> Result<Option<NormalEquations>, DescentEnd> {
+    fn valley(x: &[f64]) -> Result<Option<NormalEquations>, DescentError> {
         let residual = [-10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let slopes = [[-20.0 * x[0], 1.0], [10.0, 0.0]];
         let normal = slopes.map(|a| slopes.map(|b| dot(&a, &b)).to_vec()).to_vec();
@@ -153,7 +153,7 @@ mod tests {
     fn steps_grow_where_a_large_residual_makes_them_short() {
         // Residuals x + 1 and bend x^2 + x - 1: Gauss and Newton's steps leave `bend` of the way.
         let bend = 0.97;
-        let evaluate = |x: &[f64]| -> Result<Option<NormalEquations>, DescentEnd> {
+        let evaluate = |x: &[f64]| -> Result<Option<NormalEquations>, DescentError> {
             let residual = [x[0] + 1.0, bend * x[0] * x[0] + x[0] - 1.0].map(|r| 100.0 * r);
             let slopes = [-100.0, -100.0 * (2.0 * bend * x[0] + 1.0)];
             let normal = vec![vec![dot(&slopes, &slopes)]];
@@ -167,7 +167,7 @@ mod tests {
         };
         let unbounded = [[f64::NEG_INFINITY, f64::INFINITY]];
         let descent = descend(&[1.0], &unbounded, MAX_EVALUATIONS, &evaluate).unwrap().unwrap();
-        assert!(descent.is_settled && descent.evaluations < 40, "{descent:?}");
+        assert!(descent.is_converged && descent.evaluations < 40, "{descent:?}");
         assert!(descent.x[0].abs() < 0.01, "{descent:?}");
     }
 
@@ -175,7 +175,7 @@ mod tests {
     fn a_curved_valley_is_followed_to_its_end_or_to_a_bound() {
         let unbounded = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
         let descent = descend(&[-1.2, 1.0], &unbounded, MAX_EVALUATIONS, &valley).unwrap().unwrap();
-        assert!(descent.is_settled && descent.evaluations < 60, "{descent:?}");
+        assert!(descent.is_converged && descent.evaluations < 60, "{descent:?}");
         assert!(
             (descent.x[0] - 1.0).abs() < 0.02 && (descent.x[1] - 1.0).abs() < 0.04,
             "{descent:?}"

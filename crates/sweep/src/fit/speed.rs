@@ -4,7 +4,7 @@ use serde::Serialize;
 use washer_model::Spin;
 
 use super::algebra::quantile;
-use super::normal_draws;
+use super::normal_sampler;
 
 /// The least noise of a tachometer, as a part of its greatest speed. Basis: rounding to five
 /// digits. Doubling it gives exact speeds fewer knots.
@@ -45,8 +45,9 @@ pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedS
         .collect();
     let [first, _] = samples.first()?;
     let [last, _] = samples.last()?;
-    let greatest_rpm = samples.iter().fold(0.0_f64, |most, [_, speed]| most.max(speed.abs()));
-    let (rounding_rpm, samples_per_step) = digit_rounding(&samples).unwrap_or((0.0, 0.0));
+    let greatest_rpm =
+        samples.iter().fold(0.0_f64, |greatest, [_, speed]| greatest.max(speed.abs()));
+    let (rounding_rpm, samples_per_step) = estimate_digit_rounding(&samples).unwrap_or((0.0, 0.0));
     let noise_rpm = estimate_noise(&samples).max(MIN_NOISE_RATIO * greatest_rpm).max(rounding_rpm);
     // The least gain of a knot by the Bayesian information criterion, with its position as a
     // parameter. A step of the tachometer's digits is no reason for a knot.
@@ -63,7 +64,7 @@ pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedS
         knots.sort_by(f64::total_cmp);
         speeds = fit_spline(&samples, &knots)?;
     }
-    let spin = |mut speeds: Vec<f64>| {
+    let to_spin = |mut speeds: Vec<f64>| {
         let mut times = knots.clone();
         if *first > 0.0 {
             // The spline continues to the start of the run on the line of its first span, which
@@ -77,11 +78,11 @@ pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedS
         Spin::Table { time_s: times, speed_rpm: speeds }
     };
     let (spline_equations, _) = SplineEquations::from_samples(&samples, &knots);
-    let normal_draw = normal_draws(RANDOM_SPLINES);
+    let normal_draw = normal_sampler(RANDOM_SPLINES);
     let draw = |point: u64| {
         let standard_normal: Vec<f64> = (0..knots.len()).map(|k| normal_draw(point, k)).collect();
-        let deviations = spline_equations.random_spins(&standard_normal);
-        spin(
+        let deviations = spline_equations.transform_normal(&standard_normal);
+        to_spin(
             speeds
                 .iter()
                 .zip(&deviations)
@@ -90,15 +91,16 @@ pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedS
         )
     };
     let random_spins = (0..RANDOM_SPLINES).map(draw).collect();
-    Some(SmoothedSpin { spin: spin(speeds), noise_rpm, knots: knots.len(), random_spins })
+    Some(SmoothedSpin { spin: to_spin(speeds), noise_rpm, knots: knots.len(), random_spins })
 }
 
 /// Estimates the standard deviation of white noise about a smooth curve, from the median of the
 /// distances of samples to the line through their neighbours. Jumps do not change the median.
 fn estimate_noise(samples: &[[f64; 2]]) -> f64 {
     let distances = samples.windows(3).map(|neighbours| {
-        let share = (neighbours[1][0] - neighbours[0][0]) / (neighbours[2][0] - neighbours[0][0]);
-        let [before, after] = [1.0 - share, share];
+        let fraction =
+            (neighbours[1][0] - neighbours[0][0]) / (neighbours[2][0] - neighbours[0][0]);
+        let [before, after] = [1.0 - fraction, fraction];
         let distance = neighbours[1][1] - before * neighbours[0][1] - after * neighbours[2][1];
         distance.abs() / (1.0 + before * before + after * after).sqrt()
     });
@@ -109,7 +111,7 @@ fn estimate_noise(samples: &[[f64; 2]]) -> f64 {
 /// Returns the rounding error of a tachometer whose digits are coarser than its noise, and the
 /// usual number of samples between changes of a digit. Neighbouring samples do not show the noise
 /// of such a tachometer, because most of them are equal.
-fn digit_rounding(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
+fn estimate_digit_rounding(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
     let steps = samples.windows(2).map(|pair| (pair[1][1] - pair[0][1]).abs());
     let steps = steps.filter(|step| *step > 0.0);
     let count = steps.clone().count();
@@ -136,13 +138,13 @@ impl SplineEquations {
         let mut off_diagonal = vec![0.0; knots.len()];
         let mut rhs = vec![0.0; knots.len()];
         for &[time, speed] in samples {
-            let (k, share) = find_span(knots, time);
-            let complement = 1.0 - share;
+            let (k, fraction) = find_span(knots, time);
+            let complement = 1.0 - fraction;
             diagonal[k] += complement * complement;
-            diagonal[k + 1] += share * share;
-            off_diagonal[k] += complement * share;
+            diagonal[k + 1] += fraction * fraction;
+            off_diagonal[k] += complement * fraction;
             rhs[k] += complement * speed;
-            rhs[k + 1] += share * speed;
+            rhs[k + 1] += fraction * speed;
         }
         let mut factors = vec![0.0; knots.len()];
         for k in 1..knots.len() {
@@ -150,7 +152,7 @@ impl SplineEquations {
             diagonal[k] -= factors[k - 1] * off_diagonal[k - 1];
             rhs[k] -= factors[k - 1] * rhs[k - 1];
         }
-        rhs.iter_mut().zip(&diagonal).for_each(|(rhs, size)| *rhs /= size);
+        rhs.iter_mut().zip(&diagonal).for_each(|(rhs, pivot)| *rhs /= pivot);
         (Self { diagonal, factors }, rhs)
     }
 
@@ -163,12 +165,12 @@ impl SplineEquations {
 
     /// Transforms independent numbers of variance 1 to numbers whose covariance is the inverse of
     /// the normal matrix.
-    fn random_spins(&self, standard_normal: &[f64]) -> Vec<f64> {
+    fn transform_normal(&self, standard_normal: &[f64]) -> Vec<f64> {
         self.substitute_back(
             standard_normal
                 .iter()
                 .zip(&self.diagonal)
-                .map(|(standard_normal, size)| standard_normal / size.sqrt())
+                .map(|(standard_normal, pivot)| standard_normal / pivot.sqrt())
                 .collect(),
         )
     }
@@ -204,8 +206,9 @@ fn find_further_knots(
             let mut projection = 0.0;
             let mut hat_square = 0.0;
             for &[time, speed] in span_samples {
-                let share = (time - ends[0]) / (ends[1] - ends[0]);
-                let residual = speed - speeds[span] * (1.0 - share) - speeds[span + 1] * share;
+                let fraction = (time - ends[0]) / (ends[1] - ends[0]);
+                let residual =
+                    speed - speeds[span] * (1.0 - fraction) - speeds[span + 1] * fraction;
                 let hat = match time <= knot {
                     true => (time - ends[0]) / (knot - ends[0]),
                     false => (ends[1] - time) / (ends[1] - knot),
@@ -229,20 +232,20 @@ mod tests {
     use sweep_engine::design::{Design, DesignRule, Distribution, DistributionShape};
 
     #[test]
-    fn a_noisy_course_with_kinks_keeps_its_angle() {
+    fn a_spline_of_noisy_speeds_with_kinks_keeps_the_angle() {
         let true_speed = |t: f64| if t < 7.3 { 40.0 * t } else { 292.0 - 20.0 * (t - 7.3) };
         let normal = Distribution {
             shape: DistributionShape::Normal { mean: 0.0, sd: 1.5 },
             from: -9.0,
             to: 9.0,
         };
-        let estimate_noise = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 5 };
+        let generator = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 5 };
         let time_s: Vec<f64> = (0..3000).map(|k| 0.003 + 0.004 * f64::from(k)).collect();
         let speed: Vec<f64> = time_s
             .iter()
             .enumerate()
             .map(|(k, t)| {
-                true_speed(*t) + normal.quantile(estimate_noise.position(k as u64, 0).unwrap())
+                true_speed(*t) + normal.quantile(generator.position(k as u64, 0).unwrap())
             })
             .collect();
         let smoothed = smooth_spin(&time_s, &speed).unwrap();
@@ -260,8 +263,8 @@ mod tests {
         assert!((0.5..2.0).contains(&error), "{error}");
         let mut angle = 0.0_f64;
         let mut worst = 0.0_f64;
-        for (t, ours) in time_s.iter().zip(smoothed.spin.speeds_rpm(time_s.iter().copied())) {
-            angle += (ours - true_speed(*t)) / 60.0 * 0.004;
+        for (t, spline_rpm) in time_s.iter().zip(smoothed.spin.speeds_rpm(time_s.iter().copied())) {
+            angle += (spline_rpm - true_speed(*t)) / 60.0 * 0.004;
             worst = worst.max(angle.abs());
         }
         // Turns; the noise itself wanders by 1.5 / 60 sqrt(12 * 0.004) = 5e-3.
@@ -271,9 +274,11 @@ mod tests {
         let greatest_difference = time_s
             .iter()
             .zip(smoothed.spin.speeds_rpm(time_s.iter().copied()))
-            .fold(0.0_f64, |most, (t, ours)| most.max((ours - true_speed(*t)).abs()));
+            .fold(0.0_f64, |greatest, (t, spline_rpm)| {
+                greatest.max((spline_rpm - true_speed(*t)).abs())
+            });
         assert!(greatest_difference < 0.2, "{greatest_difference}: {smoothed:?}");
-        // Stairs of whole digits are no course.
+        // Speeds that are rounded to whole digits get no further knots.
         for digit in [1.0, 5.0] {
             let rounded: Vec<f64> =
                 time_s.iter().map(|t| (true_speed(*t) / digit).round() * digit).collect();

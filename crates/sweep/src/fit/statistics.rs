@@ -1,8 +1,10 @@
 //! Errors of fitted numbers, and tests of the model against the data.
 
-use super::algebra::{Symmetric, centred, dot, inverse, scaled};
-use super::known::{FixedInfluence, FixedInfluences};
-use super::measured::Signal;
+use super::algebra::{
+    EigenDecomposition, dot, pseudo_inverse, scale_to_unit_diagonal, subtract_mean,
+};
+use super::fixed_numbers::{FixedInfluence, FixedInfluences};
+use super::measurement::Signal;
 use super::model::{NormalEquations, Problem, SignalComparison};
 
 /// The greatest lag of a residual's autocorrelation. Basis: a second at some hundred samples a
@@ -13,7 +15,7 @@ const MAX_LAGS: usize = 400;
 const FASTEST_MOTION_TURNS: f64 = 0.25;
 /// The time within which every motion of a suspension swings back (s). Basis: modes of a suspension
 /// are faster than 1 Hz. Doubling it takes slower noise for a motion.
-const SLOWEST_S: f64 = 1.0;
+const SLOWEST_PERIOD_S: f64 = 1.0;
 /// The number of standard deviations of a correlation that chance makes. Basis: in some ten
 /// thousand correlations none is larger. Doubling it sees motions of twice the size only.
 const CHANCE_DEVIATIONS: f64 = 4.0;
@@ -28,25 +30,25 @@ const MAX_DISAGREEMENT: f64 = 4.0;
 /// is an eighth of a turn; a model farther off is nearer to none, which is a quarter. Of the test
 /// `a_wrong_unit_of_speed_or_time_is_named`, wrong units explain less than a quarter, right ones
 /// more than three. Doubling it refuses every record with noise.
-pub(super) const EXPLAINED_RATIO: f64 = 0.5;
+pub(super) const MIN_EXPLAINED_RATIO: f64 = 0.5;
 /// The number of correlations that tell white noise from other residuals. Basis: a motion of a
 /// suspension lasts longer than twenty samples, unless it is sampled twice a turn. Doubling it sees
 /// slower motions in more noise.
-const WHITE_LAGS: usize = 20;
+const WHITENESS_LAGS: usize = 20;
 /// The greatest motion that may be left over, as a share of the signal. Basis: a tenth is seen in a
 /// figure. Doubling it lets worse models pass.
 const MAX_MOTION_RATIO: f64 = 0.1;
 /// The number of standard errors by which the nonlinear model may move a number of the linear one.
 /// Basis: beyond it intervals would be wrong. Doubling it lets worse models pass.
 const MAX_BIAS: f64 = 1.0;
-/// The least part of a sample's freedom that is left beside its leverage. Basis: a sample that
-/// alone determines a number has none, and its residual says nothing of its noise. Doubling it
-/// halves how much such a sample can widen intervals.
-const LEAST_FREEDOM: f64 = 0.1;
+/// The least value of 1 less a sample's leverage. Basis: for a sample that alone determines a
+/// number it is 0, and the sample's residual says nothing of its noise. Doubling it halves how much
+/// such a sample can widen intervals.
+const MIN_ONE_MINUS_LEVERAGE: f64 = 0.1;
 /// The least part of a noise's variance that does not grow with the motion. Basis: without any,
 /// rows at rest would be exact, and their noise called a disagreement. Doubling it doubles the
 /// noise that a record of a resting machine may have.
-const STEADY_RATIO: f64 = 0.1;
+const MIN_CONSTANT_NOISE_RATIO: f64 = 0.1;
 /// The relative half-width of a 95 % interval from which on a combination of numbers is
 /// undetermined. Basis: a number that is known to half of its size is hardly known. Doubling it
 /// reports fewer combinations.
@@ -69,18 +71,18 @@ pub(crate) struct Statistics {
     pub(crate) influences: FixedInfluences,
     /// The factor by which autocorrelation widens variances: for each signal, the variance of a
     /// mean over that of independent samples.
-    pub(crate) widening: Vec<f64>,
+    pub(crate) variance_inflation: Vec<f64>,
     /// The correlation of neighbouring residuals of each signal.
-    pub(crate) neighbours: Vec<f64>,
+    pub(crate) neighbour_correlations: Vec<f64>,
     /// The part of each signal's variance that the model explains.
-    pub(crate) explained: Vec<f64>,
+    pub(crate) explained_ratios: Vec<f64>,
     /// Whether each signal's residual is white noise.
-    pub(crate) is_white: Vec<bool>,
+    pub(crate) white_signals: Vec<bool>,
     /// The variance of the parts' disagreement on the unknowns, over that by noise.
     pub(crate) disagreement: f64,
     /// The residual of each signal that is a motion, as a share of the residual and of the signal,
     /// mean squares.
-    pub(crate) motion: Vec<[f64; 2]>,
+    pub(crate) motion_ratios: Vec<[f64; 2]>,
     /// The signal with the greatest residual in units of its noise, and the part of the record (s).
     pub(crate) worst: (usize, [f64; 2]),
     /// The number of standard errors by which the nonlinear model would move each unknown of the
@@ -90,21 +92,21 @@ pub(crate) struct Statistics {
 
 impl Statistics {
     /// Computes the statistics at the end of a descent.
-    pub(crate) fn at_end(
+    pub(crate) fn from_comparisons(
         problem: &Problem<'_>,
         comparisons: &[SignalComparison],
         equations: &NormalEquations,
     ) -> Self {
         let n = problem.unknowns();
-        let inverse_normal = inverse(&equations.normal);
+        let inverse_normal = pseudo_inverse(&equations.normal);
         let mut score_covariance = vec![vec![0.0; n]; n];
         let mut own_score_covariance = vec![vec![0.0; n]; n];
         let mut white_score_covariance = vec![vec![0.0; n]; n];
-        let mut widening = Vec::new();
-        let mut neighbours = Vec::new();
-        let mut motion = Vec::new();
-        let mut explained = Vec::new();
-        let mut is_white = Vec::new();
+        let mut variance_inflation = Vec::new();
+        let mut neighbour_correlations = Vec::new();
+        let mut motion_ratios = Vec::new();
+        let mut explained_ratios = Vec::new();
+        let mut white_signals = Vec::new();
         let mut disagreement = 0.0;
         let mut freedom = 0.0;
         let mut variance_estimates = vec![VarianceEstimate::default(); n];
@@ -113,28 +115,37 @@ impl Statistics {
             problem.signals().zip(comparisons).zip(&equations.sigma).enumerate()
         {
             let rho = autocorrelation(&comparison.residual);
-            let by_lags = correlated(&comparison.slopes, &rho, 1.0 / (sigma * sigma));
-            let without_lags = correlated(&comparison.slopes, &[1.0], 1.0 / (sigma * sigma));
+            let by_lags = sum_correlated_products(&comparison.slopes, &rho, 1.0 / (sigma * sigma));
+            let without_lags =
+                sum_correlated_products(&comparison.slopes, &[1.0], 1.0 / (sigma * sigma));
             // Intervals are widened, never narrowed.
-            let widening_factor = (0..n).fold(1.0_f64, |most, i| {
+            let widening_factor = (0..n).fold(1.0_f64, |greatest, i| {
                 if without_lags[i][i] > 0.0 {
-                    most.max(by_lags[i][i] / without_lags[i][i])
+                    greatest.max(by_lags[i][i] / without_lags[i][i])
                 } else {
-                    most
+                    greatest
                 }
             });
             let is_narrower = (0..n).any(|i| by_lags[i][i] < without_lags[i][i]);
             let signal_covariance = if is_narrower { &without_lags } else { &by_lags };
-            add(
+            add_scaled(
                 &mut score_covariance,
                 signal_covariance,
                 if is_narrower { widening_factor } else { 1.0 },
             );
-            let window = lag_window(&comparison.residual);
-            let scores = scores(comparison, &inverse_normal, *sigma);
-            add(&mut own_score_covariance, &correlated(&scores, &window, 1.0), 1.0);
-            add(&mut white_score_covariance, &correlated(&scores, &[1.0], 1.0), 1.0);
-            let noise = noise_scale(comparison, signal);
+            let window = correlation_window(&comparison.residual);
+            let scores = compute_scores(comparison, &inverse_normal, *sigma);
+            add_scaled(
+                &mut own_score_covariance,
+                &sum_correlated_products(&scores, &window, 1.0),
+                1.0,
+            );
+            add_scaled(
+                &mut white_score_covariance,
+                &sum_correlated_products(&scores, &[1.0], 1.0),
+                1.0,
+            );
+            let noise = estimate_noise_scale(comparison, signal);
             for (variance_estimates, row) in variance_estimates.iter_mut().zip(&inverse_normal) {
                 variance_estimates.add(
                     comparison,
@@ -145,19 +156,22 @@ impl Statistics {
                 );
             }
             let residual_square = dot(&comparison.residual, &comparison.residual);
-            let swing = signal.centred_values();
+            let centred_values = signal.centred_values();
             let case = &problem.cases[comparison.case];
             // Noise that grows with the motion is scaled, because few of its values are great and
             // their correlations are accidental.
             let scaled_residual: Vec<f64> =
                 comparison.residual.iter().zip(&noise).map(|(r, s)| r / s).collect();
-            let motion_share =
-                motion_share(&scaled_residual, case.rate_hz(signal), 60.0 / case.greatest_rpm());
-            motion.push([motion_share, motion_share * residual_square / dot(&swing, &swing)]);
-            explained.push(1.0 - residual_square / dot(&swing, &swing));
-            is_white.push(is_white_noise(&comparison.residual));
-            neighbours.push(correlation(&comparison.residual, 1));
-            widening.push(widening_factor);
+            let motion_ratio =
+                motion_ratio(&scaled_residual, case.rate_hz(signal), 60.0 / case.greatest_rpm());
+            motion_ratios.push([
+                motion_ratio,
+                motion_ratio * residual_square / dot(&centred_values, &centred_values),
+            ]);
+            explained_ratios.push(1.0 - residual_square / dot(&centred_values, &centred_values));
+            white_signals.push(is_white_noise(&comparison.residual));
+            neighbour_correlations.push(correlation(&comparison.residual, 1));
+            variance_inflation.push(widening_factor);
             // Each part of the record pulls at the unknowns on its own.
             let count = comparison.residual.len();
             for part in 0..RECORD_PARTS {
@@ -173,10 +187,13 @@ impl Statistics {
                     .iter()
                     .map(|slope| slope.iter().zip(noise).map(|(g, s)| g * s).collect())
                     .collect();
-                let information =
-                    correlated(&noise_slopes, &[1.0], widening_factor / (sigma * sigma));
-                let (unit, scale) = scaled(&information);
-                let eigen = Symmetric::from_matrix(&unit);
+                let information = sum_correlated_products(
+                    &noise_slopes,
+                    &[1.0],
+                    widening_factor / (sigma * sigma),
+                );
+                let (unit, scale) = scale_to_unit_diagonal(&information);
+                let eigen = EigenDecomposition::from_matrix(&unit);
                 let rhs: Vec<f64> = slopes
                     .iter()
                     .zip(&scale)
@@ -199,11 +216,12 @@ impl Statistics {
         }
         let disagreement = disagreement / (freedom - n as f64).max(1.0);
         let sandwich = |score_covariance: &[Vec<f64>]| {
-            product(&product(&inverse_normal, score_covariance), &inverse_normal)
+            multiply(&multiply(&inverse_normal, score_covariance), &inverse_normal)
         };
         let unknowns_covariance =
-            widened(sandwich(&score_covariance), &sandwich(&own_score_covariance));
-        let unknowns_covariance = widened(unknowns_covariance, &sandwich(&white_score_covariance));
+            raise_variances(sandwich(&score_covariance), &sandwich(&own_score_covariance));
+        let unknowns_covariance =
+            raise_variances(unknowns_covariance, &sandwich(&white_score_covariance));
         // Disagreement of the record's parts beyond their noise is an error of the unknowns.
         let covariance = unknowns_covariance
             .iter()
@@ -212,18 +230,18 @@ impl Statistics {
         let worst = (worst.0, worst.1);
         let quantiles = variance_estimates
             .iter()
-            .map(|variance_estimates| student_975(variance_estimates.freedom()))
+            .map(|variance_estimates| student_975(variance_estimates.degrees_of_freedom()))
             .collect();
         Self {
             covariance,
             quantiles,
             influences: FixedInfluences::default(),
-            widening,
-            neighbours,
-            explained,
-            is_white,
+            variance_inflation,
+            neighbour_correlations,
+            explained_ratios,
+            white_signals,
             disagreement,
-            motion,
+            motion_ratios,
             worst,
             bias: None,
         }
@@ -232,9 +250,9 @@ impl Statistics {
     /// Returns the signal of which the model explains least, and how much: if that is less than
     /// half of the variance and the rest is more than white noise.
     pub(super) fn worst_explained(&self) -> Option<(usize, f64)> {
-        let signals = self.explained.iter().zip(&self.is_white).enumerate();
+        let signals = self.explained_ratios.iter().zip(&self.white_signals).enumerate();
         signals
-            .filter(|(_, (ratio, is_white))| **ratio < EXPLAINED_RATIO && !**is_white)
+            .filter(|(_, (ratio, is_white))| **ratio < MIN_EXPLAINED_RATIO && !**is_white)
             .map(|(k, (ratio, _))| (k, *ratio))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
@@ -242,19 +260,25 @@ impl Statistics {
     /// Returns the reason why the model does not follow, if it does not.
     pub(crate) fn objection(&self, problem: &Problem<'_>) -> Option<String> {
         let mut reasons = Vec::new();
-        let named = |k: usize| {
-            problem.signals().nth(k).map_or_else(String::new, |(.., it)| it.quantity.column())
+        let column_name = |k: usize| {
+            problem
+                .signals()
+                .nth(k)
+                .map_or_else(String::new, |(.., signal)| signal.quantity.column())
         };
         if let Some((k, ratio)) = self.worst_explained() {
             let percent = 100.0 * ratio.max(0.0);
-            reasons.push(format!("the model explains {percent:.0} % of {}'s variance", named(k)));
+            reasons.push(format!(
+                "the model explains {percent:.0} % of {}'s variance",
+                column_name(k)
+            ));
         }
-        let shares = self.motion.iter().map(|[_, by_lags]| by_lags.sqrt()).enumerate();
+        let shares = self.motion_ratios.iter().map(|[_, by_lags]| by_lags.sqrt()).enumerate();
         if let Some((k, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1))
             && share > MAX_MOTION_RATIO
         {
             let percent = 100.0 * share;
-            let column = named(k);
+            let column = column_name(k);
             reasons.push(format!(
                 "{percent:.0} % of {column} are left over as a motion, not as noise"
             ));
@@ -278,7 +302,7 @@ impl Statistics {
             return None;
         }
         let (k, [from, to]) = self.worst;
-        let worst_place = format!("; worst is {} from {from:.1} to {to:.1} s", named(k));
+        let worst_place = format!("; worst is {} from {from:.1} to {to:.1} s", column_name(k));
         Some(reasons.join(", and ") + &worst_place)
     }
 
@@ -290,27 +314,29 @@ impl Statistics {
     /// Returns the variance of each signal's noise over its independent samples.
     pub(super) fn variances(&self, equations: &NormalEquations) -> Vec<f64> {
         let disagreement = self.disagreement.max(1.0);
-        let signals = equations.sigma.iter().zip(&self.widening);
-        signals.map(|(sigma, widening)| sigma * sigma * widening * disagreement).collect()
+        let signals = equations.sigma.iter().zip(&self.variance_inflation);
+        signals
+            .map(|(sigma, variance_inflation)| sigma * sigma * variance_inflation * disagreement)
+            .collect()
     }
 
     /// Returns the covariance of the free numbers by the measurement's noise and the tolerances of
     /// the fixed numbers.
     pub(crate) fn free_covariance(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
-        let mut covariance = self.by_noise(problem);
-        add(&mut covariance, &self.influences.covariance, 1.0);
+        let mut covariance = self.noise_covariance(problem);
+        add_scaled(&mut covariance, &self.influences.covariance, 1.0);
         covariance
     }
 
     /// Returns the covariance of the free numbers by the measurement's noise alone.
-    pub(super) fn by_noise(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
+    pub(super) fn noise_covariance(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
         let free = problem.free.len();
         self.covariance[..free].iter().map(|row| row[..free].to_vec()).collect()
     }
 
     /// Describes the combinations of numbers that the data do not determine.
-    pub(crate) fn untold(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<String> {
-        let covariance = self.by_noise(problem);
+    pub(crate) fn describe_undetermined(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<String> {
+        let covariance = self.noise_covariance(problem);
         let names: Vec<&str> = problem.free.iter().map(|free| free.parameter.name()).collect();
         // The change of a number that is 0 is relative to its start.
         let magnitudes = problem.free.iter().zip(x).map(|(free, x)| x.abs().max(free.start.abs()));
@@ -320,7 +346,7 @@ impl Statistics {
         };
         let relative: Vec<Vec<f64>> = covariance.iter().enumerate().map(row).collect();
         let mut descriptions = Vec::new();
-        let eigen = Symmetric::from_matrix(&relative);
+        let eigen = EigenDecomposition::from_matrix(&relative);
         for (value, vector) in eigen.values.iter().zip(&eigen.vectors).rev() {
             let half_width = Z_975 * value.max(0.0).sqrt();
             if half_width < UNDETERMINED_RATIO {
@@ -361,8 +387,8 @@ impl Statistics {
     }
 }
 
-/// Adds a matrix times a factor.
-pub(super) fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
+/// Adds a matrix times a factor to a sum.
+pub(super) fn add_scaled(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
     for (sum, part) in sum.iter_mut().zip(part) {
         sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += factor * part);
     }
@@ -370,7 +396,7 @@ pub(super) fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
 
 /// Returns a covariance whose variances are at least those of another estimate, with the same
 /// correlations.
-fn widened(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn raise_variances(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let ratio = |k: usize| {
         let variance = covariance[k][k];
         if variance > 0.0 { (other[k][k] / variance).max(1.0).sqrt() } else { 1.0 }
@@ -386,7 +412,11 @@ fn widened(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// with the residual that the sample would have in a fit without it.
 ///
 /// J. G. MacKinnon, H. White, Journal of Econometrics 29 (1985), 305-325: HC3.
-fn scores(comparison: &SignalComparison, inverse_normal: &[Vec<f64>], sigma: f64) -> Vec<Vec<f64>> {
+fn compute_scores(
+    comparison: &SignalComparison,
+    inverse_normal: &[Vec<f64>],
+    sigma: f64,
+) -> Vec<Vec<f64>> {
     let variance = sigma * sigma;
     let known =
         || comparison.slopes.iter().zip(inverse_normal).filter(|(slope, _)| !slope.is_empty());
@@ -401,7 +431,9 @@ fn scores(comparison: &SignalComparison, inverse_normal: &[Vec<f64>], sigma: f64
                     .sum()
             };
             let leverage: f64 = known().map(|(slope, row)| slope[sample] * project(row)).sum();
-            comparison.residual[sample] / (1.0 - leverage / variance).max(LEAST_FREEDOM) / variance
+            comparison.residual[sample]
+                / (1.0 - leverage / variance).max(MIN_ONE_MINUS_LEVERAGE)
+                / variance
         })
         .collect();
     let score = |slope: &Vec<f64>| slope.iter().zip(&predicted).map(|(g, r)| g * r).collect();
@@ -415,7 +447,7 @@ fn scores(comparison: &SignalComparison, inverse_normal: &[Vec<f64>], sigma: f64
 #[derive(Clone, Debug, Default)]
 struct VarianceEstimate {
     variance: f64,
-    half_variance: f64,
+    half_squared_error: f64,
 }
 
 impl VarianceEstimate {
@@ -445,12 +477,12 @@ impl VarianceEstimate {
         // that of a motion.
         let lags = dot(window, window);
         self.variance += sum;
-        self.half_variance += squares * lags;
+        self.half_squared_error += squares * lags;
     }
 
     /// Returns the degrees of freedom of the variance.
-    fn freedom(&self) -> f64 {
-        self.variance * self.variance / self.half_variance.max(f64::MIN_POSITIVE)
+    fn degrees_of_freedom(&self) -> f64 {
+        self.variance * self.variance / self.half_squared_error.max(f64::MIN_POSITIVE)
     }
 }
 
@@ -470,12 +502,13 @@ fn student_975(freedom: f64) -> f64 {
 /// Estimates the standard deviation of a residual's noise at every sample, over its mean: its
 /// variance as a constant and a part that grows with the square of the model's motion, by least
 /// squares.
-fn noise_scale(comparison: &SignalComparison, signal: &Signal) -> Vec<f64> {
-    let motion = centred(signal.samples().map(|(row, _)| comparison.model[row]).collect()).0;
-    let (energy, mean_energy) = centred(motion.iter().map(|m| m * m).collect());
-    let (square, mean_square) = centred(comparison.residual.iter().map(|r| r * r).collect());
+fn estimate_noise_scale(comparison: &SignalComparison, signal: &Signal) -> Vec<f64> {
+    let motion = subtract_mean(signal.samples().map(|(row, _)| comparison.model[row]).collect()).0;
+    let (energy, mean_energy) = subtract_mean(motion.iter().map(|m| m * m).collect());
+    let (square, mean_square) = subtract_mean(comparison.residual.iter().map(|r| r * r).collect());
     let growth = dot(&energy, &square) / dot(&energy, &energy).max(f64::MIN_POSITIVE);
-    let max_growth = (1.0 - STEADY_RATIO) * mean_square / mean_energy.max(f64::MIN_POSITIVE);
+    let max_growth =
+        (1.0 - MIN_CONSTANT_NOISE_RATIO) * mean_square / mean_energy.max(f64::MIN_POSITIVE);
     // `clamp` would panic where squares of the measurement overflow.
     let growth = growth.min(max_growth).max(0.0);
     if mean_square == 0.0 {
@@ -486,13 +519,13 @@ fn noise_scale(comparison: &SignalComparison, signal: &Signal) -> Vec<f64> {
 }
 
 /// Returns the product of a matrix and a symmetric one.
-fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn multiply(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     a.iter().map(|row| b.iter().map(|column| dot(row, column)).collect()).collect()
 }
 
 /// Computes the sum over all pairs of samples of slope, correlation by lag and slope, times a
 /// weight.
-fn correlated(slopes: &[Vec<f64>], rho: &[f64], weight: f64) -> Vec<Vec<f64>> {
+fn sum_correlated_products(slopes: &[Vec<f64>], rho: &[f64], weight: f64) -> Vec<Vec<f64>> {
     let n = slopes.len();
     let mut sum = vec![vec![0.0; n]; n];
     for (lag, rho) in rho.iter().enumerate() {
@@ -521,7 +554,7 @@ fn correlation(values: &[f64], lag: usize) -> f64 {
 /// G. E. P. Box, D. A. Pierce, Journal of the American Statistical Association 65 (1970),
 /// 1509-1526.
 fn is_white_noise(residual: &[f64]) -> bool {
-    let lags = WHITE_LAGS.min(residual.len() / 4);
+    let lags = WHITENESS_LAGS.min(residual.len() / 4);
     let squares: f64 = (1..=lags).map(|lag| correlation(residual, lag).powi(2)).sum();
     let expected = lags as f64;
     residual.len() as f64 * squares <= expected + CHANCE_DEVIATIONS * (2.0 * expected).sqrt()
@@ -532,13 +565,13 @@ fn is_white_noise(residual: &[f64]) -> bool {
 ///
 /// D. N. Politis, J. P. Romano, Journal of Time Series Analysis 16 (1995), 67-103.
 fn autocorrelation(residual: &[f64]) -> Vec<f64> {
-    let window = lag_window(residual);
+    let window = correlation_window(residual);
     window.iter().enumerate().map(|(lag, taper)| taper * correlation(residual, lag)).collect()
 }
 
 /// Returns the weights of the autocorrelation by lag: 1 up to the last lag with a correlation above
 /// its random error, and linearly to zero at twice this lag.
-fn lag_window(residual: &[f64]) -> Vec<f64> {
+fn correlation_window(residual: &[f64]) -> Vec<f64> {
     let squares: Vec<f64> = residual.iter().map(|value| value * value).collect();
     let total = squares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
     // The variance of a correlation by White, which holds for noise of varying size.
@@ -559,11 +592,11 @@ fn lag_window(residual: &[f64]) -> Vec<f64> {
 /// Returns the part of a residual's mean square that is a motion: the greatest negative
 /// autocorrelation, if it is above its random error. Slow noise has no negative autocorrelation,
 /// and hum is faster than a suspension.
-fn motion_share(residual: &[f64], rate_hz: f64, turn_s: f64) -> f64 {
+fn motion_ratio(residual: &[f64], rate_hz: f64, turn_s: f64) -> f64 {
     let block = ((FASTEST_MOTION_TURNS * turn_s * rate_hz) as usize).clamp(1, residual.len());
     let mean = |samples: &[f64]| samples.iter().sum::<f64>() / block as f64;
-    let (means, _) = centred(residual.chunks_exact(block).map(mean).collect());
-    let max_lag = ((SLOWEST_S * rate_hz) as usize / block).min(means.len() / 4);
+    let (means, _) = subtract_mean(residual.chunks_exact(block).map(mean).collect());
+    let max_lag = ((SLOWEST_PERIOD_S * rate_hz) as usize / block).min(means.len() / 4);
     let rho: Vec<f64> = (1..max_lag).map(|lag| correlation(&means, lag)).collect();
     let lowest = rho.iter().copied().fold(0.0, f64::min);
     // The variance of a correlation by Bartlett, for noise with these positive correlations.
@@ -585,7 +618,7 @@ mod tests {
             let residual = noise(11, 0, 20_000, correlation);
             let rho = autocorrelation(&residual);
             let slopes = vec![vec![1.0; residual.len()]];
-            let wider = correlated(&slopes, &rho, 1.0)[0][0] / residual.len() as f64;
+            let wider = sum_correlated_products(&slopes, &rho, 1.0)[0][0] / residual.len() as f64;
             let endless = (1.0 + correlation) / (1.0 - correlation);
             assert!((wider / endless - 1.0).abs() < 0.2, "{correlation}: {wider}, not {endless}");
         }
@@ -610,12 +643,12 @@ mod tests {
         let tone = |hz: f64| move |k: usize| (TAU * hz * k as f64 / rate_hz).sin();
         for correlation in [0.0, 0.6, 0.9, 0.97] {
             let noise = noise(5, 0, 12_000, correlation);
-            assert_eq!(motion_share(&noise, rate_hz, turn_s), 0.0, "{correlation}");
+            assert_eq!(motion_ratio(&noise, rate_hz, turn_s), 0.0, "{correlation}");
             for (hz, expected) in [(1.5, 0.5), (5.0, 0.5), (50.0, 0.0)] {
                 let motion = (0..12_000).map(tone(hz));
                 let both: Vec<f64> =
                     motion.zip(&noise).map(|(tone, noise)| tone + 0.5_f64.sqrt() * noise).collect();
-                let found = motion_share(&both, rate_hz, turn_s);
+                let found = motion_ratio(&both, rate_hz, turn_s);
                 assert!((found - expected).abs() < 0.15, "{correlation}, {hz} Hz: {found}");
             }
         }

@@ -43,8 +43,12 @@ fn case_at(numbers: &[(&str, f64)], factor: f64, measurement: Measurement) -> Fi
     let settings = numbers.iter().map(|(name, value)| format!("{name}={}", value * factor));
     let settings: Vec<String> =
         settings.chain(["friction_linear_speed_m_per_s=0.1".to_owned()]).collect();
-    case(&WasherGridInput::text("reference", GRID.to_owned(), Vec::new()), &settings, measurement)
-        .unwrap()
+    prepare_case(
+        &WasherGridInput::text("reference", GRID.to_owned(), Vec::new()),
+        &settings,
+        measurement,
+    )
+    .unwrap()
 }
 
 fn options(free: &[&str]) -> FitOptions {
@@ -62,7 +66,7 @@ fn options(free: &[&str]) -> FitOptions {
 
 /// Returns the problem of fitting the nonlinear model by the method that commands choose.
 fn problem(cases: Vec<FitCase>, free: Vec<FreeParameter>, fits_shift: bool) -> Problem<'static> {
-    let method = Problem::method(&cases).unwrap();
+    let method = Problem::select_method(&cases).unwrap();
     let simd = simd_from_environment().unwrap();
     let model = ModelKind::Nonlinear;
     Problem { cases, free, model, fits_shift, method, simd, cancel: Cancel::Never }
@@ -71,7 +75,7 @@ fn problem(cases: Vec<FitCase>, free: Vec<FreeParameter>, fits_shift: bool) -> P
 fn fitted(cases: Vec<FitCase>, options: &FitOptions) -> FitReport {
     let context = FitContext {
         cancel: Cancel::Never,
-        count_evaluations: &|_| {},
+        report_evaluations: &|_| {},
         output: None,
         fresh: false,
     };
@@ -128,21 +132,25 @@ fn reference_data_lead_to_the_truth() {
         let cases = vec![case_at(&VISCOUS, factor, reference("viscous", 8.0))];
         let report = fitted(cases, &options(&names));
         let error_ratios = error_ratios(&report, &VISCOUS);
-        assert!(report.follows && report.settled, "{report:?}");
+        assert!(report.follows && report.is_converged, "{report:?}");
         assert!(
             error_ratios.iter().all(|error_ratios| error_ratios.abs() < 3.0),
             "{error_ratios:?}: {}",
-            report.text()
+            report.to_text()
         );
-        assert!(report.evaluations < 25 && report.untold.is_empty(), "{}", report.text());
+        assert!(report.evaluations < 25 && report.undetermined.is_empty(), "{}", report.to_text());
         for (noise, known) in report.first.noise.values().zip(NOISE) {
-            assert!((noise / known - 1.0).abs() < 0.2, "{}", report.text());
+            assert!((noise / known - 1.0).abs() < 0.2, "{}", report.to_text());
         }
         assert!(report.first.shift_s.unwrap().abs() < 1e-3);
         // The noise is a third of the smallest column.
-        assert!(report.first.explained.values().all(|share| *share > 0.88), "{}", report.text());
+        assert!(
+            report.first.explained_ratio.values().all(|share| *share > 0.88),
+            "{}",
+            report.to_text()
+        );
         let expected_text = "tub_front_y_m_per_s2 0.291315 (32.3 %)";
-        assert!(report.text().contains(expected_text), "{}", report.text());
+        assert!(report.to_text().contains(expected_text), "{}", report.to_text());
     }
 }
 
@@ -153,9 +161,9 @@ fn a_model_without_the_friction_says_that_it_does_not_follow() {
     let cases = vec![case_at(&start, 1.0, reference("friction", 8.0))];
     let free = ["unbalance_mass_kg", "damping_n_s_per_m", "spring_stiffness_n_per_m"];
     let report = fitted(cases, &options(&free));
-    assert!(!report.follows, "{}", report.text());
+    assert!(!report.follows, "{}", report.to_text());
     assert!(report.parameters.iter().all(|fit| fit.interval_95.is_none()));
-    assert!(report.text().contains("does not follow"));
+    assert!(report.to_text().contains("does not follow"));
 }
 
 #[test]
@@ -166,41 +174,41 @@ fn an_interval_goes_no_farther_than_its_range() {
     let interval_start =
         |fit: &report::FittedNumber| fit.interval_95.map(|[interval_start, _]| interval_start);
     let least = report.parameters.iter().filter_map(interval_start).reduce(f64::min);
-    assert_eq!(least, Some(0.0), "{}", report.text());
+    assert_eq!(least, Some(0.0), "{}", report.to_text());
 }
 
 #[test]
 fn a_search_that_came_to_no_end_gives_no_intervals() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
-    let free = free_parameters(&options(&["damping_n_s_per_m"]), &cases).unwrap();
+    let free = read_free_parameters(&options(&["damping_n_s_per_m"]), &cases).unwrap();
     let problem = problem(cases, free, false);
-    let x = problem.start();
+    let x = problem.start_point();
     let comparisons = problem.compare(&x).unwrap();
     let equations = problem.normal_equations(&comparisons);
-    let statistics = Statistics::at_end(&problem, &comparisons, &equations);
-    for is_settled in [true, false] {
+    let statistics = Statistics::from_comparisons(&problem, &comparisons, &equations);
+    for is_converged in [true, false] {
         let x = x.clone();
         let equations = equations.clone();
         let report_data = report::ReportData {
             problem: &problem,
-            unit_suspicions: &[None],
-            minima: &[Descent { x, equations, evaluations: 1, is_settled }],
+            suspected_unit_by_case: &[None],
+            minima: &[Descent { x, equations, evaluations: 1, is_converged }],
             comparisons: &comparisons,
             start_comparisons: &comparisons,
             statistics: &statistics,
             evaluations: 1,
             step_effect: None,
-            resampled: None,
+            bootstrap_fits: None,
             draws: 0,
         };
         let report = report_data.report().unwrap();
-        assert_eq!(report.parameters[0].interval_95.is_some(), is_settled, "{report:?}");
-        assert_eq!(report.parameters[0].standard_error.is_some(), is_settled, "{report:?}");
-        assert_eq!((report.follows, report.objection.is_none()), (is_settled, is_settled));
-        let text = report.text();
+        assert_eq!(report.parameters[0].interval_95.is_some(), is_converged, "{report:?}");
+        assert_eq!(report.parameters[0].standard_error.is_some(), is_converged, "{report:?}");
+        assert_eq!((report.follows, report.objection.is_none()), (is_converged, is_converged));
+        let text = report.to_text();
         let first = text.lines().next().unwrap();
-        assert_eq!(first.contains("the search did not come to its end"), !is_settled, "{text}");
-        assert_eq!(text.contains("follows the measurement"), is_settled, "{text}");
+        assert_eq!(first.contains("the search did not come to its end"), !is_converged, "{text}");
+        assert_eq!(text.contains("follows the measurement"), is_converged, "{text}");
     }
 }
 
@@ -208,10 +216,10 @@ fn a_search_that_came_to_no_end_gives_no_intervals() {
 fn a_fitted_machine_file_says_where_its_numbers_are_from() {
     let start = [VISCOUS[0], VISCOUS[1], ("friction_n", 5.0)];
     let cases = vec![case_at(&start, 1.0, reference("viscous", 1.0))];
-    let free = free_parameters(&options(&["damping_n_s_per_m"]), &cases).unwrap();
+    let free = read_free_parameters(&options(&["damping_n_s_per_m"]), &cases).unwrap();
     let problem = problem(cases, free, false);
-    let (machine, _) = problem.machine(0, &problem.start());
-    let text = crate::config::machine_file(&machine, &problem.written());
+    let (machine, _) = problem.machine(0, &problem.start_point());
+    let text = crate::config::machine_file(&machine, &problem.number_sources());
     let line_with_key = |key: &str| text.lines().find(|line| line.starts_with(key)).unwrap();
     assert!(line_with_key("damping_n_s_per_m").ends_with("[given: fit to viscous.csv]"), "{text}");
     assert!(line_with_key("friction_n").ends_with("[given: --at]"), "{text}");
@@ -226,11 +234,11 @@ fn friction_is_told_from_viscous_damping() {
         let cases = vec![case_at(&FRICTION, factor, reference("friction", 24.0))];
         let report = fitted(cases, &options(&names));
         let error_ratios = error_ratios(&report, &FRICTION);
-        assert!(report.follows, "{}", report.text());
+        assert!(report.follows, "{}", report.to_text());
         assert!(
             error_ratios.iter().all(|error_ratios| error_ratios.abs() < 3.0),
             "{error_ratios:?}: {}",
-            report.text()
+            report.to_text()
         );
     }
 }
@@ -248,7 +256,7 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
             signal.values.iter_mut().zip(noise).for_each(|(value, z)| *value += NOISE[s] * z);
         }
         let report = fitted(vec![case_at(&VISCOUS, 0.97, measurement)], &options(&names));
-        assert!(report.follows, "draw {draw}: {}", report.text());
+        assert!(report.follows, "draw {draw}: {}", report.to_text());
         for ((count_within, fit), (_, truth)) in
             count_within.iter_mut().zip(&report.parameters).zip(VISCOUS)
         {
@@ -274,9 +282,9 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let names: Vec<&str> = truth.iter().map(|(name, _)| *name).collect();
         let cases = vec![case_at(truth, 1.0, reference(name, 24.0))];
-        let free = free_parameters(&options(&names), &cases).unwrap();
+        let free = read_free_parameters(&options(&names), &cases).unwrap();
         let problem = problem(cases, free, true);
-        let exact = problem.compare(&problem.start()).unwrap();
+        let exact = problem.compare(&problem.start_point()).unwrap();
         // The noise grows with the motion itself, or with its envelope over half a second.
         for (correlation, growth, by_envelope) in [
             (0.0, 0.0, false),
@@ -295,7 +303,7 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                 let mut comparisons = exact.clone();
                 for (comparison, (.., signal)) in comparisons.iter_mut().zip(problem.signals()) {
                     let motion = signal.samples().map(|(row, _)| comparison.model[row]);
-                    let mut noise_size = algebra::centred(motion.collect()).0;
+                    let mut noise_size = algebra::subtract_mean(motion.collect()).0;
                     if by_envelope {
                         let square = |neighbours: &[f64]| {
                             algebra::dot(neighbours, neighbours) / neighbours.len() as f64
@@ -315,12 +323,12 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                             * noise
                             * (1.0 + growth * (noise_size / rms_size).abs())
                     });
-                    comparison.residual = algebra::centred(noise.collect()).0;
+                    comparison.residual = algebra::subtract_mean(noise.collect()).0;
                 }
                 // Near the truth the model is linear, so that one step of Gauss and Newton
                 // suffices.
                 let equations = problem.normal_equations(&comparisons);
-                let inverse_normal = algebra::inverse(&equations.normal);
+                let inverse_normal = algebra::pseudo_inverse(&equations.normal);
                 let step: Vec<f64> =
                     inverse_normal.iter().map(|row| algebra::dot(row, &equations.rhs)).collect();
                 for SignalComparison { residual, slopes, .. } in &mut comparisons {
@@ -329,7 +337,7 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                     }
                 }
                 let equations = problem.normal_equations(&comparisons);
-                let statistics = Statistics::at_end(&problem, &comparisons, &equations);
+                let statistics = Statistics::from_comparisons(&problem, &comparisons, &equations);
                 if let Some(objection) = statistics.objection(&problem) {
                     if objections == 0 {
                         println!("{objection}");
@@ -374,7 +382,7 @@ fn what_cannot_be_fitted_is_said() {
     let error_text = |free: &[&str], measurement: Measurement| {
         let context = FitContext {
             cancel: Cancel::Never,
-            count_evaluations: &|_| {},
+            report_evaluations: &|_| {},
             output: None,
             fresh: false,
         };
@@ -439,7 +447,7 @@ fn units_that_are_wrong_and_loads_that_differ_are_seen() {
     let [_, first, second] = &report.parameters[..] else { panic!("{report:?}") };
     assert_eq!(first.file.as_deref(), Some("viscous.csv"));
     assert_eq!(second.file.as_deref(), Some("other"));
-    assert!((second.value - 0.43).abs() < 0.02, "{}", report.text());
+    assert!((second.value - 0.43).abs() < 0.02, "{}", report.to_text());
 }
 
 #[test]
@@ -467,7 +475,7 @@ fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
     let mut options = options(&["friction_n=0:60", "friction_speed_m_per_s=0.005:0.02"]);
     let context = FitContext {
         cancel: Cancel::Never,
-        count_evaluations: &|_| {},
+        report_evaluations: &|_| {},
         output: None,
         fresh: false,
     };
@@ -475,7 +483,7 @@ fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
     assert!(error.contains("does not depend on friction_speed_m_per_s"), "{error}");
     options.starts = 6;
     let report = fitted(cases(), &options);
-    assert!((report.parameters[0].value / 34.0 - 1.0).abs() < 0.1, "{}", report.text());
+    assert!((report.parameters[0].value / 34.0 - 1.0).abs() < 0.1, "{}", report.to_text());
 }
 
 #[test]
@@ -500,8 +508,11 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
     ] {
         let cases = vec![case_at(&start, 1.0, record(speed_factor, time_factor))];
         let report = fitted(cases, &free);
-        let text = report.text();
-        println!("{} {expected_text}: {:?} {text}", report.evaluations, report.first.explained);
+        let text = report.to_text();
+        println!(
+            "{} {expected_text}: {:?} {text}",
+            report.evaluations, report.first.explained_ratio
+        );
         assert!(
             !report.follows && text.contains(&format!("      unit  {expected_text}")),
             "{expected_text}: {text}"
@@ -513,13 +524,13 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
         );
         // The search does not go on in wrong units: an evaluation at the start and eight others.
         assert!(report.evaluations < 10, "{expected_text}: {} evaluations", report.evaluations);
-        assert!(report.first.explained.values().all(|ratio| *ratio < 0.25), "{report:?}");
+        assert!(report.first.explained_ratio.values().all(|ratio| *ratio < 0.25), "{report:?}");
         let is_of_unit = |note: &String| note.contains("it seems to");
         assert!(!report.notes.iter().any(is_of_unit), "{expected_text}: {:?}", report.notes);
     }
     let report = fitted(vec![case_at(&start, 1.0, record(1.0, 1.0))], &free);
-    println!("right units: {:?}", report.first.explained);
-    assert!(report.first.explained.values().all(|ratio| *ratio > 0.75), "{report:?}");
+    println!("right units: {:?}", report.first.explained_ratio);
+    assert!(report.first.explained_ratio.values().all(|ratio| *ratio > 0.75), "{report:?}");
     // No unit is named for another machine in the right units.
     let report = fitted(vec![case_at(&VISCOUS, 0.8, record(1.0, 1.0))], &options(&[start[0].0]));
     assert!(report.objection.unwrap_or_default().contains("the model explains"));
@@ -536,20 +547,20 @@ fn a_wrong_unit_of_speed_is_no_wrong_unit_of_a_channel() {
     let column = problem.cases[0].measurement.signals[2].quantity.column();
     yaw.model.iter_mut().for_each(|value| *value = value.to_radians());
     let equations = problem.normal_equations(&comparisons);
-    let statistics = Statistics::at_end(&problem, &comparisons, &equations);
-    let is_settled = true;
-    let minima = [Descent { x: Vec::new(), equations, evaluations: 1, is_settled }];
-    let notes = |unit_suspicions: &[Option<String>]| {
+    let statistics = Statistics::from_comparisons(&problem, &comparisons, &equations);
+    let is_converged = true;
+    let minima = [Descent { x: Vec::new(), equations, evaluations: 1, is_converged }];
+    let notes = |suspected_unit_by_case: &[Option<String>]| {
         let report_data = report::ReportData {
             problem: &problem,
-            unit_suspicions,
+            suspected_unit_by_case,
             minima: &minima,
             comparisons: &comparisons,
             start_comparisons: &comparisons,
             statistics: &statistics,
             evaluations: 1,
             step_effect: None,
-            resampled: None,
+            bootstrap_fits: None,
             draws: 0,
         };
         report_data.report().unwrap().notes
@@ -572,9 +583,9 @@ fn a_signal_in_white_noise_is_followed() {
     }
     let report =
         fitted(vec![case_at(&VISCOUS, 0.9, measurement)], &options(&["unbalance_mass_kg"]));
-    assert!(report.first.explained.values().all(|ratio| *ratio < 0.5), "{report:?}");
-    assert!(report.follows, "{}", report.text());
-    assert!(error_ratios(&report, &VISCOUS)[0].abs() < 3.0, "{}", report.text());
+    assert!(report.first.explained_ratio.values().all(|ratio| *ratio < 0.5), "{report:?}");
+    assert!(report.follows, "{}", report.to_text());
+    assert!(error_ratios(&report, &VISCOUS)[0].abs() < 3.0, "{}", report.to_text());
 }
 
 #[test]
@@ -593,14 +604,14 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let cases = || vec![case_at(&VISCOUS, 0.9, reference("viscous", 3.0))];
     let options = options(&["damping_n_s_per_m", "unbalance_mass_kg"]);
     let uninterrupted = fitted(cases(), &options);
-    let evaluations_made = AtomicUsize::new(0);
+    let evaluation_count = AtomicUsize::new(0);
     let count_evaluation = |_| {
-        evaluations_made.fetch_add(1, Ordering::Relaxed);
+        evaluation_count.fetch_add(1, Ordering::Relaxed);
     };
-    let is_requested = || evaluations_made.load(Ordering::Relaxed) >= 3;
+    let is_requested = || evaluation_count.load(Ordering::Relaxed) >= 3;
     let context = FitContext {
         cancel: Cancel::When(&is_requested),
-        count_evaluations: &count_evaluation,
+        report_evaluations: &count_evaluation,
         output: Some(&output),
         fresh: false,
     };
@@ -615,7 +626,7 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     // Another fit does not change stored evaluations, nor does a second process.
     let context = FitContext {
         cancel: Cancel::When(&|| true),
-        count_evaluations: &|_| {},
+        report_evaluations: &|_| {},
         output: Some(&output),
         fresh: false,
     };
@@ -623,13 +634,13 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let error = fit(cases(), &without_shift, &context).err().unwrap().to_string();
     assert!(error.contains("/fit/shift: was true, is false"), "{error}");
 
-    let evaluations_made = AtomicUsize::new(0);
+    let evaluation_count = AtomicUsize::new(0);
     let count_evaluation = |_| {
-        evaluations_made.fetch_add(1, Ordering::Relaxed);
+        evaluation_count.fetch_add(1, Ordering::Relaxed);
     };
     let context = FitContext {
         cancel: Cancel::Never,
-        count_evaluations: &count_evaluation,
+        report_evaluations: &count_evaluation,
         output: Some(&output),
         fresh: false,
     };
@@ -652,7 +663,7 @@ fn a_damaged_part_of_a_fit_costs_its_evaluations() {
     let fit = || {
         let context = FitContext {
             cancel: Cancel::Never,
-            count_evaluations: &|_| {},
+            report_evaluations: &|_| {},
             output: Some(&output),
             fresh: false,
         };

@@ -7,11 +7,11 @@
 
 use std::f64::consts::TAU;
 
-use super::algebra::{Symmetric, centred, dot, scaled};
-use super::measured::{LONGEST_RUN_S, SLOWEST_S, Signal, usual_step};
+use super::algebra::{EigenDecomposition, dot, scale_to_unit_diagonal, subtract_mean};
+use super::measurement::{MAX_ROW_SPACING_S, MAX_RUN_S, Signal, usual_step};
 use super::model::{FitCase, FreeParameter, Problem};
-use super::search::{Descent, DescentEnd, descend};
-use super::statistics::EXPLAINED_RATIO;
+use super::search::{Descent, DescentError, descend};
+use super::statistics::MIN_EXPLAINED_RATIO;
 
 /// Turns of the drum over which a record's amplitude and phase are taken as constant. Basis: a
 /// resonance of a suspension with a tenth of the critical damping is five turns wide. Doubling it
@@ -19,7 +19,7 @@ use super::statistics::EXPLAINED_RATIO;
 const BLOCK_TURNS: f64 = 2.0;
 /// The least number of samples of such a block: four for each of its three numbers. Doubling it
 /// makes blocks of coarse records longer than [`BLOCK_TURNS`].
-const BLOCK_SAMPLES: usize = 12;
+const MIN_BLOCK_SAMPLES: usize = 12;
 /// The least number of samples of a turn. Basis: with two, a motion cannot be told from one that
 /// turns backwards. Doubling it leaves fast parts of coarse records out.
 const SAMPLES_PER_TURN: f64 = 4.0;
@@ -33,8 +33,9 @@ const TURNING_RATIO: f64 = 0.1;
 const TURNING_GAIN: f64 = 2.0;
 /// The greatest number of evaluations of a short fit. Basis: test
 /// `a_wrong_unit_of_speed_or_time_is_named`. Doubling it makes a trial as long as a fit.
-pub(super) const TRIAL_EVALUATIONS: usize = 8;
-/// The number of free parameters of a short fit: those that the record depends on most.
+pub(super) const MAX_TRIAL_EVALUATIONS: usize = 8;
+/// The number of free parameters of a short fit: those that the record depends on most. Basis: two
+/// describe the size and the time of a motion. Doubling it lengthens short fits.
 const TRIAL_PARAMETERS: usize = 2;
 
 /// The column whose unit may be wrong.
@@ -54,7 +55,7 @@ struct ClockUnit {
 }
 
 /// Units in which speeds and times are recorded by mistake.
-const UNITS: [ClockUnit; 12] = [
+const CLOCK_UNITS: [ClockUnit; 12] = [
     ClockUnit { column: ClockColumn::Speed, name: "rad/s", factor: 60.0 / TAU },
     ClockUnit { column: ClockColumn::Speed, name: "Hz", factor: 60.0 },
     ClockUnit { column: ClockColumn::Speed, name: "degrees per s", factor: 1.0 / 6.0 },
@@ -70,23 +71,25 @@ const UNITS: [ClockUnit; 12] = [
 ];
 
 /// Returns for each file a clause that its column seems to be in another unit, if it does.
-pub(super) fn find_suspicions(problem: &Problem<'_>) -> Result<Vec<Option<String>>, DescentEnd> {
-    (0..problem.cases.len()).map(|case| find_suspicion(problem, case)).collect()
+pub(super) fn find_suspected_units(
+    problem: &Problem<'_>,
+) -> Result<Vec<Option<String>>, DescentError> {
+    (0..problem.cases.len()).map(|case| find_suspected_unit(problem, case)).collect()
 }
 
-fn find_suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, DescentEnd> {
+fn find_suspected_unit(problem: &Problem<'_>, case: usize) -> Result<Option<String>, DescentError> {
     let fit_case = &problem.cases[case];
     let least_ratio = TURNING_RATIO.max(TURNING_GAIN * turning_ratio(fit_case));
     let mut best: Option<(ClockUnit, f64)> = None;
-    for unit in UNITS {
-        let Some(convert_column) = convert_column(fit_case, unit) else { continue };
-        let ratio = turning_ratio(&convert_column);
+    for unit in CLOCK_UNITS {
+        let Some(converted_case) = convert_column(fit_case, unit) else { continue };
+        let ratio = turning_ratio(&converted_case);
         if ratio < least_ratio {
             continue;
         }
-        let explained_ratio = explained_by_short_fit(problem, case, convert_column)?;
+        let explained_ratio = explained_by_short_fit(problem, case, converted_case)?;
         // Half, as for the model itself: less is no evidence of this unit.
-        let is_evident = explained_ratio.max(ratio) > EXPLAINED_RATIO;
+        let is_evident = explained_ratio.max(ratio) > MIN_EXPLAINED_RATIO;
         if is_evident && best.is_none_or(|(_, best)| explained_ratio > best) {
             best = Some((unit, explained_ratio));
         }
@@ -99,7 +102,7 @@ fn find_suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, 
         let name = unit.name;
         let factor = unit.factor;
         let file_name = &fit_case.measurement.name;
-        let evidence = if ratio > EXPLAINED_RATIO {
+        let evidence = if ratio > MIN_EXPLAINED_RATIO {
             format!("converted, a short fit explains {:.0} % of the record", 100.0 * ratio)
         } else {
             "converted, the record turns with the drum".to_owned()
@@ -121,10 +124,10 @@ fn convert_column(case: &FitCase, unit: ClockUnit) -> Option<FitCase> {
     };
     column.iter_mut().for_each(|value| *value *= unit.factor);
     if let (ClockColumn::Time, Some(pulses)) = (unit.column, &mut measurement.pulses) {
-        pulses.edges_s.iter_mut().for_each(|edge_s| *edge_s *= unit.factor);
+        pulses.pulse_times_s.iter_mut().for_each(|pulse_time_s| *pulse_time_s *= unit.factor);
     }
     let end_s = *measurement.time_s.last()?;
-    if end_s > LONGEST_RUN_S || usual_step(&measurement.time_s)? > SLOWEST_S {
+    if end_s > MAX_RUN_S || usual_step(&measurement.time_s)? > MAX_ROW_SPACING_S {
         return None;
     }
     let smoothed_spin = measurement.smooth_spin();
@@ -134,13 +137,13 @@ fn convert_column(case: &FitCase, unit: ClockUnit) -> Option<FitCase> {
 /// Computes the part of a record's variance that turns with the drum, the mean of its signals: by
 /// least squares, block by block, a constant and the drum's sine and cosine.
 fn turning_ratio(case: &FitCase) -> f64 {
-    let integrate_turns = integrate_turns(case);
+    let turns = integrate_turns(case);
     let signals = &case.measurement.signals;
     let ratio = |signal: &Signal| {
         let samples: Vec<[f64; 2]> =
-            signal.samples().map(|(row, value)| [integrate_turns[row], value]).collect();
-        let centred = signal.centred_values();
-        turning_square(&samples) / dot(&centred, &centred)
+            signal.samples().map(|(row, value)| [turns[row], value]).collect();
+        let centred_values = signal.centred_values();
+        turning_square(&samples) / dot(&centred_values, &centred_values)
     };
     signals.iter().map(ratio).sum::<f64>() / signals.len() as f64
 }
@@ -149,13 +152,12 @@ fn turning_ratio(case: &FitCase) -> f64 {
 fn integrate_turns(case: &FitCase) -> Vec<f64> {
     let times = &case.measurement.time_s;
     let speeds: Vec<f64> = case.spin().speeds_rpm(times.iter().copied()).collect();
-    let mut integrate_turns = vec![0.0; times.len()];
+    let mut turns = vec![0.0; times.len()];
     for row in 1..times.len() {
         let mean_rpm = 0.5 * (speeds[row] + speeds[row - 1]);
-        integrate_turns[row] =
-            integrate_turns[row - 1] + mean_rpm.abs() / 60.0 * (times[row] - times[row - 1]);
+        turns[row] = turns[row - 1] + mean_rpm.abs() / 60.0 * (times[row] - times[row - 1]);
     }
-    integrate_turns
+    turns
 }
 
 /// Computes the sum of squares that turns, of samples of turns and value: beyond what three numbers
@@ -165,7 +167,7 @@ fn turning_square(samples: &[[f64; 2]]) -> f64 {
     let mut remaining = samples;
     while let Some(&[first, _]) = remaining.first() {
         let count_in_block = remaining.partition_point(|[turn, _]| *turn < first + BLOCK_TURNS);
-        let count = count_in_block.max(BLOCK_SAMPLES);
+        let count = count_in_block.max(MIN_BLOCK_SAMPLES);
         if count > remaining.len() {
             break;
         }
@@ -180,19 +182,19 @@ fn turning_square(samples: &[[f64; 2]]) -> f64 {
 
 /// Computes the part of a block's sum of squares about its mean that sine and cosine explain.
 fn block_square(block: &[[f64; 2]]) -> f64 {
-    let values = centred(block.iter().map(|[_, value]| *value).collect()).0;
+    let values = subtract_mean(block.iter().map(|[_, value]| *value).collect()).0;
     let wave = |wave: fn(f64) -> f64| {
-        centred(block.iter().map(|[turn, _]| wave(TAU * turn.fract())).collect()).0
+        subtract_mean(block.iter().map(|[turn, _]| wave(TAU * turn.fract())).collect()).0
     };
     let centred_waves = [wave(libm::cos), wave(libm::sin)];
     let normal: Vec<Vec<f64>> =
         centred_waves.iter().map(|a| centred_waves.iter().map(|b| dot(a, b)).collect()).collect();
-    let (unit, scale) = scaled(&normal);
+    let (unit, scale) = scale_to_unit_diagonal(&normal);
     let rhs: Vec<f64> =
         centred_waves.iter().zip(&scale).map(|(wave, scale)| dot(wave, &values) / scale).collect();
     // A block of a hundredth of a turn has a parabola, but no wave.
     let inverse = |value: f64| if value > 1e-3 { 1.0 / value } else { 0.0 };
-    let explained_square = dot(&Symmetric::from_matrix(&unit).apply(&rhs, inverse), &rhs);
+    let explained_square = dot(&EigenDecomposition::from_matrix(&unit).apply(&rhs, inverse), &rhs);
     let noise = (dot(&values, &values) - explained_square) / (block.len() as f64 - 3.0);
     explained_square - 2.0 * noise
 }
@@ -203,18 +205,18 @@ fn block_square(block: &[[f64; 2]]) -> f64 {
 fn explained_by_short_fit(
     problem: &Problem<'_>,
     case: usize,
-    convert_column: FitCase,
-) -> Result<f64, DescentEnd> {
-    let cases = vec![convert_column];
-    let Ok(method) = Problem::method(&cases) else { return Ok(0.0) };
+    converted_case: FitCase,
+) -> Result<f64, DescentError> {
+    let cases = vec![converted_case];
+    let Ok(method) = Problem::select_method(&cases) else { return Ok(0.0) };
     let case_parameters = problem.free.iter().filter(|free| free.belongs_to(case));
     let free = case_parameters.map(|free| FreeParameter { case: None, ..free.clone() }).collect();
     let trial = Problem { cases, free, fits_shift: false, method, ..*problem };
-    let start = trial.start();
+    let start = trial.start_point();
     let evaluate = |x: &[f64]| {
         let comparisons = trial.compare(x);
         if trial.cancel.is_requested() {
-            return Err(DescentEnd::Stopped);
+            return Err(DescentError::Cancelled);
         }
         Ok(comparisons.map(|comparisons| trial.normal_equations(&comparisons)))
     };
@@ -224,15 +226,15 @@ fn explained_by_short_fit(
     by_influence.sort_by(|&a, &b| influence(b).total_cmp(&influence(a)));
     let mut ranges: Vec<[f64; 2]> = start.iter().map(|&value| [value; 2]).collect();
     for &k in by_influence.iter().take(TRIAL_PARAMETERS) {
-        ranges[k] = trial.range(k);
+        ranges[k] = trial.unknown_range(k);
     }
-    let descent = descend(&start, &ranges, TRIAL_EVALUATIONS, &evaluate)?;
+    let descent = descend(&start, &ranges, MAX_TRIAL_EVALUATIONS, &evaluate)?;
     Ok(descent.map_or(0.0, |descent| mean_explained_ratio(&trial, &descent)))
 }
 
 /// Returns whether the model explains most of the record at the end of a descent.
-pub(super) fn is_explained(problem: &Problem<'_>, end: &Descent) -> bool {
-    mean_explained_ratio(problem, end) > EXPLAINED_RATIO
+pub(super) fn explains_record(problem: &Problem<'_>, end: &Descent) -> bool {
+    mean_explained_ratio(problem, end) > MIN_EXPLAINED_RATIO
 }
 
 /// Computes the part of the record's variance that the model explains at the end of a descent, the
@@ -240,8 +242,8 @@ pub(super) fn is_explained(problem: &Problem<'_>, end: &Descent) -> bool {
 fn mean_explained_ratio(problem: &Problem<'_>, found: &Descent) -> f64 {
     let signals = problem.signals().zip(&found.equations.sigma);
     let ratio = |((.., signal), sigma): ((usize, usize, &Signal), &f64)| {
-        let swing = signal.centred_values();
-        1.0 - sigma * sigma * swing.len() as f64 / dot(&swing, &swing)
+        let centred_values = signal.centred_values();
+        1.0 - sigma * sigma * centred_values.len() as f64 / dot(&centred_values, &centred_values)
     };
     signals.map(ratio).sum::<f64>() / found.equations.sigma.len() as f64
 }

@@ -6,8 +6,8 @@ use serde::Serialize;
 use washer_model::{HeldSpeed, MachineParameter, Response};
 use washer_row::{Growth, Status, Verdict as RowVerdict};
 
-use super::algebra::{dot, middle_95};
-use super::draws;
+use super::algebra::{dot, interval_95};
+use super::draw_parameters;
 use super::model::Problem;
 use super::statistics::{Statistics, Z_975};
 use crate::engine::{ModelEngine, fastest_growth, find_responses};
@@ -19,7 +19,7 @@ use sweep_engine::{Error, Interrupt, RunContext};
 /// The number of speeds at which the stability of the fitted machine is computed. Basis: bands of
 /// instability of the paper's machine are several times wider than their distance. Doubling it
 /// doubles the time.
-const SPEEDS: u32 = 120;
+const GROWTH_SPEEDS: u32 = 120;
 
 /// The number of directions of fixed numbers' errors that count in a margin, those that move the
 /// estimates most. Basis: the eighth adds some percent to an interval. Doubling it doubles the time
@@ -51,7 +51,7 @@ pub(crate) struct FittedVerdict {
 impl FittedVerdict {
     /// Formats the side of a band of instability on which the machine is, if its growth is known;
     /// the machine is at the edge if the interval of its growth contains 0.
-    pub(super) fn margin(&self, short: &dyn Fn(f64) -> String) -> Option<String> {
+    pub(super) fn margin(&self, format_short: &dyn Fn(f64) -> String) -> Option<String> {
         let growth = self.growth_per_s?;
         let speed = self.growth_at_rpm?;
         let is_growing = growth > 0.0;
@@ -65,17 +65,19 @@ impl FittedVerdict {
         let verb = if is_growing { "grow" } else { "die away" };
         let interval = self.growth_95.map_or_else(String::new, |ends| {
             let [from, to] = if is_growing { ends } else { [-ends[1], -ends[0]] };
-            format!(" ({} in 95 %)", format_range([from, to], short))
+            format!(" ({} in 95 %)", format_range([from, to], format_short))
         });
-        let off = match self.growth_on_curve {
+        let off_curve_note = match self.growth_on_curve {
             Some(false) => {
                 "; off the curve of responses at some speeds, where it may be in another motion \
                  (`sweep stability`)"
             }
             _ => "",
         };
-        let rate = short(growth.abs());
-        Some(format!("{side}: disturbances {verb} by {rate} /s{interval} at {speed:.0} rpm{off}"))
+        let rate = format_short(growth.abs());
+        Some(format!(
+            "{side}: disturbances {verb} by {rate} /s{interval} at {speed:.0} rpm{off_curve_note}"
+        ))
     }
 }
 
@@ -91,7 +93,7 @@ pub(super) struct FittedMap<'a> {
 
 impl FittedMap<'_> {
     /// Computes the row of a case's map at its fitted machine, and over the fitted distribution.
-    pub(super) fn verdict(&self, case: usize, follows: bool) -> Result<FittedVerdict, Error> {
+    pub(super) fn verdict(&self, case: usize, model_follows: bool) -> Result<FittedVerdict, Error> {
         let problem = self.problem;
         let x = self.x;
         // The map has the spin of the grid, because a measured spin has no parameters.
@@ -99,13 +101,13 @@ impl FittedMap<'_> {
         let case_parameters: Vec<usize> =
             (0..problem.free.len()).filter(|&k| problem.free[k].belongs_to(case)).collect();
         // Free numbers compensate for errors of the fixed ones, which would count twice.
-        let covariance = self.statistics.by_noise(problem);
-        let mut sets = vec![x.to_vec()];
-        if follows {
-            sets.extend(draws(problem, x, &covariance, self.draws));
+        let covariance = self.statistics.noise_covariance(problem);
+        let mut parameter_sets = vec![x.to_vec()];
+        if model_follows {
+            parameter_sets.extend(draw_parameters(problem, x, &covariance, self.draws));
         }
         for &k in &case_parameters {
-            let values = || sets.iter().map(|set| set[k]);
+            let values = || parameter_sets.iter().map(|set| set[k]);
             let from = values().fold(f64::INFINITY, f64::min);
             let to = values().fold(f64::NEG_INFINITY, f64::max);
             let parameter = plan.model.parameter(problem.free[k].parameter.clone());
@@ -114,18 +116,21 @@ impl FittedMap<'_> {
                 false => Axis { parameter, values: AxisValues::List(vec![from]), tolerance: None },
             });
         }
-        let points: Vec<Vec<f64>> =
-            sets.iter().map(|set| case_parameters.iter().map(|&k| set[k]).collect()).collect();
+        let points: Vec<Vec<f64>> = parameter_sets
+            .iter()
+            .map(|set| case_parameters.iter().map(|&k| set[k]).collect())
+            .collect();
         let engine = ModelEngine::new(&plan)?;
-        let is_canceled = || problem.cancel.is_requested();
+        let is_cancelled = || problem.cancel.is_requested();
         let interrupt = Interrupt::new();
-        let context = RunContext::with_time_limit(&interrupt, &is_canceled);
+        let context = RunContext::with_time_limit(&interrupt, &is_cancelled);
         let rows = engine.evaluate_points(&points, &context).unwrap_or_default();
         let verdicts: Vec<RowVerdict> = rows.iter().map(MapRow::verdict).collect();
         let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
-        let drawn = verdicts.get(1..).unwrap_or_default();
-        let reliable = drawn.iter().filter(|verdict| verdict.reliable == Some(true)).count();
-        let errors = follows.then_some(&covariance[..]);
+        let sample_verdicts = verdicts.get(1..).unwrap_or_default();
+        let reliable =
+            sample_verdicts.iter().filter(|verdict| verdict.reliable == Some(true)).count();
+        let errors = model_follows.then_some(&covariance[..]);
         let (growth, growth_95) = match self.growth(case, &plan, errors) {
             Some((growth, interval)) => (Some(growth), interval),
             None => (None, None),
@@ -134,9 +139,10 @@ impl FittedMap<'_> {
             reliable: verdicts.first().and_then(|verdict| verdict.reliable),
             ratio_max: verdicts.first().and_then(ratio),
             ratio_limit: plan.reliability.limits.upper,
-            probability_reliable: (!drawn.is_empty()).then(|| reliable as f64 / drawn.len() as f64),
-            ratio_max_95: middle_95(drawn.iter().filter_map(ratio)),
-            draws: drawn.len(),
+            probability_reliable: (!sample_verdicts.is_empty())
+                .then(|| reliable as f64 / sample_verdicts.len() as f64),
+            ratio_max_95: interval_95(sample_verdicts.iter().filter_map(ratio)),
+            draws: sample_verdicts.len(),
             growth_per_s: growth.map(|growth| growth.fastest.growth_per_s()),
             growth_at_rpm: growth.map(|growth| growth.fastest.speed_rpm),
             growth_95,
@@ -154,8 +160,8 @@ impl FittedMap<'_> {
     ) -> Option<(Growth, Option<[f64; 2]>)> {
         let x = self.x;
         let (_, spin) = self.problem.machine(case, x);
-        let step_rpm = spin.max_speed_rad_per_s(plan.end_s) * 60.0 / TAU / f64::from(SPEEDS);
-        let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
+        let step_rpm = spin.max_speed_rad_per_s(plan.end_s) * 60.0 / TAU / f64::from(GROWTH_SPEEDS);
+        let speeds: Vec<f64> = (GROWTH_SPEEDS / 5..=GROWTH_SPEEDS)
             .map(|k| step_rpm * f64::from(k))
             .filter(|speed| *speed > 0.0)
             .collect();
@@ -183,9 +189,9 @@ impl FittedMap<'_> {
             return None;
         }
         let point = prepare_point(machine, spin, &timing(plan)).ok()?;
-        let dwells: Vec<HeldSpeed<'_>> =
+        let held_speeds: Vec<HeldSpeed<'_>> =
             speeds.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
-        Some(find_responses(&dwells, self.problem.cancel))
+        Some(find_responses(&held_speeds, self.problem.cancel))
     }
 
     /// Computes the 95 % interval of the greatest growth. Its variance is that of the free numbers'
@@ -231,12 +237,12 @@ impl FittedMap<'_> {
         for direction in self.statistics.influences.directions.iter().take(MARGIN_DIRECTIONS) {
             // A number at an end of its range can change in one direction only.
             let growths = [1.0, -1.0].into_iter().find_map(|sign| {
-                let moved = |(k, (x, by)): (usize, (&f64, &f64))| {
-                    let [from, to] = self.problem.range(k);
+                let moved_value = |(k, (x, by)): (usize, (&f64, &f64))| {
+                    let [from, to] = self.problem.unknown_range(k);
                     (x - sign * by).clamp(from, to)
                 };
                 let moves = x.iter().zip(&direction.effects).enumerate();
-                let varied: Vec<f64> = moves.map(moved).collect();
+                let varied: Vec<f64> = moves.map(moved_value).collect();
                 let changes = direction.changes.iter();
                 let changes: Vec<(MachineParameter, f64)> =
                     changes.map(|(parameter, by)| (parameter.clone(), sign * by)).collect();
@@ -259,7 +265,7 @@ mod tests {
 
     #[test]
     fn a_margin_within_its_error_is_at_the_edge() {
-        let said = |growth: f64, interval: Option<[f64; 2]>| {
+        let margin_text = |growth: f64, interval: Option<[f64; 2]>| {
             let verdict = FittedVerdict {
                 reliable: None,
                 ratio_max: None,
@@ -306,7 +312,7 @@ mod tests {
                 250 rpm",
             ),
         ] {
-            assert_eq!(said(growth, interval), expected);
+            assert_eq!(margin_text(growth, interval), expected);
         }
     }
 }

@@ -31,13 +31,13 @@ pub fn fit_tables(
         if k > 0 {
             measurement.name = format!("table {}", k + 1);
         }
-        cases.push(fit::case(grid, &constants, measurement)?);
+        cases.push(fit::prepare_case(grid, &constants, measurement)?);
     }
     let cancel = Cancel::Flag(execution.interrupt.flag());
-    let context = FitContext { cancel, count_evaluations: &|_| {}, output: None, fresh: false };
+    let context = FitContext { cancel, report_evaluations: &|_| {}, output: None, fresh: false };
     let fit_result = threads::build_pool(execution.threads()?)?
         .install(|| fit::fit(cases, options, &context))?;
-    Ok(fit_result.map(|fit| CommandReport { data: json!(fit.report), text: fit.report.text() }))
+    Ok(fit_result.map(|fit| CommandReport { data: json!(fit.report), text: fit.report.to_text() }))
 }
 
 #[cfg(test)]

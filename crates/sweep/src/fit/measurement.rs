@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::algebra::{centred, quantile};
+use super::algebra::{quantile, subtract_mean};
 use super::pulses::{PulseError, PulseSignal, Pulses};
 use super::speed::{self, SmoothedSpin};
 use sweep_engine::Diagnostics;
@@ -12,16 +12,18 @@ use sweep_engine::config::section::format_count;
 use sweep_results::nearest;
 use washer_model::Channel;
 
-/// Fewest samples of a column: fewer say nothing of their noise.
+/// The least number of samples of a column. Basis: fewer do not determine their noise. Doubling it
+/// refuses shorter records.
 const MIN_SAMPLES: usize = 16;
 /// The beginning of the names of the nonlinear model's channels in a file of `sweep trace`.
 const TRACE_PREFIX: &str = "nonlinear_";
-/// Rows that are usually farther apart (s) show no turn of a drum.
-pub(super) const SLOWEST_S: f64 = 0.2;
+/// The greatest usual distance between rows (s). Basis: rows farther apart show no turn of a drum.
+/// Doubling it accepts times in a wrong unit.
+pub(super) const MAX_ROW_SPACING_S: f64 = 0.2;
 /// The longest run that is simulated (s). Basis: a wash takes an hour, its longest spin a quarter
 /// of it; every evaluation of a fit integrates the whole run. Doubling it doubles the time that a
 /// stray row can cost before it is seen.
-pub(super) const LONGEST_RUN_S: f64 = 3600.0;
+pub(super) const MAX_RUN_S: f64 = 3600.0;
 /// The greatest part of its greatest speed at which a run counts as one from rest. Basis: forces of
 /// an unbalance grow with the square of the speed, so those at a tenth are a hundredth of the
 /// greatest. Doubling it lets a run begin with four times that.
@@ -31,7 +33,7 @@ pub(super) const REST_SPEED_RATIO: f64 = 0.1;
 const DAY_S: f64 = 86_400.0;
 /// The greatest acceleration of a drum (rpm/s). Basis: a direct drive of 40 N m on a drum of
 /// 0.4 kg m^2. Doubling it leaves drop-outs of a tachometer at twice the speed in the record.
-const GREATEST_ACCELERATION_RPM_PER_S: f64 = 1000.0;
+const MAX_ACCELERATION_RPM_PER_S: f64 = 1000.0;
 /// The number of a tachometer's usual steps between samples beyond which speeds about a zero are no
 /// noise. Basis: the sizes of two samples of white noise add up to as much once in a million.
 /// Doubling it leaves drop-outs at the slowest speeds of a coarse tachometer in the record.
@@ -83,7 +85,7 @@ impl SignalQuantity {
     }
 
     /// Returns the quantity of a column of this name. A place or an angle may go without its unit.
-    fn named(name: &str) -> Option<Self> {
+    fn from_name(name: &str) -> Option<Self> {
         let has_name = |quantity: &Self| match quantity {
             Self::Motion(channel, 0) if channel.name() == name => true,
             _ => quantity.column() == name,
@@ -96,19 +98,19 @@ impl SignalQuantity {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Signal {
     pub(crate) quantity: SignalQuantity,
-    /// NaN where there is no sample.
+    /// The values at all rows; NaN for a missing sample.
     pub(crate) values: Vec<f64>,
 }
 
 impl Signal {
-    /// Returns the samples that there are, with their places in time.
+    /// Iterates over the samples with their rows, without missing ones.
     pub(crate) fn samples(&self) -> impl Iterator<Item = (usize, f64)> {
         self.values.iter().copied().enumerate().filter(|(_, value)| !value.is_nan())
     }
 
     /// Returns the samples less their mean.
     pub(crate) fn centred_values(&self) -> Vec<f64> {
-        centred(self.samples().map(|(_, value)| value).collect()).0
+        subtract_mean(self.samples().map(|(_, value)| value).collect()).0
     }
 }
 
@@ -117,52 +119,56 @@ impl Signal {
 pub(crate) struct Measurement {
     /// The file's name, as messages and reports have it.
     pub(crate) name: String,
-    /// Rising, from 0 on or later (s).
+    /// The times of the rows (s), increasing from 0 or later.
     pub(crate) time_s: Vec<f64>,
     /// The tachometer, if there is one (rpm); NaN where it has no sample.
     pub(crate) speed_rpm: Option<Vec<f64>>,
     /// The pulses of the tachometer, if it gives those instead of speeds.
     pub(super) pulses: Option<Pulses>,
     pub(crate) signals: Vec<Signal>,
-    /// Rows before time 0, when the drum is at rest yet: they are left out.
-    pub(crate) early: usize,
+    /// The number of rows before time 0, at which the drum is still at rest. They are left out.
+    pub(crate) rows_before_start: usize,
     /// The reading of a clock that does not start with the run (s), at the first row. Times are
     /// counted from it.
     pub(crate) clock_start_s: Option<f64>,
     /// The clock time of the first row as it stands in the file, if times are not numbers.
     first_clock_time: Option<String>,
-    /// Stretches of time without any row (s).
+    /// The time intervals without rows (s).
     pub(crate) gaps_s: Vec<[f64; 2]>,
     /// Notes on the parts of the file that were read otherwise than they stand, or not at all.
     pub(crate) notes: Vec<String>,
-    /// The names of its columns in the file.
+    /// The names of the columns in the file.
     pub(crate) headers: Vec<String>,
 }
 
 impl Measurement {
-    /// Reads a file. `new_names` are headers of its columns with the names of what they hold.
+    /// Reads a file. `names_by_header` has headers of its columns with the names of their
+    /// quantities.
     ///
     /// # Errors
-    /// Every mistake in it, with its place.
-    pub(crate) fn read(path: &Path, new_names: &[(String, String)]) -> Result<Self, Diagnostics> {
+    /// Returns every mistake in the file, with its location.
+    pub(crate) fn read(
+        path: &Path,
+        names_by_header: &[(String, String)],
+    ) -> Result<Self, Diagnostics> {
         let report = Report::default();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let names = ColumnNames { known: &known_name, renamed: new_names };
+        let names = ColumnNames { known: &find_known_name, renamed: names_by_header };
         let table = NumberTable::read(path, &names, &report);
         let measurement = table.map(|table| check_table(name, table, &report));
         report.finish(measurement)
     }
 
-    /// Returns a measurement in memory; `new_names` as of [`Self::read`].
+    /// Creates a measurement from columns in memory; `names_by_header` is that of [`Self::read`].
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// Returns the errors of [`Self::read`].
     pub(crate) fn from_columns(
         columns: Vec<(String, Vec<f64>)>,
-        new_names: &[(String, String)],
+        names_by_header: &[(String, String)],
     ) -> Result<Self, Diagnostics> {
         let report = Report::default();
-        let names = ColumnNames { known: &known_name, renamed: new_names };
+        let names = ColumnNames { known: &find_known_name, renamed: names_by_header };
         let table = NumberTable::from_columns("table", columns, &names, &report);
         let measurement = check_table("table".to_owned(), table, &report);
         report.finish(Some(measurement))
@@ -175,10 +181,10 @@ impl Measurement {
     pub(crate) fn count_from_first_row(&mut self, grid_end_s: f64) {
         let Some((&first_s, &last_s)) = self.time_s.first().zip(self.time_s.last()) else { return };
         let is_after_run = first_s > grid_end_s.max(last_s - first_s) && self.begins_at_rest();
-        if first_s > 0.0 && (last_s > LONGEST_RUN_S || is_after_run) {
+        if first_s > 0.0 && (last_s > MAX_RUN_S || is_after_run) {
             self.time_s.iter_mut().for_each(|time_s| *time_s -= first_s);
-            let edges = self.pulses.iter_mut().flat_map(|pulses| &mut pulses.edges_s);
-            edges.for_each(|edge_s| *edge_s -= first_s);
+            let edges = self.pulses.iter_mut().flat_map(|pulses| &mut pulses.pulse_times_s);
+            edges.for_each(|pulse_time_s| *pulse_time_s -= first_s);
             self.gaps_s = find_gaps(&self.time_s);
             self.clock_start_s = Some(first_s);
         }
@@ -190,7 +196,7 @@ impl Measurement {
         Some(self.first_clock_time.clone().unwrap_or_else(|| format!("{start_s} s")))
     }
 
-    /// Whether the tachometer, if there is one, begins at rest.
+    /// Returns whether the tachometer, if there is one, begins at rest.
     fn begins_at_rest(&self) -> bool {
         if let (Some(pulses), Some(first_s)) = (&self.pulses, self.time_s.first()) {
             let [first_rpm, greatest_rpm] = pulses.first_and_greatest_rpm(*first_s);
@@ -209,19 +215,19 @@ impl Measurement {
         }
     }
 
-    /// Whether a column may have this name.
+    /// Returns whether a column may have this name.
     pub(crate) fn is_name(name: &str) -> bool {
-        known_name(name).is_some()
+        find_known_name(name).is_some()
     }
 
-    /// Samples of all columns together.
-    pub(crate) fn count(&self) -> usize {
+    /// Returns the number of samples of all columns.
+    pub(crate) fn count_samples(&self) -> usize {
         self.signals.iter().map(|signal| signal.samples().count()).sum()
     }
 }
 
 /// Returns the name of a quantity that a header names, and its unit.
-fn known_name(header: &str) -> Option<(String, String)> {
+fn find_known_name(header: &str) -> Option<(String, String)> {
     let name = header.strip_prefix(TRACE_PREFIX).unwrap_or(header);
     let [name, unit] = match name {
         "time_s" | "time" | "timestamp" | "t_s" | "zeit" | "zeit_s" => {
@@ -229,7 +235,7 @@ fn known_name(header: &str) -> Option<(String, String)> {
         }
         "speed_rpm" | "rpm" | "drehzahl_rpm" => ["speed_rpm", "rpm"].map(str::to_owned),
         _ if PulseSignal::from_name(name).is_some() => [name, ANY_UNIT].map(str::to_owned),
-        _ => [name.to_owned(), SignalQuantity::named(name)?.units().0],
+        _ => [name.to_owned(), SignalQuantity::from_name(name)?.units().0],
     };
     Some((name, unit))
 }
@@ -241,7 +247,7 @@ fn all_names() -> Vec<String> {
 }
 
 /// Returns the mistake of a column whose name is near that of a channel: it is meant to be read.
-fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
+fn find_misspelling(column: &ListColumn) -> Option<Diagnostic> {
     // Other words, such as drum, are near many names; names of channels have underscores.
     let names = all_names();
     let is_written_so = column.header.contains('_');
@@ -253,7 +259,7 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
     Some(refusal.with_nearest_name(&column.header, names.iter().map(String::as_str)))
 }
 
-/// Reads the table as a measurement and reports what is wrong with it.
+/// Converts the table to a measurement, and reports its mistakes.
 fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measurement {
     let clock = table.columns.iter_mut().find(|column| column.name.value == "time_s");
     let passes_midnight = clock.is_some_and(|clock| continue_past_midnight(&mut clock.values));
@@ -267,21 +273,26 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
             .push("its clock passes midnight: times after it are those of the next day".to_owned());
     }
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();
-    let mut measurement =
-        Measurement { name, early: first_row, notes, headers, ..Measurement::default() };
+    let mut measurement = Measurement {
+        name,
+        rows_before_start: first_row,
+        notes,
+        headers,
+        ..Measurement::default()
+    };
     let mut known_names: Vec<&str> = Vec::new();
     let mut pulse_columns: Vec<(&ListColumn, (PulseSignal, u32))> = Vec::new();
     for column in &table.columns {
         if !column.is_known {
-            let mistake = if is_trace { None } else { misspelt(column) };
+            let mistake = if is_trace { None } else { find_misspelling(column) };
             mistake.into_iter().for_each(|mistake| report.push(mistake));
             continue;
         }
         let name = column.name.value.as_str();
-        let at = &column.name.location;
+        let location = &column.name.location;
         if known_names.contains(&name) {
             let title = format!("the column `{name}` is given twice");
-            report.push(Diagnostic::new(title).at_location(at, "expected each column once"));
+            report.push(Diagnostic::new(title).at_location(location, "expected each column once"));
             continue;
         }
         known_names.push(name);
@@ -295,17 +306,17 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
         }
         let values = &column.values[first_row..];
         let samples = values.iter().filter(|value| !value.is_nan()).count();
-        match (name, SignalQuantity::named(name)) {
+        match (name, SignalQuantity::from_name(name)) {
             ("time_s", _) => {
                 measurement.time_s = values.to_vec();
                 measurement.first_clock_time = clock_time(&table, column, first_row, report);
                 check_times(&table, column, report);
             }
             ("speed_rpm", _) => measurement.speed_rpm = Some(values.to_vec()),
-            (_, Some(_)) if samples >= MIN_SAMPLES && is_still(values) => {
+            (_, Some(_)) if samples >= MIN_SAMPLES && is_constant(values) => {
                 let title = format!("the column `{name}` never changes");
                 report.push(
-                    Diagnostic::new(title).at_location(at, "expected what a sensor measured"),
+                    Diagnostic::new(title).at_location(location, "expected what a sensor measured"),
                 );
             }
             (_, Some(quantity)) if samples >= MIN_SAMPLES => {
@@ -315,7 +326,7 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
                 let title = format!("the column `{name}` has {samples} samples");
                 report.push(
                     Diagnostic::new(title)
-                        .at_location(at, format!("expected {MIN_SAMPLES} at least")),
+                        .at_location(location, format!("expected {MIN_SAMPLES} at least")),
                 );
             }
             (_, None) => {
@@ -350,7 +361,7 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
             read_pulses(&mut measurement, &table, column, kind, report);
         }
     }
-    leave_out_drop_outs(&mut measurement, |row| {
+    remove_drop_outs(&mut measurement, |row| {
         let clock = table.columns.iter().find(|column| column.name.value == "time_s");
         clock.and_then(|clock| clock_time(&table, clock, first_row + row, report))
     });
@@ -365,7 +376,7 @@ fn continue_past_midnight(times: &mut [f64]) -> bool {
     let mut last_s = f64::NEG_INFINITY;
     for time_s in times {
         let fall_s = last_s - (*time_s + midnights_s);
-        if fall_s > DAY_S - LONGEST_RUN_S && fall_s <= DAY_S {
+        if fall_s > DAY_S - MAX_RUN_S && fall_s <= DAY_S {
             midnights_s += DAY_S;
         }
         *time_s += midnights_s;
@@ -386,10 +397,7 @@ fn clock_time(
 }
 
 /// Removes drop-outs from the speeds, with a note. `clock_time` returns the clock time of a row.
-fn leave_out_drop_outs(
-    measurement: &mut Measurement,
-    clock_time: impl Fn(usize) -> Option<String>,
-) {
+fn remove_drop_outs(measurement: &mut Measurement, clock_time: impl Fn(usize) -> Option<String>) {
     let Some(speed_rpm) = &mut measurement.speed_rpm else { return };
     let rows = find_drop_outs(&measurement.time_s, speed_rpm);
     let Some(first_row) = rows.first() else { return };
@@ -414,7 +422,7 @@ fn find_drop_outs(time_s: &[f64], speed_rpm: &[f64]) -> Vec<usize> {
     for pair in running.windows(2) {
         let [before, after] = [pair[0], pair[1]];
         let change_rpm = speed_rpm[before].abs() + speed_rpm[after].abs();
-        let possible_rpm = GREATEST_ACCELERATION_RPM_PER_S * (time_s[after] - time_s[before]);
+        let possible_rpm = MAX_ACCELERATION_RPM_PER_S * (time_s[after] - time_s[before]);
         if change_rpm > possible_rpm + NOISE_STEPS * step_rpm {
             zero_rows.extend((before + 1..after).filter(|row| speed_rpm[*row] == 0.0));
         }
@@ -422,7 +430,7 @@ fn find_drop_outs(time_s: &[f64], speed_rpm: &[f64]) -> Vec<usize> {
     zero_rows
 }
 
-/// Reads a column of pulses as the tachometer and reports what is wrong with it.
+/// Reads a column of pulses as the tachometer, and reports its mistakes.
 fn read_pulses(
     measurement: &mut Measurement,
     table: &NumberTable,
@@ -439,63 +447,67 @@ fn read_pulses(
     }
     let counted_name = name.replace("pulses", "count");
     let voltage_name = name.replace("count_per_row", "pulses").replace("count", "pulses");
-    let (title, expected, row) =
-        match Pulses::read(&measurement.time_s, &column.values[measurement.early..], kind) {
-            Ok(pulses) => {
-                measurement.pulses = Some(pulses);
-                return;
-            }
-            Err(PulseError::FewPulses(count)) => (
-                format!("the column `{name}` has {}", format_count(count, "pulse")),
-                format!(
-                    "expected three at least: a signal that rises through half of its range once \
+    let (title, expected, row) = match Pulses::read(
+        &measurement.time_s,
+        &column.values[measurement.rows_before_start..],
+        kind,
+    ) {
+        Ok(pulses) => {
+            measurement.pulses = Some(pulses);
+            return;
+        }
+        Err(PulseError::FewPulses(count)) => (
+            format!("the column `{name}` has {}", format_count(count, "pulse")),
+            format!(
+                "expected three at least: a signal that rises through half of its range once \
                      a pulse; the column of a counter is `{counted_name}`"
-                ),
-                None,
             ),
-            Err(PulseError::FewReadings(count)) => (
-                format!("the count `{name}` tells the turns at {}", format_count(count, "time")),
-                "expected three at least, so far apart that the speed between them is known to 1 %"
-                    .to_owned(),
-                None,
-            ),
-            Err(PulseError::Fast(row)) => (
-                format!("pulses of `{name}` are as fast as half of the sampling rate"),
-                "expected three rows a pulse at least: faster pulses look slower than they are"
-                    .to_owned(),
-                Some(row),
-            ),
-            Err(PulseError::Falling(row)) => (
-                format!("the count `{name}` falls in row {}", measurement.early + row + 1),
-                format!(
-                    "expected a count that rises, or starts again at 0 after 65536 or 4294967296; \
+            None,
+        ),
+        Err(PulseError::FewReadings(count)) => (
+            format!("the count `{name}` tells the turns at {}", format_count(count, "time")),
+            "expected three at least, so far apart that the speed between them is known to 1 %"
+                .to_owned(),
+            None,
+        ),
+        Err(PulseError::TooFast(row)) => (
+            format!("pulses of `{name}` are as fast as half of the sampling rate"),
+            "expected three rows a pulse at least: faster pulses look slower than they are"
+                .to_owned(),
+            Some(row),
+        ),
+        Err(PulseError::FallingCount(row)) => (
+            format!("the count `{name}` falls in row {}", measurement.rows_before_start + row + 1),
+            format!(
+                "expected a count that rises, or starts again at 0 after 65536 or 4294967296; \
                      the column of a voltage is `{voltage_name}`"
-                ),
-                Some(row),
             ),
-            Err(PulseError::Missing(row)) => (
-                format!("`{name}` has no number in row {}", measurement.early + row + 1),
-                "expected the number of pulses since the previous row in each row".to_owned(),
-                Some(row),
-            ),
-        };
+            Some(row),
+        ),
+        Err(PulseError::MissingCount(row)) => (
+            format!("`{name}` has no number in row {}", measurement.rows_before_start + row + 1),
+            "expected the number of pulses since the previous row in each row".to_owned(),
+            Some(row),
+        ),
+    };
     report.push_with(|sources| {
         let location = match row {
-            Some(row) => table.locate(sources, column.index, measurement.early + row),
+            Some(row) => table.locate(sources, column.index, measurement.rows_before_start + row),
             None => column.name.location.clone(),
         };
         Diagnostic::new(title).at_location(&location, expected)
     });
 }
 
-/// Whether all samples are one number.
-fn is_still(values: &[f64]) -> bool {
+/// Returns whether all samples are equal.
+fn is_constant(values: &[f64]) -> bool {
     let mut samples = values.iter().filter(|value| !value.is_nan());
     let first = samples.next();
     samples.all(|value| Some(value) == first)
 }
 
-/// Judges the column of times. Of each mistake the first row is shown: often all rows have it.
+/// Checks the column of times. Only the first row with each mistake is reported, because often all
+/// rows have it.
 fn check_times(table: &NumberTable, column: &ListColumn, report: &Report) {
     let values = &column.values;
     let mut last_s = f64::NEG_INFINITY;
@@ -506,7 +518,7 @@ fn check_times(table: &NumberTable, column: &ListColumn, report: &Report) {
             _ if time_s.is_nan() => (0, "a row without its time".to_owned()),
             _ if time_s == last_s => (3, format!("two rows have the same time, {time_s} s")),
             _ if time_s < last_s => (1, format!("time goes back: {time_s} s after {last_s} s")),
-            _ if usual_step_s > SLOWEST_S => {
+            _ if usual_step_s > MAX_ROW_SPACING_S => {
                 (2, format!("rows are {usual_step_s} s apart: are these ms?"))
             }
             _ => {
@@ -536,7 +548,7 @@ fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
     let times = &values[run_start..];
     let Some((first_s, last_s)) = times.first().zip(times.last()) else { return };
     let length_s = last_s - first_s;
-    if length_s <= LONGEST_RUN_S {
+    if length_s <= MAX_RUN_S {
         return;
     }
     let gap_s = |row: usize| times[row] - times[row - 1];
@@ -551,7 +563,7 @@ fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
     };
     report.push_with(|sources| {
         let expected = format!(
-            "expected a run of at most {LONGEST_RUN_S} s: remove stray rows, cut the record, or \
+            "expected a run of at most {MAX_RUN_S} s: remove stray rows, cut the record, or \
              convert its times to s"
         );
         Diagnostic::new(title)
@@ -564,7 +576,7 @@ pub(super) fn usual_step(time_s: &[f64]) -> Option<f64> {
     quantile(time_s.windows(2).map(|pair| pair[1] - pair[0]), 0.5)
 }
 
-/// Stretches of time without rows: longer than twenty of the usual distance.
+/// Returns the time intervals without rows, which are longer than twenty usual distances of rows.
 fn find_gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
     let Some(usual_step_s) = usual_step(time_s) else { return Vec::new() };
     let gaps = time_s.windows(2).filter(|pair| pair[1] - pair[0] > 20.0 * usual_step_s);
@@ -584,13 +596,13 @@ mod tests {
 
     #[test]
     fn columns_are_known_by_their_units() {
-        let named = |name| SignalQuantity::named(name).map(SignalQuantity::column);
+        let column_of_name = |name| SignalQuantity::from_name(name).map(SignalQuantity::column);
         for name in ["tub_front_y_m_per_s2", "tub_yaw_rad_per_s", "tub_pitch_rad"] {
-            assert_eq!(named(name).as_deref(), Some(name));
+            assert_eq!(column_of_name(name).as_deref(), Some(name));
         }
-        assert_eq!(named("drum_front_z").as_deref(), Some("drum_front_z_m"));
-        assert_eq!(named("cabinet_force_z_n").as_deref(), Some("cabinet_force_z_n"));
-        assert_eq!(named("tub_yaw_m"), None);
+        assert_eq!(column_of_name("drum_front_z").as_deref(), Some("drum_front_z_m"));
+        assert_eq!(column_of_name("cabinet_force_z_n").as_deref(), Some("cabinet_force_z_n"));
+        assert_eq!(column_of_name("tub_yaw_m"), None);
     }
 
     #[test]
@@ -704,9 +716,10 @@ mod tests {
             (0..20).map(|k| format!("{};{};{};21,5\n", 20 * k, k % 5, 100 * k)).collect();
         let text = format!("Bench 3;\nTime;Acc front;Drum;Temp\nms;g;Hz;\u{b0}C\n{rows}");
         std::fs::write(&path, &text).unwrap();
-        let new_names = [("Acc front", "tub_front_y_m_per_s2"), ("Drum", "speed_rpm")];
-        let new_names = new_names.map(|(header, name)| (header.to_owned(), name.to_owned()));
-        let measurement = Measurement::read(&path, &new_names).unwrap();
+        let names_by_header = [("Acc front", "tub_front_y_m_per_s2"), ("Drum", "speed_rpm")];
+        let names_by_header =
+            names_by_header.map(|(header, name)| (header.to_owned(), name.to_owned()));
+        let measurement = Measurement::read(&path, &names_by_header).unwrap();
         assert_eq!(measurement.time_s[19], 0.38);
         assert_eq!(measurement.speed_rpm.expect("it is there")[2], 12_000.0);
         let columns: Vec<String> =
@@ -760,8 +773,8 @@ mod tests {
                 .map(|k| format!("{},{k},{}{further_cells}\n", 0.01 * f64::from(k), volts(k)))
                 .collect();
             std::fs::write(&path, format!("{columns}\n{rows}")).unwrap();
-            let new_names = [("Tacho".to_owned(), "tacho_12_pulses".to_owned())];
-            Measurement::read(&path, &new_names)
+            let names_by_header = [("Tacho".to_owned(), "tacho_12_pulses".to_owned())];
+            Measurement::read(&path, &names_by_header)
         };
         let measurement = read_record("Time,tub_yaw,Tacho [V]", 10, "").unwrap();
         let spin = measurement.smooth_spin().unwrap().spin;
@@ -782,8 +795,9 @@ mod tests {
     #[test]
     fn instants_of_pandas_count_from_the_first_row() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/fit");
-        let new_names = [("Acc front".to_owned(), "tub_front_y_m_per_s2".to_owned())];
-        let measurement = Measurement::read(&folder.join("pandas_datetime.parquet"), &new_names);
+        let names_by_header = [("Acc front".to_owned(), "tub_front_y_m_per_s2".to_owned())];
+        let measurement =
+            Measurement::read(&folder.join("pandas_datetime.parquet"), &names_by_header);
         let mut measurement = measurement.unwrap();
         assert!(measurement.notes.join(";").contains("left out the column `logged_at`"));
         measurement.count_from_first_row(24.0);
@@ -801,8 +815,8 @@ mod tests {
             let rows: String =
                 (0..400).map(|k| format!("{},{k},{}\n", 0.01 * f64::from(k), count(k))).collect();
             std::fs::write(&path, format!("Time,tub_yaw,{header}\n{rows}")).unwrap();
-            let new_names = [("Pulses".to_owned(), "tacho_60_count".to_owned())];
-            Measurement::read(&path, &new_names)
+            let names_by_header = [("Pulses".to_owned(), "tacho_60_count".to_owned())];
+            Measurement::read(&path, &names_by_header)
         };
         // 240 rpm are 2.4 pulses a row.
         let total_count = |k: u32| 12 * k / 5;
@@ -904,7 +918,7 @@ mod tests {
         };
         let [full_record, early_record] =
             [0, -30].map(|from| Measurement::from_columns(columns(from), &[]).unwrap());
-        assert_eq!(early_record, Measurement { early: 30, ..full_record });
+        assert_eq!(early_record, Measurement { rows_before_start: 30, ..full_record });
     }
 
     #[test]
@@ -916,7 +930,7 @@ mod tests {
         let (time_s, yaw) = (0..40).map(row).unzip();
         let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw)];
         let measurement = Measurement::from_columns(columns, &[]).unwrap();
-        assert_eq!(measurement.count(), 26);
+        assert_eq!(measurement.count_samples(), 26);
         assert_eq!(measurement.gaps_s.len(), 1);
         assert!((measurement.gaps_s[0][1] - 5.1).abs() < 1e-12);
     }

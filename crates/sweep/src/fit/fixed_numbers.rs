@@ -19,16 +19,16 @@
 
 use washer_model::{Machine, MachineParameter, Spin, Target};
 
-use super::algebra::{Symmetric, add_outer, centred, dot, inverse};
-use super::measured::Signal;
+use super::algebra::{EigenDecomposition, add_outer, dot, pseudo_inverse, subtract_mean};
+use super::measurement::Signal;
 use super::model::{FitCase, FreeParameter, NormalEquations, Problem, SignalComparison};
 use sweep_engine::Diagnostics;
 use sweep_engine::config::{Location, Report as Mistakes};
 
 /// The word that takes numbers without a tolerance of their own as exact.
-const NONE: &str = "none";
+const NONE_WORD: &str = "none";
 /// The name of the sensors' gains among the fixed numbers.
-const GAIN: &str = "gain";
+const GAIN_NAME: &str = "gain";
 /// The default standard deviation of a sensor's gain. Basis: an accelerometer without a calibration
 /// of its own. Doubling it doubles what gains add to intervals.
 const GAIN_RATIO: f64 = 0.03;
@@ -38,7 +38,7 @@ const GAIN_RATIO: f64 = 0.03;
 const STEP_TOLERANCES: f64 = 0.02;
 /// The greatest number of values of the slopes by fixed numbers. In longer records every `n`th
 /// sample counts `n` times. Basis: 160 MB. Doubling it doubles the memory.
-const MAX_VALUES: usize = 20_000_000;
+const MAX_SLOPE_VALUES: usize = 20_000_000;
 
 /// The endings of the names of lengths that are too short for a tape measure.
 const SHORT_LENGTHS: [&str; 2] = ["clearance_m", "softness_m"];
@@ -121,7 +121,7 @@ pub(crate) struct FixedInfluence {
 /// Errors of all fixed numbers together, of one standard deviation, that are independent of those
 /// of other directions.
 #[derive(Clone, Debug)]
-pub(crate) struct Direction {
+pub(crate) struct ErrorDirection {
     /// The changes of numbers of the machine.
     pub(crate) changes: Vec<(MachineParameter, f64)>,
     /// The change of each unknown.
@@ -136,7 +136,7 @@ pub(crate) struct FixedInfluences {
     /// The addition to the covariance of the unknowns.
     pub(crate) covariance: Vec<Vec<f64>>,
     /// The principal directions of the errors, those first that move the unknowns most.
-    pub(crate) directions: Vec<Direction>,
+    pub(crate) directions: Vec<ErrorDirection>,
 }
 
 /// An error of a fixed number of one standard deviation.
@@ -160,7 +160,7 @@ impl FixedNumbers {
         let mistakes = Mistakes::default();
         let mut parameters: Vec<(MachineParameter, FixedTolerance)> = Vec::new();
         let mut gain: Option<FixedTolerance> = None;
-        let is_none = |text: &&String| text.trim() == NONE;
+        let is_none = |text: &&String| text.trim() == NONE_WORD;
         for text in options.iter().filter(|text| !is_none(text)) {
             let location = Location::new(mistakes.add("--known", text.as_str()), 0..text.len());
             let refuse = |title: String| {
@@ -176,8 +176,8 @@ impl FixedNumbers {
                 continue;
             };
             match (name.trim(), tolerance) {
-                (GAIN, FixedTolerance::Relative(_)) => gain = Some(tolerance),
-                (GAIN, FixedTolerance::Absolute(_)) => {
+                (GAIN_NAME, FixedTolerance::Relative(_)) => gain = Some(tolerance),
+                (GAIN_NAME, FixedTolerance::Absolute(_)) => {
                     refuse("a gain's tolerance is a part".to_owned())
                 }
                 (name, _) => match single_numbers(name, case, free) {
@@ -216,12 +216,13 @@ impl FixedNumbers {
     ) -> FixedInfluences {
         let gain_count = if self.gain_ratio > 0.0 { comparisons.len() } else { 0 };
         let samples: usize = comparisons.iter().map(|comparison| comparison.residual.len()).sum();
-        let stride = (samples * (self.numbers.len() + gain_count)).div_ceil(MAX_VALUES).max(1);
+        let stride =
+            (samples * (self.numbers.len() + gain_count)).div_ceil(MAX_SLOPE_VALUES).max(1);
         let mut errors = self.machine_errors(problem, x, comparisons, equations, stride);
         if gain_count > 0 {
             errors.extend(self.gain_errors(problem, comparisons, equations, stride));
         }
-        let inverse_normal = inverse(&equations.normal);
+        let inverse_normal = pseudo_inverse(&equations.normal);
         for FixedError { influence, .. } in &mut errors {
             influence.effects =
                 inverse_normal.iter().map(|row| dot(row, &influence.effects)).collect();
@@ -252,10 +253,11 @@ impl FixedNumbers {
         }
         let strength = |effects: &[f64]| {
             let effects = effects.iter().enumerate();
-            effects
-                .fold(0.0_f64, |most, (k, by)| most.max(by * by / inverse_normal[k][k].max(1e-300)))
+            effects.fold(0.0_f64, |greatest, (k, by)| {
+                greatest.max(by * by / inverse_normal[k][k].max(1e-300))
+            })
         };
-        let eigen = Symmetric::from_matrix(&second_moment);
+        let eigen = EigenDecomposition::from_matrix(&second_moment);
         let direction = |(value, vector): (&f64, &Vec<f64>)| {
             let size = value.max(0.0).sqrt();
             let error_components: Vec<f64> = vector.iter().map(|entry| size * entry).collect();
@@ -263,9 +265,12 @@ impl FixedNumbers {
                 let parameter = error.influence.parameter.clone()?;
                 Some((parameter, by * error.influence.tolerance))
             });
-            Direction { changes: changes.collect(), effects: effect_on_unknowns(&error_components) }
+            ErrorDirection {
+                changes: changes.collect(),
+                effects: effect_on_unknowns(&error_components),
+            }
         };
-        let mut directions: Vec<Direction> =
+        let mut directions: Vec<ErrorDirection> =
             eigen.values.iter().zip(&eigen.vectors).map(direction).collect();
         directions.sort_by(|a, b| strength(&b.effects).total_cmp(&strength(&a.effects)));
         let changes_by_error: Vec<Vec<f64>> =
@@ -324,7 +329,7 @@ impl FixedNumbers {
                 let mut rhs = vec![0.0; x.len()];
                 let mut thinned = Vec::with_capacity(changes.len());
                 for (change, &signal) in changes.into_iter().zip(&case_signals) {
-                    let change = centred(change).0;
+                    let change = subtract_mean(change).0;
                     let variance = equations.sigma[signal] * equations.sigma[signal];
                     for (rhs, slope) in rhs.iter_mut().zip(&comparisons[signal].slopes) {
                         *rhs += dot(slope, &change) / variance;
@@ -336,7 +341,8 @@ impl FixedNumbers {
             let apply = |k: usize, machine: &mut Machine, spin: &mut Spin| {
                 apply_change(&self.numbers[k], steps[k], machine, spin);
             };
-            let effects = problem.changes(case, x, comparisons, (steps.len(), apply), reduce);
+            let effects =
+                problem.compute_changes(case, x, comparisons, (steps.len(), apply), reduce);
             for ((error, effect), step) in errors.iter_mut().zip(effects).zip(&steps) {
                 let Some((rhs, changes)) = effect else { continue };
                 let effects = error.influence.effects.iter_mut().zip(rhs);
@@ -364,14 +370,14 @@ impl FixedNumbers {
         )| {
             let variance = equations.sigma[k] * equations.sigma[k];
             let motion = signal.samples().map(|(row, _)| self.gain_ratio * comparison.model[row]);
-            let motion = centred(motion.collect()).0;
+            let motion = subtract_mean(motion.collect()).0;
             let mut change: Vec<Vec<f64>> = comparisons
                 .iter()
                 .map(|comparison| vec![0.0; comparison.residual.len().div_ceil(stride)])
                 .collect();
             change[k] = motion.iter().copied().step_by(stride).collect();
             let influence = FixedInfluence {
-                name: format!("{GAIN} of {}", signal.quantity.column()),
+                name: format!("{GAIN_NAME} of {}", signal.quantity.column()),
                 unit: "",
                 tolerance: self.gain_ratio,
                 error: self.gain_ratio,
@@ -433,7 +439,7 @@ fn compute_posterior(
         }
         information[i][i] += 1.0;
     }
-    let covariance = inverse(&information);
+    let covariance = pseudo_inverse(&information);
     let scores: Vec<f64> =
         uncompensated_parts.iter().map(|samples| dot(samples, &residual)).collect();
     let mean = covariance.iter().map(|row| dot(row, &scores)).collect();
