@@ -60,7 +60,7 @@ fn another_build_of_the_same_version_is_refused() {
     let mut run = open(&home.output(), &job);
     assert!(run.is_missing(3) && !run.is_missing(0));
     let notes = run.take_notes();
-    assert!(notes[0].contains("another plan, place or version"), "{notes:?}");
+    assert!(notes[0].contains("another plan, index or version"), "{notes:?}");
 
     write_missing(&run);
     finish(run, &job);
