@@ -13,8 +13,8 @@ use sweep_plot::{DISTINCT, INK, MUTED, PlotError, extremes};
 /// The frequency of a mode, or a sum of two modes' frequencies, over speed.
 pub(crate) struct FrequencyCurve {
     pub(crate) name: String,
-    pub(crate) speed: Vec<f64>,
-    pub(crate) frequency: Vec<f64>,
+    pub(crate) speeds_rpm: Vec<f64>,
+    pub(crate) frequencies_rpm: Vec<f64>,
     /// The speeds (rpm) that equal the frequency.
     pub(crate) resonances: Vec<f64>,
     /// The least and the greatest frequency over a turn, if the file has them.
@@ -29,27 +29,31 @@ pub(crate) struct FrequencyCurve {
 /// [`PlotError::Undrawable`] without a column or with fewer than two speeds; the errors of
 /// [`stability::read_unstable`].
 pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Chart, PlotError> {
-    let unstable = options.stability.as_ref();
-    let unstable = unstable.map(|path| stability::read_unstable(table, path)).transpose()?;
+    let stability_file = options.stability.as_ref();
+    let unstable_speeds =
+        stability_file.map(|path| stability::read_unstable(table, path)).transpose()?;
     let modes = modes(table)?;
-    let top_speed = modes
+    let max_speed_rpm = modes
         .iter()
-        .flat_map(|mode| &mode.speed)
-        .fold(0.0_f64, |top_speed, &speed| top_speed.max(speed));
-    if top_speed <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
+        .flat_map(|mode| &mode.speeds_rpm)
+        .fold(0.0_f64, |max_speed_rpm, &speed| max_speed_rpm.max(speed));
+    if max_speed_rpm <= 0.0 || modes.iter().all(|mode| mode.speeds_rpm.len() < 2) {
         return Err(table.source.nothing_to_draw("the modes are given at one speed only"));
     }
     let is_in_range = |mode: &FrequencyCurve| {
-        mode.frequency.iter().any(|&frequency| frequency < 1.06 * top_speed)
+        mode.frequencies_rpm.iter().any(|&frequency| frequency < 1.06 * max_speed_rpm)
     };
     let (shown_modes, higher_modes): (Vec<FrequencyCurve>, Vec<FrequencyCurve>) =
         modes.into_iter().partition(is_in_range);
-    let sum_curves_shown =
-        unstable.as_ref().map_or_else(Vec::new, |unstable| frequency_sums(&shown_modes, unstable));
-    let frequencies =
-        shown_modes.iter().chain(&sum_curves_shown).flat_map(|mode| mode.frequency.iter().copied());
-    let (_, highest_frequency) = extremes(frequencies).unwrap_or((0.0, top_speed));
-    let range = (0.0, (1.06 * top_speed).min(1.25 * highest_frequency));
+    let frequency_sum_curves = unstable_speeds
+        .as_ref()
+        .map_or_else(Vec::new, |unstable_speeds| frequency_sums(&shown_modes, unstable_speeds));
+    let frequencies = shown_modes
+        .iter()
+        .chain(&frequency_sum_curves)
+        .flat_map(|mode| mode.frequencies_rpm.iter().copied());
+    let (_, highest_frequency) = extremes(frequencies).unwrap_or((0.0, max_speed_rpm));
+    let range = (0.0, (1.06 * max_speed_rpm).min(1.25 * highest_frequency));
 
     let mut series = Vec::new();
     let mut stars = Vec::new();
@@ -58,13 +62,13 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         let style = band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
         (mode, DISTINCT[k % DISTINCT.len()], style)
     });
-    let sum_curves = sum_curves_shown.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
+    let sum_curves = frequency_sum_curves.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
     for (mode, colour, style) in mode_curves.chain(sum_curves) {
         stars
             .extend(mode.resonances.iter().map(|&speed| (speed, speed, format!("{speed:.1} rpm"))));
-        series.push(Series::new(mode.name, colour, mode.speed, mode.frequency, style));
+        series.push(Series::new(mode.name, colour, mode.speeds_rpm, mode.frequencies_rpm, style));
     }
-    let diagonal = vec![0.0, top_speed];
+    let diagonal = vec![0.0, max_speed_rpm];
     series.push(Series::new(
         "frequency = spin speed",
         INK,
@@ -87,7 +91,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         subtitle: notes.join(" · "),
         x_label: Label::new("Spin speed", "rpm"),
         panels: vec![ChartPanel { range: Some(range), height: 500.0, stars, ..panel }],
-        shades: unstable.map_or_else(Vec::new, |unstable| unstable.speeds),
+        shades: unstable_speeds.map_or_else(Vec::new, |unstable_speeds| unstable_speeds.speeds),
         shade_meaning: stability::UNSTABLE.to_owned(),
         ..Chart::default()
     })
@@ -108,9 +112,12 @@ pub(crate) fn resonances(table: &FigureTable) -> Result<Vec<f64>, PlotError> {
 
 /// Returns the sums of frequencies behind parametric resonances: of the two modes that take part,
 /// or twice the frequency of a single one.
-fn frequency_sums(modes: &[FrequencyCurve], unstable: &UnstableSpeeds) -> Vec<FrequencyCurve> {
+fn frequency_sums(
+    modes: &[FrequencyCurve],
+    unstable_speeds: &UnstableSpeeds,
+) -> Vec<FrequencyCurve> {
     let mut pairs: Vec<[usize; 2]> = Vec::new();
-    for (speed, frequencies) in &unstable.participants {
+    for (speed, frequencies) in &unstable_speeds.participants {
         let nearest_mode = |frequency: f64| {
             let distance = |mode: &FrequencyCurve| (at_speed(mode, *speed) - frequency).abs();
             let indices = 0..modes.len();
@@ -147,14 +154,14 @@ fn frequency_sums(modes: &[FrequencyCurve], unstable: &UnstableSpeeds) -> Vec<Fr
         } else {
             format!("sum of the frequencies of modes {} and {}", mode_number(a), mode_number(b))
         };
-        let speed = modes[a].speed.clone();
+        let speeds_rpm = modes[a].speeds_rpm.clone();
         let sum_at = |speed: &f64| at_speed(&modes[a], *speed) + at_speed(&modes[b], *speed);
-        let frequency: Vec<f64> = speed.iter().map(sum_at).collect();
+        let frequencies_rpm: Vec<f64> = speeds_rpm.iter().map(sum_at).collect();
         FrequencyCurve {
             name,
-            resonances: crossings(&speed, &frequency),
-            speed,
-            frequency,
+            resonances: crossings(&speeds_rpm, &frequencies_rpm),
+            speeds_rpm,
+            frequencies_rpm,
             band: None,
         }
     };
@@ -163,7 +170,7 @@ fn frequency_sums(modes: &[FrequencyCurve], unstable: &UnstableSpeeds) -> Vec<Fr
 
 /// Returns a mode's frequency at a speed.
 fn at_speed(mode: &FrequencyCurve, speed: f64) -> f64 {
-    interpolate(&mode.speed, &mode.frequency, speed)
+    interpolate(&mode.speeds_rpm, &mode.frequencies_rpm, speed)
 }
 
 /// Interpolates linearly at `x`; beyond the given values the curve is constant.
@@ -180,9 +187,9 @@ pub(crate) fn interpolate(xs: &[f64], ys: &[f64], x: f64) -> f64 {
 
 /// Returns the modes of a file by number.
 pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotError> {
-    let speed = table.numbers("speed_rpm")?;
+    let speeds_rpm = table.numbers("speed_rpm")?;
     let mode_numbers = table.numbers("mode")?;
-    let frequency = table.numbers("frequency_rpm")?;
+    let frequencies_rpm = table.numbers("frequency_rpm")?;
     let extreme_over_turn = |word: &str| {
         let mut columns = table.columns.iter().filter(|column| {
             column.facts.name.starts_with("frequency")
@@ -203,7 +210,7 @@ pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotErro
     let mode_curve = |number: f64| {
         let mut rows: Vec<usize> =
             (0..table.rows).filter(|&row| mode_numbers[row] == number).collect();
-        rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
+        rows.sort_by(|&a, &b| speeds_rpm[a].total_cmp(&speeds_rpm[b]));
         let values_of_rows =
             |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
         let shape_name = names.and_then(|names| names.get(*rows.first()?));
@@ -213,14 +220,15 @@ pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotErro
                 modes_in_file.find(|mode| mode["mode"] == number)?["resonances"].as_array()?;
             resonances.iter().map(|resonance| resonance["speed_rpm"].as_f64()).collect()
         };
-        let speed = values_of_rows(speed);
-        let frequency = values_of_rows(frequency);
+        let speeds_rpm = values_of_rows(speeds_rpm);
+        let frequencies_rpm = values_of_rows(frequencies_rpm);
         FrequencyCurve {
             name: shape_name
                 .map_or(format!("mode {number}"), |shape_name| format!("{number} {shape_name}")),
-            resonances: resonances_in_file().unwrap_or_else(|| crossings(&speed, &frequency)),
-            speed,
-            frequency,
+            resonances: resonances_in_file()
+                .unwrap_or_else(|| crossings(&speeds_rpm, &frequencies_rpm)),
+            speeds_rpm,
+            frequencies_rpm,
             band: band.map(|(low, high)| (values_of_rows(low), values_of_rows(high))),
         }
     };

@@ -64,8 +64,8 @@ pub(crate) fn chart(
     let attractors_with_kind = |kind: usize| {
         attractors.iter().filter(move |(_, kind_of_attractor, _)| *kind_of_attractor == kind)
     };
-    let first_speed = curves.speed.first().copied();
-    let last_speed = curves.speed.last().copied();
+    let first_speed = curves.speeds_rpm.first().copied();
+    let last_speed = curves.speeds_rpm.last().copied();
     let is_in_range = |speed: &f64| first_speed <= Some(*speed) && Some(*speed) <= last_speed;
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
         let (_, factor) = label::display_unit(facts.unit());

@@ -118,8 +118,8 @@ pub(crate) fn live_part(live: &Live, axes: &[(&str, bool)]) -> LivePart {
 /// Writes the table of the machine's resonances in HTML.
 pub(crate) fn resonances(live: &Live) -> String {
     let rows: Vec<_> = live.resonances.iter().cloned().map(Vec::from).collect();
-    let heads = ["Motion", "Resonance", "Damping ratio"];
-    html_table("Resonances at the middle of the map", &heads, &rows)
+    let headings = ["Motion", "Resonance", "Damping ratio"];
+    html_table("Resonances at the middle of the map", &headings, &rows)
 }
 
 fn metric_json(columns: &[String; 2]) -> Value {

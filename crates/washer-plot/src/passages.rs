@@ -12,8 +12,8 @@ use sweep_plot::{DISTINCT, PlotError};
 /// A part of a trace in which the speed only rises or only falls, by its first and last instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Ramp {
-    from: usize,
-    to: usize,
+    first: usize,
+    last: usize,
     is_rising: bool,
 }
 
@@ -21,7 +21,7 @@ struct Ramp {
 struct RampTurns {
     is_rising: bool,
     turns: Vec<[usize; 2]>,
-    speed: Vec<f64>,
+    speeds_rpm: Vec<f64>,
 }
 
 /// Draws the passages of a trace file.
@@ -31,18 +31,19 @@ struct RampTurns {
 /// makes no whole turn while its speed changes.
 pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Chart, PlotError> {
     let mut chart = trace::chart(table, options)?;
-    let time = table.numbers("time_s")?;
-    let speed: Vec<f64> = table.numbers("speed_rpm")?.iter().map(|speed| speed.abs()).collect();
-    let mean_speed = |&[from, to]: &[usize; 2]| 0.5 * (speed[from] + speed[to]);
+    let times_s = table.numbers("time_s")?;
+    let speeds_rpm: Vec<f64> =
+        table.numbers("speed_rpm")?.iter().map(|speed| speed.abs()).collect();
+    let mean_speed = |&[first, last]: &[usize; 2]| 0.5 * (speeds_rpm[first] + speeds_rpm[last]);
     let turns_of_ramp = |ramp: Ramp| {
-        let turns = turns(time, &speed, ramp);
+        let turns = turns(times_s, &speeds_rpm, ramp);
         RampTurns {
             is_rising: ramp.is_rising,
-            speed: turns.iter().map(mean_speed).collect::<Vec<_>>(),
+            speeds_rpm: turns.iter().map(mean_speed).collect::<Vec<_>>(),
             turns,
         }
     };
-    let mut all_turns: Vec<RampTurns> = ramps(&speed).into_iter().map(turns_of_ramp).collect();
+    let mut all_turns: Vec<RampTurns> = ramps(&speeds_rpm).into_iter().map(turns_of_ramp).collect();
     all_turns.retain(|turns| !turns.turns.is_empty());
     if all_turns.is_empty() {
         return Err(table
@@ -77,10 +78,16 @@ fn series_over_speed(series: &Series, all_turns: &[RampTurns]) -> Vec<Series> {
         let y = turns
             .turns
             .iter()
-            .map(|&[from, to]| greatest_magnitude(&series.y[from..=to]))
+            .map(|&[first, last]| greatest_magnitude(&series.y[first..=last]))
             .collect();
         let style = if is_dashed { Style::Dashed } else { Style::Solid(1.8) };
-        Series::new(name, DISTINCT[usize::from(!turns.is_rising)], turns.speed.clone(), y, style)
+        Series::new(
+            name,
+            DISTINCT[usize::from(!turns.is_rising)],
+            turns.speeds_rpm.clone(),
+            y,
+            style,
+        )
     };
     all_turns.iter().map(curve).collect()
 }
@@ -94,29 +101,30 @@ fn greatest_magnitude(values: &[f64]) -> f64 {
 }
 
 /// Returns the ramps of a trace; instants of constant speed belong to none.
-fn ramps(speed: &[f64]) -> Vec<Ramp> {
+fn ramps(speeds_rpm: &[f64]) -> Vec<Ramp> {
     let mut ramps: Vec<Ramp> = Vec::new();
-    for k in 1..speed.len() {
-        let change = speed[k] - speed[k - 1];
+    for k in 1..speeds_rpm.len() {
+        let change = speeds_rpm[k] - speeds_rpm[k - 1];
         if change == 0.0 || change.is_nan() {
             continue;
         }
         let is_rising = change > 0.0;
         match ramps.last_mut() {
-            Some(last) if last.to == k - 1 && last.is_rising == is_rising => last.to = k,
-            _ => ramps.push(Ramp { from: k - 1, to: k, is_rising }),
+            Some(ramp) if ramp.last == k - 1 && ramp.is_rising == is_rising => ramp.last = k,
+            _ => ramps.push(Ramp { first: k - 1, last: k, is_rising }),
         }
     }
     ramps
 }
 
 /// Returns the whole turns of a ramp by first and last instant, in order of rising speed.
-fn turns(time: &[f64], speed: &[f64], ramp: Ramp) -> Vec<[usize; 2]> {
+fn turns(times_s: &[f64], speeds_rpm: &[f64], ramp: Ramp) -> Vec<[usize; 2]> {
     let mut turns = Vec::new();
     let mut turn_count = 0.0;
-    let mut turn_start = ramp.from;
-    for k in ramp.from + 1..=ramp.to {
-        turn_count += 0.5 * (speed[k] + speed[k - 1]) / 60.0 * (time[k] - time[k - 1]);
+    let mut turn_start = ramp.first;
+    for k in ramp.first + 1..=ramp.last {
+        turn_count +=
+            0.5 * (speeds_rpm[k] + speeds_rpm[k - 1]) / 60.0 * (times_s[k] - times_s[k - 1]);
         if turn_count >= 1.0 {
             turns.push([turn_start, k]);
             (turn_count, turn_start) = (turn_count - 1.0, k);
@@ -135,19 +143,20 @@ mod tests {
     #[test]
     fn rising_and_falling_ramps_are_divided_into_turns() {
         // The speed rises by 30 rpm a second up to 4.2 s and falls from 5 s: 4.41 turns each.
-        let time: Vec<f64> = (0..=920).map(|k| 0.01 * f64::from(k)).collect();
-        let speed: Vec<f64> =
-            time.iter().map(|t| (30.0 * t).min(126.0).min(30.0 * (9.2 - t))).collect();
-        let found_ramps = ramps(&speed);
+        let times_s: Vec<f64> = (0..=920).map(|k| 0.01 * f64::from(k)).collect();
+        let speeds_rpm: Vec<f64> =
+            times_s.iter().map(|t| (30.0 * t).min(126.0).min(30.0 * (9.2 - t))).collect();
+        let found_ramps = ramps(&speeds_rpm);
         assert_eq!(
             found_ramps.iter().map(|ramp| ramp.is_rising).collect::<Vec<_>>(),
             [true, false]
         );
-        let [rising_turns, falling_turns] = [0, 1].map(|k| turns(&time, &speed, found_ramps[k]));
+        let [rising_turns, falling_turns] =
+            [0, 1].map(|k| turns(&times_s, &speeds_rpm, found_ramps[k]));
         // On the rising ramp t^2/4 turns are made at t: the second ends at sqrt(8) s.
         assert_eq!((rising_turns.len(), falling_turns.len()), (4, 4));
-        assert!((time[rising_turns[1][1]] - 8.0_f64.sqrt()).abs() < 0.02);
-        let speed_sum = |turn: &[usize; 2]| speed[turn[0]] + speed[turn[1]];
+        assert!((times_s[rising_turns[1][1]] - 8.0_f64.sqrt()).abs() < 0.02);
+        let speed_sum = |turn: &[usize; 2]| speeds_rpm[turn[0]] + speeds_rpm[turn[1]];
         assert!(falling_turns.windows(2).all(|pair| speed_sum(&pair[0]) < speed_sum(&pair[1])));
         assert_eq!(greatest_magnitude(&[1.0, -3.0, 2.0]), 3.0);
         assert!(

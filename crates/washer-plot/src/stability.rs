@@ -31,9 +31,9 @@ pub(crate) const UNSTABLE: &str = "speeds at which the periodic response is unst
 /// The responses at one point over speed.
 #[derive(Clone, Default)]
 pub(crate) struct SpeedCurves {
-    pub(crate) speed: Vec<f64>,
+    pub(crate) speeds_rpm: Vec<f64>,
     /// The growth at each speed; NaN without a response.
-    pub(crate) growth: Vec<f64>,
+    pub(crate) growths_per_s: Vec<f64>,
     /// The values of each requested column.
     columns: Vec<Vec<f64>>,
 }
@@ -59,8 +59,8 @@ pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<C
         if varying_axes.is_empty() { "growth".to_owned() } else { varying_axes.join(", ") }
     };
     let series = curves.iter().zip(shown_points).enumerate().map(|(k, (curve, values))| {
-        let x = curve.speed.clone();
-        let y = curve.growth.clone();
+        let x = curve.speeds_rpm.clone();
+        let y = curve.growths_per_s.clone();
         Series::new(curve_name(values), DISTINCT[k], x, y, Style::Solid(2.2))
     });
     let constant_axes =
@@ -75,8 +75,8 @@ pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<C
     let channel_panel = ChartPanel { levels, ..ChartPanel::new("growth", label, series.collect()) };
     let (shades, edges) = match &curves[..] {
         [curve] => (
-            unstable_ranges(&curve.speed, &curve.growth),
-            stability_edges(&curve.speed, &curve.growth),
+            unstable_ranges(&curve.speeds_rpm, &curve.growths_per_s),
+            stability_edges(&curve.speeds_rpm, &curve.growths_per_s),
         ),
         _ => Default::default(),
     };
@@ -140,7 +140,7 @@ pub(crate) fn over_speeds(
         title: title.to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        shades: unstable_ranges(&curves.speed, &curves.growth),
+        shades: unstable_ranges(&curves.speeds_rpm, &curves.growths_per_s),
         shade_meaning: UNSTABLE.to_owned(),
         panels,
         ..Chart::default()
@@ -186,12 +186,12 @@ pub(crate) fn response_series(
 ) -> Vec<Series> {
     let [linear, periodic]: [Vec<f64>; 2] =
         [2 * k, 2 * k + 1].map(|k| curves.columns[k].iter().map(|value| value * factor).collect());
-    let [stable, unstable] = stability_parts(&curves.speed, &periodic, &curves.growth);
+    let [stable, unstable] = stability_parts(&curves.speeds_rpm, &periodic, &curves.growths_per_s);
     let series_of_part = |word: &str, colour, (speed, values): (Vec<f64>, Vec<f64>), style| {
         Series::new(format!("{name}, {word}"), colour, speed, values, style)
     };
     vec![
-        Series::new("linear model", LINEAR, curves.speed.clone(), linear, Style::Solid(1.6)),
+        Series::new("linear model", LINEAR, curves.speeds_rpm.clone(), linear, Style::Solid(1.6)),
         series_of_part("stable", NONLINEAR, stable, Style::Solid(2.2)),
         series_of_part("unstable", NONLINEAR, unstable, Style::Dashed),
     ]
@@ -283,10 +283,10 @@ pub(crate) fn read_unstable(table: &FigureTable, path: &Path) -> Result<Unstable
     let frequency =
         |column: usize, k: usize| curves.columns[column].get(k).copied().unwrap_or(f64::NAN);
     Ok(UnstableSpeeds {
-        speeds: unstable_ranges(&curves.speed, &curves.growth),
-        participants: (0..curves.speed.len())
-            .filter(|&k| curves.growth[k] > 0.0)
-            .map(|k| (curves.speed[k], [frequency(0, k), frequency(1, k)]))
+        speeds: unstable_ranges(&curves.speeds_rpm, &curves.growths_per_s),
+        participants: (0..curves.speeds_rpm.len())
+            .filter(|&k| curves.growths_per_s[k] > 0.0)
+            .map(|k| (curves.speeds_rpm[k], [frequency(0, k), frequency(1, k)]))
             .collect(),
     })
 }
@@ -457,11 +457,11 @@ impl<'a> HeldPoints<'a> {
         self.each_row(columns, |point_index, row| {
             let curve = &mut curves[point_index];
             // A speed can have several responses. The first is that of a machine that runs up.
-            if curve.speed.last() == Some(&row.speed) {
+            if curve.speeds_rpm.last() == Some(&row.speed) {
                 return;
             }
-            curve.speed.push(row.speed);
-            curve.growth.push(row.growth);
+            curve.speeds_rpm.push(row.speed);
+            curve.growths_per_s.push(row.growth);
             for (values, value) in curve.columns.iter_mut().zip(row.values) {
                 values.push(value);
             }

@@ -20,8 +20,8 @@ use sweep_plot::{INK, LINEAR, NONLINEAR, PlotError, extremes};
 /// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and the
 /// errors of [`campbell::resonances`] for the modes file.
 pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Chart, PlotError> {
-    let time = Rc::new(table.numbers("time_s")?.to_vec());
-    if time.len() < 2 {
+    let times_s = Rc::new(table.numbers("time_s")?.to_vec());
+    if times_s.len() < 2 {
         return Err(table.source.nothing_to_draw("a trace needs at least two instants"));
     }
     if table.column("point").is_some() {
@@ -49,20 +49,22 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     // The second curve is translucent, so that the first one shows through.
     let front_table = compared_trace.as_ref().unwrap_or(table);
     let front_time = Rc::new(front_table.numbers("time_s")?.to_vec());
-    let curve_sources =
-        [(table, Rc::clone(&time), NONLINEAR), (front_table, front_time, LINEAR.with_alpha(165))];
+    let curve_sources = [
+        (table, Rc::clone(&times_s), NONLINEAR),
+        (front_table, front_time, LINEAR.with_alpha(165)),
+    ];
     let model_curves = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         let curve = |k: usize| {
-            let ((table, time, colour), name) = (&curve_sources[k], names[k].clone());
+            let ((table, times_s, colour), name) = (&curve_sources[k], names[k].clone());
             let column = table.column(&columns[if compared_trace.is_some() { 0 } else { k }])?;
             let y = column.numbers()?.iter().map(|value| value * factor).collect();
-            Some(Series::new(name, *colour, Rc::clone(time), y, Style::Solid(1.3)))
+            Some(Series::new(name, *colour, Rc::clone(times_s), y, Style::Solid(1.3)))
         };
         (0..2).filter_map(curve).collect()
     };
     let quantity_panel = |quantity: &TraceQuantity<'_>| {
         let (name, (unit, factor)) = (quantity.name, label::display_unit(quantity.unit));
-        let is_channel = quantity.is_channel && model_prefixes == MODELS;
+        let is_channel = quantity.is_channel && model_prefixes == MODEL_PREFIXES;
         let words =
             if is_channel { label::channel_in_words(name) } else { label::name_in_words(name) };
         let series = model_curves(&quantity.columns, factor);
@@ -77,7 +79,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     for (name, column) in table.with_prefix("residual_") {
         let (unit, factor) = label::display_unit(column.facts.unit());
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
-        let residual = Series::new("residual", INK, Rc::clone(&time), y, Style::Dots);
+        let residual = Series::new("residual", INK, Rc::clone(&times_s), y, Style::Dots);
         let words = format!("residual, {}", label::name_in_words(name));
         let is_shown = shown_names.contains(&name);
         let label = Label::new(&words, unit);
@@ -100,13 +102,13 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     }
     let mut marks = Vec::new();
     let mut shades = Vec::new();
-    let unstable = unstable_speeds(table, options)?;
+    let unstable_ranges = unstable_speeds(table, options)?;
     let (resonances, other_machine_note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
-        let passages = passages(&time, speed, &resonances).into_iter();
+        let passages = passages(&times_s, speed, &resonances).into_iter();
         marks.extend(passages.map(|(x, resonance)| speed_mark(x, resonance)));
-        shades = stability::intervals_within(&time, speed, &unstable);
-        let x = Rc::clone(&time);
+        shades = stability::intervals_within(&times_s, speed, &unstable_ranges);
+        let x = Rc::clone(&times_s);
         let series = Series::new("", INK, x, speed.to_vec(), Style::Solid(2.0));
         let speed_panel = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
         panels.push(ChartPanel { height: 130.0, ..speed_panel });
@@ -114,7 +116,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     Ok(Chart {
         title: match &compared_trace {
             Some(_) => "Nonlinear motion from static equilibrium".to_owned(),
-            None if model_prefixes == FITTED => {
+            None if model_prefixes == FIT_PREFIXES => {
                 "A measurement, and the model fitted to it".to_owned()
             }
             None => "Motion of both models from static equilibrium".to_owned(),
@@ -136,18 +138,18 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
 }
 
 /// The prefixes of the columns of both models in a trace.
-const MODELS: [&str; 2] = ["nonlinear", "linear"];
+const MODEL_PREFIXES: [&str; 2] = ["nonlinear", "linear"];
 /// The prefixes of the columns of measurement and model in the curves of a fit.
-const FITTED: [&str; 2] = ["measured", "model"];
+const FIT_PREFIXES: [&str; 2] = ["measured", "model"];
 
 /// Returns the prefixes of a file's columns.
 fn model_prefixes(table: &FigureTable) -> [&'static str; 2] {
-    if table.with_prefix("measured_").is_empty() { MODELS } else { FITTED }
+    if table.with_prefix("measured_").is_empty() { MODEL_PREFIXES } else { FIT_PREFIXES }
 }
 
 /// Returns the legend entry of a prefix.
 fn curve_name(prefix: &str) -> String {
-    if MODELS.contains(&prefix) { format!("{prefix} model") } else { prefix.to_owned() }
+    if MODEL_PREFIXES.contains(&prefix) { format!("{prefix} model") } else { prefix.to_owned() }
 }
 
 /// A quantity that a trace has of both models over time.
@@ -320,9 +322,9 @@ pub(crate) fn resonances(
 }
 
 /// Returns the instants at which the speed passes each resonance, in order of time.
-fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> {
+fn passages(times_s: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> {
     let mut passages = Vec::new();
-    for k in 1..time.len().min(speed.len()) {
+    for k in 1..times_s.len().min(speed.len()) {
         for &resonance in resonances {
             let distance_before = speed[k - 1] - resonance;
             let distance_after = speed[k] - resonance;
@@ -331,7 +333,8 @@ fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> 
                 && distance_after.is_finite()
             {
                 let fraction = distance_before / (distance_before - distance_after);
-                passages.push((time[k - 1] + fraction * (time[k] - time[k - 1]), resonance));
+                passages
+                    .push((times_s[k - 1] + fraction * (times_s[k] - times_s[k - 1]), resonance));
             }
         }
     }
@@ -352,9 +355,9 @@ mod tests {
 
     #[test]
     fn a_resonance_is_passed_while_speed_rises_and_falls() {
-        let time: Vec<f64> = (0..=8).map(f64::from).collect();
-        let speed: Vec<f64> = time.iter().map(|t| 50.0 * (4.0 - (t - 4.0).abs())).collect();
-        assert_eq!(passages(&time, &speed, &[75.0, 500.0]), [(1.5, 75.0), (6.5, 75.0)]);
-        assert_eq!(passages(&time, &speed, &[200.0]), [(4.0, 200.0)]);
+        let times_s: Vec<f64> = (0..=8).map(f64::from).collect();
+        let speed: Vec<f64> = times_s.iter().map(|t| 50.0 * (4.0 - (t - 4.0).abs())).collect();
+        assert_eq!(passages(&times_s, &speed, &[75.0, 500.0]), [(1.5, 75.0), (6.5, 75.0)]);
+        assert_eq!(passages(&times_s, &speed, &[200.0]), [(4.0, 200.0)]);
     }
 }

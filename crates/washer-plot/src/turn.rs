@@ -21,17 +21,17 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
         let Some((least, greatest)) = mode.band.filter(|_| !resonances.is_empty()) else {
             continue;
         };
-        let variation = |k: usize| 50.0 * (greatest[k] - least[k]) / mode.frequency[k];
-        let variation: Vec<f64> = (0..mode.frequency.len()).map(variation).collect();
+        let variation = |k: usize| 50.0 * (greatest[k] - least[k]) / mode.frequencies_rpm[k];
+        let variation: Vec<f64> = (0..mode.frequencies_rpm.len()).map(variation).collect();
         for &speed in resonances {
             stars.push((
                 speed,
-                interpolate(&mode.speed, &variation, speed),
+                interpolate(&mode.speeds_rpm, &variation, speed),
                 format!("{speed:.1} rpm"),
             ));
         }
         let colour = DISTINCT[k % DISTINCT.len()];
-        series.push(Series::new(mode.name, colour, mode.speed, variation, Style::Solid(2.2)));
+        series.push(Series::new(mode.name, colour, mode.speeds_rpm, variation, Style::Solid(2.2)));
     }
     if series.is_empty() {
         return Err(table.source.nothing_to_draw("no mode's frequency meets the spin speed"));

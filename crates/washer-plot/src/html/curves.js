@@ -3,11 +3,11 @@
 // The highest frequency of a spectrum, Hz.
 const MAX_FREQUENCY_HZ = 25;
 
-// Time histories and spectra of both models, redrawn in place.
+// Creates the charts of time histories and spectra of both models.
 function createCurves(host, live) {
   const instants = 1 + Math.floor((live.endS / live.everyS) * (1 + 1e-12));
   const times = Float32Array.from({ length: instants }, (_, k) => k * live.everyS);
-  const [from, to] = live.windowS.map((at) => Math.round(at / live.everyS));
+  const [from, to] = live.windowS.map((timeS) => Math.round(timeS / live.everyS));
   const size = spectrumSize(to - from + 1);
   const binWidth = 1 / (size * live.everyS);
   const bins = Math.min(Math.floor(MAX_FREQUENCY_HZ / binWidth), size / 2);
@@ -18,11 +18,11 @@ function createCurves(host, live) {
     new Float32Array(count).fill(NaN), alpha);
   const bothModels = (count) => [line("nonlinear model", "#0072b2", count),
     line("linear model", "#d55e00", count, 0.65)];
-  const first = live.compared[Math.max(live.compared.length - 2, 0)];
-  const motion = live.channels.map((channel, k) => plainPanel(channel.name,
-    capitalise(channel.words), channel.unit, k === first, bothModels(instants)));
-  const gap = plainPanel("gap", "Gap, drum to tub", "mm", false, bothModels(instants));
-  const speed = plainPanel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
+  const shownChannel = live.compared[Math.max(live.compared.length - 2, 0)];
+  const motionPanels = live.channels.map((channel, k) => plainPanel(channel.name,
+    capitalise(channel.words), channel.unit, k === shownChannel, bothModels(instants)));
+  const gapPanel = plainPanel("gap", "Gap, drum to tub", "mm", false, bothModels(instants));
+  const speedPanel = plainPanel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
   // Spectra are computed when they are drawn.
   const spectrumOf = (line, source) => {
     const [y, cache] = [new Float32Array(bins).fill(NaN), { version: -1 }];
@@ -34,14 +34,14 @@ function createCurves(host, live) {
     } });
   };
   const spectra = live.channels.map((channel, k) => plainPanel(channel.name,
-    capitalise(channel.words), channel.unit, k === first,
-    bothModels(bins).map((line, model) => spectrumOf(line, motion[k].series[model]))));
+    capitalise(channel.words), channel.unit, k === shownChannel,
+    bothModels(bins).map((line, model) => spectrumOf(line, motionPanels[k].series[model]))));
   const histories = element("div", { id: "live-histories" });
   const spectrumHost = element("div", { id: "live-spectrum" });
   host.append(element("h2", {}, "Time histories"), histories,
     element("h2", {}, `Spectrum from ${live.windowS[0]} to ${live.windowS[1]} s`), spectrumHost);
   const charts = [
-    createChart(histories, plainChart("Time", "s", times, [...motion, gap, speed]),
+    createChart(histories, plainChart("Time", "s", times, [...motionPanels, gapPanel, speedPanel]),
       "Time histories"),
     createChart(spectrumHost, plainChart("Frequency", "Hz", frequencies, spectra), "Spectrum"),
   ];
@@ -52,12 +52,12 @@ function createCurves(host, live) {
       models.forEach((numbers, model) => {
         const count = numbers[0] === 1 ? numbers[3] : 0;
         [...live.channels, { factor: 1e3 }].forEach(({ factor }, k) => {
-          const { y } = (motion[k] ?? gap).series[model];
+          const { y } = (motionPanels[k] ?? gapPanel).series[model];
           y.forEach((_, i) => { y[i] = i < count ? numbers[4 + i * columns + k] * factor : NaN; });
         });
       });
       version += 1;
-      speed.series[0].y.set(speeds.subarray(0, instants));
+      speedPanel.series[0].y.set(speeds.subarray(0, instants));
       charts.forEach((chart) => chart.changed());
     },
   };

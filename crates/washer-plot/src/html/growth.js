@@ -5,8 +5,8 @@
 // growth takes long to compute, and for others.
 const SPEED_RULE = { from: 50, slow: [24, 1], quick: [300, 10] };
 
-// The numbers of the fastest disturbance at each speed: growth (1/s), frequency (cycles per
-// minute), kind, and whether the response is on the curve of a machine that runs up.
+// Returns the numbers of the fastest-growing disturbance at each speed: growth (1/s), frequency
+// (cycles per minute), kind, and whether the response is on the curve of a machine that runs up.
 async function computeGrowth(pool, kind, values, speeds) {
   const urgency = kind === "check" ? 1 : 0;
   const { numbers } = await pool.request(kind, urgency, "growth", [...values, ...speeds],
@@ -27,12 +27,12 @@ function offCurveNote(speeds, isOnCurve) {
 const HELD_METRICS = {
   async growth(pool, values, { heldSpeedsRpm: speeds }) {
     const disturbances = await computeGrowth(pool, "check", values, speeds);
-    const growth = disturbances.map((one) => one[0]);
+    const growth = disturbances.map(([growthPerS]) => growthPerS);
     const greatest = Math.max(...growth.filter(Number.isFinite));
     return [Number.isFinite(greatest) ? `Growth at most ${formatSignificant(greatest, 3)} /s, at `
       + `${formatSignificant(speeds[growth.indexOf(greatest)])} rpm of ${speeds.length} constant `
       + "speeds."
-      + offCurveNote(speeds, disturbances.map((one) => one[3]))
+      + offCurveNote(speeds, disturbances.map((disturbance) => disturbance[3]))
       : "No response at any of the map's constant speeds.", [greatest]];
   },
   async dwell(pool, values, { heldSpeedsRpm: speeds, channels, motions }) {
@@ -72,7 +72,7 @@ function createGrowth(host, live, pool) {
     requestCount += 1;
     const requestId = requestCount;
     const speeds = speedsUpTo(point.peak);
-    const started = performance.now();
+    const startMs = performance.now();
     const [y, frequencies] = [0, 1].map(() => new Float32Array(speeds.length).fill(NaN));
     const line = (values) => [{ ...plainLine("", "#0072b2", values), width: 1.6 }];
     const panels = [plainPanel("growth", "Growth", "1/s", true, line(y), 200),
@@ -88,8 +88,8 @@ function createGrowth(host, live, pool) {
       const batch = speeds.subarray(k, k + batchSize);
       const disturbances = await computeGrowth(pool, "growth", point.values, batch);
       if (requestId !== requestCount) return;
-      disturbances.forEach((one, at) => {
-        [y[k + at], frequencies[k + at], kinds[k + at], isOnCurve[k + at]] = one;
+      disturbances.forEach((disturbance, i) => {
+        [y[k + i], frequencies[k + i], kinds[k + i], isOnCurve[k + i]] = disturbance;
       });
       remaining -= batch.length;
       status.textContent = `Computing: ${remaining} of ${speeds.length} speeds are left.`;
@@ -124,7 +124,7 @@ function createGrowth(host, live, pool) {
     });
     const summary = rangeTexts.length ? `Disturbances grow ${rangeTexts.join(", and ")}.`
       : "Disturbances decay at every speed.";
-    const seconds = ((performance.now() - started) / 1000).toFixed(1);
+    const seconds = ((performance.now() - startMs) / 1000).toFixed(1);
     const note = offCurveNote(speeds, isOnCurve);
     status.textContent = `${summary}${note} ${speeds.length} speeds in ${seconds} s.`;
     box.dataset.speeds = speeds.join(" ");
@@ -134,14 +134,14 @@ function createGrowth(host, live, pool) {
 
   return {
     // Discards the point, which has changed.
-    moved() {
+    discardPoint() {
       requestCount += 1;
       pool.cancel("growth");
       point = null;
       if (box.open) status.textContent = "The point moves.";
     },
     // Sets the point after its change, with the greatest speed of its spin.
-    rested(values, peak) {
+    setPoint(values, peak) {
       point = { values, peak };
       isDone = false;
       compute();

@@ -5,19 +5,19 @@ const QUICK_LEVEL = 255;
 // Time without a change of the sliders after which their point is checked, ms.
 const REST_MS = 150;
 const FAILURES = ["", "diverged", "needs steps too small", "used up its steps"];
-// The size of a finer map: points along each axis, cells that it spans without a zoom, points in a
-// call.
-const FINE_MAP = { points: 20, cells: 7, together: 10 };
+// The size of a finer map: points along each axis, cells of the map that it spans without a zoom,
+// points in a call.
+const FINE_MAP = { points: 20, cells: 7, batchSize: 10 };
 
 function createLive(host, data) {
   const { live } = data;
   const values = live.sliders.map((slider) => slider.value);
   let map = null;
-  let latest = 0;
+  let latestRevision = 0;
   let restTimer = 0;
   let isBusy = false;
-  let isMoved = false;
-  let fine = [];
+  let hasMoved = false;
+  let fineCells = [];
   let fineRemaining = 0;
   // Returns the ends of a slider along both axes, as the map spaces them.
   let fineEdges = null;
@@ -52,35 +52,35 @@ function createLive(host, data) {
   function createSlider(slider, k) {
     const { from, to } = slider;
     // The slider of a logarithmic axis moves by the logarithm and shows the value.
-    const [scaled, back] = slider.log ? [Math.log10, (x) => 10 ** x] : [(x) => x, (x) => x];
-    const bounded = (value) => Math.min(Math.max(value, from), to);
+    const [toScale, fromScale] = slider.log ? [Math.log10, (x) => 10 ** x] : [(x) => x, (x) => x];
+    const clampToRange = (value) => Math.min(Math.max(value, from), to);
     const number = element("input", {
       type: "number", step: "any", min: from, max: to,
       "aria-label": withUnit(slider.words, slider.unit), "data-number": slider.name,
       onchange: () => {
-        const typed = Number(number.value);
-        set(k, Number.isFinite(typed) ? bounded(typed) : values[k]);
+        const typedValue = Number(number.value);
+        set(k, Number.isFinite(typedValue) ? clampToRange(typedValue) : values[k]);
         pointChanged();
       },
     });
     const range = element("input", {
-      type: "range", step: "any", min: scaled(from), max: scaled(to),
+      type: "range", step: "any", min: toScale(from), max: toScale(to),
       "aria-label": slider.words, "data-slider": slider.name, title: slider.description,
       oninput: () => {
-        set(k, bounded(Number(back(Number(range.value)).toPrecision(4))));
+        set(k, clampToRange(Number(fromScale(Number(range.value)).toPrecision(4))));
         pointChanged();
       },
     });
-    return { number, range, scaled, row: element("label", { title: slider.description },
+    return { number, range, toScale, row: element("label", { title: slider.description },
       element("span", {}, slider.words), range, number, element("span", {}, slider.unit)) };
   }
 
   function set(k, value) {
     values[k] = value;
-    const { number, range, scaled } = inputs[k];
+    const { number, range, toScale } = inputs[k];
     // A value that a step of an axis has rounded is restored.
     number.value = Number(value.toPrecision(12));
-    range.value = scaled(value);
+    range.value = toScale(value);
     if (live.sliders[k].log) range.setAttribute("aria-valuetext", value);
   }
 
@@ -91,12 +91,12 @@ function createLive(host, data) {
   }
 
   function pointChanged() {
-    latest += 1;
+    latestRevision += 1;
     clearTimeout(restTimer);
     pool.cancel("check");
-    growth?.moved();
+    growth?.discardPoint();
     map?.mark?.();
-    if (isBusy) isMoved = true;
+    if (isBusy) hasMoved = true;
     else preview();
   }
 
@@ -105,45 +105,45 @@ function createLive(host, data) {
   const requestMotions = (kind, levels) => [0, 1].map((model) => request(kind, 3, "history",
     [model, levels[model], live.everyS]));
 
-  // Computes quick answers until the point rests, one after the other, and then the checked answer.
+  // Computes previews until the sliders rest, and then starts the check of the point.
   async function preview() {
     isBusy = true;
     do {
-      isMoved = false;
-      const started = performance.now();
+      hasMoved = false;
+      const startMs = performance.now();
       try {
         const speeds = request("preview", 3, "speeds", [live.everyS]);
         const [peaks, ...motions] = await Promise.all([
           request("preview", 4, "quick", [values.length]),
           ...requestMotions("preview", [QUICK_LEVEL, QUICK_LEVEL])]);
-        const duration = performance.now() - started;
-        const ms = [peaks, ...motions].map((one) => one.ms);
-        show({ ...parsedAnswer(peaks.numbers, live), isChecked: false, took: duration, ms });
-        curves.show(motions.map((one) => one.numbers), (await speeds).numbers);
+        const duration = performance.now() - startMs;
+        const ms = [peaks, ...motions].map((answer) => answer.ms);
+        show({ ...parsedAnswer(peaks.numbers, live), isChecked: false, elapsedMs: duration, ms });
+        curves.show(motions.map((motion) => motion.numbers), (await speeds).numbers);
       } catch (error) {
         showError(error);
       }
-    } while (isMoved);
+    } while (hasMoved);
     isBusy = false;
-    restTimer = setTimeout(() => check(latest), REST_MS);
+    restTimer = setTimeout(() => check(latestRevision), REST_MS);
   }
 
   async function check(revision) {
     try {
-      const started = performance.now();
+      const startMs = performance.now();
       const { numbers, ms } = await request("check", 2, "checked");
-      if (revision !== latest) return;
+      if (revision !== latestRevision) return;
       const answer = parsedAnswer(numbers, live);
       if (answer.is !== 1) return;
-      show({ ...answer, isChecked: true, took: performance.now() - started, ms: [ms] });
+      show({ ...answer, isChecked: true, elapsedMs: performance.now() - startMs, ms: [ms] });
       const speedsRequest = request("check", 2, "speeds", [live.everyS]);
       const levels = answer.records.map((record) => record.rung);
       const motions = await Promise.all(requestMotions("check", levels));
       const speeds = (await speedsRequest).numbers;
-      if (revision === latest) {
-        curves.show(motions.map((one) => one.numbers), speeds);
+      if (revision === latestRevision) {
+        curves.show(motions.map((motion) => motion.numbers), speeds);
         if (live.heldMetrics.length) showHeldMetrics(revision);
-        growth?.rested([...values], speeds.reduce((most, speed) => Math.max(most, speed)));
+        growth?.setPoint([...values], speeds.reduce((most, speed) => Math.max(most, speed)));
       }
     } catch (error) {
       showError(error);
@@ -159,7 +159,7 @@ function createLive(host, data) {
       line.dataset[metric] = numbers.join(" ");
       return sentence;
     })).then((all) => {
-      if (revision === latest) line.textContent = all.join(" ");
+      if (revision === latestRevision) line.textContent = all.join(" ");
     }, showError);
     valuesHost.append(line);
     if (!live.hasSlowGrowth && !live.heldMetrics.includes("dwell")) compute();
@@ -173,10 +173,10 @@ function createLive(host, data) {
     status.textContent = `This point could not be computed: ${error.message}. It is a defect.`;
   }
 
-  const compared = (ratios) => live.compared.map((channel) => ratios[channel])
+  const comparedRatios = (ratios) => live.compared.map((channel) => ratios[channel])
     .filter(Number.isFinite);
-  const greatestOf = (ratios) => Math.max(...compared(ratios));
-  const leastOf = (ratios) => Math.min(...compared(ratios));
+  const greatestOf = (ratios) => Math.max(...comparedRatios(ratios));
+  const leastOf = (ratios) => Math.min(...comparedRatios(ratios));
   const isTrusted = (ratios) => greatestOf(ratios) < live.ratioLimit
     && (live.ratioMin === null || leastOf(ratios) > live.ratioMin);
 
@@ -197,7 +197,7 @@ function createLive(host, data) {
     panel.dataset.ratios = ratios.join(" ");
     panel.dataset.sag = answer.sag;
     const greatest = greatestOf(ratios);
-    const channel = live.compared.find((of) => ratios[of] === greatest);
+    const channel = live.compared.find((index) => ratios[index] === greatest);
     const failed = records.findIndex((record) => record.failure !== 0);
     const verdict = failed >= 0
       ? `The ${["nonlinear", "linear"][failed]} model ${FAILURES[records[failed].failure]} at `
@@ -225,12 +225,12 @@ function createLive(host, data) {
       ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: a slightly disturbed "
         + "trajectory departs exponentially. The digits are those of one trajectory.")] : []),
       numbers, ...sag);
-    const took = `${answer.took.toFixed(answer.took < 10 ? 1 : 0)} ms`;
+    const elapsedMs = `${answer.elapsedMs.toFixed(answer.elapsedMs < 10 ? 1 : 0)} ms`;
     status.textContent = answer.isChecked
-      ? `Checked in ${took}: estimated relative error at most `
+      ? `Checked in ${elapsedMs}: estimated relative error at most `
         + `${formatSignificant(Math.max(...records.map((record) => record.error)), 2)}; `
         + `nonlinear model by ${records[0].level}, linear model by ${records[1].level}.`
-      : `Preview in ${took}: peaks of both models ${answer.ms[0].toFixed(1)} ms, curves `
+      : `Preview in ${elapsedMs}: peaks of both models ${answer.ms[0].toFixed(1)} ms, curves `
         + `${answer.ms.slice(1).map((ms) => ms.toFixed(1)).join(" and ")} ms, side by side.`;
   }
 
@@ -240,19 +240,19 @@ function createLive(host, data) {
     fineEdges = map.region(map.sliders.slice(0, 2).map((k) => values[k]), FINE_MAP.cells);
     const step = fineEdges.map(([low, high]) => (high - low) / FINE_MAP.points);
     const middle = (FINE_MAP.points - 1) / 2;
-    const distance = (place) => Math.hypot(...place.map((index) => index - middle));
-    const places = Array.from({ length: FINE_MAP.points ** 2 },
+    const distance = (indices) => Math.hypot(...indices.map((index) => index - middle));
+    const cells = Array.from({ length: FINE_MAP.points ** 2 },
       (_, k) => [Math.floor(k / FINE_MAP.points), k % FINE_MAP.points])
       .sort((a, b) => distance(a) - distance(b));
-    [fine, fineRemaining] = [[], places.length];
+    [fineCells, fineRemaining] = [[], cells.length];
     map.mark();
     map.request();
-    for (let k = 0; k < places.length; k += FINE_MAP.together) {
-      const part = places.slice(k, k + FINE_MAP.together).map((place) => {
-        const from = place.map((at, axis) => fineEdges[axis][0] + at * step[axis]);
-        return { from, to: from.map((at, axis) => at + step[axis]) };
+    for (let k = 0; k < cells.length; k += FINE_MAP.batchSize) {
+      const batch = cells.slice(k, k + FINE_MAP.batchSize).map((indices) => {
+        const from = indices.map((index, axis) => fineEdges[axis][0] + index * step[axis]);
+        return { from, to: from.map((start, axis) => start + step[axis]) };
       });
-      const points = part.flatMap(({ from }) => {
+      const points = batch.flatMap(({ from }) => {
         const point = [...values];
         from.forEach((even, axis) => {
           point[map.sliders[axis]] = map.back(axis, even + 0.5 * step[axis]);
@@ -260,15 +260,15 @@ function createLive(host, data) {
         return point;
       });
       pool.request("fine", 1, "quick", points, [values.length]).then(({ numbers }) => {
-        const width = numbers.length / part.length;
-        part.forEach((cell, at) => {
-          const answer = parsedAnswer(numbers.slice(at * width, (at + 1) * width), live);
+        const width = numbers.length / batch.length;
+        batch.forEach((cell, k) => {
+          const answer = parsedAnswer(numbers.slice(k * width, (k + 1) * width), live);
           const { ratios, byColumn } = answer;
           const extremes = { ratio_max: greatestOf(ratios), ratio_min: leastOf(ratios) };
-          if (answer.is === 1) fine.push({ ...cell, columns: { ...byColumn, ...extremes } });
+          if (answer.is === 1) fineCells.push({ ...cell, columns: { ...byColumn, ...extremes } });
         });
-        fineRemaining -= part.length;
-        panel.dataset.fine = `${fine.length} ${fineRemaining}`;
+        fineRemaining -= batch.length;
+        panel.dataset.fine = `${fineCells.length} ${fineRemaining}`;
         map.request();
       }, showError);
     }
@@ -281,43 +281,44 @@ function createLive(host, data) {
     return { sliders, start: sliders.map((k) => Number(middle(live.sliders[k]).toPrecision(4))) };
   }
 
-  const axisSettings = (place) => place.map((value, k) => [map.sliders[k], value]);
+  const axisSettings = (point) => point.map((value, k) => [map.sliders[k], value]);
   return {
     // The interface for the figure; `connect` passes the interface of a map to this panel.
-    connect(given = withoutMap()) {
-      map = given;
+    connect(mapInterface = withoutMap()) {
+      map = mapInterface;
       refine.hidden = !map.region;
       setSliders(axisSettings(map.start));
     },
-    pinned: (place) => setSliders(axisSettings(place)),
+    pinned: (point) => setSliders(axisSettings(point)),
     // Values by name, with the 32-bit precision of the file's numbers.
     chosen: (point) => setSliders(live.sliders.flatMap(({ name }, k) => (name in point
       ? [[k, Number(point[name].toPrecision(7))]] : []))),
     values: () => [...values],
     restore: (saved) => setSliders([...saved.entries()]
       .filter(([, value]) => Number.isFinite(value))),
-    hasFine: () => fine.length > 0,
-    cells(context, layer, at, colour) {
+    hasFine: () => fineCells.length > 0,
+    cells(context, layer, toPixels, colour) {
       if (!layer) return;
-      for (const { from, to, columns } of fine) {
+      for (const { from, to, columns } of fineCells) {
         const value = columns[layer.column];
         // The panel shows another point.
         if (!Number.isFinite(value)) continue;
-        const [left, low] = at(...from).map(Math.round);
-        const [right, high] = at(...to).map(Math.round);
+        const [left, low] = toPixels(...from).map(Math.round);
+        const [right, high] = toPixels(...to).map(Math.round);
         context.fillStyle = colour(layer, value);
         context.fillRect(left, high, right - left, low - high);
       }
     },
-    over(context, at) {
+    over(context, toPixels) {
       if (fineEdges) {
-        const [[left, low], [right, high]] = [0, 1].map((end) => at(...fineEdges
+        const [[left, low], [right, high]] = [0, 1].map((end) => toPixels(...fineEdges
           .map((ends) => ends[end])));
         context.beginPath();
         context.rect(left, high, right - left, low - high);
         strokeOutlined(context, [1.5, 1.5], [5, 4]);
       }
-      const [x, y] = at(...map.sliders.slice(0, 2).map((k, axis) => map.even(axis, values[k])));
+      const position = map.sliders.slice(0, 2).map((k, axis) => map.even(axis, values[k]));
+      const [x, y] = toPixels(...position);
       context.beginPath();
       for (const [dx, dy] of [[9, 0], [0, 9]]) {
         context.moveTo(x - dx, y - dy);

@@ -52,7 +52,7 @@ function createPool(module, setup, report) {
       queue.sort((a, b) => b.urgency - a.urgency || a.id - b.id);
       const task = queue.shift();
       member.task = task;
-      task.started = performance.now();
+      task.startMs = performance.now();
       const { id, call, numbers, rest } = task;
       member.worker.postMessage({ id, call, numbers, rest });
     }
@@ -81,7 +81,7 @@ function createPool(module, setup, report) {
         member.worker.terminate();
         task.reject(null);
         startWorker(member);
-      }, Math.max(0, ABORT_DELAY_MS - (performance.now() - task.started)));
+      }, Math.max(0, ABORT_DELAY_MS - (performance.now() - task.startMs)));
     }
   }
 

@@ -1,6 +1,6 @@
 "use strict";
-// A worker: the module with its setup, and one call after another. The first message has the module
-// and the setup; later ones are calls: { id, call, numbers, rest }.
+// A worker, which runs the calls of a module one after another. The first message has the module
+// and its setup; later ones are calls: { id, call, numbers, rest }.
 let module = null;
 let setup = null;
 let api = null;
@@ -14,16 +14,16 @@ async function start() {
   const instance = await WebAssembly.instantiate(module, {});
   api = instance.exports;
   write(setup);
-  if (api.setup() !== 1) throw new Error("the module does not take its setup");
+  if (api.setup() !== 1) throw new Error("the module refuses its setup");
 }
 
 async function answer({ id, call, numbers, rest = [] }) {
   try {
     if (!api) await start();
-    const started = performance.now();
+    const startMs = performance.now();
     write(numbers);
     const count = api[call](...rest);
-    const ms = performance.now() - started;
+    const ms = performance.now() - startMs;
     const result = new Float64Array(api.memory.buffer, api.output(), count).slice();
     postMessage({ id, result, ms }, [result.buffer]);
   } catch (error) {
