@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::interrupt::Interrupt;
 use crate::store::PointRows;
-use sweep_files::panics::{lock, unlocked};
+use sweep_files::panics::{into_content, lock};
 
 /// A source of rows: returns a row's number and the values of the plan's axes there.
 pub type RowSource<'a> = dyn Fn() -> Option<(u64, Vec<f64>)> + Sync + 'a;
@@ -43,7 +43,7 @@ pub fn evaluate_points(
     let results = Mutex::new(Vec::with_capacity(axis_values.len()));
     let sink = |result: PointRows| lock(&results).push(result);
     evaluator.evaluate(&source, &sink, context);
-    let mut results = unlocked(results);
+    let mut results = into_content(results);
     results.sort_by_key(|result| result.point);
     (results.len() == axis_values.len()).then_some(results)
 }

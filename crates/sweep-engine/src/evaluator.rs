@@ -10,7 +10,7 @@ use rayon::ThreadPool;
 use crate::engine::IncompleteGroups;
 use crate::store::{PointRows, TrialKey, Trials, WRITE_INTERVAL};
 use crate::{Engine, Interrupt, RunContext, StoreError, ThreadsError, threads};
-use sweep_files::panics::{lock, unlocked};
+use sweep_files::panics::{into_content, lock};
 
 /// A reason why a search stopped before its end. The responses up to then are in the cache.
 #[derive(Debug)]
@@ -74,7 +74,7 @@ impl<'a> CachedEvaluator<'a> {
 
     /// Returns the cache.
     pub fn into_cache(self) -> Option<Trials> {
-        unlocked(self.cache)
+        into_content(self.cache)
     }
 
     /// Evaluates requests, each identified by its key and covering `rows` points.

@@ -29,7 +29,7 @@ pub fn survive_file_size_limits() -> io::Result<()> {
 /// # Errors
 /// A system that does not provide random numbers.
 pub fn check_random_numbers() -> Result<(), Error> {
-    let result = panics::caught(|| drop(RandomState::new()));
+    let result = panics::catch_panic(|| drop(RandomState::new()));
     result.map_err(|panic| Error::File {
         action: "draw random numbers for",
         path: "this process".into(),

@@ -27,7 +27,7 @@ use crate::store::{
 };
 use crate::threads::{self};
 use crate::{Engine, Environment, Interrupt, Job, Progress, ProgressMode, RunContext, StoreError};
-use sweep_files::panics::{self, lock, unlocked};
+use sweep_files::panics::{self, into_content, lock};
 
 /// The interval between updates of the progress. Basis: a bar that moves smoothly. Doubling it
 /// makes the bar jerk.
@@ -226,7 +226,7 @@ impl Runner<'_> {
                 self.progress.show(start + context.points_done());
             }
         });
-        write_result.and(unlocked(collection_result))
+        write_result.and(into_content(collection_result))
     }
 }
 
@@ -292,7 +292,7 @@ impl<'a> ChunkCollector<'a> {
         let sink = |row| self.collect(row);
         let evaluate = || engine.evaluator.evaluate(&source, &sink, self.context);
         let reason = match catch_unwind(AssertUnwindSafe(evaluate)) {
-            Err(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
+            Err(panic) => format!("the engine panicked: {}", panics::panic_message(panic.as_ref())),
             Ok(()) if self.context.must_stop() => return Ok(()),
             Ok(()) => "the engine ended before it had evaluated all points".to_owned(),
         };

@@ -136,11 +136,11 @@ impl Table {
         let schema = Arc::new(Schema::new(fields));
         let batch = RecordBatch::try_new(schema.clone(), arrays).map_err(from_arrow)?;
         let rows = batch.clone();
-        let bytes = panics::in_parquet("the library gave up writing", move || {
+        let bytes = panics::catch_in_parquet("the library gave up writing", move || {
             let mut writer = Writer::new(Vec::new(), &schema, properties)?;
             writer.write(&rows)?;
             let mut file = writer.end()?;
-            file.append_key_value_metadata(seal::blank());
+            file.append_key_value_metadata(seal::blank_digest());
             file.into_inner()
         })?;
         let mut file = Cursor::new(bytes);

@@ -145,13 +145,13 @@ pub struct Batches<R> {
     file: Arc<ParquetMetaData>,
     schema: SchemaRef,
     /// The index of each column among those of a row group.
-    leaves: Vec<usize>,
+    leaf_indices: Vec<usize>,
     /// The number of decimal places of each column; `None` if it has no decimals.
-    scales: Vec<Option<i32>>,
+    decimal_places: Vec<Option<i32>>,
     /// The next row group.
-    group: usize,
+    next_group: usize,
     /// The number of rows that are still to be read of the current row group.
-    left: usize,
+    remaining_rows: usize,
     columns: Vec<ColumnReader>,
 }
 
@@ -175,23 +175,24 @@ impl<R: ChunkReader + 'static> Batches<R> {
             return Err(ParquetError::General(reason));
         }
         let schema_descriptor = file.file_metadata().schema_descr();
-        let mut leaves = vec![0; schema_descriptor.root_schema().get_fields().len()];
+        let mut leaf_indices = vec![0; schema_descriptor.root_schema().get_fields().len()];
         (0..schema_descriptor.num_columns())
-            .for_each(|leaf| leaves[schema_descriptor.get_column_root_idx(leaf)] = leaf);
-        let leaves: Vec<usize> = fields.into_iter().map(|field| leaves[field]).collect();
+            .for_each(|leaf| leaf_indices[schema_descriptor.get_column_root_idx(leaf)] = leaf);
+        let leaf_indices: Vec<usize> =
+            fields.into_iter().map(|field| leaf_indices[field]).collect();
         let scale = |leaf: &usize| {
             let column = schema_descriptor.column(*leaf);
             (column.converted_type() == ConvertedType::DECIMAL).then(|| column.type_scale())
         };
-        let scales = leaves.iter().map(scale).collect();
+        let decimal_places = leaf_indices.iter().map(scale).collect();
         Ok(Self {
             source: Arc::new(source),
             file,
             schema,
-            leaves,
-            scales,
-            group: 0,
-            left: 0,
+            leaf_indices,
+            decimal_places,
+            next_group: 0,
+            remaining_rows: 0,
             columns: Vec::new(),
         })
     }
@@ -201,26 +202,32 @@ impl<R: ChunkReader + 'static> Batches<R> {
     /// # Errors
     /// Fails if the file is damaged.
     pub fn batch(&mut self) -> Result<Option<RecordBatch>, ParquetError> {
-        while self.left == 0 {
-            let Some(group) = self.file.row_groups().get(self.group) else { return Ok(None) };
-            self.group += 1;
-            self.left = usize::try_from(group.num_rows())?;
-            // The pages of the last row group go before others come.
+        while self.remaining_rows == 0 {
+            let Some(group) = self.file.row_groups().get(self.next_group) else { return Ok(None) };
+            self.next_group += 1;
+            self.remaining_rows = usize::try_from(group.num_rows())?;
+            // The pages of the last row group are freed before others are read.
             self.columns.clear();
-            let byte_budget = pages::budget();
+            let byte_budget = pages::new_budget();
             let open_column = |leaf: &usize| {
-                pages::open(&self.source, group.column(*leaf), self.left, &byte_budget)
+                pages::open_pages(
+                    &self.source,
+                    group.column(*leaf),
+                    self.remaining_rows,
+                    &byte_budget,
+                )
             };
             self.columns =
-                self.leaves.iter().map(open_column).collect::<Result<_, ParquetError>>()?;
+                self.leaf_indices.iter().map(open_column).collect::<Result<_, ParquetError>>()?;
         }
-        let rows = self.left.min(BATCH_ROWS);
-        self.left -= rows;
+        let rows = self.remaining_rows.min(BATCH_ROWS);
+        self.remaining_rows -= rows;
         let columns = self.columns.iter_mut().zip(self.schema.fields());
-        let arrays = columns.zip(&self.scales).map(|((column, field), scale)| match scale {
-            Some(scale) => read_decimals(column, *scale, rows),
-            None => read_array(column, field.data_type(), rows),
-        });
+        let arrays =
+            columns.zip(&self.decimal_places).map(|((column, field), scale)| match scale {
+                Some(scale) => read_decimals(column, *scale, rows),
+                None => read_array(column, field.data_type(), rows),
+            });
         let arrays = arrays.collect::<Result<Vec<_>, _>>()?;
         // The number of rows is given because there may be no column.
         let count = RecordBatchOptions::new().with_row_count(Some(rows));
@@ -243,20 +250,24 @@ fn read_array(
     let is_unsigned = *data_type == DataType::UInt64;
     match column {
         Reader::BoolColumnReader(column) => {
-            Ok(Arc::new(cells(read_values(column, rows)?).collect::<BooleanArray>()))
+            Ok(Arc::new(cells_by_level(read_values(column, rows)?).collect::<BooleanArray>()))
         }
         Reader::Int32ColumnReader(column) if is_unsigned => {
-            numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned().into())
+            read_numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned().into())
         }
-        Reader::Int32ColumnReader(column) => numbers::<_, Int64Type>(column, rows, i64::from),
+        Reader::Int32ColumnReader(column) => read_numbers::<_, Int64Type>(column, rows, i64::from),
         Reader::Int64ColumnReader(column) if is_unsigned => {
-            numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned())
+            read_numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned())
         }
         Reader::Int64ColumnReader(column) => read_integers(column, data_type, rows),
-        Reader::FloatColumnReader(column) => numbers::<_, Float64Type>(column, rows, f64::from),
-        Reader::DoubleColumnReader(column) => numbers::<_, Float64Type>(column, rows, |cell| cell),
+        Reader::FloatColumnReader(column) => {
+            read_numbers::<_, Float64Type>(column, rows, f64::from)
+        }
+        Reader::DoubleColumnReader(column) => {
+            read_numbers::<_, Float64Type>(column, rows, |cell| cell)
+        }
         Reader::ByteArrayColumnReader(column) => read_words(column, rows),
-        _ => unreachable!("`data_type` takes no others"),
+        _ => unreachable!("`data_type` has no other types"),
     }
 }
 
@@ -277,7 +288,7 @@ fn read_values<T: Physical>(
 }
 
 /// Returns the value of each row, if it has one.
-fn cells<T>((levels, values): (Vec<i16>, Vec<T>)) -> impl Iterator<Item = Option<T>> {
+fn cells_by_level<T>((levels, values): (Vec<i16>, Vec<T>)) -> impl Iterator<Item = Option<T>> {
     let mut values = values.into_iter();
     levels.into_iter().map(move |level| if level == 1 { values.next() } else { None })
 }
@@ -290,7 +301,7 @@ fn read_integers(
 ) -> Result<ArrayRef, ParquetError> {
     macro_rules! read_as {
         ($type:ty) => {
-            numbers::<_, $type>(column, rows, |cell| cell)
+            read_numbers::<_, $type>(column, rows, |cell| cell)
         };
     }
     match data_type {
@@ -303,7 +314,7 @@ fn read_integers(
     }
 }
 
-fn numbers<T: Physical, A: ArrowPrimitiveType>(
+fn read_numbers<T: Physical, A: ArrowPrimitiveType>(
     column: &mut ColumnReaderImpl<T>,
     rows: usize,
     typed: impl Fn(T::T) -> A::Native,
@@ -313,7 +324,7 @@ fn numbers<T: Physical, A: ArrowPrimitiveType>(
     Ok(Arc::new(if values.len() == rows {
         PrimitiveArray::<A>::new(values.into(), None)
     } else {
-        cells((levels, values)).collect()
+        cells_by_level((levels, values)).collect()
     }))
 }
 
@@ -331,13 +342,13 @@ fn read_decimals(
     let size = 10_f64.powi(scale);
     match column {
         ColumnReader::Int32ColumnReader(column) => {
-            numbers::<_, Float64Type>(column, rows, |cell| f64::from(cell) / size)
+            read_numbers::<_, Float64Type>(column, rows, |cell| f64::from(cell) / size)
         }
         ColumnReader::Int64ColumnReader(column) => {
-            numbers::<_, Float64Type>(column, rows, |cell| cell as f64 / size)
+            read_numbers::<_, Float64Type>(column, rows, |cell| cell as f64 / size)
         }
         ColumnReader::FixedLenByteArrayColumnReader(column) => {
-            numbers::<_, Float64Type>(column, rows, |cell| {
+            read_numbers::<_, Float64Type>(column, rows, |cell| {
                 big_endian_integer(cell.data()) as f64 / size
             })
         }
@@ -365,7 +376,7 @@ fn read_words(
     while keys.len() < rows {
         // Neighbouring rows mostly have the same word: `last_word` spares the look-up.
         let mut last_word = (("".as_ptr(), usize::MAX), 0);
-        for word in cells(read_values(column, WORDS_AT_ONCE.min(rows - keys.len()))?) {
+        for word in cells_by_level(read_values(column, WORDS_AT_ONCE.min(rows - keys.len()))?) {
             let Some(word) = word else {
                 keys.push(None);
                 continue;

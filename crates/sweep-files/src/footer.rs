@@ -94,7 +94,7 @@ pub fn metadata<R: ChunkReader>(file: &R) -> Result<ParquetMetaData, ParquetErro
 }
 
 /// Returns the error for a file that is refused.
-pub(crate) fn refused(reason: impl Into<String>) -> ParquetError {
+pub(crate) fn refusal_error(reason: impl Into<String>) -> ParquetError {
     ParquetError::General(reason.into())
 }
 
@@ -118,41 +118,41 @@ impl<R: ChunkReader> ChunkReader for Footer<'_, R> {
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
         if length > MAX_FOOTER_BYTES {
             let max_mebibytes = MAX_FOOTER_BYTES >> 20;
-            return Err(refused(format!("its footer is longer than {max_mebibytes} MiB")));
+            return Err(refusal_error(format!("its footer is longer than {max_mebibytes} MiB")));
         }
         let footer = self.0.get_bytes(start, length)?;
-        check(&footer)?;
+        check_footer(&footer)?;
         Ok(footer)
     }
 }
 
-fn check(footer: &[u8]) -> Result<(), ParquetError> {
+fn check_footer(footer: &[u8]) -> Result<(), ParquetError> {
     let mut tree = Tree::default();
     let mut name = 0;
-    let mut children = 0;
+    let mut child_count = 0;
     let rest = thrift::walk(footer, FILE, &mut |path, found| match (path, found) {
         (NAME, Found::Number(length)) => name = u64::try_from(length).unwrap_or(0),
-        (CHILDREN, Found::Number(number)) => children = u64::try_from(number).unwrap_or(0),
+        (CHILDREN, Found::Number(number)) => child_count = u64::try_from(number).unwrap_or(0),
         (ELEMENT, Found::End) => {
-            tree.add(name, children);
+            tree.add(name, child_count);
             name = 0;
-            children = 0;
+            child_count = 0;
         }
         _ => {}
     });
     // The library allocates as many columns as a group declares.
-    if rest.is_none() || tree.declared >= tree.elements.max(1) {
-        return Err(refused("its footer makes no sense"));
+    if rest.is_none() || tree.declared_count >= tree.element_count.max(1) {
+        return Err(refusal_error("its footer makes no sense"));
     }
-    if tree.elements > MAX_COLUMNS {
-        return Err(refused(format!("it has more than {MAX_COLUMNS} columns")));
+    if tree.element_count > MAX_COLUMNS {
+        return Err(refusal_error(format!("it has more than {MAX_COLUMNS} columns")));
     }
     if tree.depth > MAX_DEPTH {
-        return Err(refused(format!("its columns are nested more than {MAX_DEPTH} deep")));
+        return Err(refusal_error(format!("its columns are nested more than {MAX_DEPTH} deep")));
     }
     if tree.path_bytes > MAX_PATH_BYTES {
         let max_mebibytes = MAX_PATH_BYTES >> 20;
-        return Err(refused(format!(
+        return Err(refusal_error(format!(
             "the paths of its columns are longer than {max_mebibytes} MiB"
         )));
     }
@@ -163,9 +163,9 @@ fn check(footer: &[u8]) -> Result<(), ParquetError> {
 #[derive(Default)]
 struct Tree {
     /// The number of columns and groups.
-    elements: u64,
+    element_count: u64,
     /// The number of children that all groups declare.
-    declared: u64,
+    declared_count: u64,
     /// The number of children that are still to come, and the length of the path, for each open
     /// group.
     open: Vec<(u64, u64)>,
@@ -177,17 +177,17 @@ struct Tree {
 
 impl Tree {
     /// Adds the next column or group, with the length of its name and the number of its children.
-    fn add(&mut self, name: u64, children: u64) {
-        self.elements += 1;
-        self.declared = self.declared.saturating_add(children);
+    fn add(&mut self, name: u64, child_count: u64) {
+        self.element_count += 1;
+        self.declared_count = self.declared_count.saturating_add(child_count);
         while self.open.pop_if(|(left, _)| *left == 0).is_some() {}
         let mut path = name;
         if let Some((left, parent)) = self.open.last_mut() {
             *left -= 1;
             path += *parent;
         }
-        if children > 0 {
-            self.open.push((children, path));
+        if child_count > 0 {
+            self.open.push((child_count, path));
             self.depth = self.depth.max(self.open.len());
         } else {
             self.path_bytes = self.path_bytes.saturating_add(path);
@@ -212,25 +212,25 @@ mod tests {
     /// The mark at either end of a file.
     const MARK: &[u8] = b"PAR1";
 
-    /// Encodes a column, or a group if `children` is not zero.
-    fn element(children: u64) -> Vec<u8> {
-        match children {
+    /// Encodes a column, or a group if `child_count` is not zero.
+    fn element(child_count: u64) -> Vec<u8> {
+        match child_count {
             0 => vec![0x15, 10, 0x25, 0, 0x18, 1, b'x', 0],
-            _ => group(1, children),
+            _ => group(1, child_count),
         }
     }
 
     /// Encodes a group with a name of this length.
-    fn group(name: usize, children: u64) -> Vec<u8> {
+    fn group(name: usize, child_count: u64) -> Vec<u8> {
         let length = varint(name as u64);
-        let children = varint(2 * children);
-        [&[0x35, 0, 0x18], &length[..], &vec![b'g'; name], &[0x15], &children, &[0]].concat()
+        let child_count = varint(2 * child_count);
+        [&[0x35, 0, 0x18], &length[..], &vec![b'g'; name], &[0x15], &child_count, &[0]].concat()
     }
 
     /// Encodes a file without rows that has these groups and columns, given by their numbers of
     /// children, and `more` fields at the footer's end.
-    fn file(children: impl IntoIterator<Item = u64>, more: &[u8]) -> Vec<u8> {
-        file_from(children.into_iter().map(element).collect(), more)
+    fn file(child_counts: impl IntoIterator<Item = u64>, more: &[u8]) -> Vec<u8> {
+        file_from(child_counts.into_iter().map(element).collect(), more)
     }
 
     /// Encodes a file like [`file`] from its encoded groups and columns.

@@ -103,8 +103,8 @@ pub fn check_replaceable(path: &Path, kind: FileKind<'_>) -> Result<(), FileErro
             "give the name of the file that the link leads to, or remove the link",
         );
     }
-    if let Some(what) = regular::what(metadata.file_type()) {
-        return refuse(&format!("it is {what}, not a regular file"), NAME_A_FILE);
+    if let Some(description) = regular::describe_file_type(metadata.file_type()) {
+        return refuse(&format!("it is {description}, not a regular file"), NAME_A_FILE);
     }
     if metadata.len() == 0 {
         return Ok(());
@@ -185,7 +185,7 @@ mod tests {
             let value = "{}".to_owned();
             writer.append_key_value_metadata(KeyValue::new((*key).to_owned(), value));
         }
-        writer.append_key_value_metadata(seal::blank());
+        writer.append_key_value_metadata(seal::blank_digest());
         let mut file = Cursor::new(writer.into_inner().unwrap());
         seal::seal(&mut file).unwrap();
         file.into_inner()

@@ -17,7 +17,7 @@ use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::file::serialized_reader::SerializedPageReader;
 
-use crate::footer::{STATISTICS, refused};
+use crate::footer::{STATISTICS, refusal_error};
 use crate::panics::lock;
 use crate::thrift::{self, Found, Shape, Wire};
 use Wire::{Bool, Number, Struct};
@@ -52,7 +52,7 @@ const PAGE_HEADER: Shape = &[
 pub(crate) type Budget = Arc<AtomicU64>;
 
 /// Returns the budget of a row group.
-pub(crate) fn budget() -> Budget {
+pub(crate) fn new_budget() -> Budget {
     Arc::new(AtomicU64::new(MAX_UNPACKED_BYTES))
 }
 
@@ -60,7 +60,7 @@ pub(crate) fn budget() -> Budget {
 ///
 /// # Errors
 /// Fails if the column lies outside the file, or its compression is not supported.
-pub(crate) fn open<R: ChunkReader + 'static>(
+pub(crate) fn open_pages<R: ChunkReader + 'static>(
     file: &Arc<R>,
     column: &ColumnChunkMetaData,
     rows: usize,
@@ -71,7 +71,7 @@ pub(crate) fn open<R: ChunkReader + 'static>(
     let length = u64::try_from(column.compressed_size()).ok();
     let column_end = start.zip(length).and_then(|(start, length)| start.checked_add(length));
     let column_end = column_end.filter(|column_end| *column_end <= file.len());
-    let column_end = column_end.ok_or_else(|| refused("a column lies outside of it"))?;
+    let column_end = column_end.ok_or_else(|| refusal_error("a column lies outside of it"))?;
     let headers = PageHeaders {
         file: Arc::clone(file),
         end: column_end,
@@ -112,8 +112,8 @@ impl<R: ChunkReader> ChunkReader for PageHeaders<R> {
     /// Returns the page header at `start`, and nothing behind it: the library reads no more here.
     fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
         let remaining_bytes = self.end.saturating_sub(start);
-        for most in HEADER_BYTES {
-            let bytes = self.file.get_bytes(start, remaining_bytes.min(most) as usize)?;
+        for max_bytes in HEADER_BYTES {
+            let bytes = self.file.get_bytes(start, remaining_bytes.min(max_bytes) as usize)?;
             if let Some((header, rest)) = Header::read(&bytes) {
                 let length = bytes.len() - rest.len();
                 self.check(&header, start + length as u64)?;
@@ -150,7 +150,7 @@ impl<R: ChunkReader> PageHeaders<R> {
         }
         let is_bytes = matches!(self.kind, Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY);
         if is_bytes && header.encodings.iter().any(|it| COUNTED_ENCODINGS.contains(it)) {
-            return Err(refused(
+            return Err(refusal_error(
                 "a column is encoded by DELTA_LENGTH_BYTE_ARRAY or DELTA_BYTE_ARRAY, which this \
                  program does not read: write it with a dictionary or PLAIN",
             ));
@@ -165,10 +165,10 @@ impl<R: ChunkReader> PageHeaders<R> {
         let additional_bytes = bytes.saturating_sub(*counted_bytes);
         *counted_bytes += additional_bytes;
         self.budget
-            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
-                left.checked_sub(additional_bytes)
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |remaining_budget| {
+                remaining_budget.checked_sub(additional_bytes)
             })
-            .map_err(|_| too_long())?;
+            .map_err(|_| too_long_error())?;
         if matches!(self.codec, Compression::GZIP(_)) && !header.is_plain {
             let levels = size(header.levels[0])? + size(header.levels[1])?;
             let length = packed.checked_sub(levels).ok_or_else(invalid_header_error)?;
@@ -182,21 +182,21 @@ impl<R: ChunkReader> PageHeaders<R> {
 }
 
 fn invalid_header_error() -> ParquetError {
-    refused("the header of a page makes no sense")
+    refusal_error("the header of a page makes no sense")
 }
 
-fn too_long() -> ParquetError {
+fn too_long_error() -> ParquetError {
     let [max_mebibytes, max_word_mebibytes] =
         [1, BYTES_PER_WORD_BYTE].map(|weight| (MAX_UNPACKED_BYTES / weight) >> 20);
     let limits = format!("{max_mebibytes} MiB at once, or into {max_word_mebibytes} MiB of words");
-    refused(format!("its pages unpack into more than {limits}"))
+    refusal_error(format!("its pages unpack into more than {limits}"))
 }
 
-/// Whether gzip unpacks into more than `most` bytes. The library unpacks gzip, and no other codec,
-/// to its end, even beyond the size in the header; it reports bytes that are not gzip.
-fn unpacks_beyond(packed: &[u8], most: u64) -> bool {
-    let mut decoder = MultiGzDecoder::new(packed).take(most + 1);
-    io::copy(&mut decoder, &mut io::sink()).is_ok_and(|found| found > most)
+/// Whether gzip unpacks into more than `max_bytes` bytes. The library unpacks gzip, and no other
+/// codec, to its end, even beyond the size in the header; it reports bytes that are not gzip.
+fn unpacks_beyond(packed: &[u8], max_bytes: u64) -> bool {
+    let mut decoder = MultiGzDecoder::new(packed).take(max_bytes + 1);
+    io::copy(&mut decoder, &mut io::sink()).is_ok_and(|unpacked_bytes| unpacked_bytes > max_bytes)
 }
 
 /// The encodings of words and decimals whose data begin with a count, for which the library
@@ -223,8 +223,8 @@ impl Header {
     /// Parses the header at the beginning of `bytes`, and returns it with the bytes behind it.
     fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let mut header = Self::default();
-        let rest = thrift::walk(bytes, PAGE_HEADER, &mut |path, found| {
-            let Found::Number(number) = found else { return };
+        let rest = thrift::walk(bytes, PAGE_HEADER, &mut |path, value| {
+            let Found::Number(number) = value else { return };
             // The library truncates numbers to this type too.
             let number = number as i32;
             match path {
@@ -277,7 +277,7 @@ mod tests {
     fn bytes_by_encoding(chunk: &[u8], codec: Compression, kind: Type) -> Result<u64, String> {
         // Other bytes stand before and behind the column chunk.
         let file = Arc::new(Bytes::from([&[9; 5], chunk, &[9; 500]].concat()));
-        let budget = budget();
+        let budget = new_budget();
         let headers = PageHeaders {
             file,
             end: 5 + chunk.len() as u64,
@@ -327,14 +327,17 @@ mod tests {
         let fits = |kind, entries| {
             bytes_by_encoding(&dictionary(80, entries), Compression::UNCOMPRESSED, kind).is_ok()
         };
-        for (kind, most) in [
+        for (kind, max_bytes) in [
             (Type::INT32, 20),
             (Type::INT64, 10),
             (Type::DOUBLE, 10),
             (Type::BYTE_ARRAY, 20),
             (Type::FIXED_LEN_BYTE_ARRAY, 40),
         ] {
-            assert!(fits(kind, most) && !fits(kind, most + 1) && !fits(kind, i32::MAX), "{kind}");
+            assert!(
+                fits(kind, max_bytes) && !fits(kind, max_bytes + 1) && !fits(kind, i32::MAX),
+                "{kind}"
+            );
         }
     }
 

@@ -75,7 +75,7 @@ impl ParquetFile {
     ///
     /// # Errors
     /// Returns the errors of [`ParquetFile::open`].
-    pub fn look(path: &Path) -> Result<Self, FileError> {
+    pub fn open_unchecked(path: &Path) -> Result<Self, FileError> {
         let open = || regular::open(path).map_err(FileError::io("open", path));
         let parsed = Self::parse(path, open()?, Seal::Absent);
         let is_damaged = matches!(parsed, Err(FileError::NotParquet { .. }))
@@ -185,7 +185,7 @@ impl ParquetFile {
 
 /// Calls the library, and turns a panic into an error.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
-    panics::in_parquet("it makes no sense inside", work)
+    panics::catch_in_parquet("it makes no sense inside", work)
 }
 
 /// Returns a function that makes a file's error from one of the library: [`FileError::Io`] if the
@@ -239,7 +239,7 @@ mod tests {
         let mut writer = Writer::new(Vec::new(), &batch.schema(), properties).unwrap();
         writer.write(&batch).unwrap();
         let mut writer = writer.end().unwrap();
-        writer.append_key_value_metadata(seal::blank());
+        writer.append_key_value_metadata(seal::blank_digest());
         writer.into_inner().unwrap()
     }
 

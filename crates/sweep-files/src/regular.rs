@@ -99,7 +99,7 @@ pub fn if_there<T>(result: io::Result<T>) -> io::Result<Option<T>> {
 
 /// Greatest number of bytes of a plan or of a sidecar. Basis: ours have kilobytes, and 16 MiB of
 /// JSON may take half a GB. Twice as many may take 1 GB.
-pub const LONGEST_JSON_BYTES: u64 = 16 << 20;
+pub const MAX_JSON_BYTES: u64 = 16 << 20;
 
 /// Reads the text of a JSON file. A file that is too long to be ours is cut off, so that it no
 /// longer parses.
@@ -108,7 +108,7 @@ pub const LONGEST_JSON_BYTES: u64 = 16 << 20;
 /// An error of the system, or an error with the type of a file that is not regular.
 pub fn read_json(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    open(path)?.take(LONGEST_JSON_BYTES).read_to_end(&mut bytes)?;
+    open(path)?.take(MAX_JSON_BYTES).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -133,7 +133,7 @@ pub fn open_or_create(path: &Path) -> io::Result<File> {
 }
 
 fn expect_regular(file_type: FileType) -> io::Result<()> {
-    match what(file_type) {
+    match describe_file_type(file_type) {
         None => Ok(()),
         Some(what) => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
@@ -143,7 +143,7 @@ fn expect_regular(file_type: FileType) -> io::Result<()> {
 }
 
 /// Names the type of a file; `None` for a regular one.
-pub(crate) fn what(file_type: FileType) -> Option<&'static str> {
+pub(crate) fn describe_file_type(file_type: FileType) -> Option<&'static str> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::FileTypeExt as _;
@@ -298,6 +298,6 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("plan.json");
         File::create(&path).unwrap().set_len(1 << 40).unwrap();
-        assert_eq!(read_json(&path).unwrap().len() as u64, LONGEST_JSON_BYTES);
+        assert_eq!(read_json(&path).unwrap().len() as u64, MAX_JSON_BYTES);
     }
 }

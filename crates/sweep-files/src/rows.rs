@@ -125,7 +125,7 @@ impl ResultTable {
 
     /// Returns the names of the columns that identify a row: the point's index, the axes, and in
     /// results other than maps the further columns that number their rows.
-    pub fn places(&self) -> Vec<&str> {
+    pub fn key_columns(&self) -> Vec<&str> {
         let further_keys = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
         let mut names: Vec<&str> = ["point"].into_iter().chain(self.axes()).collect();
         names.extend(
@@ -148,14 +148,14 @@ impl ParquetFile {
     ) -> Result<impl Iterator<Item = Result<Rows, FileError>> + use<'_>, FileError> {
         let all_columns = columns(self.schema());
         let find_by_name = |name: &&str| all_columns.iter().find(|column| column.name == **name);
-        let chosen_columns: Vec<Option<&Column>> = names.iter().map(find_by_name).collect();
+        let requested_columns: Vec<Option<&Column>> = names.iter().map(find_by_name).collect();
         // A column that is named twice is decoded once.
         let fields: BTreeMap<usize, CellKind> =
-            chosen_columns.iter().flatten().map(|column| (column.field, column.kind)).collect();
+            requested_columns.iter().flatten().map(|column| (column.field, column.kind)).collect();
         let position_in_batch =
             |column: &Column| fields.keys().position(|field| *field == column.field);
         let positions_in_batch: Vec<Option<usize>> =
-            chosen_columns.iter().map(|column| position_in_batch((*column)?)).collect();
+            requested_columns.iter().map(|column| position_in_batch((*column)?)).collect();
         let batches = self.batches(fields.keys().copied().collect())?;
         let mut first_row = 0;
         Ok(batches.map(move |batch| {
@@ -167,7 +167,7 @@ impl ParquetFile {
             let rows = Rows {
                 first: first_row,
                 count: batch.num_rows(),
-                places: positions_in_batch.clone(),
+                positions: positions_in_batch.clone(),
                 columns,
             };
             first_row += rows.count as u64;
@@ -187,7 +187,7 @@ impl ParquetFile {
     ) -> Result<(), E> {
         for rows in self.read(names)? {
             let rows = rows?;
-            (0..rows.count).try_for_each(|at| take(rows.row(at)))?;
+            (0..rows.count).try_for_each(|row_index| take(rows.row(row_index)))?;
         }
         Ok(())
     }
@@ -201,7 +201,7 @@ pub struct Rows {
     /// The number of rows.
     pub count: usize,
     /// The index in `columns` of each requested column, if the file has it.
-    places: Vec<Option<usize>>,
+    positions: Vec<Option<usize>>,
     columns: Vec<Cells>,
 }
 
@@ -213,13 +213,13 @@ impl Rows {
     pub fn from_batch(batch: &RecordBatch, columns: &[Column]) -> Result<Self, ArrowError> {
         let decoded = |column: &Column| decode(batch.column(column.field), column.kind);
         let columns = columns.iter().map(decoded).collect::<Result<Vec<_>, _>>()?;
-        let places = (0..columns.len()).map(Some).collect();
-        Ok(Self { first: 0, count: batch.num_rows(), places, columns })
+        let positions = (0..columns.len()).map(Some).collect();
+        Ok(Self { first: 0, count: batch.num_rows(), positions, columns })
     }
 
     /// Returns a row.
-    pub const fn row(&self, at: usize) -> Row<'_> {
-        Row { rows: self, at }
+    pub const fn row(&self, row_index: usize) -> Row<'_> {
+        Row { rows: self, row_index }
     }
 }
 
@@ -227,26 +227,26 @@ impl Rows {
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
     rows: &'a Rows,
-    at: usize,
+    row_index: usize,
 }
 
 impl<'a> Row<'a> {
     /// Returns the row's index in the file, from 0.
     pub const fn index(self) -> u64 {
-        self.rows.first + self.at as u64
+        self.rows.first + self.row_index as u64
     }
 
     #[inline]
     fn cells(self, column: usize) -> Option<&'a Cells> {
-        self.rows.places[column].map(|place| &self.rows.columns[place])
+        self.rows.positions[column].map(|position| &self.rows.columns[position])
     }
 
     /// Returns the cell of a column.
     pub fn cell(self, column: usize) -> Cell {
         match self.cells(column) {
-            Some(Cells::Numbers(cells)) if cells[self.at].is_nan() => Cell::Null,
-            Some(Cells::Numbers(cells)) => Cell::Number(cells[self.at]),
-            Some(Cells::Flags(cells)) => cells[self.at].map_or(Cell::Null, Cell::Flag),
+            Some(Cells::Numbers(cells)) if cells[self.row_index].is_nan() => Cell::Null,
+            Some(Cells::Numbers(cells)) => Cell::Number(cells[self.row_index]),
+            Some(Cells::Flags(cells)) => cells[self.row_index].map_or(Cell::Null, Cell::Flag),
             _ => self.word(column).map_or(Cell::Null, |word| Cell::Text(word.to_owned())),
         }
     }
@@ -255,18 +255,22 @@ impl<'a> Row<'a> {
     #[inline]
     pub fn value(self, column: usize) -> f64 {
         let Some(Cells::Numbers(cells)) = self.cells(column) else { return f64::NAN };
-        cells[self.at]
+        cells[self.row_index]
     }
 
     /// Returns the word in a column; a truth value is a word too.
     #[inline]
     pub fn word(self, column: usize) -> Option<&'a str> {
         match self.cells(column)? {
-            Cells::Words(places, words) => {
-                let word_index = places.is_valid(self.at).then(|| places.value(self.at))?;
+            Cells::Words(word_indices, words) => {
+                let word_index = word_indices
+                    .is_valid(self.row_index)
+                    .then(|| word_indices.value(self.row_index))?;
                 Some(words.value(word_index as usize))
             }
-            Cells::Flags(cells) => cells[self.at].map(|flag| if flag { "true" } else { "false" }),
+            Cells::Flags(cells) => {
+                cells[self.row_index].map(|flag| if flag { "true" } else { "false" })
+            }
             Cells::Numbers(_) => None,
         }
     }

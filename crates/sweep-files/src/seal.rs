@@ -32,7 +32,7 @@ pub(crate) enum Seal {
 }
 
 /// Returns the metadata's last entry with a placeholder, which [`seal`] overwrites.
-pub fn blank() -> KeyValue {
+pub fn blank_digest() -> KeyValue {
     KeyValue::new(key::DIGEST.to_owned(), String::from_utf8_lossy(&BLANK).into_owned())
 }
 
@@ -43,7 +43,7 @@ pub fn blank() -> KeyValue {
 pub fn seal(file: &mut (impl Read + Write + Seek)) -> io::Result<()> {
     let digest_offset = find_digest_offset(file)?
         .ok_or_else(|| io::Error::other("it has no place for its digest"))?;
-    let digest = digest(file, digest_offset)?;
+    let digest = compute_digest(file, digest_offset)?;
     file.seek(SeekFrom::Start(digest_offset))?;
     file.write_all(digest.as_bytes())?;
     file.flush()
@@ -55,7 +55,7 @@ pub(crate) fn check(file: &mut (impl Read + Seek)) -> io::Result<Seal> {
     let mut found_digest = BLANK;
     file.seek(SeekFrom::Start(digest_offset))?;
     file.read_exact(&mut found_digest)?;
-    Ok(if digest(file, digest_offset)?.as_bytes() == found_digest {
+    Ok(if compute_digest(file, digest_offset)?.as_bytes() == found_digest {
         Seal::Whole
     } else {
         Seal::Broken
@@ -73,19 +73,19 @@ fn find_digest_offset(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> 
     let mut key_bytes = key::DIGEST.as_bytes().to_vec();
     key_bytes.extend_from_slice(&[0x18, DIGITS as u8]);
     let key_offset = tail.windows(key_bytes.len()).rposition(|window| window == key_bytes);
-    let find_digest_offset = key_offset
+    let digest_offset = key_offset
         .map(|key_offset| key_offset + key_bytes.len())
-        .filter(|find_digest_offset| find_digest_offset + DIGITS <= tail.len());
-    Ok(find_digest_offset.map(|find_digest_offset| start + find_digest_offset as u64))
+        .filter(|digest_offset| digest_offset + DIGITS <= tail.len());
+    Ok(digest_offset.map(|digest_offset| start + digest_offset as u64))
 }
 
-/// Computes the digest of a file whose digest begins at `find_digest_offset`.
-fn digest(file: &mut (impl Read + Seek), find_digest_offset: u64) -> io::Result<String> {
+/// Computes the digest of a file whose digest begins at `digest_offset`.
+fn compute_digest(file: &mut (impl Read + Seek), digest_offset: u64) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     file.seek(SeekFrom::Start(0))?;
-    hasher.update_reader(file.by_ref().take(find_digest_offset))?;
+    hasher.update_reader(file.by_ref().take(digest_offset))?;
     hasher.update(&BLANK);
-    file.seek(SeekFrom::Start(find_digest_offset + DIGITS as u64))?;
+    file.seek(SeekFrom::Start(digest_offset + DIGITS as u64))?;
     hasher.update_reader(file)?;
     Ok(hasher.finalize().to_hex().to_string())
 }

@@ -38,7 +38,7 @@ impl<W: Write + Send> Writer<W> {
         schema: &Schema,
         properties: WriterProperties,
     ) -> Result<Self, ParquetError> {
-        let fields = schema.fields().iter().map(|field| Ok(declared(field)?.into()));
+        let fields = schema.fields().iter().map(|field| Ok(declare_type(field)?.into()));
         let fields = fields.collect::<Result<_, ParquetError>>()?;
         let root = Declared::group_type_builder("arrow_schema").with_fields(fields).build()?;
         let group_rows = properties.max_row_group_row_count().unwrap_or(usize::MAX);
@@ -117,7 +117,7 @@ fn column_metadata(schema: &Schema) -> KeyValue {
     KeyValue::new(key::COLUMNS.to_owned(), columns.to_string())
 }
 
-fn declared(field: &Field) -> Result<Declared, ParquetError> {
+fn declare_type(field: &Field) -> Result<Declared, ParquetError> {
     let (physical, logical) = match field.data_type() {
         DataType::Boolean => (Type::BOOLEAN, None),
         DataType::UInt64 => (Type::INT64, Some(LogicalType::integer(64, false))),
@@ -163,11 +163,11 @@ fn write(column: &mut ColumnWriter<'_>, arrays: &[&dyn Array]) -> Result<usize, 
         }
         ColumnWriter::ByteArrayColumnWriter(column) => {
             let mut cells: Vec<ByteArray> = Vec::new();
-            for coded in arrays.iter().map(|array| array.as_dictionary::<Int32Type>()) {
-                let words = coded.values().as_string::<i32>().iter();
+            for dictionary_array in arrays.iter().map(|array| array.as_dictionary::<Int32Type>()) {
+                let words = dictionary_array.values().as_string::<i32>().iter();
                 let words: Vec<ByteArray> =
                     words.map(|word| word.unwrap_or_default().into()).collect();
-                let keys = coded.keys().iter().flatten();
+                let keys = dictionary_array.keys().iter().flatten();
                 cells.extend(keys.map(|key| words[key as usize].clone()));
             }
             column.write_batch(&cells, levels, None)

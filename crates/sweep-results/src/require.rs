@@ -81,7 +81,7 @@ pub fn check(
     let order_column = condition.columns.iter().enumerate().find_map(ordered_column);
     let mut offenders = WorstRows::new(order_column.map(|(_, direction)| direction), max_offenders);
     let mut truth_of_file = None;
-    let key_columns = table.places();
+    let key_columns = table.key_columns();
     let names = [&condition.column_names()[..], &key_columns].concat();
     for_each_row(table, &names, filter, |context| {
         condition_check.rows += 1;

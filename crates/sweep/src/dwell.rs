@@ -302,7 +302,7 @@ mod tests {
     use super::*;
     use crate::stability::HeldPlan;
     use sweep_engine::{Interrupt, RowLookup};
-    use sweep_files::panics::{lock, unlocked};
+    use sweep_files::panics::{into_content, lock};
 
     #[test]
     fn a_carried_motion_starts_from_a_known_row() {
@@ -329,7 +329,7 @@ mod tests {
                 &|row| lock(&finished).push(row),
                 &RunContext::with_known_rows(&interrupt, known),
             );
-            let mut finished = unlocked(finished);
+            let mut finished = into_content(finished);
             finished.sort_by_key(|row: &PointRows| row.point);
             finished
         };

@@ -214,7 +214,7 @@ fn shown_columns(args: &ShowArgs, file: &ResultTable, filter: Option<&Condition>
     if !args.columns.is_empty() {
         return args.columns.clone();
     }
-    let key_columns = file.places();
+    let key_columns = file.key_columns();
     let verdict_names =
         ["ratio_max", "ratio_max_channel", "reliable", "min_gap_nonlinear_m", "status"];
     let order_columns = args.by.iter().map(String::as_str);

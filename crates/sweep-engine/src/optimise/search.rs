@@ -9,7 +9,7 @@ use super::{Candidate, Study, evolve};
 use crate::evaluator::{CachedEvaluator, RequestValues, SearchStop};
 use crate::store::{Layout, PointRows, ResultRows, RowCells, TrialKey, Trials};
 use crate::{Error, Execution, Model, Progress, StoreError};
-use sweep_files::panics::{lock, unlocked};
+use sweep_files::panics::{into_content, lock};
 use sweep_results::{Goal, Slack};
 
 /// Evaluates all candidates of a study, with the cache of its stored trials if there is one, which
@@ -79,7 +79,7 @@ pub fn compute_slacks<M: Model>(
     let keys = [trial_key(0, values)];
     let result =
         evaluator.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &respond);
-    Ok(SearchStop::interrupted_to_none(result)?.map(|_| unlocked(found_slacks)))
+    Ok(SearchStop::interrupted_to_none(result)?.map(|_| into_content(found_slacks)))
 }
 
 /// Returns the error of rows that do not fit their own columns, which is a defect of the program.

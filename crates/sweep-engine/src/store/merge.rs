@@ -56,7 +56,7 @@ impl<'a> MapWriter<'a> {
         // would return only its text.
         write_to(output, || {
             let mut file = writer.end()?;
-            file.append_key_value_metadata(seal::blank());
+            file.append_key_value_metadata(seal::blank_digest());
             file.close()
         })?;
         seal::seal(file.as_file_mut()).map_err(StoreError::io("write", output))?;
@@ -70,7 +70,7 @@ fn write_to<T>(
     output: &Path,
     write: impl FnOnce() -> Result<T, ParquetError>,
 ) -> Result<T, StoreError> {
-    panics::in_parquet("the library gave up writing", write)
+    panics::catch_in_parquet("the library gave up writing", write)
         .map_err(StoreError::parquet("write", output))
 }
 

@@ -126,10 +126,11 @@ impl PartSchema {
             writer.write(&batch)?;
             let mut writer = writer.end()?;
             writer.append_key_value_metadata(KeyValue::new(key::PART.to_owned(), entry.to_owned()));
-            writer.append_key_value_metadata(seal::blank());
+            writer.append_key_value_metadata(seal::blank_digest());
             writer.into_inner()
         };
-        let mut file = io::Cursor::new(panics::in_parquet("the library gave up writing", write)?);
+        let mut file =
+            io::Cursor::new(panics::catch_in_parquet("the library gave up writing", write)?);
         seal::seal(&mut file).map_err(|error| ParquetError::External(Box::new(error)))?;
         Ok(file.into_inner())
     }
@@ -204,7 +205,7 @@ fn open_sealed(path: &Path) -> Result<Option<ParquetFile>, PartError> {
 
 /// Returns whether a file is a part that this program wrote, of any plan, damaged or not.
 pub(super) fn is_part(path: &Path) -> bool {
-    let part = ParquetFile::look(path).ok();
+    let part = ParquetFile::open_unchecked(path).ok();
     part.is_some_and(|file| {
         let is_ours = file.created_by().is_some_and(|creator| creator.starts_with(CREATED_BY));
         is_ours && file.value(key::PART).is_some()

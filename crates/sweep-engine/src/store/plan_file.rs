@@ -82,12 +82,12 @@ impl PlanFile {
     /// Writes the plan, unless another process has written one.
     pub(super) fn write_if_absent(&self, folder: &Folder) -> Result<(), StoreError> {
         let text = format_json(&json!(self));
-        if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
+        if text.len() as u64 >= regular::MAX_JSON_BYTES {
             return Err(StoreError::Refused(format!(
                 "the plan is too long for {}: written out, it has more than {} MiB\n  = help: \
                  write values as a range, or points as a list in a file of their own",
                 folder.path.display(),
-                regular::LONGEST_JSON_BYTES >> 20
+                regular::MAX_JSON_BYTES >> 20
             )));
         }
         atomic::create(&folder.path, &folder.file(PLAN_FILE), &text)?;

@@ -28,7 +28,8 @@ pub(super) struct ComparedFile {
 
 /// Returns the columns that identify a file's rows.
 pub(super) fn key_columns(table: &ResultTable, is_boundary: bool) -> Vec<String> {
-    let mut names: Vec<&str> = table.places().into_iter().filter(|name| *name != "point").collect();
+    let mut names: Vec<&str> =
+        table.key_columns().into_iter().filter(|name| *name != "point").collect();
     if names.contains(&"time_s") {
         // The speed follows from the time.
         names = vec!["time_s"];

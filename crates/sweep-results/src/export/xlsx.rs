@@ -30,7 +30,7 @@ const FILTER_BUTTON_WIDTH: usize = 3;
 /// Encodes a table as a workbook.
 pub(super) fn encode(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
     // The library panics where the system refuses its temporary files.
-    panics::caught(|| write_workbook(table))
+    panics::catch_panic(|| write_workbook(table))
         .unwrap_or_else(|panic| Err(temporary_file_error(table, panic.to_string())))
 }
 

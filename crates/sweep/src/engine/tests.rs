@@ -3,7 +3,7 @@
 mod fast;
 
 use sweep_engine::Interrupt;
-use sweep_files::panics::{lock, unlocked};
+use sweep_files::panics::{into_content, lock};
 
 use super::*;
 
@@ -36,7 +36,7 @@ impl ModelEngine<'_> {
         let outcomes = Mutex::new(Vec::new());
         let sink = |outcome: &Outcome| lock(&outcomes).push(outcome.clone());
         self.integrate_rows(&source, &sink, &RunContext::new(&Interrupt::new()));
-        let mut outcomes = unlocked(outcomes);
+        let mut outcomes = into_content(outcomes);
         outcomes.sort_by_key(|outcome| outcome.point);
         outcomes
     }

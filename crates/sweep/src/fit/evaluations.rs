@@ -90,7 +90,7 @@ impl Evaluations {
     /// Removes the stored evaluations once the machine file is written, and returns a note if that
     /// fails.
     pub(crate) fn complete(self) -> Option<String> {
-        sweep_files::panics::unlocked(self.trials).complete()
+        sweep_files::panics::into_content(self.trials).complete()
     }
 
     /// Returns the cells of normal equations, in the order of [`evaluation_columns`].

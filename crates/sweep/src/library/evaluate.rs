@@ -105,7 +105,7 @@ impl EvaluationTask<'_> {
         let evaluation_result = catch_unwind(AssertUnwindSafe(evaluate));
         progress.finish();
         evaluation_result.map_err(|panic| {
-            engine_error(format!("the engine panicked: {}", panics::text(panic.as_ref())))
+            engine_error(format!("the engine panicked: {}", panics::panic_message(panic.as_ref())))
         })?;
         let is_complete = context.points_done() == job.points;
         let batches = collector.into_batches().map_err(|error| engine_error(error.to_string()))?;

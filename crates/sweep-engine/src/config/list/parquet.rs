@@ -39,7 +39,7 @@ pub(super) fn read_columns(
     names: &ColumnNames<'_>,
 ) -> Result<Vec<ParquetColumn>, ListError> {
     let panic_error = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
-    panics::caught(|| read(bytes.into(), allows_missing, names)).unwrap_or_else(panic_error)
+    panics::catch_panic(|| read(bytes.into(), allows_missing, names)).unwrap_or_else(panic_error)
 }
 
 fn read(
