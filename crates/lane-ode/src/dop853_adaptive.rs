@@ -31,9 +31,11 @@ const B3: SparseRow = &[
     (11, 2.205_882_352_941_176_470_588_235_294e-2),
 ];
 
-/// Index of a step's first state among the states, of its last one, and of a stage's one.
+/// The index of the state at the start of a step.
 const START_STATE: usize = 0;
+/// The index of the state at the end of a step.
 const END_STATE: usize = 1;
+/// The index of the state of a stage.
 const STAGE_STATE: usize = 2;
 
 /// Integrates every trajectory of the task. The lanes accept and reject steps independently.
@@ -85,7 +87,8 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
             slopes[stage] = task.system().derivative(forcing, &states[STAGE_STATE]);
         }
         add_slopes(h, B, &slopes, &mut states, START_STATE, END_STATE);
-        // The state of a stage is free, and takes the result of the formula of order 3.
+        // The result of the formula of order 3 overwrites the state of the last stage, which is no
+        // longer needed.
         add_slopes(h, B3, &slopes, &mut states, START_STATE, STAGE_STATE);
         let mut error_5 = [zero; D];
         let mut error_3 = [zero; D];

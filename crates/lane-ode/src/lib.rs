@@ -19,9 +19,9 @@
 //!    set and runs the kernel on one.
 //!
 //! The methods are [`rk4`] (classical, fixed step), [`dop853`] (order 8, fixed step),
-//! [`dop853_adaptive`] (the same formula, adaptive), [`dopri5`] (Dormand-Prince 5(4), adaptive, with
-//! dense output) and [`additive`] (Kennedy and Carpenter's ARK5(4), adaptive, for systems with a
-//! stiff linear part).
+//! [`dop853_adaptive`] (the same formula, adaptive), [`dopri5`] (Dormand-Prince 5(4), adaptive,
+//! with dense output) and [`additive`] (Kennedy and Carpenter's ARK5(4), adaptive, for systems with
+//! a stiff linear part).
 //!
 //! # Example
 //!

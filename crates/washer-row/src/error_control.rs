@@ -82,8 +82,8 @@ pub(crate) const LEVELS_PER_METHOD: usize = 2;
 
 /// The number of levels of order 8 at corners.
 ///
-/// Basis: in `sweeps/friction.toml` two levels leave 9 rows of 120 not converged, three leave 6 at a
-/// tenth more time. Doubling it takes longer in the rows that do not converge.
+/// Basis: in `sweeps/friction.toml` two levels leave 9 rows of 120 not converged, three leave 6 at
+/// a tenth more time. Doubling it takes longer in the rows that do not converge.
 const CORNER_LEVELS: usize = 3;
 
 /// The product of the first step that resolves the bearings' modes and their frequency (rad), for
