@@ -42,8 +42,8 @@ sweep_parameter::named! {
         /// Dormand and Prince's formula of order 8 with fixed steps, without capped modes. The
         /// linear model uses classical Runge-Kutta instead.
         Dop853 = "dop853",
-        /// Dormand and Prince's formula of order 8 with adaptive steps up to the limit of stability.
-        /// The linear model uses [`Self::Dopri5`] instead.
+        /// Dormand and Prince's formula of order 8 with adaptive steps up to the limit of
+        /// stability. The linear model uses [`Self::Dopri5`] instead.
         Dop853Adaptive = "dop853_adaptive",
     }
 }
