@@ -47,11 +47,11 @@ fn boundary_command(folder: &tempfile::TempDir, arguments: &[&str]) -> Command {
 #[test]
 fn every_combination_of_further_axes_has_a_curve() {
     let folder = folder_with("0.1");
-    let completed = boundary_command(&folder, &["--quantity", "min_gap_nonlinear_m"])
+    let command_output = boundary_command(&folder, &["--quantity", "min_gap_nonlinear_m"])
         .output()
         .expect("it starts");
-    let messages = all_output(&completed);
-    assert_eq!(completed.status.code(), Some(0), "{messages}");
+    let messages = all_output(&command_output);
+    assert_eq!(command_output.status.code(), Some(0), "{messages}");
     // No gap closes in a tenth of a second, as six rows say.
     assert!(
         messages.contains("6 lines within the limit throughout") && !messages.contains("brackets"),
@@ -71,12 +71,12 @@ fn every_combination_of_further_axes_has_a_curve() {
         String::from_utf8_lossy(&plot_output.stderr)
     );
     let run_sweep = |arguments: &[&str]| {
-        let completed =
+        let command_output =
             Command::new(sweep_binary()).current_dir(folder.path()).args(arguments).output();
-        let completed = completed.expect("it starts");
+        let command_output = command_output.expect("it starts");
         (
-            completed.status.code(),
-            [completed.stdout, completed.stderr]
+            command_output.status.code(),
+            [command_output.stdout, command_output.stderr]
                 .map(|text| String::from_utf8_lossy(&text).into_owned()),
         )
     };
@@ -99,8 +99,8 @@ fn brackets_of_a_logarithmic_axis_are_relative() {
     let text = format!("metrics = [\"static_sag\"]\n{grid}{axes}");
     fs::write(folder.path().join("grid.toml"), text).expect("the grid is written");
     let arguments = ["--quantity", "static_sag_m", "--limit", "0.01", "--tolerance", "0.01"];
-    let completed = boundary_command(&folder, &arguments).output().expect("it starts");
-    let messages = String::from_utf8_lossy(&completed.stderr);
+    let command_output = boundary_command(&folder, &arguments).output().expect("it starts");
+    let messages = String::from_utf8_lossy(&command_output.stderr);
     let widest_bracket =
         messages.split("brackets  at most ").nth(1).expect("brackets").split(' ').next();
     let widest_bracket: f64 = widest_bracket.expect("a number").parse().expect("a number");
@@ -173,12 +173,20 @@ fn an_interrupted_search_continues_to_the_same_bytes() {
     for (name, code) in [("INT", 130), ("TERM", 143)] {
         let child = start_search(&folder, &mut search("x.parquet"));
         signal(name, child.id());
-        let completed = child.wait_with_output().expect("it ends");
-        assert_eq!(completed.status.code(), Some(code), "{}", all_output(&completed));
-        assert!(all_output(&completed).contains("points kept"), "{}", all_output(&completed));
+        let command_output = child.wait_with_output().expect("it ends");
+        assert_eq!(command_output.status.code(), Some(code), "{}", all_output(&command_output));
+        assert!(
+            all_output(&command_output).contains("points kept"),
+            "{}",
+            all_output(&command_output)
+        );
         let repeated_output =
             "go on  sweep boundary grid.toml --threads 1 --lattice 11 --progress none --out";
-        assert!(all_output(&completed).contains(repeated_output), "{}", all_output(&completed));
+        assert!(
+            all_output(&command_output).contains(repeated_output),
+            "{}",
+            all_output(&command_output)
+        );
         assert_eq!(file_names(&folder), ["grid.toml", "whole.parquet", "x.parquet.partial"]);
     }
     // SIGKILL leaves the search no time for a message.
@@ -194,9 +202,9 @@ fn an_interrupted_search_continues_to_the_same_bytes() {
         "{}",
         all_output(&other_output)
     );
-    let completed = search("x.parquet").output().expect("it starts");
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
-    assert!(all_output(&completed).contains("going on: "), "{}", all_output(&completed));
+    let command_output = search("x.parquet").output().expect("it starts");
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
+    assert!(all_output(&command_output).contains("going on: "), "{}", all_output(&command_output));
     let read_bytes = |name: &str| fs::read(folder.path().join(name)).expect("there is a file");
     assert!(read_bytes("x.parquet") == read_bytes("whole.parquet"), "other bytes");
     assert_eq!(file_names(&folder), ["grid.toml", "whole.parquet", "x.parquet"]);
@@ -207,8 +215,8 @@ fn a_boundary_of_another_plan_is_overwritten_only_on_request() {
     let folder = folder_with("0.1");
     let trace_boundary = |options: &[&str]| {
         let arguments = [&["--lattice", "1", "--out", "x.parquet"][..], options].concat();
-        let completed = boundary_command(&folder, &arguments).output().expect("it starts");
-        (completed.status.code(), String::from_utf8_lossy(&completed.stderr).into_owned())
+        let command_output = boundary_command(&folder, &arguments).output().expect("it starts");
+        (command_output.status.code(), String::from_utf8_lossy(&command_output.stderr).into_owned())
     };
     let read_bytes = || fs::read(folder.path().join("x.parquet")).expect("there is a file");
     let (code, messages) = trace_boundary(&[]);

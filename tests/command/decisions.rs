@@ -14,8 +14,8 @@ use crate::test_folder::{TestFolder, all_output, grid};
 /// Returns a folder with a finished map of six points, `results/short.parquet`.
 fn folder_with_map() -> TestFolder {
     let test_folder = TestFolder::new(&grid(3, 2));
-    let completed = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let command_output = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     test_folder
 }
 
@@ -98,19 +98,19 @@ fn only_results_go_to_standard_output() {
         &["compare", MAP, MAP],
         &["modes", "--speed", "0:300:100"],
     ] {
-        let completed = test_folder.sweep(words);
+        let command_output = test_folder.sweep(words);
         assert!(
-            completed.stdout.len() > 40 && completed.stderr.is_empty(),
+            command_output.stdout.len() > 40 && command_output.stderr.is_empty(),
             "{words:?}: {}",
-            all_output(&completed)
+            all_output(&command_output)
         );
     }
     for words in [&["run", "g.toml"][..], &["plot", MAP]] {
-        let completed = test_folder.sweep(words);
+        let command_output = test_folder.sweep(words);
         assert!(
-            completed.stdout.is_empty() && !completed.stderr.is_empty(),
+            command_output.stdout.is_empty() && !command_output.stderr.is_empty(),
             "{words:?}: {}",
-            all_output(&completed)
+            all_output(&command_output)
         );
     }
 }
@@ -247,8 +247,8 @@ fn compare_reports_the_differences_of_two_maps() {
     assert!(stdout(&same_output).contains("not at all"), "{}", stdout(&same_output));
 
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--name", "light"];
-    let completed = test_folder.sweep(&[&light[..], &["--progress", "none"]].concat());
-    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    let command_output = test_folder.sweep(&[&light[..], &["--progress", "none"]].concat());
+    assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     let shown = stdout(&test_folder.sweep(&["show", "results/light.parquet"]));
     assert!(shown.contains("--set  tub_mass_kg = 20"), "{shown}");
 
@@ -305,8 +305,9 @@ fn compare_matches_points_of_tolerances_about_other_numbers() {
     for (name, mass) in [("a", "20"), ("b", "24")] {
         let mass = format!("[set]\ntub_mass_kg = {mass}\n");
         fs::write(test_folder.path("g.toml"), format!("{start}{mass}{axes}")).expect("written");
-        let completed = test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
-        assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+        let command_output =
+            test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
+        assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     }
     let arguments = ["compare", "results/a.parquet", "results/b.parquet", "--fail-on", "rows"];
     let compare_output = test_folder.sweep(&arguments);
@@ -329,8 +330,9 @@ fn compare_names_differences_that_an_axis_overrides() {
     let test_folder = TestFolder::new(&format!("{start}{axis}"));
     for (name, mass) in [("a", ""), ("b", "[set]\nspring_stiffness_n_per_m = 9e3\n")] {
         fs::write(test_folder.path("g.toml"), format!("{start}{mass}{axis}")).expect("written");
-        let completed = test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
-        assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+        let command_output =
+            test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
+        assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     }
     let arguments = ["compare", "results/a.parquet", "results/b.parquet"];
     let text = stdout(&test_folder.sweep(&arguments));
@@ -349,8 +351,8 @@ fn compare_names_differences_that_an_axis_overrides() {
 fn compare_can_limit_the_difference_of_any_column() {
     let test_folder = folder_with_map();
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--out", "light.parquet"];
-    let completed = test_folder.sweep(&light);
-    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    let command_output = test_folder.sweep(&light);
+    assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     let compare_output =
         |gate: &str| test_folder.sweep(&["compare", MAP, "light.parquet", "--fail-on", gate]);
     assert_eq!(exit_code(&compare_output("nonlinear_tub_yaw=1e9")), Some(0));
@@ -375,8 +377,8 @@ fn compare_shows_both_ratios_of_a_changed_verdict() {
     for (name, least, mass) in [("a", "ratio_min=0.5", "20"), ("b", "ratio_min=1", "22")] {
         let mass = format!("tub_mass_kg={mass}");
         let run = ["run", "g.toml", "--name", name, "--set", least, "--set", &mass];
-        let completed = test_folder.sweep(&[&run[..], &["--progress", "none"]].concat());
-        assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+        let command_output = test_folder.sweep(&[&run[..], &["--progress", "none"]].concat());
+        assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     }
     let output = stdout(&test_folder.sweep(&["compare", "results/a.parquet", "results/b.parquet"]));
     let flips = output.split("verdicts that flipped").nth(1).expect("some");
@@ -406,9 +408,9 @@ fn a_report_describes_quantities_and_both_limits() {
     let test_folder =
         TestFolder::new(&format!("metrics = [\"damper_speed\", \"static_sag\"]\n{grid}"));
     let sets = ["--set", "spin_ramp_s=0.05", "--set", "damper_1_friction_n=3"];
-    let completed =
+    let command_output =
         test_folder.sweep(&[&["run", "g.toml", "--progress", "none"], &sets[..]].concat());
-    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     let written_output = test_folder.sweep(&["report", MAP, "-o", "r.html"]);
     assert_eq!(exit_code(&written_output), Some(0), "{}", all_output(&written_output));
     let page = fs::read_to_string(test_folder.path("r.html")).expect("it was written");
@@ -440,8 +442,8 @@ fn exports_overwrite_only_files_of_the_same_kind() {
     let test_folder = folder_with_map();
     for (name, begins) in [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04")] {
         for _ in 0..2 {
-            let completed = test_folder.sweep(&["export", MAP, name]);
-            assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+            let command_output = test_folder.sweep(&["export", MAP, name]);
+            assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
         }
         let bytes = fs::read(test_folder.path(name)).expect("the export is there");
         assert!(bytes.starts_with(begins), "{name}");
@@ -563,8 +565,8 @@ fn show_describes_lists_and_unfinished_runs() {
         integrator = { method = \"rk4\" }\n\
         design = { method = \"list\", file = \"list.csv\" }\n";
     fs::write(test_folder.path("list.toml"), listed).expect("written");
-    let completed = test_folder.sweep(&["run", "list.toml", "--progress", "none"]);
-    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    let command_output = test_folder.sweep(&["run", "list.toml", "--progress", "none"]);
+    assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     let shown = stdout(&test_folder.sweep(&["show", MAP]));
     assert!(shown.contains("design  file list.csv"), "{shown}");
     assert!(shown.contains("axis  unbalance_mass_kg\n"), "{shown}");
@@ -601,8 +603,8 @@ fn show_describes_lists_and_unfinished_runs() {
 #[test]
 fn require_names_the_failing_part_and_the_confidence_of_shares() {
     let test_folder = TestFolder::new(&designed("monte_carlo"));
-    let completed = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
-    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    let command_output = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     let text = "share(unbalance_mass_kg < 0.5) > 0.99 and count(true) == 32";
     let closed = test_folder.sweep(&["require", MAP, text]);
     assert_eq!(exit_code(&closed), Some(4), "{}", all_output(&closed));
@@ -640,9 +642,9 @@ fn plot_suggests_the_nearest_name_of_a_quantity() {
 fn figures_show_the_constants_of_set() {
     let test_folder = folder_with_map();
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--set", "channels=tub_yaw"];
-    let completed =
+    let command_output =
         test_folder.sweep(&[&light[..], &["--name", "light", "--progress", "none"]].concat());
-    assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
+    assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     let plot_output = test_folder.sweep(&["plot", "results/light.parquet", "-o", "light.svg"]);
     assert_eq!(exit_code(&plot_output), Some(0), "{}", all_output(&plot_output));
     let figure = fs::read_to_string(test_folder.path("light.svg")).expect("a figure");
@@ -677,9 +679,9 @@ fn designed(method: &str) -> String {
 fn run_recommends_a_figure_that_can_be_drawn_for_a_design() {
     for method in ["latin_hypercube", "sobol", "monte_carlo"] {
         let test_folder = TestFolder::new(&designed(method));
-        let completed = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
-        assert_eq!(exit_code(&completed), Some(0), "{}", all_output(&completed));
-        let text = all_output(&completed);
+        let command_output = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+        assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
+        let text = all_output(&command_output);
         assert!(text.contains("share  ") && text.contains("next  sweep plot "), "{text}");
         let next = test_folder.sweep(&["plot", MAP]);
         assert_eq!(exit_code(&next), Some(0), "{}", all_output(&next));

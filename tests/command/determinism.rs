@@ -162,12 +162,12 @@ fn machine(kinds: u64, numbers: &mut Numbers) -> String {
 
 /// Returns the rows of a result as text, without the point's number.
 fn rows(folder: &std::path::Path, name: &str) -> Vec<String> {
-    let completed = Command::new(sweep_binary())
+    let command_output = Command::new(sweep_binary())
         .current_dir(folder)
         .args(["export", name, "rows.csv"])
         .output()
         .expect("the command starts");
-    assert!(completed.status.success(), "{}", String::from_utf8_lossy(&completed.stderr));
+    assert!(command_output.status.success(), "{}", String::from_utf8_lossy(&command_output.stderr));
     let text = fs::read_to_string(folder.join("rows.csv")).expect("it was written");
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     let without_point = |line: &str| line.split_once(',').map(|(_, rest)| rest.to_owned());
@@ -254,7 +254,7 @@ fn rows_of_random_machines_do_not_depend_on_other_points() {
             let (verb, together, alone) = &commands[(first + k) % commands.len()];
             let make = |options: &[&str], threads: &str, name: &str| {
                 let out = &format!("{verb}-{name}.parquet");
-                let completed = Command::new(sweep_binary())
+                let command_output = Command::new(sweep_binary())
                     .current_dir(test_folder.path())
                     .arg(verb)
                     .args(options)
@@ -263,9 +263,9 @@ fn rows_of_random_machines_do_not_depend_on_other_points() {
                     .env_remove("JOB_COMPLETION_INDEX")
                     .output()
                     .expect("the command starts");
-                let messages = String::from_utf8_lossy(&completed.stderr);
+                let messages = String::from_utf8_lossy(&command_output.stderr);
                 assert!(
-                    completed.status.success(),
+                    command_output.status.success(),
                     "{verb} {options:?} of {kinds:05b}: {messages}"
                 );
                 fs::read(test_folder.path().join(out)).expect("it was written")

@@ -36,11 +36,11 @@ fn sweep(folder: &tempfile::TempDir, arguments: &[&str], simd: Option<&str>) -> 
 #[test]
 fn every_motion_of_a_held_speed_has_a_row() {
     let folder = folder();
-    let completed = sweep(&folder, &["dwell", "grid.toml", "--speed", "250,297.5"], None);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let command_output = sweep(&folder, &["dwell", "grid.toml", "--speed", "250,297.5"], None);
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     let file = "results/grid-dwell.parquet";
     let shown_text = all_output(&sweep(&folder, &["show", file], None));
-    for messages in [&all_output(&completed), &shown_text] {
+    for messages in [&all_output(&command_output), &shown_text] {
         for line in [
             "4 at 4 points and speeds: 2 periodic, 1 periodic 2, 1 quasi periodic",
             "tub yaw 152.3 mrad, quasi periodic, at unbalance_mass_kg 0.4, 250 rpm",
@@ -71,11 +71,11 @@ fn at_can_replace_an_axis() {
     let files = [("--at", "a.parquet"), ("--set", "b.parquet")].map(|(option, file)| {
         let point = [option, "unbalance_mass_kg=0.4"];
         let dwell = ["dwell", "grid.toml", "--speed", "250", "--starts", "1", "--out", file];
-        let completed = sweep(&folder, &[&dwell[..], &point].concat(), None);
+        let command_output = sweep(&folder, &[&dwell[..], &point].concat(), None);
         assert!(
-            all_output(&completed).contains("1 at 1 point and speed: 1 quasi periodic"),
+            all_output(&command_output).contains("1 at 1 point and speed: 1 quasi periodic"),
             "{}",
-            all_output(&completed)
+            all_output(&command_output)
         );
         fs::read(folder.path().join(file)).expect("it is there")
     });
@@ -131,9 +131,9 @@ fn motions_have_sections_and_metrics_and_can_be_compared() {
     let dwell = |damping: &str, more: &[&str], out: &str| {
         let at = ["--at", "unbalance_mass_kg=0.4", "--set", damping, "--starts", "1"];
         let dwell = ["dwell", "grid.toml", "--speed", "250,280", "--out", out];
-        let completed = sweep(&folder, &[&dwell[..], &at, more].concat(), None);
-        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
-        all_output(&completed)
+        let command_output = sweep(&folder, &[&dwell[..], &at, more].concat(), None);
+        assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
+        all_output(&command_output)
     };
     let messages = dwell("damping_n_s_per_m=140", &["--sections", "64"], "a.parquet");
     assert!(messages.contains("2 at 2 points and speeds"), "{messages}");
@@ -163,8 +163,8 @@ fn bytes_do_not_depend_on_threads_instruction_set_or_shards() {
             [&["dwell", "grid.toml", "--speed", "240:300:30"], search, more].concat()
         };
         let bytes = |more: &[&'static str], simd| {
-            let completed = sweep(&folder, &arguments(more), simd);
-            assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+            let command_output = sweep(&folder, &arguments(more), simd);
+            assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
             more.last().map(|name| fs::read(folder.path().join(name)).unwrap_or_default())
         };
         let first_line = bytes(&["--threads", "1", "--out", "a.parquet"], None);
@@ -258,8 +258,8 @@ fn held_speeds_do_not_depend_on_the_spin() {
 fn dots_of_one_speed_are_whole() {
     let folder = folder();
     let dwell = ["dwell", "grid.toml", "--speed", "280", "--at", "unbalance_mass_kg=0.4"];
-    let completed = sweep(&folder, &[&dwell[..], &["--starts", "1"]].concat(), None);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let command_output = sweep(&folder, &[&dwell[..], &["--starts", "1"]].concat(), None);
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     let plot_output =
         sweep(&folder, &["plot", "results/grid-dwell.parquet", "-o", "one.svg"], None);
     assert_eq!(plot_output.status.code(), Some(0), "{}", all_output(&plot_output));

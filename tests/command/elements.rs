@@ -75,9 +75,9 @@ fn columns_of_stops_and_feet_agree_with_the_trace() {
     let grid = format!("{GRID}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-4\n");
     fs::write(test_folder.path("g.toml"), grid).expect("the grid is written");
     let export_csv = |words: &[&str], file: &str| {
-        let completed =
+        let command_output =
             test_folder.sweep(&[words, &["--out", &format!("{file}.parquet")]].concat());
-        assert!(completed.status.success(), "{}", all_output(&completed));
+        assert!(command_output.status.success(), "{}", all_output(&command_output));
         let [from, to] = ["parquet", "csv"].map(|ending| format!("{file}.{ending}"));
         assert!(test_folder.sweep(&["export", &from, &to]).status.success());
         fs::read_to_string(test_folder.path(&to)).expect("it was written")
@@ -186,9 +186,9 @@ fn feet_that_do_not_support_the_cabinet_are_an_error() {
 #[test]
 fn machines_with_friction_and_stops_have_responses_and_growth() {
     let test_folder = test_folder(&example());
-    let completed =
+    let command_output =
         test_folder.sweep(&["stability", "g.toml", "--speed", "240:260:10", "--out", "s.parquet"]);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     let require_output = test_folder.sweep(&["require", "s.parquet", "count(status == 'ok') > 0"]);
     assert_eq!(require_output.status.code(), Some(0), "{}", all_output(&require_output));
 }

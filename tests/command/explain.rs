@@ -44,9 +44,9 @@ fn assert_within(value: &Value, expected: f64, tolerance: f64) {
 fn tongues_of_the_papers_machine_agree_with_the_reference() {
     let options = ["--json", "--ratio-limit", "2.5", "--name", "own", "--progress", "none"];
     let arguments = [&["--at", "damping_n_s_per_m=140"], &options[..]].concat();
-    let completed = explain(&grid(PAPER, AXES), &arguments);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
-    let explanation: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    let command_output = explain(&grid(PAPER, AXES), &arguments);
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
+    let explanation: Value = serde_json::from_slice(&command_output.stdout).expect("it is JSON");
     assert_eq!(explanation["swept"]["reliable"], true);
     assert_eq!(
         (&explanation["swept"]["ratio_limit"], &explanation["name"]),
@@ -88,9 +88,9 @@ fn tongues_of_the_papers_machine_agree_with_the_reference() {
 fn a_folded_response_has_one_band_with_a_jump() {
     let axes = AXES.replace("[0.4]", "[1.0]").replace("100.0, 140.0", "60.0, 140.0");
     let at = ["--at", "damping_n_s_per_m=60", "--speed", "200:350:1", "--json"];
-    let completed = explain(&grid(PAPER, &axes), &at);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
-    let explanation: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    let command_output = explain(&grid(PAPER, &axes), &at);
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
+    let explanation: Value = serde_json::from_slice(&command_output.stdout).expect("it is JSON");
     assert_within(&explanation["speeds"]["jumps_rpm"][0], 243.06, 0.1);
     let tongues = explanation["tongues"].as_array().expect("a list");
     assert_eq!(tongues.len(), 2, "{tongues:?}");
@@ -104,9 +104,10 @@ fn a_folded_response_has_one_band_with_a_jump() {
             let [from, to] = [0, 1].map(|end| closed["nothing_grows_from_to_rpm"][end].to_string());
             let speed = format!("{from}:{to}:1");
             let at = format!("damping_n_s_per_m={damping}");
-            let completed =
+            let command_output =
                 explain(&grid(PAPER, &axes), &["--at", &at, "--speed", &speed, "--json"]);
-            let explanation: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+            let explanation: Value =
+                serde_json::from_slice(&command_output.stdout).expect("it is JSON");
             assert_eq!(explanation["tongues"], serde_json::json!([]), "{damping}");
         }
     }
@@ -114,18 +115,18 @@ fn a_folded_response_has_one_band_with_a_jump() {
 
 #[test]
 fn a_stable_machine_has_no_tongues() {
-    let completed =
+    let command_output =
         explain(&grid(PAPER, AXES), &["--at", "damping_n_s_per_m=300", "--speed", "200:340:5"]);
-    let messages = all_output(&completed);
-    assert_eq!(completed.status.code(), Some(0), "{messages}");
+    let messages = all_output(&command_output);
+    assert_eq!(command_output.status.code(), Some(0), "{messages}");
     for line in ["stable at every speed from 200 to 340 rpm", "and the models agree"] {
         assert!(messages.contains(line), "{line}\n{messages}");
     }
     // The summary has the limits, because the vertical motion is less with friction.
     let strict = format!("{}[reliability]\nratio_min = 0.98\n", grid(PAPER, AXES));
     let at = ["--at", "damping_n_s_per_m=300", "--at", "friction_n=60", "--speed", "300:340:20"];
-    let completed = explain(&strict, &at);
-    let messages = all_output(&completed);
+    let command_output = explain(&strict, &at);
+    let messages = all_output(&command_output);
     for line in ["0.98 and 2", "over-estimates: a ratio is below 0.98"] {
         assert!(messages.contains(line), "{line}\n{messages}");
     }
@@ -165,9 +166,9 @@ fn a_spin_may_reverse_and_pause() {
                  speed_rpm = [0, 280, 0, 0, -280]";
     let arguments = ["--at", "damping_n_s_per_m=140", "--speed", "225:275:5", "--json"];
     let explain_json = |options: &[&str]| {
-        let completed = explain(&grid(cycle, AXES), &[&arguments, options].concat());
-        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
-        serde_json::from_slice::<Value>(&completed.stdout).expect("it is JSON")
+        let command_output = explain(&grid(cycle, AXES), &[&arguments, options].concat());
+        assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
+        serde_json::from_slice::<Value>(&command_output.stdout).expect("it is JSON")
     };
     let explanation = explain_json(&[]);
     assert_eq!(explanation["speeds"], explanation["speeds_backwards"]);
@@ -204,9 +205,9 @@ fn tongues_that_are_passed_late_are_not_causes() {
     let explain_json = |mass: &str, speed: &str| {
         let axes = AXES.replace("[0.4]", &format!("[{mass}]"));
         let arguments = ["--at", "damping_n_s_per_m=100", "--speed", speed, "--json"];
-        let completed = explain(&grid(PAPER, &axes), &arguments);
-        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
-        serde_json::from_slice::<Value>(&completed.stdout).expect("it is JSON")
+        let command_output = explain(&grid(PAPER, &axes), &arguments);
+        assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
+        serde_json::from_slice::<Value>(&command_output.stdout).expect("it is JSON")
     };
     let whole_range = explain_json("0.4", "225:325:5");
     let deviation = &whole_range["deviation"];

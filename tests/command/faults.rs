@@ -89,8 +89,8 @@ fn undisturbed_output() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
         let test_folder = fresh_folder();
-        let completed = output(&mut test_folder.run());
-        assert!(completed.status.success(), "{}", all_output(&completed));
+        let command_output = output(&mut test_folder.run());
+        assert!(command_output.status.success(), "{}", all_output(&command_output));
         fs::read(test_folder.output()).expect("a finished run has an output")
     })
 }
@@ -492,12 +492,17 @@ fn failed_points_are_rows_and_fail_the_run_only_on_request() {
         (&["merge", "--fail-on-error"], 3),
         (&["merge"], 0),
     ] {
-        let completed = run_sharded(words);
-        assert_eq!(completed.status.code(), Some(code), "{words:?}: {}", all_output(&completed));
-        assert!(
-            all_output(&completed).contains(" no_equilibrium"),
+        let command_output = run_sharded(words);
+        assert_eq!(
+            command_output.status.code(),
+            Some(code),
             "{words:?}: {}",
-            all_output(&completed)
+            all_output(&command_output)
+        );
+        assert!(
+            all_output(&command_output).contains(" no_equilibrium"),
+            "{words:?}: {}",
+            all_output(&command_output)
         );
     }
     let idle_shard_output =

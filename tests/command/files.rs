@@ -26,8 +26,8 @@ fn fresh_folder() -> TestFolder {
     static MAP: OnceLock<Vec<u8>> = OnceLock::new();
     let test_folder = TestFolder::new(&grid(5, 8));
     let map = MAP.get_or_init(|| {
-        let completed = test_folder.sweep(&["run", "g.toml", "--out", "map.parquet"]);
-        assert!(completed.status.success(), "{}", all_output(&completed));
+        let command_output = test_folder.sweep(&["run", "g.toml", "--out", "map.parquet"]);
+        assert!(command_output.status.success(), "{}", all_output(&command_output));
         fs::remove_file(test_folder.path("map.run.json")).expect("there is a sidecar");
         fs::read(test_folder.path("map.parquet")).expect("there is a map")
     });
@@ -184,11 +184,11 @@ fn every_command_overwrites_its_own_files_and_removes_those_of_killed_processes(
                 if is_run {
                     fs::remove_file(&leftover_path).expect("the leftover goes");
                 }
-                let completed = test_folder.sweep(&[*writer, &[&path]].concat());
+                let command_output = test_folder.sweep(&[*writer, &[&path]].concat());
                 assert!(
-                    completed.status.success(),
+                    command_output.status.success(),
                     "{writer:?} {output} round {round}: {}",
-                    all_output(&completed)
+                    all_output(&command_output)
                 );
                 assert!(!leftover_path.exists(), "{writer:?} {output}");
                 let written = fs::read(test_folder.path(&path)).expect("there is an output");
@@ -287,8 +287,9 @@ fn every_command_detects_a_flipped_bit_in_its_input() {
     let map = test_folder.path("map.parquet");
     let map_bytes = fs::read(&map).expect("the map");
     for writer in [WRITERS[3], WRITERS[4], WRITERS[5]] {
-        let completed = test_folder.sweep(&[writer, &[&format!("{}.parquet", writer[0])]].concat());
-        assert!(completed.status.success(), "{}", all_output(&completed));
+        let command_output =
+            test_folder.sweep(&[writer, &[&format!("{}.parquet", writer[0])]].concat());
+        assert!(command_output.status.success(), "{}", all_output(&command_output));
     }
     let readers: [&[&str]; 9] = [
         &["run", "g.toml", "--out", "map.parquet"],

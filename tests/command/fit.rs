@@ -61,9 +61,9 @@ fn a_fit_writes_a_machine_file_that_runs() {
     let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m,unbalance_mass_kg"];
     let more = ["--json", "--draws", "4", "--out", "bench.toml", "--curves", "fit.parquet"];
     let more = [&more[..], &["--set", "unbalance_mass_kg=0.3", "--name", "monday"]].concat();
-    let completed = test_folder.sweep(&[&words[..], &more].concat());
-    assert!(completed.status.success(), "{}", all_output(&completed));
-    let estimate: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    let command_output = test_folder.sweep(&[&words[..], &more].concat());
+    assert!(command_output.status.success(), "{}", all_output(&command_output));
+    let estimate: Value = serde_json::from_slice(&command_output.stdout).expect("it is JSON");
     for (parameter, (name, truth)) in estimate["parameters"]
         .as_array()
         .expect("a list")
@@ -133,10 +133,10 @@ fn a_number_that_differs_from_damper_to_damper_needs_a_range() {
 #[test]
 fn a_fit_uses_the_given_point() {
     let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m", "--draws", "0"];
-    let completed = folder_with_measurement()
+    let command_output = folder_with_measurement()
         .sweep(&[&words[..], &["--json", "--at", "unbalance_mass_kg=0.35"]].concat());
-    assert!(completed.status.success(), "{}", all_output(&completed));
-    let estimate: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    assert!(command_output.status.success(), "{}", all_output(&command_output));
+    let estimate: Value = serde_json::from_slice(&command_output.stdout).expect("it is JSON");
     let value = estimate["parameters"][0]["value"].as_f64().expect("a number");
     assert!((value / 180.0 - 1.0).abs() < 0.01, "{estimate}");
 }
@@ -146,12 +146,17 @@ fn mistakes_in_a_measurement_are_reported_with_their_place() {
     let test_folder = TestFolder::new(GRID);
     fs::write(test_folder.path("run.csv"), "time_s,tub_front_x_m\n0,1\n1,2\n0.5,3\n")
         .expect("written");
-    let completed = test_folder.sweep(&["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m"]);
-    assert_eq!(completed.status.code(), Some(2));
+    let command_output =
+        test_folder.sweep(&["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m"]);
+    assert_eq!(command_output.status.code(), Some(2));
     for said_of in
         ["run.csv:1:8", "does not name a channel", "run.csv:4:1", "time goes back: 0.5 s after 1 s"]
     {
-        assert!(all_output(&completed).contains(said_of), "{said_of}: {}", all_output(&completed));
+        assert!(
+            all_output(&command_output).contains(said_of),
+            "{said_of}: {}",
+            all_output(&command_output)
+        );
     }
     let gone = test_folder.sweep(&["fit", "g.toml", "gone.csv", "--free", "damping_n_s_per_m"]);
     assert_eq!(gone.status.code(), Some(2), "{}", all_output(&gone));
@@ -172,9 +177,9 @@ fn times_since_1970_are_relative_to_the_first_row() {
     fs::write(test_folder.path("epoch.csv"), &shifted).expect("it is written");
     let at = ["--draws", "0", "--json", "--at", "unbalance_mass_kg=0.35"];
     let words = ["fit", "g.toml", "epoch.csv", "--free", "damping_n_s_per_m"];
-    let completed = test_folder.sweep(&[&words[..], &at].concat());
-    assert!(completed.status.success(), "{}", all_output(&completed));
-    let estimate: Value = serde_json::from_slice(&completed.stdout).expect("it is JSON");
+    let command_output = test_folder.sweep(&[&words[..], &at].concat());
+    assert!(command_output.status.success(), "{}", all_output(&command_output));
+    let estimate: Value = serde_json::from_slice(&command_output.stdout).expect("it is JSON");
     let value = estimate["parameters"][0]["value"].as_f64().expect("a number");
     assert!((value / 180.0 - 1.0).abs() < 0.01, "{estimate}");
     let note = estimate["notes"][0].as_str().expect("a note");
@@ -182,12 +187,12 @@ fn times_since_1970_are_relative_to_the_first_row() {
 
     fs::write(test_folder.path("stray.csv"), text + "100000,9.81,0,0\n").expect("it is written");
     let words = ["fit", "g.toml", "stray.csv", "--free", "damping_n_s_per_m"];
-    let completed = test_folder.sweep(&words);
-    assert_eq!(completed.status.code(), Some(2), "{}", all_output(&completed));
+    let command_output = test_folder.sweep(&words);
+    assert_eq!(command_output.status.code(), Some(2), "{}", all_output(&command_output));
     assert!(
-        all_output(&completed).contains("time jumps by 99997 s, from 3 to 100000 s"),
+        all_output(&command_output).contains("time jumps by 99997 s, from 3 to 100000 s"),
         "{}",
-        all_output(&completed)
+        all_output(&command_output)
     );
 }
 
@@ -199,13 +204,18 @@ fn a_fifo_is_an_error() {
     assert!(fifo_status.expect("mkfifo starts").success());
     fs::write(test_folder.path("machine.toml"), "machine = \"fifo\"\n").expect("it is written");
     for words in [&["fit", "g.toml", "fifo"][..], &["check", "fifo"], &["check", "machine.toml"]] {
-        let completed =
+        let command_output =
             test_folder.under(&["timeout", "20"]).args(words).output().expect("timeout starts");
-        assert_eq!(completed.status.code(), Some(2), "{words:?}: {}", all_output(&completed));
-        assert!(
-            all_output(&completed).contains("it is a FIFO"),
+        assert_eq!(
+            command_output.status.code(),
+            Some(2),
             "{words:?}: {}",
-            all_output(&completed)
+            all_output(&command_output)
+        );
+        assert!(
+            all_output(&command_output).contains("it is a FIFO"),
+            "{words:?}: {}",
+            all_output(&command_output)
         );
     }
 }

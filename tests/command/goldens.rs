@@ -48,7 +48,7 @@ fn record_path() -> PathBuf {
 
 /// Runs a command in `test_folder` and returns what it prints.
 fn sweep(test_folder: &TempDir, words: &[&str]) -> Vec<u8> {
-    let completed = Command::new(sweep_binary())
+    let command_output = Command::new(sweep_binary())
         .args(words)
         .current_dir(test_folder.path())
         .env_remove("SLURM_ARRAY_TASK_ID")
@@ -57,11 +57,11 @@ fn sweep(test_folder: &TempDir, words: &[&str]) -> Vec<u8> {
         .output()
         .expect("the command starts");
     assert!(
-        completed.status.success(),
+        command_output.status.success(),
         "{words:?}: {}",
-        String::from_utf8_lossy(&completed.stderr)
+        String::from_utf8_lossy(&command_output.stderr)
     );
-    completed.stdout
+    command_output.stdout
 }
 
 /// Returns the path of the readable record.

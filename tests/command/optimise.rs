@@ -334,13 +334,13 @@ fn the_path_of_the_machine_file_is_checked_before_the_search() {
 fn a_study_without_a_feasible_candidate_writes_no_machine_file() {
     let folder = folder_with("2", &STUDY.replace("max(ratio_max) < 50", "max(ratio_max) < 0"));
     let line = "optimise study.toml --best best.toml";
-    let completed = sweep(&folder, line).output().expect("it starts");
-    assert_eq!(completed.status.code(), Some(4), "{}", all_output(&completed));
+    let command_output = sweep(&folder, line).output().expect("it starts");
+    assert_eq!(command_output.status.code(), Some(4), "{}", all_output(&command_output));
     for expected in ["feasible  0 of 24\n", "none is feasible; best.toml is not written"] {
         assert!(
-            all_output(&completed).contains(expected),
+            all_output(&command_output).contains(expected),
             "no {expected} in {}",
-            all_output(&completed)
+            all_output(&command_output)
         );
     }
     assert!(!folder.path().join("best.toml").exists());

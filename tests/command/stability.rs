@@ -49,11 +49,11 @@ fn stability(folder: &tempfile::TempDir, speed: &str, more: &[&str]) -> Output {
 #[test]
 fn both_tongues_of_the_papers_machine_are_found_and_named() {
     let folder = folder_with("");
-    let completed = stability(&folder, "230:325:1", &[]);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let command_output = stability(&folder, "230:325:1", &[]);
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     let file = "results/grid-stability.parquet";
     let shown_text = all_output(&sweep(&folder, &["show", file]).output().expect("it starts"));
-    for messages in [&all_output(&completed), &shown_text] {
+    for messages in [&all_output(&command_output), &shown_text] {
         for line in [
             "43 not, 0 without a response; 2 points",
             "damping_n_s_per_m 140: 239 to 259 rpm, quasi periodic, up to 0.39",
@@ -80,8 +80,8 @@ fn bytes_do_not_depend_on_threads_or_instruction_set() {
         if let Some(simd) = simd {
             command.env("SWEEP_SIMD", simd);
         }
-        let completed = command.output().expect("it starts");
-        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+        let command_output = command.output().expect("it starts");
+        assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
         fs::read(folder.path().join(name)).expect("it is there")
     };
     let first_bytes = bytes("a.parquet", "1", None);
@@ -148,9 +148,9 @@ fn an_interrupted_run_continues_to_the_same_bytes() {
     );
     let status = sweep(&folder, &["status", "grid.toml", "--speed", "60:360:0.05"]).output();
     assert!(all_output(&status.expect("it starts")).contains("unfinished"));
-    let completed = sweep(&folder, &arguments).output().expect("it starts");
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
-    assert!(all_output(&completed).contains("going on: "), "{}", all_output(&completed));
+    let command_output = sweep(&folder, &arguments).output().expect("it starts");
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
+    assert!(all_output(&command_output).contains("going on: "), "{}", all_output(&command_output));
     let whole_output = sweep(&folder, &arguments).args(["--out", "whole.parquet"]).output();
     assert_eq!(whole_output.expect("it starts").status.code(), Some(0));
     let bytes = |name: &str| fs::read(folder.path().join(name)).expect("it is there");
@@ -168,10 +168,11 @@ fn joined_shards_have_the_same_bytes() {
     let folder = folder_with("");
     let speed = ["--speed", "210:330:0.5"];
     let run = |more: &[&str]| {
-        let completed = sweep(&folder, &[&["stability", "grid.toml"], &speed[..], more].concat());
-        let completed = { completed }.output().expect("it starts");
-        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
-        completed
+        let command_output =
+            sweep(&folder, &[&["stability", "grid.toml"], &speed[..], more].concat());
+        let command_output = { command_output }.output().expect("it starts");
+        assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
+        command_output
     };
     for shard in ["1/3", "3/3", "2/3"] {
         run(&["--shard", shard]);
@@ -193,8 +194,8 @@ fn growth_is_a_metric_of_maps_and_a_quantity_of_boundaries() {
     let grid =
         grid.replace("values = [140.0, 300.0]", "range = { from = 240, to = 270, count = 2 }");
     fs::write(folder.path().join("grid.toml"), grid).expect("it is written");
-    let completed = sweep(&folder, &["run", "grid.toml"]).output().expect("it starts");
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let command_output = sweep(&folder, &["run", "grid.toml"]).output().expect("it starts");
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     let shown_text = sweep(&folder, &["show", "results/grid.parquet"]).output().expect("it starts");
     for column in ["growth_per_s", "growth_speed_rpm", "growth_kind", "growth_mode_1_name"] {
         assert!(all_output(&shown_text).contains(column), "{column}: {}", all_output(&shown_text));
@@ -228,14 +229,14 @@ fn coexisting_responses_have_rows() {
     let grid = grid.replace("values = [140.0, 300.0]", "values = [30.0, 140.0]");
     fs::write(folder.path().join("grid.toml"), grid).expect("it is written");
     let speed = "254:259:0.5";
-    let completed = stability(&folder, speed, &[]);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let command_output = stability(&folder, speed, &[]);
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     let file = "results/grid-stability.parquet";
     let shown_text = all_output(&sweep(&folder, &["show", file]).output().expect("it starts"));
     let jump = "damping_n_s_per_m 30: at 255.36 rpm, running up";
     for line in ["6 of 44 rows", "4 further rows", jump] {
         assert!(
-            shown_text.contains(line) || all_output(&completed).contains(line),
+            shown_text.contains(line) || all_output(&command_output).contains(line),
             "{line}\n{shown_text}"
         );
     }
@@ -268,8 +269,9 @@ fn coexisting_responses_have_rows() {
     }
     // The further rows are also in shards, and in the comparison of a file with itself.
     for shard in ["2/2", "1/2"] {
-        let completed = stability(&folder, speed, &["--out", "joined.parquet", "--shard", shard]);
-        assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+        let command_output =
+            stability(&folder, speed, &["--out", "joined.parquet", "--shard", shard]);
+        assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     }
     let merge = ["merge", "grid.toml", "--speed", speed, "--out", "joined.parquet"];
     let merge_output = sweep(&folder, &merge).output().expect("it starts");
@@ -289,8 +291,8 @@ fn coexisting_responses_have_rows() {
 #[test]
 fn a_drum_that_is_too_slow_has_a_status_at_once() {
     let folder = folder_with("");
-    let completed = stability(&folder, "0.01:0.02:0.01", &[]);
-    assert_eq!(completed.status.code(), Some(0), "{}", all_output(&completed));
+    let command_output = stability(&folder, "0.01:0.02:0.01", &[]);
+    assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     let shown_text = sweep(&folder, &["show", "--all", "results/grid-stability.parquet"]).output();
     let shown_text = all_output(&shown_text.expect("it starts"));
     assert!(shown_text.contains("too_slow"), "{shown_text}");
