@@ -28,3 +28,29 @@ impl Point {
         a.iter().zip(b).zip(&*self.segments).map(separation).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Machine, Profile, Spin, Timing, prepare};
+    use lane_ode::Simd;
+
+    #[test]
+    fn rounding_noise_is_no_separation() {
+        let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 2.0 };
+        let timing = Timing { end_s: 2.0, window_s: [0.0, 2.0], checkpoints: 4 };
+        let point = prepare(Simd::best(), &[(Machine::paper(), spin)], &timing).remove(0);
+        let point = point.unwrap();
+        let at_rest = |deviation: f64| {
+            let coordinates = point.equilibrium.map(|q| q + deviation);
+            vec![Checkpoint { coordinates }; point.segments.len()]
+        };
+        let greatest = |a: f64, b: f64| {
+            let separations = point.separations(&at_rest(a), &at_rest(b));
+            separations.into_iter().map(|(_, distance)| distance).fold(0.0, f64::max)
+        };
+        assert!(greatest(1e-15, -1e-15) < 1e-2);
+        assert!((greatest(1e-3, 2e-3) - 0.5).abs() < 1e-9);
+        assert_eq!(greatest(1e-3, 1e-3), 0.0);
+    }
+}
