@@ -99,7 +99,9 @@ struct ModelRefinement {
 /// The difference of a level from the one before.
 #[derive(Clone, Copy, Debug)]
 struct LevelDifference {
-    /// The relative difference; `None` if the levels cannot be compared.
+    /// The relative difference of the numbers; `None` if the levels cannot be compared.
+    numbers: Option<f64>,
+    /// The same, or the distance of the motions if the levels follow different ones.
     relative: Option<f64>,
     /// The change by which the level starts a family.
     start: FamilyStart,
@@ -150,7 +152,7 @@ impl ModelRefinement {
         }
         let relative = difference.map(|numbers| difference_of_levels(numbers, separation));
         let start = rule.levels.family_start(level);
-        self.differences.push(LevelDifference { relative, start });
+        self.differences.push(LevelDifference { numbers: difference, relative, start });
         if self.differences.len() == 1 && self.level == 0 {
             self.first_difference = relative.unwrap_or(f64::INFINITY);
         }
@@ -176,7 +178,7 @@ impl ModelRefinement {
     /// Returns the error of the finest run; `None` if there is no estimate.
     fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
         if let Some(PerturbedComparison { is_chaotic: true, difference }) = self.perturbed {
-            return error_of_chaos(self.last_difference()?, difference?);
+            return error_of_chaos(self.differences.last()?.numbers?, difference?);
         }
         let kind = rule.levels.levels[self.level].kind;
         let contracted_difference = match self.differences[..] {
@@ -330,11 +332,10 @@ impl RowRefinement {
             let greatest = |(a, b): (f64, f64)| a.max(b);
             outcome.error = nonlinear_error.zip(linear_error).map(greatest);
             outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
-            // If two levels agree, the motion is not chaotic, and its error is known without a
-            // perturbed run.
-            let disagrees =
-                nonlinear.last_difference().is_none_or(|difference| difference > rule.accuracy);
-            outcome.sensitive = Some(nonlinear.is_chaotic() && disagrees);
+            // The numbers of a motion that is chaotic for a part of the run may be independent of
+            // that part: then those of both levels and of the perturbed run agree.
+            let is_uncertain = nonlinear_error.is_none_or(|error| error > rule.accuracy);
+            outcome.sensitive = Some(nonlinear.is_chaotic() && is_uncertain);
         }
         Some(outcome)
     }
