@@ -12,7 +12,7 @@ use washer_row::{
     ROW_STATUSES, Trajectory,
 };
 
-use crate::model::described;
+use crate::model::engine_channel;
 use crate::plan::{Plan, compared_channels, has_friction};
 
 type WasherColumn = ResultColumn<Outcome>;
@@ -109,7 +109,7 @@ const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
 
 /// Returns the engine's descriptions of channels.
 fn descriptions(channels: &[Channel]) -> Vec<sweep_parameter::Channel> {
-    channels.iter().map(|channel| described(*channel)).collect()
+    channels.iter().map(|channel| engine_channel(*channel)).collect()
 }
 
 /// Returns the columns of the verdict, with the levels of this model's methods.

@@ -14,7 +14,7 @@ use sweep_parameter::named;
 use washer_model::{AttractorStatus, Attractors, Gauge, HeldSpeed, Recorders, StartRule, decimal};
 use washer_row::Status;
 
-use crate::engine::{Carried, find_motions};
+use crate::engine::{CarriedState, find_motions};
 use crate::plan::{Plan, compared_channels};
 use columns::{DwellColumn, DwellRow};
 use sweep_engine::columns::{declared, point_rows};
@@ -217,7 +217,7 @@ impl AttractorEngine {
     ) {
         let is_stopped = || context.must_stop();
         let Some(carry) = self.search.carry else {
-            let held_speeds: Vec<(HeldSpeed<'_>, Carried)> =
+            let held_speeds: Vec<(HeldSpeed<'_>, CarriedState)> =
                 requested.iter().map(|(_, held_speed)| (*held_speed, None)).collect();
             let results = find_motions(simd, &held_speeds, &self.starts, Cancel::When(&is_stopped));
             for ((row, _), result) in requested.iter().zip(results) {
@@ -228,7 +228,7 @@ impl AttractorEngine {
         let speeds = speeds_rpm.len() as u64;
         let groups: Vec<&[(u64, HeldSpeed<'_>)]> =
             requested.chunk_by(|a, b| a.0 / speeds == b.0 / speeds).collect();
-        let mut carried: Vec<Carried> = vec![None; groups.len()];
+        let mut carried: Vec<CarriedState> = vec![None; groups.len()];
         for step in 0..speeds {
             let position = if carry == Carry::Up { step } else { speeds - 1 - step };
             // The speeds before the first requested row are needed for its start state.
@@ -252,7 +252,7 @@ impl AttractorEngine {
                 let speed_rpm = speeds_rpm[position as usize];
                 (HeldSpeed { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
             };
-            let held_speeds: Vec<(HeldSpeed<'_>, Carried)> =
+            let held_speeds: Vec<(HeldSpeed<'_>, CarriedState)> =
                 groups_to_compute.iter().map(held_speed).collect();
             let results = find_motions(simd, &held_speeds, &self.starts, Cancel::When(&is_stopped));
             if is_stopped() {
@@ -290,7 +290,7 @@ impl AttractorEngine {
 
 /// Returns the state that the search carries to the next speed; `None` if the motion left the
 /// model's range.
-fn final_state(attractors: &Attractors) -> Carried {
+fn final_state(attractors: &Attractors) -> CarriedState {
     let motion = attractors.attractors.first()?;
     (!matches!(motion.status, AttractorStatus::LeftRange { .. })).then_some(motion.end)
 }

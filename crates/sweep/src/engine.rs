@@ -5,7 +5,7 @@ mod growth;
 mod pool;
 mod reference;
 
-pub(crate) use growth::{Carried, fastest_growth, find_motions, find_responses};
+pub(crate) use growth::{CarriedState, fastest_growth, find_motions, find_responses};
 pub(crate) use reference::{reference_method, reference_step_s};
 pub(crate) use sweep_engine::{Engine, Evaluator, RunContext};
 
@@ -25,7 +25,7 @@ use washer_row::{
 
 use crate::columns::Columns;
 use crate::map_row::{MapLayout, MapRow};
-use crate::method::direct;
+use crate::method::direct_method;
 use crate::plan::{Plan, compared_channels, failure_reason, point_input};
 use sweep_engine::engine::evaluate_points;
 use sweep_engine::method::Steps;
@@ -165,7 +165,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     fn find_levels(&self, cancel: Cancel<'_>) -> [RefinementLevels; 2] {
-        if let Some(method) = direct(&self.plan.integrator) {
+        if let Some(method) = direct_method(&self.plan.integrator) {
             return ModelKind::ALL.map(|_| RefinementLevels::direct(method));
         }
         // The corners of the grid have the extremes of the machines' frequencies.

@@ -14,52 +14,54 @@ use sweep_engine::store::chunk_points;
 use sweep_engine::store::read::{NameCounts, count_name};
 use sweep_engine::{Error, Estimate, Interrupt, Job, RunContext};
 
-/// Time (s) that the integration of beginnings must take: they become longer until it does. Basis:
+/// The minimum time (s) for the integration of beginnings of trajectories, which are made longer
+/// until their integration takes it. Basis:
 /// far above the resolution of clocks. Doubling it doubles the time of an estimate.
-const MEASURED_S: f64 = 0.2;
+const MIN_MEASURED_S: f64 = 0.2;
 
-/// Maximum time (s) for whole trajectories, after which beginnings are used. Basis: a user's
+/// The maximum time (s) for whole trajectories, after which beginnings are used. Basis: a user's
 /// patience. Doubling it makes estimates of expensive grids slower and more accurate.
-const MAX_WHOLE_S: f64 = 4.0;
+const MAX_TRAJECTORIES_S: f64 = 4.0;
 
-/// Shortest beginning (s) of a trajectory by a method that chooses its steps. Basis: milliseconds
-/// of computing. Doubling it saves no time.
-const SHORTEST_END_S: f64 = 1e-3;
+/// The length (s) of the shortest beginning of a trajectory by a method that chooses its steps.
+/// Basis: milliseconds of computing. Doubling it saves no time.
+const SHORTEST_BEGINNING_S: f64 = 1e-3;
 
-/// Maximum number of the shortest possible steps in the shortest beginning. Basis: milliseconds of
-/// computing, however stiff the machine is. Doubling it doubles that time.
+/// The maximum number of the shortest possible steps in the shortest beginning. Basis: milliseconds
+/// of computing, however stiff the machine is. Doubling it doubles that time.
 const MAX_SHORTEST_STEPS: f64 = 1e4;
 
-/// Time (s) for a batch of whole trajectories, by the cost of the first few. Basis: a user's
-/// patience. Doubling it makes estimates slower and more accurate.
-const BATCH_S: f64 = 2.0;
+/// The maximum time (s) for a batch of whole trajectories, by the cost of the first few. Basis: a
+/// user's patience. Doubling it makes estimates slower and more accurate.
+const MAX_BATCH_S: f64 = 2.0;
 
-/// Maximum number of points in such a batch. Basis: all lanes of all levels are full. Doubling it
-/// doubles the time of an estimate.
-const MAX_BATCH: u64 = 64;
+/// The maximum number of points in a batch of whole trajectories. Basis: all lanes of all levels
+/// are full. Doubling it doubles the time of an estimate.
+const MAX_BATCH_POINTS: u64 = 64;
 
 /// The golden section. The fractional parts of its multiples are spread over the unit interval
 /// without a period.
 const GOLDEN_SECTION: f64 = 0.618_033_988_749_894_9;
 
-/// Memory (bytes) of the program, its libraries and buffers without points. Basis: measured in
+/// The memory (bytes) of the program, its libraries and buffers without points. Basis: measured in
 /// docs/scaling.md. Doubling it overestimates small runs.
 const PROGRAM_BYTES: f64 = 14e6;
 
-/// Memory (bytes) of a cell of a row group while it is encoded, besides its own 8 bytes. Basis:
+/// The memory (bytes) of a cell of a row group while it is encoded, besides its own 8 bytes. Basis:
 /// measured in docs/scaling.md. Doubling it overestimates large results.
-const CELL_BYTES: f64 = 5.0;
+const BYTES_PER_CELL: f64 = 5.0;
 
-/// Disk space (bytes) of a column besides its cells, with its share of the plan. Basis: 767 and 768
-/// bytes in results of one point with 35 and 40 columns. Doubling it overestimates small results.
-const RESULT_COLUMN_BYTES: f64 = 800.0;
+/// The disk space (bytes) of a column besides its cells, with its share of the plan. Basis: 767 and
+/// 768 bytes in results of one point with 35 and 40 columns. Doubling it overestimates small
+/// results.
+const BYTES_PER_RESULT_COLUMN: f64 = 800.0;
 
 /// The bytes that a column of a part takes besides its cells. Basis: 282 bytes in parts of eight
 /// points with 36 columns. Doubling it doubles the disk that small chunks are said to take.
-const PART_COLUMN_BYTES: f64 = 300.0;
+const BYTES_PER_PART_COLUMN: f64 = 300.0;
 
 /// The estimated time (s) of work above which a command says what makes it shorter. Basis: a user's
-/// patience. Doubling it lets more users wait who need not.
+/// patience. Doubling it makes more users wait who could shorten the work.
 pub(crate) const LONG_WORK_S: f64 = 180.0;
 
 /// Estimates the cost of a run on a number of threads: it integrates some points of the plan, for a
@@ -68,7 +70,7 @@ pub(crate) const LONG_WORK_S: f64 = 180.0;
 /// # Errors
 /// Returns an error if the plan has no engine.
 pub(crate) fn estimate(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
-    estimate_within(plan, threads, MAX_WHOLE_S)
+    estimate_within(plan, threads, MAX_TRAJECTORIES_S)
 }
 
 /// Estimates the cost like [`estimate`], with a maximum time (s) for whole trajectories.
@@ -79,25 +81,25 @@ fn estimate_within(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate
     let first = MeasuredCost::measure_few(&engine, whole_s);
     let MeasuredCost { core_s_per_point, sample_statuses, integrated_s } =
         MeasuredCost::measure_batch(&engine, &first).unwrap_or(first);
-    let chunk = chunk_points(plan.points());
+    let points_per_chunk = chunk_points(plan.points());
     let layout = &Job::new(plan).layout;
     let row_bytes = plan.points() as f64 * layout.bytes_per_row() as f64;
     let columns = layout.schema().fields().len() as f64;
-    let parts = plan.points().div_ceil(chunk) as f64;
+    let parts = plan.points().div_ceil(points_per_chunk) as f64;
     // A chunk is one thread's work, so the last round of chunks may leave threads without any.
-    let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);
-    let points_a_thread = (rounds * chunk).min(plan.points());
+    let rounds = plan.points().div_ceil(points_per_chunk).div_ceil(threads as u64);
+    let points_per_thread = (rounds * points_per_chunk).min(plan.points());
     Ok(Estimate {
         simd: engine.widest_simd().name().to_owned(),
         threads,
-        wall_s: points_a_thread as f64 * core_s_per_point,
+        wall_s: points_per_thread as f64 * core_s_per_point,
         core_s_per_point,
         sample_statuses,
         sampled_s: integrated_s,
         memory_bytes: memory_bytes(&engine, threads),
-        disk_bytes: row_bytes + parts * columns * PART_COLUMN_BYTES,
-        result_bytes: row_bytes + columns * RESULT_COLUMN_BYTES,
-        method: method(plan, &engine.levels()[0]),
+        disk_bytes: row_bytes + parts * columns * BYTES_PER_PART_COLUMN,
+        result_bytes: row_bytes + columns * BYTES_PER_RESULT_COLUMN,
+        method: describe_method(plan, &engine.levels()[0]),
         criterion: criterion_words(plan),
         notes: plan_notes(plan),
     })
@@ -108,7 +110,7 @@ struct MeasuredCost {
     core_s_per_point: f64,
     /// The number of points by status.
     sample_statuses: NameCounts,
-    /// The end (s) of the integrated beginnings.
+    /// The length (s) of the integrated beginnings.
     integrated_s: f64,
 }
 
@@ -120,39 +122,40 @@ impl MeasuredCost {
         // A method with levels costs most at the beginning, where little moves, so that beginnings
         // overestimate it.
         if let Steps::Checked(_) = plan.integrator.steps()
-            && let Some((cost_s, sample_statuses)) = cost_within(whole_s, engine, points)
+            && let Some((cost_s, sample_statuses)) = measure_cost_within(whole_s, engine, points)
         {
             let core_s_per_point = cost_s / points as f64;
             return Self { core_s_per_point, sample_statuses, integrated_s: plan.end_s };
         }
-        let mut shorter: Option<(f64, f64)> = None;
+        let mut shorter_beginning: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
-        let mut cut = plan.clone();
+        let mut shortened_plan = plan.clone();
         // The cost of metrics at held speeds does not grow with the length. It is measured once,
         // and these metrics are removed.
-        let mut held_s = 0.0;
+        let mut held_speeds_s = 0.0;
         loop {
-            cut.end_s = end_s;
-            cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
+            shortened_plan.end_s = end_s;
+            shortened_plan.window_s =
+                plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
             // The levels of a shorter run would be for lower speeds, with longer steps.
-            let (cost_s, sample_statuses) = cost(&engine.for_plan(&cut), points);
+            let (cost_s, sample_statuses) = measure_cost(&engine.for_plan(&shortened_plan), points);
             let grows_with_length =
                 |metric: &Metric| !matches!(metric, Metric::Growth | Metric::Dwell);
-            if !cut.model.measures.metrics.iter().all(grows_with_length) {
-                cut.model.measures.metrics.retain(grows_with_length);
-                held_s = cost_s;
+            if !shortened_plan.model.measures.metrics.iter().all(grows_with_length) {
+                shortened_plan.model.measures.metrics.retain(grows_with_length);
+                held_speeds_s = cost_s;
                 continue;
             }
-            if end_s >= plan.end_s || cost_s >= MEASURED_S {
+            if end_s >= plan.end_s || cost_s >= MIN_MEASURED_S {
                 // The cost of the equilibrium does not grow with the length, so the difference of
                 // two beginnings gives the rate.
-                let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
+                let (base_end_s, base_s) = shorter_beginning.unwrap_or((0.0, 0.0));
                 let rate = ((cost_s - base_s) / (end_s - base_end_s)).max(0.0);
-                let whole_s = held_s + cost_s + rate * (plan.end_s - end_s);
+                let whole_s = held_speeds_s + cost_s + rate * (plan.end_s - end_s);
                 let core_s_per_point = whole_s / points as f64;
                 return Self { core_s_per_point, sample_statuses, integrated_s: end_s };
             }
-            shorter = Some((end_s, cost_s));
+            shorter_beginning = Some((end_s, cost_s));
             end_s = (4.0 * end_s).min(plan.end_s);
         }
     }
@@ -162,12 +165,12 @@ impl MeasuredCost {
     /// times as much each.
     fn measure_batch(engine: &ModelEngine<'_>, first: &Self) -> Option<Self> {
         let plan = engine.plan();
-        let affordable = (BATCH_S / first.core_s_per_point) as u64;
-        let points = affordable.min(MAX_BATCH).min(plan.points());
+        let affordable = (MAX_BATCH_S / first.core_s_per_point) as u64;
+        let points = affordable.min(MAX_BATCH_POINTS).min(plan.points());
         if first.integrated_s < plan.end_s || points <= first.sample_statuses.values().sum() {
             return None;
         }
-        let (cost_s, sample_statuses) = cost(engine, points);
+        let (cost_s, sample_statuses) = measure_cost(engine, points);
         let core_s_per_point = cost_s / points as f64;
         Some(Self { core_s_per_point, sample_statuses, integrated_s: plan.end_s })
     }
@@ -178,31 +181,37 @@ fn first_end_s(plan: &Plan) -> f64 {
     let short_s = match plan.integrator.steps() {
         Steps::Fixed(step_s) => 100.0 * step_s,
         Steps::ByError | Steps::Checked(_) => {
-            SHORTEST_END_S.min(MAX_SHORTEST_STEPS * shortest_step_s(plan.end_s))
+            SHORTEST_BEGINNING_S.min(MAX_SHORTEST_STEPS * shortest_step_s(plan.end_s))
         }
     };
     short_s.min(plan.end_s)
 }
 
 /// Returns the time (s) that one core takes for a number of points, and their statuses.
-fn cost(engine: &ModelEngine<'_>, points: u64) -> (f64, NameCounts) {
-    cost_within(f64::INFINITY, engine, points).unwrap_or((f64::INFINITY, NameCounts::new()))
+fn measure_cost(engine: &ModelEngine<'_>, points: u64) -> (f64, NameCounts) {
+    measure_cost_within(f64::INFINITY, engine, points).unwrap_or((f64::INFINITY, NameCounts::new()))
 }
 
-/// Returns the cost like [`cost`], or `None` if it exceeds a time (s). The points are one in each
-/// of as many equal parts of the grid, at irregular positions: with equal distances all might have
-/// the same value of an axis.
-fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<(f64, NameCounts)> {
+/// Returns the cost like [`measure_cost`], or `None` if it exceeds a time (s). The points are one
+/// in each of as many equal parts of the grid, at irregular positions: with equal distances all
+/// might have the same value of an axis.
+fn measure_cost_within(
+    max_s: f64,
+    engine: &ModelEngine<'_>,
+    points: u64,
+) -> Option<(f64, NameCounts)> {
     let plan = engine.plan();
-    let part = plan.points() as f64 / points as f64;
-    let point = |k| ((k as f64 + (k as f64 * GOLDEN_SECTION).fract()) * part) as u64;
-    let axis_values: Vec<Vec<f64>> = (0..points).map(|k| plan.axis_values(point(k))).collect();
-    let began_s = thread_time_s();
-    let is_late = || thread_time_s() - began_s > most_s;
+    let points_per_part = plan.points() as f64 / points as f64;
+    let point_index =
+        |k| ((k as f64 + (k as f64 * GOLDEN_SECTION).fract()) * points_per_part) as u64;
+    let axis_values: Vec<Vec<f64>> =
+        (0..points).map(|k| plan.axis_values(point_index(k))).collect();
+    let start_s = thread_time_s();
+    let is_late = || thread_time_s() - start_s > max_s;
     let interrupt = Interrupt::new();
     let context = RunContext::with_time_limit(&interrupt, &is_late);
     let rows = engine.evaluate_points(&axis_values, &context)?;
-    let cost_s = thread_time_s() - began_s;
+    let cost_s = thread_time_s() - start_s;
     let mut sample_statuses = NameCounts::new();
     rows.iter().for_each(|row| count_name(&mut sample_statuses, row.status()));
     Some((cost_s, sample_statuses))
@@ -229,12 +238,13 @@ fn thread_time_s() -> f64 {
 fn memory_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
     let plan = engine.plan();
     let channels = plan.reliability.channels.len() as f64;
-    let outcome = size_of::<Outcome>() as f64 + 2.0 * 8.0 * channels;
-    let in_hand = (2 * threads + 1) as f64 * chunk_points(plan.points()) as f64 * outcome;
+    let outcome_bytes = size_of::<Outcome>() as f64 + 2.0 * 8.0 * channels;
+    let chunk_bytes = (2 * threads + 1) as f64 * chunk_points(plan.points()) as f64 * outcome_bytes;
     let columns = Job::new(plan).layout.schema().fields().len() as f64;
-    let row_group = sweep_engine::store::schema::ROW_GROUP_ROWS as f64;
-    let joining = row_group.min(plan.points() as f64) * columns * (8.0 + CELL_BYTES);
-    PROGRAM_BYTES + in_hand.max(joining) + turn_bytes(engine, threads)
+    let row_group_rows = sweep_engine::store::schema::ROW_GROUP_ROWS as f64;
+    let row_group_bytes =
+        row_group_rows.min(plan.points() as f64) * columns * (8.0 + BYTES_PER_CELL);
+    PROGRAM_BYTES + chunk_bytes.max(row_group_bytes) + turn_bytes(engine, threads)
 }
 
 /// Returns the memory (bytes) of the peaks by turn of the drum, of both models and of all points
@@ -250,7 +260,7 @@ fn turn_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
 }
 
 /// Returns a description of the method, with its steps or levels.
-fn method(plan: &Plan, levels: &RefinementLevels) -> String {
+fn describe_method(plan: &Plan, levels: &RefinementLevels) -> String {
     let steps = match plan.integrator.steps() {
         Steps::Fixed(step_s) => {
             // Steps end at both window edges and at the end, so the number in each part is rounded

@@ -32,32 +32,32 @@ pub(crate) use tongue::{Closing, ModeResonance, Tongue, TongueEnd};
 use tongue::{ResponseFinder, SpeedScan, find_tongues};
 use washer_row::Verdict;
 
-/// Step between the speeds at which responses are sought (rpm), unless `--speed` gives another.
+/// The step between the speeds at which responses are sought (rpm), unless `--speed` gives another.
 /// Basis: the tongues of the paper's machine are wider. Doubling it halves the time and misses
 /// tongues of up to twice the width.
 const STEP_RPM: f64 = 1.0;
 
-/// Lowest speed at which responses are sought, as a share of the slowest mode's frequency, unless
-/// `--speed` gives another. Basis: parametric resonances of a mode of frequency f are at 2 f / k,
-/// and this is the fourth. Doubling it leaves out the third and the fourth.
-const LOWEST_SPEED: f64 = 0.5;
+/// The lowest speed at which responses are sought, as a share of the slowest mode's frequency,
+/// unless `--speed` gives another. Basis: parametric resonances of a mode of frequency f are at
+/// 2 f / k, and the one for k = 4 is at 0.5 f. Doubling it leaves out the third and the fourth.
+const LOWEST_SPEED_RATIO: f64 = 0.5;
 
-/// Greatest time of the whole work, as a multiple of the scan's. Basis: 2.4 for the machine of
-/// docs/examples/friction.toml at 0.4 kg. Doubling it doubles the announced time.
-const WORK_AFTER_SCAN: f64 = 3.0;
+/// The maximum time of the whole command, as a multiple of the time of the scan. Basis: 2.4 for the
+/// machine of docs/examples/friction.toml at 0.4 kg. Doubling it doubles the announced time.
+const TOTAL_WORK_FACTOR: f64 = 3.0;
 
-/// Time (s) of work from which on it is announced. Basis: a user does not wonder before. Doubling
-/// it announces less.
+/// The least time (s) of a command that is announced. Basis: a user does not wonder before.
+/// Doubling it announces fewer commands.
 const ANNOUNCED_TIME_S: f64 = 10.0;
 
-/// The tongues of a point, and their part in its verdict.
+/// The tongues of a point, and how they affect its verdict.
 pub(crate) struct Explanation {
     /// The grid's name.
     pub(crate) name: String,
     /// The values of the parameters of the point, by name.
     pub(crate) parameters: NamedValues,
-    /// The result of the point in a map.
-    pub(crate) swept: SweptResult,
+    /// The row of the point in a map.
+    pub(crate) map_result: MapResult,
     /// The scans over speed, one for each direction in which the drum turns, forwards first.
     pub(crate) scans: Vec<SpeedScan>,
     /// The lowest and the greatest speed of the profile within the run (rpm), negative backwards.
@@ -67,12 +67,12 @@ pub(crate) struct Explanation {
     /// The amplitudes, by channel of the plan, of the same run when it is put on the periodic
     /// response at the entry of each tongue; `None` if no tongue is crossed before the window ends.
     pub(crate) without_departures: Option<Result<Vec<f64>, LeftRangeError>>,
-    /// The deviation of the models, and the share that tongues have in it; `None` without a ratio.
+    /// The deviation of the models, and the part of the tongues in it; `None` without a ratio.
     pub(crate) cause: Option<Cause>,
 }
 
-/// The result of the point as a map has it.
-pub(crate) struct SweptResult {
+/// The row of a point in a map.
+pub(crate) struct MapResult {
     pub(crate) channels: Vec<Channel>,
     pub(crate) window_s: [f64; 2],
     pub(crate) limits: RatioLimits,
@@ -85,7 +85,7 @@ pub(crate) struct SweptResult {
     pub(crate) verdict: Verdict,
 }
 
-impl SweptResult {
+impl MapResult {
     /// Returns the peaks of the plan's channels, out of those of all channels.
     pub(crate) fn plan_channels(&self, peaks: &[f64; Channel::ALL.len()]) -> Vec<f64> {
         self.channels.iter().map(|channel| peaks[channel.index()]).collect()
@@ -138,13 +138,13 @@ fn explain_in_pool(
     let simd = simd_from_environment()?;
     let input = point_input(plan, &plan.axis_values(0));
     let spin = &input.spin;
-    let profile_rpm = profile::speed_range(spin, plan.end_s);
+    let profile_rpm = profile::speed_range_rpm(spin, plan.end_s);
     let point = prepare_input(plan, &input).map_err(Error::model)?;
-    let find_directions = find_directions(plan, &input, &point, profile_rpm, speeds)?;
+    let directions = find_directions(plan, &input, &point, profile_rpm, speeds)?;
     // The total is that of the scans. The searches after them take a number of speeds that is not
     // known beforehand.
     let speed_count = |direction: &TurningDirection| direction.speeds_to_scan.values().len() as u64;
-    let total_speeds: u64 = find_directions.iter().map(speed_count).sum();
+    let total_speeds: u64 = directions.iter().map(speed_count).sum();
     let speeds_done = AtomicU64::new(0);
     let progress = Progress::for_search(progress_mode, total_speeds, "speeds looked at", 0);
     let count_speeds = |speeds: usize| {
@@ -152,8 +152,8 @@ fn explain_in_pool(
         progress.show_search(speeds_done.min(total_speeds), speeds_done);
     };
     count_speeds(0);
-    let mut finders = Vec::with_capacity(find_directions.len());
-    for direction in &find_directions {
+    let mut finders = Vec::with_capacity(directions.len());
+    for direction in &directions {
         let mut finder = ResponseFinder {
             simd,
             plan,
@@ -164,11 +164,11 @@ fn explain_in_pool(
             count_speeds: &count_speeds,
             curves: Vec::new(),
         };
-        finder.follow_curves(direction.speeds_to_scan.to.max(direction.fastest_rpm));
+        finder.follow_curves(direction.speeds_to_scan.to_rpm.max(direction.fastest_rpm));
         finders.push(finder);
     }
     if progress_mode != ProgressMode::None {
-        let scans = finders.iter().zip(&find_directions);
+        let scans = finders.iter().zip(&directions);
         let thread_s: f64 = scans
             .map(|(finder, direction)| {
                 speed_count(direction) as f64 * finder.seconds_per_speed(direction.speeds_to_scan)
@@ -180,43 +180,48 @@ fn explain_in_pool(
     let run_scans = || {
         finders
             .iter()
-            .zip(&find_directions)
+            .zip(&directions)
             .map(|(finder, direction)| find_tongues(finder, direction.speeds_to_scan))
             .collect::<Vec<_>>()
     };
-    let (scan_results, swept) = rayon::join(run_scans, || evaluate_swept_result(plan, interrupt));
+    let (scan_results, map_result) =
+        rayon::join(run_scans, || evaluate_map_result(plan, interrupt));
     let (tongues, scans): (Vec<Vec<Tongue>>, Vec<SpeedScan>) = scan_results.into_iter().unzip();
     let tongues: Vec<Tongue> = tongues.into_iter().flatten().collect();
-    let swept = swept?;
+    let map_result = map_result?;
     let finder_for = |tongue: &Tongue| {
         let has_same_direction =
             |finder: &&ResponseFinder<'_>| finder.is_backward == tongue.is_backward;
         finders.iter().find(has_same_direction).unwrap_or(&finders[0])
     };
     let find_all_endings = || -> Vec<Option<Attractor>> {
-        let find_directions = tongues.chunk_by(|a, b| a.is_backward == b.is_backward);
-        let find_all_endings =
+        let tongues_by_direction = tongues.chunk_by(|a, b| a.is_backward == b.is_backward);
+        let find_endings =
             |tongues: &[Tongue]| tongue::find_endings(finder_for(&tongues[0]), tongues);
-        find_directions.flat_map(find_all_endings).collect()
+        tongues_by_direction.flat_map(find_endings).collect()
     };
-    let find_all_crossings = || find_crossings(plan, (&point, spin), &finders, &tongues, &swept);
+    let find_all_crossings =
+        || find_crossings(plan, (&point, spin), &finders, &tongues, &map_result);
     let find_all_closings =
         || tongues.par_iter().map(|tongue| tongue.find_closing(finder_for(tongue)));
-    let ((find_all_crossings, find_all_endings), find_all_closings) = rayon::join(
+    let ((crossing_results, endings), closings) = rayon::join(
         || rayon::join(find_all_crossings, find_all_endings),
         || find_all_closings().collect::<Vec<_>>(),
     );
-    let (passages, without_departures) = find_all_crossings;
+    let (passages, without_departures) = crossing_results;
     let step_s = reference_step_s(&StepSelector::new([(&point, spin)], plan.end_s));
     let growing_passages = tongues.iter().zip(&passages).flat_map(|(tongue, passages)| {
         passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
     });
     let keeps_limit = |amplitudes: &Vec<f64>| {
-        swept.greatest_ratio(amplitudes).is_some_and(|(ratio, _)| ratio < swept.limits.upper)
+        map_result
+            .greatest_ratio(amplitudes)
+            .is_some_and(|(ratio, _)| ratio < map_result.limits.upper)
     };
     let has_passed = matches!(&without_departures, Some(Ok(amplitudes)) if keeps_limit(amplitudes));
-    let cause = cause::find_cause((&point, spin), step_s, &swept, has_passed, growing_passages);
-    let tongues = tongues.into_iter().zip(find_all_closings).zip(find_all_endings).zip(passages);
+    let cause =
+        cause::find_cause((&point, spin), step_s, &map_result, has_passed, growing_passages);
+    let tongues = tongues.into_iter().zip(closings).zip(endings).zip(passages);
     let tongues = tongues.map(|(((tongue, closing), ending), passages)| {
         (Tongue { closing: Some(closing), ending, ..tongue }, passages)
     });
@@ -228,14 +233,14 @@ fn explain_in_pool(
         tongues: tongues.collect(),
         without_departures,
         cause,
-        swept,
+        map_result,
     })
 }
 
 /// Returns the time of a scan over a number of speeds, if a user notices it, and what makes a long
 /// one shorter.
 fn announce_long_scan(speeds: u64, scan_s: f64) -> Option<String> {
-    let total_s = WORK_AFTER_SCAN * scan_s;
+    let total_s = TOTAL_WORK_FACTOR * scan_s;
     if total_s < ANNOUNCED_TIME_S {
         return None;
     }
@@ -278,8 +283,8 @@ fn find_directions(
     requested: Option<Speeds>,
 ) -> Result<Vec<TurningDirection>, Error> {
     let slowest_rpm = modes(point, 0.0, 0.0).map_err(Error::model)?.modes[0].frequency_rpm();
-    let from_rpm = (LOWEST_SPEED * slowest_rpm).floor().max(1.0);
-    let mut find_directions = Vec::new();
+    let from_rpm = (LOWEST_SPEED_RATIO * slowest_rpm).floor().max(1.0);
+    let mut directions = Vec::new();
     for (is_backward, fastest_rpm) in [(false, highest_rpm), (true, -lowest_rpm)] {
         let is_turned = fastest_rpm > 0.0 || !is_backward && lowest_rpm >= 0.0;
         let speeds_to_scan = match requested {
@@ -289,7 +294,7 @@ fn find_directions(
         };
         let input = if is_backward { mirror_input(input) } else { input.clone() };
         let point = prepare_input(plan, &input).map_err(Error::model)?;
-        find_directions.push(TurningDirection {
+        directions.push(TurningDirection {
             is_backward,
             input,
             point,
@@ -297,7 +302,7 @@ fn find_directions(
             fastest_rpm,
         });
     }
-    if find_directions.is_empty() {
+    if directions.is_empty() {
         let fastest_rpm = highest_rpm.max(-lowest_rpm);
         let expected = format!(
             "a profile that exceeds {from_rpm} rpm, half of the slowest mode's frequency, within \
@@ -305,7 +310,7 @@ fn find_directions(
         );
         return Err(Error::option("[spin]", format!("at most {fastest_rpm:.3} rpm"), expected));
     }
-    Ok(find_directions)
+    Ok(directions)
 }
 
 /// Returns the mirror image of a machine and its spin.
@@ -321,11 +326,11 @@ fn mirror_input(input: &PointInput) -> PointInput {
 
 /// Computes the row of the plan's only point. Once the interrupt is raised, the result is
 /// meaningless.
-fn evaluate_swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResult, Error> {
+fn evaluate_map_result(plan: &Plan, interrupt: &Interrupt) -> Result<MapResult, Error> {
     let engine = ModelEngine::new(plan)?;
     let row = engine.evaluate_only_point(interrupt);
     let amplitudes = |model| row.as_ref().map_or_else(Vec::new, |row| row.amplitudes(model));
-    Ok(SweptResult {
+    Ok(MapResult {
         channels: compared_channels(plan),
         window_s: plan.window_at(&plan.axis_values(0)),
         limits: plan.reliability.limits,
@@ -336,7 +341,7 @@ fn evaluate_swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResu
     })
 }
 
-/// The field of this name of an [`Explanation`].
+/// The type of [`Explanation::without_departures`].
 type WithoutDepartures = Option<Result<Vec<f64>, LeftRangeError>>;
 
 /// Returns the passages of the run through each tongue, and the amplitudes of the same run when it
@@ -346,14 +351,14 @@ fn find_crossings(
     (point, spin): (&Point, &Spin),
     finders: &[ResponseFinder<'_>],
     tongues: &[Tongue],
-    swept: &SweptResult,
+    map_result: &MapResult,
 ) -> (Vec<Vec<Passage>>, WithoutDepartures) {
     let end_s = plan.end_s;
     // Passages in order of time, each with the number of its tongue.
     let intervals = tongues.iter().enumerate().flat_map(|(k, tongue)| {
         let [from, to] = tongue.range_rpm;
         let band_rpm = if tongue.is_backward { [-to, -from] } else { [from, to] };
-        let intervals_s = profile::times_inside_s(spin, end_s, band_rpm);
+        let intervals_s = profile::intervals_inside_s(spin, end_s, band_rpm);
         intervals_s.into_iter().map(move |interval_s| (k, interval_s))
     });
     let mut intervals: Vec<(usize, [f64; 2])> = intervals.collect();
@@ -388,13 +393,13 @@ fn find_crossings(
     }
     let step_s = reference_step_s(&StepSelector::new([(point, spin)], end_s));
     let begins_before_window_end =
-        |crossing: &&Crossing<'_>| crossing.interval_s[0] < swept.window_s[1];
+        |crossing: &&Crossing<'_>| crossing.interval_s[0] < map_result.window_s[1];
     let (effects, peaks) = rayon::join(
         || follow_crossings(point, step_s, &crossings),
         || {
             crossings.iter().find(begins_before_window_end)?;
-            let peaks = peaks_without_departures(point, step_s, &crossings, swept.window_s);
-            Some(peaks.map(|peaks| swept.plan_channels(&peaks)))
+            let peaks = peaks_without_departures(point, step_s, &crossings, map_result.window_s);
+            Some(peaks.map(|peaks| map_result.plan_channels(&peaks)))
         },
     );
     let mut passages: Vec<Vec<Passage>> = tongues.iter().map(|_| Vec::new()).collect();

@@ -1,5 +1,4 @@
-//! The methods of integration that a grid file may write; what each does is
-//! `washer_model`'s.
+//! The methods of integration that a grid file may write; `washer_model` computes them.
 
 use lane_ode::Tolerance;
 pub use sweep_engine::method::Integrator;
@@ -10,8 +9,8 @@ use sweep_parameter::Range;
 use washer_model::{Method, MethodKind};
 use washer_row::MAX_ADAPTIVE_STEPS;
 
-/// Share of the longest stable step that plain RK4 uses as the fast method's reference.
-pub(crate) const REFERENCE_SHARE: f64 = 0.75;
+/// The share of the longest stable step that plain RK4 uses as the fast method's reference.
+pub(crate) const REFERENCE_STEP_RATIO: f64 = 0.75;
 
 /// The accuracy of the fast method. Below 1e-4 its levels agree on ringing that none resolves.
 const LEVELS_ACCURACY: Setting = Setting {
@@ -53,7 +52,7 @@ pub fn rk4_mass_scaled(accuracy: f64) -> Integrator {
 
 /// Returns the method by which each trajectory is integrated; `None` for the fast method, which
 /// compares levels.
-pub(crate) fn direct(integrator: &Integrator) -> Option<Method> {
+pub(crate) fn direct_method(integrator: &Integrator) -> Option<Method> {
     let mut method = Method::new(MethodKind::named(integrator.name())?);
     match (method.kind.adapts_steps(), &integrator.settings()[..]) {
         (false, &[(_, step_s)]) => method.step_s = step_s,
@@ -80,28 +79,28 @@ mod tests {
 
     #[test]
     fn a_row_of_the_table_says_what_its_method_does() {
-        for entry in METHODS.iter() {
-            let method = entry.with_defaults();
-            assert_eq!(method.name(), entry.name);
-            let keys: Vec<_> = entry.settings.iter().map(|setting| setting.key).collect();
-            let written = method.settings();
-            assert_eq!(written.iter().map(|(key, _)| *key).collect::<Vec<_>>(), keys);
-            for (setting, (key, value)) in entry.settings.iter().zip(written) {
+        for table_row in METHODS.iter() {
+            let method = table_row.with_defaults();
+            assert_eq!(method.name(), table_row.name);
+            let keys: Vec<_> = table_row.settings.iter().map(|setting| setting.key).collect();
+            let settings = method.settings();
+            assert_eq!(settings.iter().map(|(key, _)| *key).collect::<Vec<_>>(), keys);
+            for (setting, (key, value)) in table_row.settings.iter().zip(settings) {
                 assert!(setting.range.contains(value), "{key} = {value}");
                 assert_eq!(method.to_json()[key], value);
             }
-            if let Some(direct) = direct(&method) {
-                assert_eq!(direct.kind.name(), entry.name, "a row names its method");
+            if let Some(direct) = direct_method(&method) {
+                assert_eq!(direct.kind.name(), table_row.name, "a row names its method");
             }
         }
     }
 
     #[test]
     fn a_key_means_the_same_to_every_method() {
-        let all = || METHODS.iter().flat_map(|entry| entry.settings);
+        let all = || METHODS.iter().flat_map(|table_row| table_row.settings);
         for (one, other) in all().flat_map(|one| all().map(move |other| (one, other))) {
-            let same = (one.range, one.default) == (other.range, other.default);
-            assert!(one.key != other.key || same, "{}", one.key);
+            let means_same = (one.range, one.default) == (other.range, other.default);
+            assert!(one.key != other.key || means_same, "{}", one.key);
         }
     }
 
@@ -112,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn methods_are_shown_and_written_as_ever() {
+    fn methods_are_shown_and_written_with_their_settings() {
         let method =
             METHODS[1].with_settings(|setting| if setting.key == "rtol" { 1e-5 } else { 1e-8 });
         assert_eq!(method.to_string(), "dopri5, rtol 1e-5, atol 1e-8");

@@ -1,4 +1,5 @@
-//! The washing machine's part of a plan, and what the engine knows of its parameters and channels.
+//! The washing machine's part of a plan, and its parameters and channels in the form that the
+//! engine takes.
 
 use sweep_engine::ModelParameter;
 use washer_model::{Channel, Machine, MachineParameter, Spin, Target};
@@ -6,8 +7,8 @@ use washer_row::Measures;
 
 use crate::speeds::SpeedList;
 
-/// Returns what the engine knows of a channel.
-pub(crate) const fn described(channel: Channel) -> sweep_parameter::Channel {
+/// Returns a channel of the model in the form that the engine takes.
+pub(crate) const fn engine_channel(channel: Channel) -> sweep_parameter::Channel {
     sweep_parameter::Channel {
         name: channel.name(),
         unit: channel.unit(),
@@ -15,7 +16,7 @@ pub(crate) const fn described(channel: Channel) -> sweep_parameter::Channel {
     }
 }
 
-/// Returns what the engine knows of a parameter of a machine and a spin.
+/// Returns a parameter of a machine and a spin in the form that the engine takes.
 pub(crate) fn engine_parameter(
     parameter: MachineParameter,
     machine: &Machine,
@@ -52,7 +53,7 @@ pub struct Washer {
 }
 
 impl Washer {
-    /// Returns what the engine knows of a parameter, with its value.
+    /// Returns a parameter, with its value, in the form that the engine takes.
     pub(crate) fn parameter(&self, parameter: MachineParameter) -> ModelParameter<Self> {
         engine_parameter(parameter, &self.machine, &self.spin)
     }

@@ -5,25 +5,25 @@ use washer_row::Criterion;
 
 use crate::plan::{Plan, point_input, prepare_input};
 
-/// Minimum force of a stop at rest, as a share of the machine's weight, at which a note reports it.
-/// Basis: softened stops that are open have a small force. Doubling it may hide a stop that is
+/// The minimum force of a stop at rest, as a share of the machine's weight, at which a note reports
+/// it. Basis: softened stops that are open have a small force. Doubling it may hide a stop that is
 /// barely closed.
-const RESTING_SHARE: f64 = 0.01;
+const MIN_RESTING_FORCE_RATIO: f64 = 0.01;
 
 /// Returns a note on the equilibrium of the first point's machine: the reason why it has none, or
 /// the stop with the greatest load, if it rests on one.
 fn rest_note(plan: &Plan) -> Option<(&'static str, String)> {
     match prepare_input(plan, &point_input(plan, &plan.axis_values(0))) {
-        Ok(point) => most_loaded_stop(&point).map(|stop| ("stops", stop)),
-        Err(why) => Some(("rest", format!("{why} (first point)"))),
+        Ok(point) => describe_most_loaded_stop(&point).map(|text| ("stops", text)),
+        Err(reason) => Some(("rest", format!("{reason} (first point)"))),
     }
 }
 
 /// Returns a text on the stop with the greatest force at rest, if the machine rests on it.
-fn most_loaded_stop(point: &Point) -> Option<String> {
+fn describe_most_loaded_stop(point: &Point) -> Option<String> {
     let forces_n = stops_at_rest_n(point).into_iter().map(f64::abs).zip(1..);
     let (force_n, stop) = forces_n.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (force_n > RESTING_SHARE * point.weight_n()).then(|| {
+    (force_n > MIN_RESTING_FORCE_RATIO * point.weight_n()).then(|| {
         let [force_n, weight_n] = [force_n, point.weight_n()].map(f64::round);
         format!(
             "stop {stop} carries {force_n} of {weight_n} N at rest: it is closed in both models, \
@@ -34,16 +34,16 @@ fn most_loaded_stop(point: &Point) -> Option<String> {
 
 /// Returns the lines that `check` adds on a plan: heading and text.
 pub(crate) fn plan_notes(plan: &Plan) -> Vec<(&'static str, String)> {
-    let metrics: Vec<_> = plan.model.measures.metrics.iter().map(|one| one.name()).collect();
+    let metrics: Vec<_> = plan.model.measures.metrics.iter().map(|metric| metric.name()).collect();
     let mut notes = Vec::new();
     if !metrics.is_empty() {
         notes.push(("metrics", metrics.join(", ")));
     }
     if let Spin::Table { speed_rpm, .. } = &plan.model.spin
-        && let Some(first) = speed_rpm.first().filter(|first| **first != 0.0)
+        && let Some(first_rpm) = speed_rpm.first().filter(|rpm| **rpm != 0.0)
     {
         let note = "from the first instant, with the suspension at rest: the speed jumps";
-        notes.push(("spin", format!("{first} rpm {note}")));
+        notes.push(("spin", format!("{first_rpm} rpm {note}")));
     }
     notes.extend(rest_note(plan));
     notes

@@ -3,22 +3,23 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Maximum number of speeds. Basis: an hour of computing. Doubling it doubles that.
+/// The maximum number of speeds. Basis: computing at so many takes an hour. Doubling it doubles the
+/// time.
 pub(crate) const MAX_SPEEDS: f64 = 100_000.0;
 
-/// Maximum held speed (rpm). Basis: that of `spin_peak_rpm`. Doubling it accepts more mistakes of
-/// units.
-const MAX_RPM: f64 = 1e5;
+/// The maximum held speed (rpm). Basis: the maximum of `spin_peak_rpm`. Doubling it accepts more
+/// mistakes of units.
+const MAX_HELD_SPEED_RPM: f64 = 1e5;
 
 /// Equally spaced speeds, including both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Speeds {
     /// The first speed (rpm).
-    pub(crate) from: f64,
+    pub(crate) from_rpm: f64,
     /// The last speed (rpm).
-    pub(crate) to: f64,
+    pub(crate) to_rpm: f64,
     /// The distance of two neighbours (rpm); that of the last two may be smaller.
-    pub(crate) step: f64,
+    pub(crate) step_rpm: f64,
 }
 
 impl FromStr for Speeds {
@@ -35,12 +36,12 @@ impl FromStr for Speeds {
 }
 
 impl Speeds {
-    pub(crate) const fn new(from: f64, to: f64, step: f64) -> Self {
-        Self { from, to, step }
+    pub(crate) const fn new(from_rpm: f64, to_rpm: f64, step_rpm: f64) -> Self {
+        Self { from_rpm, to_rpm, step_rpm }
     }
 
     fn check(self) -> Result<Self, String> {
-        let Self { from, to, step } = self;
+        let Self { from_rpm: from, to_rpm: to, step_rpm: step } = self;
         let count = (to - from) / step;
         if !(from >= 0.0 && to > from && step > 0.0 && to.is_finite()) {
             return Err(
@@ -68,9 +69,13 @@ impl Speeds {
     /// Returns the speeds (rpm). The last one is exactly `to`.
     pub(crate) fn values(self) -> Vec<f64> {
         // Rounding may make the quotient slightly greater than the whole number of steps.
-        let steps = ((self.to - self.from) / self.step * (1.0 - 1e-12)).ceil().max(1.0) as usize;
-        (0..=steps)
-            .map(|k| if k == steps { self.to } else { self.from + k as f64 * self.step })
+        let step_count = ((self.to_rpm - self.from_rpm) / self.step_rpm * (1.0 - 1e-12))
+            .ceil()
+            .max(1.0) as usize;
+        (0..=step_count)
+            .map(|k| {
+                if k == step_count { self.to_rpm } else { self.from_rpm + k as f64 * self.step_rpm }
+            })
             .collect()
     }
 }
@@ -80,6 +85,7 @@ impl Speeds {
 pub struct SpeedList {
     /// The list as the user wrote it.
     text: String,
+    /// The speeds (rpm) in rising order.
     values_rpm: Vec<f64>,
 }
 
@@ -118,8 +124,8 @@ impl FromStr for SpeedList {
         if values_rpm.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err("expected rising speeds".to_owned());
         }
-        if values_rpm.last().is_some_and(|last| *last > MAX_RPM) {
-            return Err(format!("expected at most {MAX_RPM} rpm"));
+        if values_rpm.last().is_some_and(|last| *last > MAX_HELD_SPEED_RPM) {
+            return Err(format!("expected at most {MAX_HELD_SPEED_RPM} rpm"));
         }
         let count = values_rpm.len();
         if count as f64 > MAX_SPEEDS + 1.0 {
@@ -135,7 +141,7 @@ impl FromStr for SpeedList {
 /// Returns a description of the expected text.
 pub(crate) fn parse_speeds_above_zero(text: &str) -> Result<Speeds, String> {
     let speeds: Speeds = text.parse()?;
-    if speeds.from > 0.0 {
+    if speeds.from_rpm > 0.0 {
         return Ok(speeds);
     }
     Err("expected speeds above 0 rpm, as in 60:400:1: a drum at rest has no turn whose response \

@@ -14,7 +14,7 @@ use washer_model::{
 };
 
 use crate::engine::{CappedRun, reference_method};
-use crate::method::{direct, rk4};
+use crate::method::{direct_method, rk4};
 use crate::plan::{Plan, friction_speeds, point_input, prepare_point};
 use lane_ode::Cancel;
 use sweep_engine::config::NamedValues;
@@ -360,7 +360,7 @@ fn choose_methods(
     if let Some(CappedRun { methods, .. }) = capped {
         return (methods, json_with_row(&methods));
     }
-    if let Some(method) = direct(&plan.integrator) {
+    if let Some(method) = direct_method(&plan.integrator) {
         return ([method; 2], plan.integrator.to_json());
     }
     let steps = StepSelector::new([(point, spin)], plan.end_s);

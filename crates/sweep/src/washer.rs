@@ -13,25 +13,25 @@ use crate::config::{WasherGridInput, read, spin};
 use crate::engine::ModelEngine;
 use crate::identity::BUILD;
 use crate::method::METHODS;
-use crate::model::{Washer, described};
+use crate::model::{Washer, engine_channel};
 use crate::plan::Plan;
 
 /// Channels that are compared if the grid file names none.
 const DEFAULT_CHANNELS: [sweep_parameter::Channel; 6] = [
-    described(Channel::TubFrontY),
-    described(Channel::TubFrontZ),
-    described(Channel::DrumFrontY),
-    described(Channel::DrumFrontZ),
-    described(Channel::TubYaw),
-    described(Channel::TubPitch),
+    engine_channel(Channel::TubFrontY),
+    engine_channel(Channel::TubFrontZ),
+    engine_channel(Channel::DrumFrontY),
+    engine_channel(Channel::DrumFrontZ),
+    engine_channel(Channel::TubYaw),
+    engine_channel(Channel::TubPitch),
 ];
 
 /// All channels, in the order of the models' output.
 const CHANNELS: [sweep_parameter::Channel; Channel::ALL.len()] = {
-    let mut channels = [described(Channel::TubFrontY); Channel::ALL.len()];
+    let mut channels = [engine_channel(Channel::TubFrontY); Channel::ALL.len()];
     let mut k = 0;
     while k < channels.len() {
-        channels[k] = described(Channel::ALL[k]);
+        channels[k] = engine_channel(Channel::ALL[k]);
         k += 1;
     }
     channels

@@ -52,7 +52,7 @@ pub struct ModesArgs {
 /// or modes, and if output cannot be written.
 pub(crate) fn run(args: &ModesArgs) -> Result<Exit, Error> {
     let grid = args.grid.clone().map(|grid| WasherGridInput::file(grid, args.sets.clone()));
-    let input = ModesInput::new(grid.as_ref(), &args.at, args.speed.to)?;
+    let input = ModesInput::new(grid.as_ref(), &args.at, args.speed.to_rpm)?;
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let speeds_rpm = args.speed.values();

@@ -15,7 +15,7 @@ pub(super) const MODEL_SUMMARY: ModelSummary<'static> =
 fn summary_lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     Ok(match file.kind() {
         Some(FileKind::Stability) => tongues::summarise(file)?.lines(),
-        Some(FileKind::Dwell) => dwell::summary::lines(file)?,
+        Some(FileKind::Dwell) => dwell::summary::summary_lines(file)?,
         _ => Vec::new(),
     })
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::engine::ModelEngine;
-use crate::method::direct;
+use crate::method::direct_method;
 use crate::plan::{Plan, compared_channels};
 use crate::trace::{
     Models, StartValue, TraceExtras, TraceSettings, TraceTable, check_spacing, parse_start_value,
@@ -208,7 +208,7 @@ fn summarise_row(
         _ => "undefined: no ratio is defined".to_owned(),
     };
     text.line("verdict", &verdict_text);
-    if let Some(trace_method) = trace_method.filter(|_| direct(&plan.integrator).is_none()) {
+    if let Some(trace_method) = trace_method.filter(|_| direct_method(&plan.integrator).is_none()) {
         let method = row.name("method").unwrap_or_default();
         let trace_name = trace_method.name();
         let methods = format!("{method}, as in the point's row of a map; the file: {trace_name}");

@@ -10,7 +10,7 @@ use washer_model::{
 };
 use washer_row::{Criterion, MethodKind};
 
-use crate::method::{REFERENCE_SHARE, direct};
+use crate::method::{REFERENCE_STEP_RATIO, direct_method};
 use crate::model::Washer;
 use crate::plan::{Plan, point_input, timing, write_axis_values};
 use sweep_engine::config::plan_checks::{check_window, refuse, refuse_step};
@@ -185,7 +185,7 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
     let (step_s, step_ratio) = match draft.plan.integrator.steps() {
         Steps::Fixed(step_s) => (Some(step_s), 1.0),
         Steps::ByError => (None, 1.0),
-        Steps::Checked(_) => (None, REFERENCE_SHARE),
+        Steps::Checked(_) => (None, REFERENCE_STEP_RATIO),
     };
     if !draft.report.is_clean() {
         return;
@@ -193,8 +193,8 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
     let end_s = draft.plan.end_s;
     let is_too_fast =
         |frequency: f64| step_ratio * RK4_STABILITY_LIMIT / frequency < shortest_step_s(end_s);
-    let is_additive =
-        direct(&draft.plan.integrator).is_some_and(|method| method.kind == MethodKind::Additive);
+    let is_additive = direct_method(&draft.plan.integrator)
+        .is_some_and(|method| method.kind == MethodKind::Additive);
     let highest_frequency = if is_additive {
         highest_explicit_frequency_rad_per_s
     } else {

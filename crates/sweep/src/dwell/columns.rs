@@ -10,7 +10,7 @@ use washer_model::{
 use washer_row::{Measures, MetricColumn, Status};
 
 use super::final_state;
-use crate::engine::Carried;
+use crate::engine::CarriedState;
 
 /// The data of a row: a motion of a point at a held speed, and one of the motion's turns.
 pub(crate) struct DwellRow {
@@ -266,7 +266,7 @@ pub(super) fn carried_columns() -> impl Iterator<Item = DwellColumn> {
 }
 
 /// Returns the state of a known row that the search carries to the next speed.
-pub(super) fn carried_state(known: &PointRows) -> Carried {
+pub(super) fn carried_state(known: &PointRows) -> CarriedState {
     let cells = known.rows.first()?.last_chunk::<STATE_LEN>()?;
     let state: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
     state?.try_into().ok()

@@ -16,7 +16,7 @@ const MAX_LISTED_MOTIONS: usize = 12;
 ///
 /// # Errors
 /// Returns an error if the file cannot be read.
-pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, FileError> {
+pub(crate) fn summary_lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, FileError> {
     let mut axes = places::axis_names(file);
     axes.push("speed_rpm".to_owned());
     let mut kinds: BTreeMap<String, u64> = BTreeMap::new();
@@ -47,11 +47,11 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         if listed_motions.len() <= MAX_LISTED_MOTIONS {
             listed_motions.push(MotionLine {
                 point_and_speed: point_and_speed(),
-                motion: row.value(2),
+                motion_number: row.value(2),
                 kind_text: kind_text.replace('_', " "),
-                deviations: [0, 1].map(|k| row.value(first_channel + k)),
-                starts: [row.value(4), row.value(5)],
-                least_kick: if has_kicks { row.value(6) } else { f64::NAN },
+                amplitudes_rad: [0, 1].map(|k| row.value(first_channel + k)),
+                start_counts: [row.value(4), row.value(5)],
+                least_kick_rad_per_s: if has_kicks { row.value(6) } else { f64::NAN },
             });
         }
         *kinds.entry(kind_text.to_owned()).or_default() += 1;
@@ -65,8 +65,8 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
                 .for_each(|(_, count)| *count += 1),
         }
         let status = row.word(1).unwrap_or_default();
-        let deviations = [0, 1].map(|k| row.value(first_channel + k));
-        farthest.add(status, deviations, kind_text, &point_and_speed);
+        let amplitudes_rad = [0, 1].map(|k| row.value(first_channel + k));
+        farthest.add(status, amplitudes_rad, kind_text, &point_and_speed);
         Ok::<(), FileError>(())
     })?;
     let kind_counts: Vec<String> =
@@ -78,12 +78,12 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     );
     let mut lines = vec![("motions", summary)];
     if row_count as usize <= MAX_LISTED_MOTIONS {
-        lines.extend(listed_motions.iter().map(|motion| ("motion", motion.sentence(&axes))));
+        lines.extend(listed_motions.iter().map(|motion| ("motion", motion.to_sentence(&axes))));
         lines.extend(
             kick_sentences(file, &axes, &listed_motions).into_iter().map(|line| ("push", line)),
         );
     }
-    lines.extend(farthest.lines(&axes));
+    lines.extend(farthest.to_lines(&axes));
     for (values, motions) in &points_with_several_motions {
         lines.push((
             "several",
@@ -97,8 +97,8 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
 struct MotionClass {
     /// The status of the motions' rows.
     status: &'static str,
-    /// The name of the lines.
-    line: &'static str,
+    /// The name of the summary's lines about the class.
+    line_name: &'static str,
     /// The words after the place of a motion, which begin with a comma, or are empty.
     remark: &'static str,
 }
@@ -106,15 +106,15 @@ struct MotionClass {
 /// The classes of motions. Only confirmed endings, which have the status `ok`, may be named as the
 /// farthest motion that a machine stays in.
 const MOTION_CLASSES: [MotionClass; 3] = [
-    MotionClass { status: "ok", line: "farthest", remark: "" },
-    MotionClass { status: "transient", line: "transient", remark: ", which ends elsewhere" },
-    MotionClass { status: "not_settled", line: "unsettled", remark: ", with an unknown end" },
+    MotionClass { status: "ok", line_name: "farthest", remark: "" },
+    MotionClass { status: "transient", line_name: "transient", remark: ", which ends elsewhere" },
+    MotionClass { status: "not_settled", line_name: "unsettled", remark: ", with an unknown end" },
 ];
 
 /// A motion with the greatest amplitude of a channel.
 struct FarthestMotion {
     /// The amplitude (rad).
-    deviation: f64,
+    amplitude_rad: f64,
     kind_text: String,
     /// The point and the speed.
     point_and_speed: Vec<f64>,
@@ -130,20 +130,20 @@ impl FarthestByClass {
     fn add(
         &mut self,
         status: &str,
-        deviations: [f64; CHANNELS.len()],
+        amplitudes_rad: [f64; CHANNELS.len()],
         kind_text: &str,
         point_and_speed: &dyn Fn() -> Vec<f64>,
     ) {
         let Some(class) = MOTION_CLASSES.iter().position(|class| class.status == status) else {
             return;
         };
-        for (deviation, farthest) in deviations.into_iter().zip(&mut self.0[class]) {
-            let greatest_deviation =
-                farthest.as_ref().map_or(f64::NEG_INFINITY, |motion| motion.deviation);
-            if deviation > greatest_deviation {
+        for (amplitude_rad, farthest) in amplitudes_rad.into_iter().zip(&mut self.0[class]) {
+            let greatest_rad =
+                farthest.as_ref().map_or(f64::NEG_INFINITY, |motion| motion.amplitude_rad);
+            if amplitude_rad > greatest_rad {
                 let kind_text = kind_text.replace('_', " ");
                 *farthest = Some(FarthestMotion {
-                    deviation,
+                    amplitude_rad,
                     kind_text,
                     point_and_speed: point_and_speed(),
                 });
@@ -152,18 +152,19 @@ impl FarthestByClass {
     }
 
     /// Returns a line for each class and channel with a motion.
-    fn lines(&self, axes: &[String]) -> Vec<(&'static str, String)> {
+    fn to_lines(&self, axes: &[String]) -> Vec<(&'static str, String)> {
         let mut lines = Vec::new();
         for (class, motions) in MOTION_CLASSES.iter().zip(&self.0) {
             for (name, motion) in CHANNELS.iter().zip(motions) {
-                let Some(FarthestMotion { deviation, kind_text, point_and_speed }) = motion else {
+                let Some(FarthestMotion { amplitude_rad, kind_text, point_and_speed }) = motion
+                else {
                     continue;
                 };
                 let name = name.replace('_', " ");
                 let point_text = places::point_text(axes, point_and_speed);
-                let mrad = 1e3 * deviation;
+                let mrad = 1e3 * amplitude_rad;
                 let sentence = format!("{name} {mrad:.1} mrad, {kind_text}, at {point_text}");
-                lines.push((class.line, sentence + class.remark));
+                lines.push((class.line_name, sentence + class.remark));
             }
         }
         lines
@@ -174,33 +175,34 @@ impl FarthestByClass {
 struct MotionLine {
     /// The point and the speed.
     point_and_speed: Vec<f64>,
-    motion: f64,
-    /// The kind, or the reason why there is none.
+    /// The number of the motion among those of the point and speed, from 0.
+    motion_number: f64,
+    /// The kind of the motion, or the reason why it has none.
     kind_text: String,
     /// The amplitudes of yaw and pitch (rad).
-    deviations: [f64; CHANNELS.len()],
+    amplitudes_rad: [f64; CHANNELS.len()],
     /// The number of starts that ended in this motion, and that of all starts.
-    starts: [f64; 2],
-    /// The smallest kick that led to this motion (rad/s); not finite if it is not known.
-    least_kick: f64,
+    start_counts: [f64; 2],
+    /// The smallest kick (rad/s) that led to this motion; not finite if it is not known.
+    least_kick_rad_per_s: f64,
 }
 
 impl MotionLine {
-    fn sentence(&self, axes: &[String]) -> String {
+    fn to_sentence(&self, axes: &[String]) -> String {
         let mut text =
             format!("{} at {}", self.kind_text, places::point_text(axes, &self.point_and_speed));
-        for (name, value) in CHANNELS.iter().zip(self.deviations) {
+        for (name, value) in CHANNELS.iter().zip(self.amplitudes_rad) {
             if value.is_finite() {
                 text += &format!(", {} {:.1} mrad", name.replace('_', " "), 1e3 * value);
             }
         }
-        let [ended_here, total] = self.starts;
+        let [ended_here, total] = self.start_counts;
         if total > 0.0 {
             text += &format!("; from {ended_here} of {total} starts");
-            if self.least_kick == 0.0 {
+            if self.least_kick_rad_per_s == 0.0 {
                 text += ", the disturbed periodic response among them";
-            } else if self.least_kick > 0.0 {
-                text += &format!(", the weakest a kick of {:.2} rad/s", self.least_kick);
+            } else if self.least_kick_rad_per_s > 0.0 {
+                text += &format!(", the weakest a kick of {:.2} rad/s", self.least_kick_rad_per_s);
             } else if ended_here > 0.0 {
                 text += ", of the machine at rest";
             } else {
@@ -212,20 +214,27 @@ impl MotionLine {
 
     /// Whether the row describes a motion.
     fn is_found(&self) -> bool {
-        self.starts[1] > 0.0
+        self.start_counts[1] > 0.0
     }
 }
 
 /// Returns for each point and speed a sentence on the kicks that lead from motion 0 to another
 /// motion.
-fn kick_sentences(file: &ParquetFile, axes: &[String], listed: &[MotionLine]) -> Vec<String> {
-    let search = file.json(key::DWELL).unwrap_or_default();
-    let Some(max_kick) = search["kick_rad_per_s"].as_f64() else { return Vec::new() };
+fn kick_sentences(
+    file: &ParquetFile,
+    axes: &[String],
+    listed_motions: &[MotionLine],
+) -> Vec<String> {
+    let search_json = file.json(key::DWELL).unwrap_or_default();
+    let Some(max_kick_rad_per_s) = search_json["kick_rad_per_s"].as_f64() else {
+        return Vec::new();
+    };
     let mut lines = Vec::new();
-    for motions in listed.chunk_by(|a, b| a.point_and_speed == b.point_and_speed) {
+    for motions in listed_motions.chunk_by(|a, b| a.point_and_speed == b.point_and_speed) {
         let point_and_speed = places::point_text(axes, &motions[0].point_and_speed);
-        let other_motions = motions.iter().filter(|motion| motion.motion > 0.0);
-        let kicks = other_motions.map(|motion| motion.least_kick).filter(|kick| kick.is_finite());
+        let other_motions = motions.iter().filter(|motion| motion.motion_number > 0.0);
+        let kicks =
+            other_motions.map(|motion| motion.least_kick_rad_per_s).filter(|kick| kick.is_finite());
         if !motions[0].is_found() {
             continue;
         }
@@ -233,7 +242,7 @@ fn kick_sentences(file: &ParquetFile, axes: &[String], listed: &[MotionLine]) ->
             Some(kick) => format!("a kick of {kick:.2} rad/s leads elsewhere at {point_and_speed}"),
             None => {
                 format!(
-                    "no push up to {max_kick} rad/s that was tried leads elsewhere at \
+                    "no push up to {max_kick_rad_per_s} rad/s that was tried leads elsewhere at \
                      {point_and_speed}"
                 )
             }
@@ -258,7 +267,7 @@ mod tests {
         ] {
             farthest.add(status, [yaw_rad, f64::NAN], kind, &|| vec![speed_rpm]);
         }
-        let lines = farthest.lines(&["speed_rpm".to_owned()]);
+        let lines = farthest.to_lines(&["speed_rpm".to_owned()]);
         let expected = [
             ("farthest", "tub yaw 35.0 mrad, periodic 2, at 270 rpm"),
             ("transient", "tub yaw 61.0 mrad, transient, at 260 rpm, which ends elsewhere"),

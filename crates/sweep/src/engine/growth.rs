@@ -8,7 +8,7 @@ use washer_row::{DwellPeaks, Growth, Metric, Outcome, Status};
 use super::map_isolating_panics;
 
 /// The state in which a machine arrives from another speed, if it does.
-pub(crate) type Carried = Option<[f64; STATE_LEN]>;
+pub(crate) type CarriedState = Option<[f64; STATE_LEN]>;
 
 /// Returns the periodic responses of points at held speeds, or the status of a point without one.
 /// The first response is that of a machine that runs up. Once `cancel` is requested, the result
@@ -48,11 +48,11 @@ pub(crate) fn fastest_growth(
 /// Once `cancel` is requested, the result is meaningless.
 pub(crate) fn find_motions(
     simd: Simd,
-    dwells: &[(HeldSpeed<'_>, Carried)],
+    dwells: &[(HeldSpeed<'_>, CarriedState)],
     starts: &StartRule,
     cancel: Cancel<'_>,
 ) -> Vec<Result<Attractors, Status>> {
-    let find_group = |dwells: &[(HeldSpeed<'_>, Carried)]| {
+    let find_group = |dwells: &[(HeldSpeed<'_>, CarriedState)]| {
         let (dwells, carried): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
         let attractors = find_attractors(simd, &dwells, &carried, starts, cancel).into_iter();
         attractors.map(|attractors| attractors.map_err(Status::from)).collect()

@@ -3,7 +3,7 @@
 
 use washer_model::{Formula, Method, ModelKind, StepSelector};
 
-use crate::method::REFERENCE_SHARE;
+use crate::method::REFERENCE_STEP_RATIO;
 
 /// Maximum step (s) of the classical Runge-Kutta method. Basis: amplitudes of the paper's machine
 /// have an error of some 1e-9. Doubling it makes the error 16 times as large.
@@ -26,5 +26,5 @@ pub(crate) fn reference_method(steps: &StepSelector<'_>, model: ModelKind) -> Me
 /// Returns the step (s) of classical Runge-Kutta for a single trajectory.
 pub(crate) fn reference_step_s(steps: &StepSelector<'_>) -> f64 {
     let longest_s = steps.plain_step_s(Formula::Rk4).unwrap_or(f64::INFINITY);
-    REFERENCE_STEP_S.min(REFERENCE_SHARE * longest_s)
+    REFERENCE_STEP_S.min(REFERENCE_STEP_RATIO * longest_s)
 }

@@ -8,11 +8,11 @@
 use washer_model::{History, InitialDeviation, Method, ModelKind, Point, Spin, history};
 
 use super::profile::growth_at;
-use super::{Passage, SweptResult};
+use super::{MapResult, Passage};
 
-/// Time between instants at which the two models are compared (s). Basis: the fastest motion of the
-/// suspension has a period of some 0.2 s. Doubling it misses up to a twentieth of a deviation.
-const INTERVAL_S: f64 = 0.005;
+/// The time between instants at which the two models are compared (s). Basis: the fastest motion of
+/// the suspension has a period of some 0.2 s. Doubling it misses up to a twentieth of a deviation.
+const INSTANT_STEP_S: f64 = 0.005;
 
 /// The deviation that decides the verdict, and the part of the tongues before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +26,8 @@ pub(crate) struct Cause {
     pub(crate) e_folds: f64,
     /// The greatest ratio of the motion without the part that tongues add.
     pub(crate) ratio_without: f64,
-    /// Whether `ratio_without` keeps the limit, so that the tongues suffice as the cause.
-    pub(crate) is_enough: bool,
+    /// Whether `ratio_without` keeps the limit, so that the tongues are a sufficient cause.
+    pub(crate) is_sufficient: bool,
 }
 
 /// The growth of a disturbance in a passage through a tongue, at the instants of a run.
@@ -45,14 +45,14 @@ struct PassageGrowth {
 pub(super) fn find_cause<'p>(
     (point, spin): (&Point, &Spin),
     step_s: f64,
-    swept: &SweptResult,
+    map_result: &MapResult,
     has_passed: bool,
     passages: impl Iterator<Item = (&'p Passage, &'p [[f64; 2]])>,
 ) -> Option<Cause> {
-    let (position, _) = swept.verdict.greatest?;
-    let channel = swept.channels[position].index();
+    let (position, _) = map_result.verdict.greatest?;
+    let channel = map_result.channels[position].index();
     let record_history = |model| {
-        history(model, &Method::rk4(step_s), point, &InitialDeviation::default(), INTERVAL_S)
+        history(model, &Method::rk4(step_s), point, &InitialDeviation::default(), INSTANT_STEP_S)
     };
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(record_history);
     let channel_value =
@@ -62,23 +62,24 @@ pub(super) fn find_cause<'p>(
         .map(|k| Some([channel_value(&nonlinear, k)?, channel_value(&linear, k)?]))
         .collect();
     let values = values?;
-    let amplitude = *swept.amplitudes[1].get(position)?;
-    let index = |time_s: f64| (time_s / INTERVAL_S) as usize;
-    let window = index(swept.window_s[0])..(index(swept.window_s[1]) + 1).min(instant_count);
-    let times_s = (0..instant_count).map(|k| k as f64 * INTERVAL_S);
+    let amplitude = *map_result.amplitudes[1].get(position)?;
+    let index_of = |time_s: f64| (time_s / INSTANT_STEP_S) as usize;
+    let window =
+        index_of(map_result.window_s[0])..(index_of(map_result.window_s[1]) + 1).min(instant_count);
+    let times_s = (0..instant_count).map(|k| k as f64 * INSTANT_STEP_S);
     let speeds_rpm: Vec<f64> = spin.speeds_rpm(times_s).collect();
     let passage_growths: Vec<PassageGrowth> = passages
         .map(|(passage, growths)| find_passage_growth(passage, growths, &speeds_rpm))
         .collect();
-    let limit = swept.limits.upper;
+    let limit = map_result.limits.upper;
     let remainder =
         remove_growth(&values, &passage_growths, window, (amplitude, limit), has_passed)?;
     Some(Cause {
-        time_s: remainder.first as f64 * INTERVAL_S,
-        speed_rpm: speeds_rpm[remainder.first],
+        time_s: remainder.first_instant as f64 * INSTANT_STEP_S,
+        speed_rpm: speeds_rpm[remainder.first_instant],
         e_folds: remainder.e_folds,
         ratio_without: remainder.ratio_without,
-        is_enough: remainder.ratio_without < limit,
+        is_sufficient: remainder.ratio_without < limit,
     })
 }
 
@@ -93,9 +94,9 @@ fn find_passage_growth(
 ) -> PassageGrowth {
     let [from_s, to_s] = passage.interval_s;
     let last_index = speeds_rpm.len().saturating_sub(1);
-    let entry_index = ((from_s / INTERVAL_S) as usize).min(last_index);
+    let entry_index = ((from_s / INSTANT_STEP_S) as usize).min(last_index);
     let turn_s = 60.0 / speeds_rpm.get(entry_index).map_or(1.0, |rpm| rpm.abs().max(1.0));
-    let instants_per_turn = (turn_s / INTERVAL_S).ceil() as usize;
+    let instants_per_turn = (turn_s / INSTANT_STEP_S).ceil() as usize;
     let entry_instants = match entry_index.checked_sub(instants_per_turn) {
         Some(before) => before..=entry_index,
         None => 0..=instants_per_turn.min(last_index),
@@ -103,8 +104,8 @@ fn find_passage_growth(
     let mut sum = 0.0;
     let e_folds = speeds_rpm.iter().enumerate().map(|(k, rpm)| {
         // The part of the interval about the instant that is in the passage.
-        let start_s = ((k as f64 - 0.5) * INTERVAL_S).max(from_s);
-        let end_s = ((k as f64 + 0.5) * INTERVAL_S).min(to_s);
+        let start_s = ((k as f64 - 0.5) * INSTANT_STEP_S).max(from_s);
+        let end_s = ((k as f64 + 0.5) * INSTANT_STEP_S).min(to_s);
         if end_s > start_s {
             sum += (end_s - start_s) * growth_at(growths, rpm.abs());
         }
@@ -119,7 +120,7 @@ fn find_passage_growth(
 struct Remainder {
     /// The first instant at which the deviation exceeds the limit, or that of the greatest
     /// deviation.
-    first: usize,
+    first_instant: usize,
     /// The growth in tongues (e-folds) until the instant of the greatest deviation.
     e_folds: f64,
     /// The greatest ratio of this motion.
@@ -159,7 +160,8 @@ fn remove_growth(
         }
         let mut added_share = -(-e_folds(k)).exp_m1();
         if !has_passed {
-            let added_by_tongue = |(entry, e_folds): &(f64, &[f64])| entry * e_folds[k].exp_m1();
+            let added_by_tongue =
+                |(disturbance, e_folds): &(f64, &[f64])| disturbance * e_folds[k].exp_m1();
             let added_by_tongue: f64 = entered_tongues.iter().map(added_by_tongue).sum();
             added_share = added_share.min(added_by_tongue / difference);
         }
@@ -171,7 +173,11 @@ fn remove_growth(
         window.clone().find(|k| deviation(k) > limit * amplitude).unwrap_or(greatest_instant);
     let amplitude_without = window.map(deviation_without).fold(0.0, f64::max);
     let ratio_without = amplitude_without / amplitude;
-    Some(Remainder { first: first_beyond_limit, e_folds: e_folds(greatest_instant), ratio_without })
+    Some(Remainder {
+        first_instant: first_beyond_limit,
+        e_folds: e_folds(greatest_instant),
+        ratio_without,
+    })
 }
 
 #[cfg(test)]
@@ -180,7 +186,7 @@ mod tests {
 
     /// Returns deviations of both models by instant: an oscillation of the linear model, and a
     /// difference of the given size.
-    fn values(difference: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
+    fn oscillation_with(difference: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
         let linear = |k: usize| (0.9 * k as f64).sin();
         (0..1000)
             .map(|k| [linear(k) + difference(k) * (0.37 * k as f64).cos(), linear(k)])
@@ -212,17 +218,20 @@ mod tests {
 
     #[test]
     fn growth_in_a_tongue_is_removed() {
-        let values = values(growing_difference(0.2, 300, 600, 3.0));
+        let values = oscillation_with(growing_difference(0.2, 300, 600, 3.0));
         let tongues = [tongue(300, 600, 3.0)];
         let remainder = remove_growth(&values, &tongues, 500..1000, (1.0, 2.0), false).unwrap();
-        assert!(remainder.first < 600 && (remainder.e_folds - 3.0).abs() < 1e-9, "{remainder:?}");
+        assert!(
+            remainder.first_instant < 600 && (remainder.e_folds - 3.0).abs() < 1e-9,
+            "{remainder:?}"
+        );
         assert!((1.0..1.3).contains(&remainder.ratio_without), "{remainder:?}");
     }
 
     /// The tongue has enough growth, but the run enters it after its deviation.
     #[test]
     fn a_tongue_after_the_deviation_is_no_cause() {
-        let values = values(growing_difference(0.2, 300, 600, 3.0));
+        let values = oscillation_with(growing_difference(0.2, 300, 600, 3.0));
         let ratio = ratio_without(&values, &[tongue(700, 900, 3.0)]);
         assert!(ratio > 3.0, "{ratio}");
     }
@@ -230,7 +239,7 @@ mod tests {
     /// The difference grows by 3 e-folds, of which only 0.07 are in the tongue.
     #[test]
     fn a_tongue_with_little_growth_is_no_cause() {
-        let values = values(growing_difference(0.2, 300, 600, 3.0));
+        let values = oscillation_with(growing_difference(0.2, 300, 600, 3.0));
         let ratio = ratio_without(&values, &[tongue(300, 400, 0.07)]);
         assert!(ratio > 3.0, "{ratio}");
     }
@@ -239,7 +248,8 @@ mod tests {
     #[test]
     fn a_deviation_that_decays_after_a_tongue_is_due_to_it() {
         let difference = growing_difference(0.5, 200, 400, 3.0);
-        let values = values(|k| difference(k) * (-0.005 * (k.max(400) - 400) as f64).exp());
+        let values =
+            oscillation_with(|k| difference(k) * (-0.005 * (k.max(400) - 400) as f64).exp());
         let ratio = ratio_without(&values, &[tongue(200, 400, 3.0)]);
         assert!((1.0..1.6).contains(&ratio), "{ratio}");
     }
@@ -247,7 +257,7 @@ mod tests {
     /// A tongue that is passed with a small difference does not cause a later deviation.
     #[test]
     fn a_deviation_that_arises_after_a_tongue_is_not_due_to_it() {
-        let values = values(|k| if k < 600 { 0.01 } else { 4.0 });
+        let values = oscillation_with(|k| if k < 600 { 0.01 } else { 4.0 });
         let ratio = ratio_without(&values, &[tongue(200, 400, 3.0)]);
         assert!(ratio > 4.0, "{ratio}");
     }
@@ -255,7 +265,7 @@ mod tests {
     /// A deviation that has passed through a tongue may grow further after it.
     #[test]
     fn a_deviation_that_passed_through_a_tongue_is_smaller_without_it() {
-        let values = values(growing_difference(0.1, 300, 700, 3.7));
+        let values = oscillation_with(growing_difference(0.1, 300, 700, 3.7));
         let tongues = [tongue(300, 500, 1.85)];
         let ratio = |has_passed: bool| {
             remove_growth(&values, &tongues, 500..1000, (1.0, 2.0), has_passed)
@@ -270,7 +280,7 @@ mod tests {
     fn growths_of_successive_tongues_multiply() {
         let first = growing_difference(0.1, 100, 300, 1.7);
         let second = growing_difference(1.0, 400, 600, 1.7);
-        let values = values(|k| first(k) * second(k));
+        let values = oscillation_with(|k| first(k) * second(k));
         let tongues = [tongue(100, 300, 1.7), tongue(400, 600, 1.7)];
         assert!(ratio_without(&values, &tongues[..1]) > 2.0);
         let ratio = ratio_without(&values, &tongues);

@@ -7,7 +7,7 @@ use washer_model::{
 use sweep_engine::commands::cells::format_number;
 
 use super::{
-    Cause, Closing, Explanation, ModeResonance, Passage, SpeedScan, SweptResult, Tongue, TongueEnd,
+    Cause, Closing, Explanation, MapResult, ModeResonance, Passage, SpeedScan, Tongue, TongueEnd,
 };
 
 /// Maximum width of a line, in characters. Basis: the width of common terminals. Doubling it makes
@@ -46,7 +46,7 @@ pub(crate) fn to_text(explanation: &Explanation) -> String {
     };
     text += format!("{}{point}", explanation.name).trim_end();
     text.push('\n');
-    push_verdict(&mut text, &explanation.swept);
+    push_verdict(&mut text, &explanation.map_result);
     for scan in &explanation.scans {
         push_scan(&mut text, explanation, scan);
     }
@@ -95,7 +95,7 @@ const fn direction_prefix(is_backward: bool) -> &'static str {
 
 /// Returns a sentence on the speeds at which the response is stable, unstable or not known.
 fn describe_stability(explanation: &Explanation, scan: &SpeedScan) -> String {
-    let [from, to] = [scan.speeds.from, scan.speeds.to].map(decimal);
+    let [from, to] = [scan.speeds.from_rpm, scan.speeds.to_rpm].map(decimal);
     let count = scan.speeds.values().len();
     let without_response = scan.without_response;
     let unknown_text = format!(
@@ -163,21 +163,22 @@ fn format_significant(value: f64) -> String {
     format!("{value:.*}", (2.0 - magnitude).max(0.0) as usize)
 }
 
-fn push_verdict(text: &mut String, swept: &SweptResult) {
-    let [from, to] = swept.window_s.map(decimal);
-    let Some((position, ratio)) = swept.verdict.greatest else {
-        let fail_time_text = swept.fail_time_s.map_or(String::new(), |at| format!(" at {at:.3} s"));
-        let failure_text = match swept.status {
+fn push_verdict(text: &mut String, map_result: &MapResult) {
+    let [from, to] = map_result.window_s.map(decimal);
+    let Some((position, ratio)) = map_result.verdict.greatest else {
+        let fail_time_text =
+            map_result.fail_time_s.map_or(String::new(), |at| format!(" at {at:.3} s"));
+        let failure_text = match map_result.status {
             "ok" => "every linear amplitude is zero".to_owned(),
             status => format!("the run ends as `{status}`{fail_time_text}"),
         };
         push_line(text, "swept", format!("no ratio is defined: {failure_text}"));
         return;
     };
-    let channel = swept.channels[position];
+    let channel = map_result.channels[position];
     let verdict_text =
-        if swept.verdict.reliable == Some(true) { "reliable" } else { "not reliable" };
-    let amplitudes: Vec<String> = swept
+        if map_result.verdict.reliable == Some(true) { "reliable" } else { "not reliable" };
+    let amplitudes: Vec<String> = map_result
         .amplitudes
         .iter()
         .filter_map(|model| model.get(position).map(|value| format_thousandths(*value, channel)))
@@ -188,18 +189,18 @@ fn push_verdict(text: &mut String, swept: &SweptResult) {
         channel.name(),
         format_significant(ratio),
         amplitudes.join(" against "),
-        match (decimal(swept.limits.upper), swept.limits.lower) {
+        match (decimal(map_result.limits.upper), map_result.limits.lower) {
             (most, None) => format!("the limit is {most}"),
             (most, Some(least)) => format!("the limits are {} and {most}", decimal(least)),
         }
     );
     push_line(text, "swept", words);
-    if over_estimates(swept) {
-        let limit_text = format_number(swept.limits.over_estimate());
+    if over_estimates(map_result) {
+        let limit_text = format_number(map_result.limits.over_estimate());
         let words = format!("the linear model over-estimates: a ratio is below {limit_text}");
         push_line(text, "too high", words);
     }
-    let ratios = swept.channels.iter().zip(&swept.verdict.ratios);
+    let ratios = map_result.channels.iter().zip(&map_result.verdict.ratios);
     let other_ratios = ratios.filter(|(other, _)| **other != channel).map(|(other, ratio)| {
         let ratio = ratio.map_or("none".to_owned(), format_significant);
         format!("{} {ratio}", other.name())
@@ -211,8 +212,8 @@ fn push_verdict(text: &mut String, swept: &SweptResult) {
 }
 
 /// Whether the linear model over-estimates a channel, by the limit that summaries of runs use.
-fn over_estimates(swept: &SweptResult) -> bool {
-    swept.verdict.least.is_some_and(|(_, least)| least < swept.limits.over_estimate())
+fn over_estimates(map_result: &MapResult) -> bool {
+    map_result.verdict.least.is_some_and(|(_, least)| least < map_result.limits.over_estimate())
 }
 
 fn push_tongue(
@@ -396,14 +397,14 @@ fn push_remedy(text: &mut String, tongue: &Tongue) {
 
 /// Appends whether tongues cause the verdict of the run over the spin profile.
 fn push_conclusion(text: &mut String, explanation: &Explanation) {
-    let swept = &explanation.swept;
-    let Some((_, greatest)) = swept.verdict.greatest else {
+    let map_result = &explanation.map_result;
+    let Some((_, greatest)) = map_result.verdict.greatest else {
         push_line(text, "so", "there is no verdict to explain");
         return;
     };
-    let is_within = greatest < swept.limits.upper;
+    let is_within = greatest < map_result.limits.upper;
     let words = match &explanation.without_departures {
-        None if is_within && !over_estimates(swept) => {
+        None if is_within && !over_estimates(map_result) => {
             "no tongue is crossed before the window ends, and the models agree".to_owned()
         }
         None => "no tongue is crossed before the window ends: no unstable response explains the \
@@ -414,7 +415,7 @@ fn push_conclusion(text: &mut String, explanation: &Explanation) {
              range at {time_s:.3} s: the failure is not due to motion left over from earlier \
              resonances"
         ),
-        Some(Ok(amplitudes)) => match swept.greatest_ratio(amplitudes) {
+        Some(Ok(amplitudes)) => match map_result.greatest_ratio(amplitudes) {
             None => "put on the periodic response as it enters each tongue, the run has no ratio"
                 .to_owned(),
             Some((ratio, channel)) => {
@@ -425,8 +426,8 @@ fn push_conclusion(text: &mut String, explanation: &Explanation) {
                     channel.name()
                 );
                 let growth = describe_growth(explanation.cause.as_ref());
-                let is_cause = explanation.cause.is_some_and(|cause| cause.is_enough);
-                match (is_within, ratio < swept.limits.upper) {
+                let is_cause = explanation.cause.is_some_and(|cause| cause.is_sufficient);
+                match (is_within, ratio < map_result.limits.upper) {
                     (false, true) if is_cause => format!(
                         "{verdict_text}, within the limit: the verdict is due to motion left over \
                          from before the tongue, and would change with the ramp; {growth}"
@@ -478,7 +479,7 @@ fn push_limitations(text: &mut String, explanation: &Explanation) {
         "a tongue narrower than {} rpm may be missed. E-folds take the growth at each instant as \
          that at its speed, held constant; equal e-folds do not mean equal ratios, and a map's \
          boundary is not the edge of a tongue",
-        explanation.scans.first().map_or_else(String::new, |scan| decimal(scan.speeds.step))
+        explanation.scans.first().map_or_else(String::new, |scan| decimal(scan.speeds.step_rpm))
     );
     let without_response: usize = explanation.scans.iter().map(|scan| scan.without_response).sum();
     if without_response > 0 {

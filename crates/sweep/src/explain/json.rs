@@ -5,32 +5,33 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use washer_model::{Attractor, Channel, LeftRangeError, ParticipatingMode};
 
-use super::{Explanation, Passage, SpeedScan, SweptResult, Tongue};
+use super::{Explanation, MapResult, Passage, SpeedScan, Tongue};
 
 /// Returns an explanation as JSON. Units are part of the names.
 pub(crate) fn to_json(explanation: &Explanation) -> Value {
     let tongues = explanation
         .tongues
         .iter()
-        .map(|(tongue, passages)| tongue_json(tongue, passages, &explanation.swept));
-    let without_departures = explanation.without_departures.as_ref().map(|entered| match entered {
-        Ok(amplitudes) => {
-            let greatest = explanation.swept.greatest_ratio(amplitudes);
-            json!({
-                "amplitudes": by_channel(&explanation.swept, amplitudes),
-                "ratio_max": greatest.map(|(ratio, _)| ratio),
-                "ratio_max_channel": greatest.map(|(_, channel)| channel.name()),
-            })
-        }
-        Err(LeftRangeError { time_s }) => json!({ "left_range_at_s": time_s }),
-    });
+        .map(|(tongue, passages)| tongue_json(tongue, passages, &explanation.map_result));
+    let without_departures =
+        explanation.without_departures.as_ref().map(|amplitudes| match amplitudes {
+            Ok(amplitudes) => {
+                let greatest = explanation.map_result.greatest_ratio(amplitudes);
+                json!({
+                    "amplitudes": by_channel(&explanation.map_result, amplitudes),
+                    "ratio_max": greatest.map(|(ratio, _)| ratio),
+                    "ratio_max_channel": greatest.map(|(_, channel)| channel.name()),
+                })
+            }
+            Err(LeftRangeError { time_s }) => json!({ "left_range_at_s": time_s }),
+        });
     let scan = |is_backward: bool| {
         explanation.scans.iter().find(|scan| scan.is_backward == is_backward).map(scan_json)
     };
     json!({
         "name": explanation.name,
         "at": explanation.parameters.iter().cloned().collect::<BTreeMap<_, _>>(),
-        "swept": swept_json(&explanation.swept),
+        "swept": map_result_json(&explanation.map_result),
         "speeds": scan(false),
         "speeds_backwards": scan(true),
         "profile_rpm": explanation.profile_rpm,
@@ -41,7 +42,7 @@ pub(crate) fn to_json(explanation: &Explanation) -> Value {
             "speed_rpm": cause.speed_rpm,
             "e_folds_of_tongues": cause.e_folds,
             "ratio_without_tongues": cause.ratio_without,
-            "tongues_are_the_cause": cause.is_enough,
+            "tongues_are_the_cause": cause.is_sufficient,
         })),
     })
 }
@@ -53,9 +54,9 @@ fn scan_json(scan: &SpeedScan) -> Value {
         .iter()
         .map(|(rpm, limit)| json!({ "speed_rpm": rpm, "passes": limit.name() }));
     json!({
-        "from_rpm": scan.speeds.from,
-        "to_rpm": scan.speeds.to,
-        "step_rpm": scan.speeds.step,
+        "from_rpm": scan.speeds.from_rpm,
+        "to_rpm": scan.speeds.to_rpm,
+        "step_rpm": scan.speeds.step_rpm,
         "without_response": scan.without_response,
         "jumps_rpm": scan.jumps_rpm,
         "off_curve_rpm": scan.off_curve_rpm,
@@ -63,32 +64,32 @@ fn scan_json(scan: &SpeedScan) -> Value {
     })
 }
 
-fn by_channel(swept: &SweptResult, amplitudes: &[f64]) -> Value {
+fn by_channel(map_result: &MapResult, amplitudes: &[f64]) -> Value {
     let name = |channel: &Channel| format!("{}_{}", channel.name(), channel.unit());
-    swept.channels.iter().map(name).zip(amplitudes.iter().copied()).collect()
+    map_result.channels.iter().map(name).zip(amplitudes.iter().copied()).collect()
 }
 
-fn swept_json(swept: &SweptResult) -> Value {
-    let ratios = swept.channels.iter().zip(&swept.verdict.ratios);
-    let greatest = swept.verdict.greatest;
+fn map_result_json(map_result: &MapResult) -> Value {
+    let ratios = map_result.channels.iter().zip(&map_result.verdict.ratios);
+    let greatest = map_result.verdict.greatest;
     json!({
-        "status": swept.status,
-        "fail_time_s": swept.fail_time_s,
-        "reliable": swept.verdict.reliable,
-        "ratio_limit": swept.limits.upper,
-        "ratio_min": swept.limits.lower,
+        "status": map_result.status,
+        "fail_time_s": map_result.fail_time_s,
+        "reliable": map_result.verdict.reliable,
+        "ratio_limit": map_result.limits.upper,
+        "ratio_min": map_result.limits.lower,
         "ratio_max": greatest.map(|(_, ratio)| ratio),
-        "ratio_max_channel": greatest.map(|(channel, _)| swept.channels[channel].name()),
+        "ratio_max_channel": greatest.map(|(channel, _)| map_result.channels[channel].name()),
         "ratios": ratios
             .map(|(channel, ratio)| (channel.name().to_owned(), json!(ratio)))
             .collect::<Value>(),
-        "nonlinear": by_channel(swept, &swept.amplitudes[0]),
-        "linear": by_channel(swept, &swept.amplitudes[1]),
-        "window_s": swept.window_s,
+        "nonlinear": by_channel(map_result, &map_result.amplitudes[0]),
+        "linear": by_channel(map_result, &map_result.amplitudes[1]),
+        "window_s": map_result.window_s,
     })
 }
 
-fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Value {
+fn tongue_json(tongue: &Tongue, passages: &[Passage], map_result: &MapResult) -> Value {
     let response = &tongue.fastest_response;
     json!({
         "is_backward": tongue.is_backward,
@@ -105,7 +106,7 @@ fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Va
         "crossed": passages.iter().map(passage_json).collect::<Value>(),
         "ends_in": tongue.ending.as_ref().map(|motion| json!({
             "kind": Attractor::KIND_NAMES[motion.kind()],
-            "amplitudes": by_channel(swept, &swept.plan_channels(&motion.peaks)),
+            "amplitudes": by_channel(map_result, &map_result.plan_channels(&motion.peaks)),
             "followed_s": motion.time_s,
         })),
         "closed_by": tongue.closing,
@@ -121,13 +122,13 @@ fn participant_json(mode: &ParticipatingMode) -> Value {
     })
 }
 
-fn passage_json(passage_json: &Passage) -> Value {
-    let effect = passage_json.effect.as_ref();
+fn passage_json(passage: &Passage) -> Value {
+    let effect = passage.effect.as_ref();
     json!({
-        "from_s": passage_json.interval_s[0],
-        "to_s": passage_json.interval_s[1],
-        "is_cut_by_the_end": passage_json.ends_inside,
-        "e_folds": passage_json.e_folds,
+        "from_s": passage.interval_s[0],
+        "to_s": passage.interval_s[1],
+        "is_cut_by_the_end": passage.ends_inside,
+        "e_folds": passage.e_folds,
         "amplification": effect.ok().map(|effect| effect.amplification),
         "departure_j": effect.ok().map(|effect| effect.departure_j),
         "left_range_at_s": effect.err().map(|left| left.time_s),

@@ -2,24 +2,24 @@
 
 use washer_model::{Profile, Spin};
 
-/// Number of equal intervals at whose ends a profile is sampled. Basis: profiles are smooth between
-/// kinks, which are sampled, too. Doubling it doubles the time of a search.
-const SAMPLE_INTERVALS: usize = 4000;
+/// The number of equal intervals at whose ends a profile is sampled. Basis: profiles are smooth
+/// between kinks, which are sampled, too. Doubling it doubles the time of a search.
+const SAMPLE_INTERVAL_COUNT: usize = 4000;
 
-/// Bisections of an interval. Basis: they exhaust the digits of a double. Doubling it changes
-/// nothing.
-const BISECTIONS: usize = 50;
+/// The number of bisections of an interval. Basis: they exhaust the digits of a double. Doubling it
+/// changes nothing.
+const BISECTION_COUNT: usize = 50;
 
-/// Number of equal parts of a passage over which growth is integrated by the midpoint rule. Basis:
-/// test `e_folds_are_the_area_under_growth_over_time`, with an error below 1e-5. Doubling it
+/// The number of equal parts of a passage over which growth is integrated by the midpoint rule.
+/// Basis: test `e_folds_are_the_area_under_growth_over_time`, with an error below 1e-5. Doubling it
 /// divides the error by 4.
-const INTEGRATION_PARTS: usize = 1000;
+const INTEGRATION_PART_COUNT: usize = 1000;
 
 /// Returns the lowest and the greatest speed (rpm) up to the run's end, negative backwards.
-pub(super) fn speed_range(spin: &Spin, end_s: f64) -> [f64; 2] {
+pub(super) fn speed_range_rpm(spin: &Spin, end_s: f64) -> [f64; 2] {
     let mut lowest_rpm = f64::INFINITY;
     let mut greatest_rpm = f64::NEG_INFINITY;
-    for speed_rpm in spin.speeds_rpm(instants_s(spin, end_s)) {
+    for speed_rpm in spin.speeds_rpm(sample_times_s(spin, end_s)) {
         lowest_rpm = lowest_rpm.min(speed_rpm);
         greatest_rpm = greatest_rpm.max(speed_rpm);
     }
@@ -27,26 +27,27 @@ pub(super) fn speed_range(spin: &Spin, end_s: f64) -> [f64; 2] {
     [lowest_rpm, greatest_rpm].map(|rpm| (1e9 * rpm).round() / 1e9)
 }
 
-/// Returns equally spaced instants and the kinks of the profile, in order.
-fn instants_s(spin: &Spin, end_s: f64) -> Vec<f64> {
-    let mut times: Vec<f64> =
-        (0..=SAMPLE_INTERVALS).map(|k| end_s * (k as f64 / SAMPLE_INTERVALS as f64)).collect();
-    let kinks = match spin {
+/// Returns equally spaced times (s) and those of the kinks of the profile, in order.
+fn sample_times_s(spin: &Spin, end_s: f64) -> Vec<f64> {
+    let mut times: Vec<f64> = (0..=SAMPLE_INTERVAL_COUNT)
+        .map(|k| end_s * (k as f64 / SAMPLE_INTERVAL_COUNT as f64))
+        .collect();
+    let kink_times_s = match spin {
         Spin::Ramped { profile: Profile::Triangular, ramp_s, .. } => vec![*ramp_s, 2.0 * ramp_s],
         Spin::Ramped { ramp_s, .. } => vec![*ramp_s],
         Spin::Table { time_s, .. } => time_s.clone(),
     };
-    times.extend(kinks.into_iter().filter(|&kink_s| kink_s < end_s));
+    times.extend(kink_times_s.into_iter().filter(|&kink_s| kink_s < end_s));
     times.sort_by(f64::total_cmp);
     times.dedup();
     times
 }
 
 /// Returns the intervals of time (s) in which the speed is within a band (rpm), in order.
-pub(super) fn times_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
+pub(super) fn intervals_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
     let speed_rpm = |time_s: f64| spin.speeds_rpm([time_s]).next().unwrap_or(0.0);
     let is_inside = |time_s: f64| (low..=high).contains(&speed_rpm(time_s));
-    let times = instants_s(spin, end_s);
+    let times = sample_times_s(spin, end_s);
     let mut intervals: Vec<[f64; 2]> = Vec::new();
     let mut entry_s = is_inside(0.0).then_some(0.0);
     for pair in times.windows(2) {
@@ -79,10 +80,10 @@ pub(super) fn times_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> 
 
 /// Returns the time (s) at which a condition ceases to hold, by bisection. It must hold at `from_s`
 /// and not at `to_s`.
-fn bisect_s(holds: &dyn Fn(f64) -> bool, mut from_s: f64, mut to_s: f64) -> f64 {
-    for _ in 0..BISECTIONS {
+fn bisect_s(is_before_end: &dyn Fn(f64) -> bool, mut from_s: f64, mut to_s: f64) -> f64 {
+    for _ in 0..BISECTION_COUNT {
         let middle_s = 0.5 * (from_s + to_s);
-        if holds(middle_s) { from_s = middle_s } else { to_s = middle_s }
+        if is_before_end(middle_s) { from_s = middle_s } else { to_s = middle_s }
     }
     0.5 * (from_s + to_s)
 }
@@ -90,9 +91,9 @@ fn bisect_s(holds: &dyn Fn(f64) -> bool, mut from_s: f64, mut to_s: f64) -> f64 
 /// Returns the integral over time of the growth at the magnitude of the speed. `growths` has pairs
 /// of speed (rpm) and growth (1/s) in order of speed.
 pub(super) fn e_folds(spin: &Spin, [from_s, to_s]: [f64; 2], growths: &[[f64; 2]]) -> f64 {
-    let part_s = (to_s - from_s) / INTEGRATION_PARTS as f64;
-    let middles = (0..INTEGRATION_PARTS).map(|k| from_s + (k as f64 + 0.5) * part_s);
-    spin.speeds_rpm(middles).map(|speed| part_s * growth_at(growths, speed.abs())).sum()
+    let part_s = (to_s - from_s) / INTEGRATION_PART_COUNT as f64;
+    let middle_times_s = (0..INTEGRATION_PART_COUNT).map(|k| from_s + (k as f64 + 0.5) * part_s);
+    spin.speeds_rpm(middle_times_s).map(|speed| part_s * growth_at(growths, speed.abs())).sum()
 }
 
 /// Returns the growth (1/s) at a speed (rpm), by linear interpolation.
@@ -126,26 +127,26 @@ mod tests {
     #[test]
     fn a_band_is_crossed_up_and_down() {
         let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
-        let intervals_s = times_inside_s(&spin, 100.0, [140.0, 210.0]);
+        let intervals_s = intervals_inside_s(&spin, 100.0, [140.0, 210.0]);
         assert_eq!(intervals_s.len(), 2);
         for (found, meant) in intervals_s.iter().flatten().zip([20.0, 30.0, 70.0, 80.0]) {
             assert!(is_nearly_equal(*found, meant), "{found} {meant}");
         }
         // A run that ends inside the band, and one that begins inside.
-        let intervals_s = times_inside_s(&spin, 25.0, [140.0, 210.0]);
+        let intervals_s = intervals_inside_s(&spin, 25.0, [140.0, 210.0]);
         assert!(
             intervals_s.len() == 1
                 && is_nearly_equal(intervals_s[0][0], 20.0)
                 && intervals_s[0][1] == 25.0
         );
-        assert_eq!(times_inside_s(&table(&[(0.0, 200.0)]), 9.0, [140.0, 210.0]), [[0.0, 9.0]]);
-        assert!(times_inside_s(&spin, 100.0, [400.0, 500.0]).is_empty());
+        assert_eq!(intervals_inside_s(&table(&[(0.0, 200.0)]), 9.0, [140.0, 210.0]), [[0.0, 9.0]]);
+        assert!(intervals_inside_s(&spin, 100.0, [400.0, 500.0]).is_empty());
     }
 
     #[test]
     fn a_band_is_found_even_if_it_is_passed_quickly() {
         let spin = table(&[(0.0, 0.0), (50.0, 0.0), (50.001, 400.0), (70.0, 400.0), (70.01, 0.0)]);
-        let intervals_s = times_inside_s(&spin, 100.0, [100.0, 200.0]);
+        let intervals_s = intervals_inside_s(&spin, 100.0, [100.0, 200.0]);
         assert_eq!(intervals_s.len(), 2);
         for (found, meant) in intervals_s.iter().flatten().zip([50.00025, 50.0005, 70.005, 70.0075])
         {
@@ -165,9 +166,9 @@ mod tests {
     #[test]
     fn a_profile_may_turn_both_ways_and_pause() {
         let spin = table(&[(0.0, 0.0), (3.0, 100.0), (6.0, -50.0), (8.0, -50.0), (9.0, 0.0)]);
-        assert_eq!(speed_range(&spin, 12.0), [-50.0, 100.0]);
-        assert_eq!(speed_range(&spin, 3.0), [0.0, 100.0]);
-        let intervals_s = times_inside_s(&spin, 12.0, [-40.0, -25.0]);
+        assert_eq!(speed_range_rpm(&spin, 12.0), [-50.0, 100.0]);
+        assert_eq!(speed_range_rpm(&spin, 3.0), [0.0, 100.0]);
+        let intervals_s = intervals_inside_s(&spin, 12.0, [-40.0, -25.0]);
         assert_eq!(intervals_s.len(), 2);
         for (found, meant) in intervals_s.iter().flatten().zip([5.5, 5.8, 8.2, 8.5]) {
             assert!(is_nearly_equal(*found, meant), "{found} {meant}");

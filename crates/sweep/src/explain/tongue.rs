@@ -14,65 +14,67 @@ use crate::plan::{Plan, prepare_input};
 use crate::speeds::Speeds;
 use sweep_engine::Interrupt;
 
-/// Speeds whose responses are computed together. Basis: several times the number of lanes. Doubling
-/// it leaves threads without work at the end of a short scan.
-const SPEED_BATCH: usize = 32;
+/// The number of speeds whose responses are computed together. Basis: several times the number of
+/// lanes. Doubling it leaves threads without work at the end of a short scan.
+const SPEEDS_PER_BATCH: usize = 32;
 
-/// Width (rpm) of the bracket at which the search for an edge ends. Basis: edges are reported with
-/// two decimals. Doubling it saves less than one round of a search.
+/// The width (rpm) of the bracket at which the search for an edge ends. Basis: edges are reported
+/// with two decimals. Doubling it saves less than one round of a search.
 const EDGE_TOLERANCE_RPM: f64 = 0.01;
 
-/// Trial speeds between two others in one round of a search. Basis: they fill the lanes. Doubling
-/// it saves a round in four and doubles the work of each.
-const TRIALS_BETWEEN: usize = 8;
+/// The number of trial speeds between two others in one round of a search. Basis: they fill the
+/// lanes. Doubling it saves a round in four and doubles the work of each.
+const TRIALS_PER_INTERVAL: usize = 8;
 
-/// Rounds of the search for the greatest growth between the scanned speeds. Basis: two rounds
-/// locate it within a twentieth of a step. Doubling it refines that to 1/400.
-const PEAK_ROUNDS: usize = 2;
+/// The number of rounds of the search for the greatest growth between the scanned speeds. Basis:
+/// two rounds locate it within a twentieth of a step. Doubling it refines that to 1/400.
+const PEAK_ROUND_COUNT: usize = 2;
 
-/// Speeds at which growth is computed in a trial of stronger dampers. Basis: growth over a tongue
-/// has one maximum, which further rounds refine. Doubling it doubles the time of a trial.
-const DAMPING_TRIAL_SPEEDS: usize = 24;
+/// The number of speeds at which growth is computed in a trial of stronger dampers. Basis: growth
+/// over a tongue has one maximum, which further rounds refine. Doubling it doubles the time of a
+/// trial.
+const SPEEDS_PER_DAMPING_TRIAL: usize = 24;
 
-/// Margin on each side of a tongue in which a trial looks for growth, as a share of the width. It
-/// leaves room for a tongue that moves with the damping. Doubling it spreads the trial speeds.
-const DAMPING_TRIAL_MARGIN: f64 = 0.25;
+/// The margin on each side of a tongue in which a trial looks for growth, as a share of the width.
+/// Basis: it leaves room for a tongue that moves with the damping. Doubling it spreads the trial
+/// speeds.
+const DAMPING_TRIAL_MARGIN_RATIO: f64 = 0.25;
 
-/// Rate (1/s) at which all disturbances must decay, at the speeds of a trial, for a tongue to count
-/// as closed. Basis: growth between two of these speeds is greater by less. Doubling it raises the
-/// damping that is reported slightly.
+/// The rate (1/s) at which all disturbances must decay, at the speeds of a trial, for a tongue to
+/// count as closed. Basis: between two of these speeds the growth exceeds that at them by less.
+/// Doubling it raises the damping that is reported slightly.
 const CLOSED_DECAY_PER_S: f64 = 5e-4;
 
-/// Maximum factor by which dampers are made stronger. Basis: no machine has such dampers. Doubling
-/// it adds a round to searches that fail.
+/// The maximum factor by which dampers are made stronger. Basis: no machine has such dampers.
+/// Doubling it adds a round to searches that fail.
 const MAX_DAMPING_FACTOR: f64 = 32.0;
 
-/// Factors of the damping in one round of trials. Basis: their machines share the lanes. Doubling
-/// it doubles the work of a round.
-const DAMPING_FACTORS: usize = 4;
+/// The number of factors of the damping in one round of trials. Basis: their machines share the
+/// lanes. Doubling it doubles the work of a round.
+const FACTORS_PER_ROUND: usize = 4;
 
-/// Ratio of two successive factors while none closes the tongue. Basis: one round reaches 5.8 times
-/// the damping. Doubling it leaves a wider bracket to the next round.
+/// The ratio of two successive factors while none closes the tongue. Basis: one round reaches 5.8
+/// times the damping. Doubling it leaves a wider bracket to the next round.
 const DAMPING_FACTOR_RATIO: f64 = 1.55;
 
-/// Relative width of the bracket at which the search for the factor ends. Basis: factors are
+/// The relative width of the bracket at which the search for the factor ends. Basis: factors are
 /// reported with three digits. Doubling it saves less than one round.
 const DAMPING_FACTOR_TOLERANCE: f64 = 5e-4;
 
-/// Greatest number of speeds by which the time of a scan is estimated. Basis: the lanes of the
+/// The maximum number of speeds by which the time of a scan is estimated. Basis: the lanes of the
 /// widest instruction set. Doubling it doubles the time of an estimate.
-const TIMED_SPEEDS: usize = 8;
+const MAX_TIMED_SPEEDS: usize = 8;
 
-/// Positions of trials about the root that linear interpolation gives, in tolerances. Basis: the
-/// inner two bracket the root within the tolerance if growth is nearly linear, and the outer two if
-/// it is less so. Doubling them needs another round where growth is linear.
+/// The positions of trials about the root that linear interpolation gives, in tolerances. Basis:
+/// the inner two bracket the root within the tolerance if growth is nearly linear, and the outer
+/// two if it is less so. Doubling them needs another round where growth is linear.
 const ROOT_OFFSETS: [f64; 4] = [-8.0, -0.4, 0.4, 8.0];
 
-/// Number of modes, from the slowest, that may take part in a resonance: those of the suspension.
-/// Doubling it admits the modes of the bearings and of the hinge.
-const SUSPENSION_MODES: usize = 4;
+/// The number of modes, from the slowest, that may take part in a resonance: those of the
+/// suspension. Doubling it admits the modes of the bearings and of the hinge.
+const SUSPENSION_MODE_COUNT: usize = 4;
 
-/// Maximum multiple of the speed at which frequencies may meet. Basis: the growth of parametric
+/// The maximum multiple of the speed at which frequencies may meet. Basis: the growth of parametric
 /// resonances falls with their order. Doubling it finds multiples by chance.
 const MAX_ORDER: u32 = 3;
 
@@ -89,7 +91,7 @@ pub(crate) struct ResponseFinder<'a> {
     pub(crate) point: &'a Point,
     /// Whether the machine is the mirror image of one whose drum turns backwards.
     pub(crate) is_backward: bool,
-    /// The interrupt after which no response is found, so that results are meaningless.
+    /// The interrupt. Once it is raised, no response is found, and results are meaningless.
     pub(crate) interrupt: &'a Interrupt,
     /// A function that is called with the number of speeds that are done.
     pub(crate) count_speeds: &'a (dyn Fn(usize) + Sync),
@@ -107,7 +109,7 @@ impl ResponseFinder<'_> {
     /// Measures the time (s) of one thread for the response at a speed, by a few of the speeds.
     pub(crate) fn seconds_per_speed(&self, speeds: Speeds) -> f64 {
         let speeds_rpm = speeds.values();
-        let stride = speeds_rpm.len().div_ceil(TIMED_SPEEDS);
+        let stride = speeds_rpm.len().div_ceil(MAX_TIMED_SPEEDS);
         let timed_speeds: Vec<(usize, f64)> =
             speeds_rpm.iter().step_by(stride).map(|&speed_rpm| (0, speed_rpm)).collect();
         let cancel = Cancel::Flag(self.interrupt.flag());
@@ -132,7 +134,7 @@ impl ResponseFinder<'_> {
             let first_response = |answer: Result<Vec<_>, _>| answer.ok()?.into_iter().next();
             results.into_iter().map(first_response).collect::<Vec<_>>()
         };
-        let batches: Vec<_> = speeds_rpm.par_chunks(SPEED_BATCH).map(find_batch).collect();
+        let batches: Vec<_> = speeds_rpm.par_chunks(SPEEDS_PER_BATCH).map(find_batch).collect();
         batches.into_iter().flatten().collect()
     }
 }
@@ -143,7 +145,7 @@ impl ResponseFinder<'_> {
 pub(crate) enum TongueEnd {
     /// The growth is 0, and the response is stable beyond.
     Edge,
-    /// The response is unstable beyond, in another way.
+    /// The response beyond has another kind of instability.
     OtherKind,
     /// The range of the scan ends.
     Range,
@@ -151,13 +153,13 @@ pub(crate) enum TongueEnd {
     NoResponse,
 }
 
-/// A range of speeds in which the response is unstable in one way.
+/// A range of speeds in which the response has one kind of instability.
 pub(crate) struct Tongue {
     /// Whether the drum turns backwards.
     pub(crate) is_backward: bool,
-    /// The edges (rpm).
+    /// The speeds (rpm) of the lower and of the upper edge.
     pub(crate) range_rpm: [f64; 2],
-    /// The kinds of the edges.
+    /// The reasons why the tongue ends at the lower and at the upper edge.
     pub(crate) ends: [TongueEnd; 2],
     /// Pairs of speed (rpm) and growth (1/s) in order of speed, from edge to edge.
     pub(crate) growths: Vec<[f64; 2]>,
@@ -192,7 +194,7 @@ pub(crate) struct ModeResonance {
 pub(crate) enum Closing {
     /// A common factor of all dampers, which a trial has confirmed.
     Factor {
-        /// The factor.
+        /// The factor by which every damper is made stronger.
         #[serde(rename = "damping_factor")]
         factor: f64,
         /// The resulting damping of each damper, if all have the same.
@@ -219,11 +221,13 @@ pub(crate) struct SpeedScan {
     pub(crate) speeds: Speeds,
     /// The number of these speeds without a response.
     pub(crate) without_response: usize,
-    /// Speeds (rpm) of the folds at which a machine that runs up leaves its branch of responses.
+    /// The speeds (rpm) of the folds at which a machine that runs up leaves its branch of
+    /// responses.
     pub(crate) jumps_rpm: Vec<f64>,
-    /// Speeds (rpm) at which the response is not on the curve of a machine that runs up.
+    /// The speeds (rpm) at which the response is not on the curve of a machine that runs up.
     pub(crate) off_curve_rpm: Vec<f64>,
-    /// Speeds (rpm) at which the response exceeds the machine's geometry, and the limit exceeded.
+    /// The speeds (rpm) at which the response exceeds a limit of the machine's geometry, each with
+    /// the limit.
     pub(crate) exceeded_limits: Vec<(f64, GeometryLimit)>,
 }
 
@@ -236,7 +240,7 @@ pub(crate) fn find_tongues(
     let found_responses = || responses.iter().flatten();
     let on_curve = found_responses().filter(|response| response.is_on_curve);
     let fold_speeds = on_curve.filter_map(|response| response.fold_speeds_rpm[1]);
-    let mut jumps_rpm: Vec<f64> = fold_speeds.filter(|&rpm| rpm <= speeds.to).collect();
+    let mut jumps_rpm: Vec<f64> = fold_speeds.filter(|&rpm| rpm <= speeds.to_rpm).collect();
     jumps_rpm.dedup();
     let kind = |response: &Option<Response>| response.as_ref().map(Response::kind);
     let mut tongues = Vec::new();
@@ -246,7 +250,7 @@ pub(crate) fn find_tongues(
         next_index += same_kind.len();
         let unstable_kind = kind(&same_kind[0]).filter(|kind| *kind != StabilityKind::Stable);
         let Some(unstable_kind) = unstable_kind else { continue };
-        let unstable_run: Vec<&Response> = same_kind.iter().flatten().collect();
+        let unstable_responses: Vec<&Response> = same_kind.iter().flatten().collect();
         let find_edge = |inside: &Response, outside: Option<&Option<Response>>| match outside {
             None => (inside.speed_rpm, TongueEnd::Range),
             Some(None) => (inside.speed_rpm, TongueEnd::NoResponse),
@@ -257,12 +261,13 @@ pub(crate) fn find_tongues(
                 (rpm, if is_stable { TongueEnd::Edge } else { TongueEnd::OtherKind })
             }
         };
-        let lower_edge = find_edge(unstable_run[0], response_before);
-        let upper_edge = find_edge(unstable_run[unstable_run.len() - 1], responses.get(next_index));
+        let lower_edge = find_edge(unstable_responses[0], response_before);
+        let upper_edge =
+            find_edge(unstable_responses[unstable_responses.len() - 1], responses.get(next_index));
         tongues.push(measure_tongue(
             finder,
             unstable_kind,
-            &unstable_run,
+            &unstable_responses,
             [lower_edge, upper_edge],
         ));
     }
@@ -289,15 +294,13 @@ pub(crate) fn find_endings(
     finder: &ResponseFinder<'_>,
     tongues: &[Tongue],
 ) -> Vec<Option<Attractor>> {
-    let held_speed = |measure_tongue: &Tongue| HeldSpeed {
+    let held_speed = |tongue: &Tongue| HeldSpeed {
         point: finder.point,
-        speed_rpm: measure_tongue.fastest_response.speed_rpm,
+        speed_rpm: tongue.fastest_response.speed_rpm,
     };
     let held_speeds: Vec<HeldSpeed<'_>> = tongues.iter().map(held_speed).collect();
-    let responses = tongues
-        .iter()
-        .map(|measure_tongue| Ok(vec![measure_tongue.fastest_response.clone()]))
-        .collect();
+    let responses =
+        tongues.iter().map(|tongue| Ok(vec![tongue.fastest_response.clone()])).collect();
     let starts = StartRule { count: 1, ..StartRule::default() };
     let cancel = Cancel::Flag(finder.interrupt.flag());
     let attractors =
@@ -351,24 +354,25 @@ fn speed_and_growth(response: &Response) -> [f64; 2] {
     [response.speed_rpm, response.growth_per_s()]
 }
 
-/// Returns trial values between `open` and `closed`, in this order, about the root of the growth.
-/// Each of the two is a value with its growth; the growth is taken as linear between them.
+/// Returns trial values between those of `inside` and `outside`, in this order, about the root of
+/// the growth. `inside` and `outside` are pairs of a value and its growth; between them the growth
+/// is assumed to be linear.
 fn trials_about_root(inside: [f64; 2], outside: [f64; 2], tolerance: f64) -> Vec<f64> {
-    let interpolated = (inside[1] / (inside[1] - outside[1])).clamp(0.0, 1.0);
-    let root = if interpolated.is_nan() { 0.5 } else { interpolated };
-    let distance = outside[0] - inside[0];
-    let shares_about_root = ROOT_OFFSETS.map(|offset| root + offset * tolerance / distance.abs());
+    let linear_root = (inside[1] / (inside[1] - outside[1])).clamp(0.0, 1.0);
+    let root = if linear_root.is_nan() { 0.5 } else { linear_root };
+    let difference = outside[0] - inside[0];
+    let shares_about_root = ROOT_OFFSETS.map(|offset| root + offset * tolerance / difference.abs());
     let mut shares: Vec<f64> =
         shares_about_root.into_iter().filter(|share| *share > 0.0 && *share < 1.0).collect();
     if shares.len() < ROOT_OFFSETS.len() {
         shares.push(0.5);
         shares.sort_by(f64::total_cmp);
     }
-    shares.into_iter().map(|share| inside[0] + share * distance).collect()
+    shares.into_iter().map(|share| inside[0] + share * difference).collect()
 }
 
-/// Returns the speed (rpm) at which a kind of instability ends, between a speed with it and one
-/// without it. Each of the two is a speed with its growth.
+/// Returns the speed (rpm) at which a kind of instability ends, between a speed with this kind and
+/// one without. `inside` and `outside` are these speeds (rpm), each with its growth (1/s).
 fn find_edge_rpm(
     finder: &ResponseFinder<'_>,
     kind: StabilityKind,
@@ -378,7 +382,7 @@ fn find_edge_rpm(
     while (outside[0] - inside[0]).abs() > EDGE_TOLERANCE_RPM {
         let trials = match outside[1] < 0.0 {
             true => trials_about_root(inside, outside, EDGE_TOLERANCE_RPM),
-            false => speeds_between(inside[0], outside[0], TRIALS_BETWEEN),
+            false => speeds_between(inside[0], outside[0], TRIALS_PER_INTERVAL),
         };
         for (rpm, response) in trials.iter().zip(finder.find_responses(&trials)) {
             let is_inside = response.as_ref().is_some_and(|response| response.kind() == kind);
@@ -407,15 +411,15 @@ fn fastest_response(
     let index = growths.partition_point(|[rpm, _]| *rpm < fastest.speed_rpm);
     let rpm_at = |k: usize| growths.get(k).map_or(fastest.speed_rpm, |[rpm, _]| *rpm);
     let mut bracket_rpm = [rpm_at(index.saturating_sub(1)), rpm_at(index + 1)];
-    for _ in 0..PEAK_ROUNDS {
+    for _ in 0..PEAK_ROUND_COUNT {
         let [low_rpm, high_rpm] = bracket_rpm;
-        let trials = speeds_between(low_rpm, high_rpm, TRIALS_BETWEEN);
+        let trials = speeds_between(low_rpm, high_rpm, TRIALS_PER_INTERVAL);
         for response in finder.find_responses(&trials).into_iter().flatten() {
             if response.kind() == kind && response.growth_per_s() > fastest.growth_per_s() {
                 fastest = response;
             }
         }
-        let step_rpm = (high_rpm - low_rpm) / (TRIALS_BETWEEN + 1) as f64;
+        let step_rpm = (high_rpm - low_rpm) / (TRIALS_PER_INTERVAL + 1) as f64;
         bracket_rpm = [fastest.speed_rpm - step_rpm, fastest.speed_rpm + step_rpm]
             .map(|rpm| rpm.clamp(low_rpm, high_rpm));
     }
@@ -435,9 +439,10 @@ fn nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance
         response.participating_modes.iter().map(|mode| mode.mode - 1).collect();
     let pairs: Vec<(usize, usize)> = match (response.kind(), participants.as_slice()) {
         (_, []) => return None,
-        (StabilityKind::QuasiPeriodic, &[one]) => {
-            (0..SUSPENSION_MODES).filter(|other| *other != one).map(|other| (one, other)).collect()
-        }
+        (StabilityKind::QuasiPeriodic, &[one]) => (0..SUSPENSION_MODE_COUNT)
+            .filter(|other| *other != one)
+            .map(|other| (one, other))
+            .collect(),
         (StabilityKind::QuasiPeriodic, &[one, other, ..]) => vec![(one, other)],
         (_, participants) => participants.iter().map(|&one| (one, one)).collect(),
     };
@@ -469,18 +474,22 @@ fn nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance
     nearest.filter(|nearest| distance(nearest) < MAX_RESONANCE_DISTANCE)
 }
 
-/// Returns the factors to try next, above `open`, which leaves growth, and below `closed`, which
-/// leaves none, once such a factor is known. Each of the two is a factor with the growth that
-/// remains.
+/// Returns the factors of the damping to try next, between that of `open_trial`, with which the
+/// tongue is open, and that of `closed_trial`, with which it is closed, once there is one. A trial
+/// is a factor with the growth (1/s) that remains.
 fn trial_factors(open_trial: [f64; 2], closed_trial: Option<[f64; 2]>) -> Vec<f64> {
-    let above_limit = |[factor, growth]: [f64; 2]| [factor, growth + CLOSED_DECAY_PER_S];
+    let growth_above_limit = |[factor, growth]: [f64; 2]| [factor, growth + CLOSED_DECAY_PER_S];
     match closed_trial {
-        None => (1..=DAMPING_FACTORS)
+        None => (1..=FACTORS_PER_ROUND)
             .map(|k| open_trial[0] * DAMPING_FACTOR_RATIO.powi(k as i32))
             .collect(),
         Some(closed_trial) => {
             let tolerance = DAMPING_FACTOR_TOLERANCE * open_trial[0];
-            trials_about_root(above_limit(open_trial), above_limit(closed_trial), tolerance)
+            trials_about_root(
+                growth_above_limit(open_trial),
+                growth_above_limit(closed_trial),
+                tolerance,
+            )
         }
     }
 }
@@ -512,18 +521,19 @@ impl Tongue {
                 return Closing::NotUpTo { factor: MAX_DAMPING_FACTOR };
             }
         }
-        let closed_trial = closed_trial.map_or(MAX_DAMPING_FACTOR, |[factor, _]| factor);
+        let factor = closed_trial.map_or(MAX_DAMPING_FACTOR, |[factor, _]| factor);
         let first_damping = dampers[0].damping_n_s_per_m;
-        let is_common = dampers.iter().all(|damper| damper.damping_n_s_per_m == first_damping);
-        let damping_n_s_per_m = is_common.then_some(closed_trial * first_damping);
-        Closing::Factor { factor: closed_trial, damping_n_s_per_m, stable_rpm: self.searched_rpm() }
+        let is_same_for_all =
+            dampers.iter().all(|damper| damper.damping_n_s_per_m == first_damping);
+        let damping_n_s_per_m = is_same_for_all.then_some(factor * first_damping);
+        Closing::Factor { factor, damping_n_s_per_m, stable_rpm: self.trial_range_rpm() }
     }
 
     /// Returns the lowest and the greatest speed (rpm) at which growth is sought in machines with
     /// stronger dampers.
-    fn searched_rpm(&self) -> [f64; 2] {
+    fn trial_range_rpm(&self) -> [f64; 2] {
         let [from, to] = self.range_rpm;
-        let margin = DAMPING_TRIAL_MARGIN * (to - from) + 1.0;
+        let margin = DAMPING_TRIAL_MARGIN_RATIO * (to - from) + 1.0;
         [(from - margin).max(0.5 * from), to + margin]
     }
 
@@ -539,7 +549,7 @@ impl Tongue {
         };
         let points: Vec<Option<Point>> =
             factors.iter().map(|&factor| prepare_with_factor(factor)).collect();
-        let range_rpm = self.searched_rpm();
+        let range_rpm = self.trial_range_rpm();
         let cancel = Cancel::Flag(finder.interrupt.flag());
         let points_and_speeds: Vec<(&Point, f64)> =
             points.iter().flatten().map(|point| (point, range_rpm[1])).collect();
@@ -549,16 +559,19 @@ impl Tongue {
             ResponseCurves::continue_curves(&points_and_speeds, response_below.as_ref(), cancel);
         let mut growths = vec![f64::NEG_INFINITY; points_and_speeds.len()];
         let mut brackets_rpm = vec![range_rpm; points_and_speeds.len()];
-        let mut speed_count = DAMPING_TRIAL_SPEEDS;
-        for _ in 0..=PEAK_ROUNDS {
+        let mut speed_count = SPEEDS_PER_DAMPING_TRIAL;
+        for _ in 0..=PEAK_ROUND_COUNT {
             // A machine with growth at one speed needs no further ones: its tongue is open.
             let may_be_closed =
                 (0..points_and_speeds.len()).filter(|&k| growths[k] <= -CLOSED_DECAY_PER_S);
             let requests: Vec<(usize, f64)> = may_be_closed
                 .flat_map(|k| {
                     let [low, high] = brackets_rpm[k];
-                    let range_ends =
-                        if speed_count == DAMPING_TRIAL_SPEEDS { vec![low, high] } else { vec![] };
+                    let range_ends = if speed_count == SPEEDS_PER_DAMPING_TRIAL {
+                        vec![low, high]
+                    } else {
+                        vec![]
+                    };
                     let speeds =
                         range_ends.into_iter().chain(speeds_between(low, high, speed_count));
                     speeds.map(move |rpm| (k, rpm))
@@ -585,7 +598,7 @@ impl Tongue {
                         .map(|rpm| rpm.clamp(range_rpm[0], range_rpm[1]));
                 }
             }
-            speed_count = TRIALS_BETWEEN;
+            speed_count = TRIALS_PER_INTERVAL;
         }
         let mut growths = growths.into_iter();
         let growth = |point: &Option<Point>| point.as_ref().and_then(|_| growths.next());

@@ -16,7 +16,7 @@ use super::algebra::{dot, subtract_mean};
 use super::measurement::{Measurement, Signal, SignalQuantity};
 use super::speed::SmoothedSpin;
 use crate::engine::reference_step_s;
-use crate::method::direct;
+use crate::method::direct_method;
 use crate::plan::{Plan, prepare_point};
 use lane_ode::Cancel;
 use sweep_engine::plan::NumberSources;
@@ -137,7 +137,7 @@ impl Problem<'_> {
     /// Selects the integration method: that of the grid if it is a method of fixed steps, or else
     /// Runge and Kutta's with the step of references, which depends on the machine at the start.
     pub(crate) fn select_method(cases: &[FitCase]) -> Result<Method, washer_model::NoEquilibrium> {
-        if let Some(method) = cases.iter().find_map(|case| direct(&case.plan.integrator)) {
+        if let Some(method) = cases.iter().find_map(|case| direct_method(&case.plan.integrator)) {
             return Ok(method);
         }
         let mut step_s = f64::INFINITY;

@@ -35,7 +35,7 @@ pub fn explain_point(
 ) -> Result<Option<CommandReport>, Error> {
     let (plan, parameters) = grid.load_point(point_values)?;
     let parse = |speeds: &[f64]| {
-        Speeds::from_values(speeds).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
+        Speeds::from_values(speeds).filter(|speeds| speeds.from_rpm > 0.0).ok_or_else(|| {
             let expected = "at least two equally spaced speeds in rpm above 0, as those of \
                             range(200, 351)";
             speeds_error(speeds.len(), expected.to_owned())
