@@ -187,8 +187,9 @@ impl<R: 'static> ComparisonColumns<'_, R> {
         }
         let rule = format!("{rule}; null where ratio_max is");
         let sensitive = "true where the motion is chaotic, and the row's digits are those of one \
-                         trajectory: a perturbed run separates exponentially, and its numbers or \
-                         those of the level before differ by more than the accuracy; null where nothing was compared";
+                         trajectory: a perturbed run separates exponentially, and its numbers \
+                         or those of the level before differ by more than the accuracy; null \
+                         where nothing was compared";
         let error = "greatest relative error of the row's numbers, from the differences of its \
                      method's levels; null where nothing was compared";
         let converged =

@@ -37,8 +37,8 @@
 //! is within the accuracy.
 //!
 //! Fifteen constants decide `error`, `converged` and `sensitive`. Eleven are in this file (of
-//! [`RESOLVING_RAD`], both numbers count); [`STEP_CONTRACTION`] follows from them. Four are limits of
-//! the model beside their use: the steps relative to the limit of stability (`STABILITY_SHARE`,
+//! [`RESOLVING_RAD`], both numbers count); [`STEP_CONTRACTION`] follows from them. Four are limits
+//! of the model beside their use: the steps relative to the limit of stability (`STABILITY_SHARE`,
 //! `CAP_LIMIT_SHARE` and `MIN_HINGE_SPEED_RATIO` beside [`StepSelector`]), and the swing of a body
 //! under a jump of its load (`SWING_FACTOR`). Each metric has a scale besides.
 

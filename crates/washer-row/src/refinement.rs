@@ -101,7 +101,8 @@ struct ModelRefinement {
 struct LevelDifference {
     /// The relative difference of the numbers; `None` if the levels cannot be compared.
     numbers: Option<f64>,
-    /// The same, or the distance of the motions if the levels follow different ones.
+    /// The relative difference of the levels: that of the numbers, or the distance of the motions
+    /// if the levels follow different ones.
     relative: Option<f64>,
     /// The change by which the level starts a family.
     start: FamilyStart,
