@@ -56,16 +56,16 @@ impl<T: Lane> TimeAbove<T> {
         // which bound the cubic.
         let max_height = N(a.0.larger(b.0).larger(c.0.larger(d.0)));
         let max_depth = N((-a).0.larger((-b).0).larger((-c).0.larger((-d).0)));
-        let mut fraction = max_depth.where_less(zero, one, zero);
+        let mut fraction_above_zero = max_depth.where_less(zero, one, zero);
         let is_counted = N(T::select(counted_lanes, one.0, zero.0));
         let has_zero =
             max_depth.where_less(zero, zero, zero.where_less(max_height, is_counted, zero));
         if T::bits(zero.0.less(has_zero.0)) != 0 {
             let positive_fraction =
                 positive_fraction_of_step(&Quintic::new(length_s, &self.last_sample, sample));
-            fraction = zero.where_less(has_zero, positive_fraction, fraction);
+            fraction_above_zero = zero.where_less(has_zero, positive_fraction, fraction_above_zero);
         }
-        self.time_s += N(T::select(counted_lanes, (fraction * length_s).v().0, zero.0));
+        self.time_s += N(T::select(counted_lanes, (fraction_above_zero * length_s).v().0, zero.0));
         self.last_sample = *sample;
     }
 

@@ -77,12 +77,12 @@ named! {
         /// On one side of the bracket the quantity is not defined (a model failed, or there is
         /// nothing to compare).
         Undefined = "undefined",
-        /// The quantity is on the reliable side wherever it was evaluated.
-        NoneReliable = "none_in_range_reliable",
-        /// The quantity is not on the reliable side wherever it was evaluated.
-        NoneUnreliable = "none_in_range_unreliable",
-        /// The quantity is not defined wherever it was evaluated.
-        NoneUndefined = "none_in_range_undefined",
+        /// The quantity is on the reliable side at every evaluated point of the line.
+        AllReliable = "none_in_range_reliable",
+        /// The quantity is on the unreliable side at every evaluated point of the line.
+        AllUnreliable = "none_in_range_unreliable",
+        /// The quantity is not defined at any evaluated point of the line.
+        AllUndefined = "none_in_range_undefined",
     }
 }
 

@@ -28,7 +28,7 @@ pub struct Estimate {
     pub disk_bytes: f64,
     /// An upper bound of the disk space of the result.
     pub result_bytes: f64,
-    /// The steps of the method, in words.
+    /// The integration method and the choice of its time steps, in words.
     pub method: String,
     /// The words that follow the limit in the sentence on the verdict; empty if ratios are those of
     /// the largest deviations.

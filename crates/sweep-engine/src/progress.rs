@@ -56,13 +56,13 @@ impl Progress {
         noun: &'static str,
         stored_points: u64,
     ) -> Self {
-        let lines = |seconds| {
-            let interval = Duration::from_secs(seconds);
+        let create_line_display = |interval_s| {
+            let interval = Duration::from_secs(interval_s);
             Display::Lines { interval, next_line_time: Instant::now() + interval }
         };
         let display = match mode {
             ProgressMode::None => Display::Nothing,
-            ProgressMode::Plain => lines(5),
+            ProgressMode::Plain => create_line_display(5),
             ProgressMode::Auto if std::io::stderr().is_terminal() => {
                 let target = ProgressDrawTarget::stderr_with_hz(8);
                 let bar = ProgressBar::with_draw_target(Some(total), target);
@@ -73,7 +73,7 @@ impl Progress {
                     BAR_TEMPLATE
                 })))
             }
-            ProgressMode::Auto => lines(60),
+            ProgressMode::Auto => create_line_display(60),
         };
         Self {
             display: Mutex::new(display),

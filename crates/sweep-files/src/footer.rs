@@ -127,30 +127,30 @@ impl<R: ChunkReader> ChunkReader for Footer<'_, R> {
 }
 
 fn check_footer(footer: &[u8]) -> Result<(), ParquetError> {
-    let mut tree = Tree::default();
+    let mut column_tree = ColumnTree::default();
     let mut name = 0;
     let mut child_count = 0;
     let rest = thrift::walk(footer, FILE, &mut |path, found| match (path, found) {
         (NAME, Found::Number(length)) => name = u64::try_from(length).unwrap_or(0),
         (CHILDREN, Found::Number(number)) => child_count = u64::try_from(number).unwrap_or(0),
         (ELEMENT, Found::End) => {
-            tree.add(name, child_count);
+            column_tree.add(name, child_count);
             name = 0;
             child_count = 0;
         }
         _ => {}
     });
     // The library allocates as many columns as a group declares.
-    if rest.is_none() || tree.declared_count >= tree.element_count.max(1) {
+    if rest.is_none() || column_tree.declared_count >= column_tree.element_count.max(1) {
         return Err(refusal_error("its footer makes no sense"));
     }
-    if tree.element_count > MAX_COLUMNS {
+    if column_tree.element_count > MAX_COLUMNS {
         return Err(refusal_error(format!("it has more than {MAX_COLUMNS} columns")));
     }
-    if tree.depth > MAX_DEPTH {
+    if column_tree.depth > MAX_DEPTH {
         return Err(refusal_error(format!("its columns are nested more than {MAX_DEPTH} deep")));
     }
-    if tree.path_bytes > MAX_PATH_BYTES {
+    if column_tree.path_bytes > MAX_PATH_BYTES {
         let max_mebibytes = MAX_PATH_BYTES >> 20;
         return Err(refusal_error(format!(
             "the paths of its columns are longer than {max_mebibytes} MiB"
@@ -161,7 +161,7 @@ fn check_footer(footer: &[u8]) -> Result<(), ParquetError> {
 
 /// The nesting of columns and groups; each group comes before its children.
 #[derive(Default)]
-struct Tree {
+struct ColumnTree {
     /// The number of columns and groups.
     element_count: u64,
     /// The number of children that all groups declare.
@@ -175,7 +175,7 @@ struct Tree {
     path_bytes: u64,
 }
 
-impl Tree {
+impl ColumnTree {
     /// Adds the next column or group, with the length of its name and the number of its children.
     fn add(&mut self, name: u64, child_count: u64) {
         self.element_count += 1;

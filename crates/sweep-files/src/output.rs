@@ -26,7 +26,7 @@ impl<'a> Output<'a> {
     pub fn begin(path: &'a Path, kind: FileKind<'a>) -> Result<Self, FileError> {
         check_replaceable(path, kind)?;
         let folder = atomic::parent(path);
-        prepare_folder(folder)?;
+        create_folder_without_leftovers(folder)?;
         Ok(Self { path, kind, temporary: atomic::create_temporary(folder)? })
     }
 
@@ -49,7 +49,7 @@ impl<'a> Output<'a> {
     }
 }
 
-/// Writes a file of this kind into a folder that [`prepare_folder`] has prepared.
+/// Writes a file of this kind into a folder of [`create_folder_without_leftovers`].
 ///
 /// # Errors
 /// Those of [`Output::begin`].
@@ -63,7 +63,7 @@ pub fn write(path: &Path, kind: FileKind<'_>, bytes: &[u8]) -> Result<(), FileEr
 ///
 /// # Errors
 /// [`FileError::Io`].
-pub fn prepare_folder(folder: &Path) -> Result<(), FileError> {
+pub fn create_folder_without_leftovers(folder: &Path) -> Result<(), FileError> {
     fs::create_dir_all(folder).map_err(FileError::io("make the folder", folder))?;
     atomic::clear_leftovers(folder);
     Ok(())

@@ -26,9 +26,10 @@ use Wire::{Bool, Number, Struct};
 /// our pages have 1 MiB, and the library holds a page until it has unpacked the next one, so that
 /// twice as many bytes are taken, 2 GB. Doubling it doubles this memory.
 const MAX_UNPACKED_BYTES: u64 = 1 << 30;
-/// Weight of a byte of words against [`MAX_UNPACKED_BYTES`]. Basis: the library takes
-/// [`BYTE_ARRAY_BYTES`] for each word of a dictionary, which may have only 4 in the file, its
-/// length. Doubling it halves the number of words in the longest file that is read.
+/// Memory for each unpacked byte of a column of text, in bytes, as it counts towards
+/// [`MAX_UNPACKED_BYTES`]. Basis: a word of a dictionary takes [`BYTE_ARRAY_BYTES`] of the
+/// library's memory, but only the 4 bytes of its length in the file if it is empty. Doubling it
+/// halves the number of words in the longest file that is read.
 const BYTES_PER_WORD_BYTE: u64 = 8;
 /// Size of the library's `ByteArray` and `FixedLenByteArray`, in bytes. Basis: their fields.
 /// Doubling it allows half as many decimals in a dictionary.

@@ -143,7 +143,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     /// Returns [`Self::levels`], or `None` if the context stops the search.
-    fn levels_under(&self, context: &RunContext<'_>) -> Option<&[RefinementLevels; 2]> {
+    fn levels_unless_stopped(&self, context: &RunContext<'_>) -> Option<&[RefinementLevels; 2]> {
         // The standard library's cell has no `get_or_try_init` yet.
         let find = || {
             let found = self.find_levels(Cancel::When(&|| context.must_stop()));

@@ -102,7 +102,7 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
             })
             .collect();
         let Some([low, high]) = side_change.bracket else {
-            assert_eq!((row.first, side_change.kind), (0.1, SideChangeKind::NoneReliable));
+            assert_eq!((row.first, side_change.kind), (0.1, SideChangeKind::AllReliable));
             assert!(distances.iter().all(|(_, distance)| *distance < 0.0));
             continue;
         };
@@ -314,7 +314,7 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
     let kinds: Vec<SideChangeKind> = rows.iter().map(|row| row.side_changes[0].kind).collect();
     assert_eq!(
         kinds[..3],
-        [SideChangeKind::NoneUnreliable, SideChangeKind::Crossing, SideChangeKind::Crossing],
+        [SideChangeKind::AllUnreliable, SideChangeKind::Crossing, SideChangeKind::Crossing],
         "{rows:?}"
     );
     let engine = ModelEngine::new(&plan).unwrap();
@@ -332,7 +332,7 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
             let expected = match (bracket_below, row.side_changes[0].distances[0]) {
                 (Some(side_change), _) => side_change.distances[1].unwrap() < 0.0,
                 (None, Some(distance)) => distance < 0.0,
-                (None, None) => row.side_changes[0].kind == SideChangeKind::NoneReliable,
+                (None, None) => row.side_changes[0].kind == SideChangeKind::AllReliable,
             };
             let is_bracketed = |side_change: &SideChange| {
                 side_change.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1])

@@ -184,9 +184,9 @@ impl LineSearch {
         }
         if side_changes.is_empty() {
             let kind = match self.samples.first().map(LineSample::side) {
-                Some(LimitSide::Reliable) => SideChangeKind::NoneReliable,
-                Some(LimitSide::Unreliable) => SideChangeKind::NoneUnreliable,
-                Some(LimitSide::Undefined) | None => SideChangeKind::NoneUndefined,
+                Some(LimitSide::Reliable) => SideChangeKind::AllReliable,
+                Some(LimitSide::Unreliable) => SideChangeKind::AllUnreliable,
+                Some(LimitSide::Undefined) | None => SideChangeKind::AllUndefined,
             };
             side_changes.push(SideChange {
                 kind,

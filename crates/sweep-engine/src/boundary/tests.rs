@@ -92,7 +92,7 @@ fn a_smooth_boundary_takes_a_fifth_of_the_grids_points() {
         assert_eq!((row.first, row.side_changes.len()), (mass, 1));
         let side_change = row.side_changes[0];
         if line(mass) <= 60.0 {
-            assert_eq!(side_change.kind, SideChangeKind::NoneReliable, "{mass}");
+            assert_eq!(side_change.kind, SideChangeKind::AllReliable, "{mass}");
         } else {
             assert_eq!(side_change.kind, SideChangeKind::Crossing, "{mass}");
             // The function has a kink at its limit, so that linear interpolation in the bracket is
@@ -177,9 +177,9 @@ fn an_island_as_wide_as_two_cells_is_found_in_every_row_it_spans() {
                 assert_eq!(row.side_changes.len(), 2, "{row:?}");
             } else if x.abs() > 1.0 {
                 let no_change_kind = if sign > 0.0 {
-                    SideChangeKind::NoneUnreliable
+                    SideChangeKind::AllUnreliable
                 } else {
-                    SideChangeKind::NoneReliable
+                    SideChangeKind::AllReliable
                 };
                 assert_eq!(row.side_changes[0].kind, no_change_kind, "{row:?}");
             }
@@ -222,7 +222,7 @@ fn a_pocket_that_ends_between_rows_is_found_up_to_its_last_row() {
     let traced = traced(pocket, &heights, &SEARCH);
     check_side_changes(&traced, pocket, 0.5);
     let rows = &traced.curves[0];
-    assert_eq!(rows[0].side_changes[0].kind, SideChangeKind::NoneUnreliable);
+    assert_eq!(rows[0].side_changes[0].kind, SideChangeKind::AllUnreliable);
     for (row, height) in rows.iter().zip(&heights).skip(1) {
         let mut expected = vec![bottom(*height)];
         expected.extend((*height < 0.12).then_some(180.0));
@@ -290,16 +290,16 @@ fn undefined_quantities_are_reported() {
     assert_eq!(rows[0].side_changes[0].position, None);
     let undefined_rows = rows_of(&|_, _| None, &masses(5));
     assert!(
-        undefined_rows.iter().all(|row| row.side_changes[0].kind == SideChangeKind::NoneUndefined)
+        undefined_rows.iter().all(|row| row.side_changes[0].kind == SideChangeKind::AllUndefined)
     );
     let nan_rows = rows_of(&|_, _| Some(f64::NAN), &masses(5));
-    assert!(nan_rows.iter().all(|row| row.side_changes[0].kind == SideChangeKind::NoneUndefined));
+    assert!(nan_rows.iter().all(|row| row.side_changes[0].kind == SideChangeKind::AllUndefined));
 }
 
 #[test]
 fn a_row_without_a_change_of_side_has_no_number() {
     for (distance, kind) in
-        [(-1.0, SideChangeKind::NoneReliable), (1.0, SideChangeKind::NoneUnreliable)]
+        [(-1.0, SideChangeKind::AllReliable), (1.0, SideChangeKind::AllUnreliable)]
     {
         let traced = traced(|_, _| Some(distance), &masses(39), &SEARCH);
         for row in &traced.curves[0] {

@@ -194,9 +194,9 @@ const fn noun_and_qualifier(kind: SideChangeKind) -> [&'static str; 2] {
         SideChangeKind::Crossing => ["crossing", ""],
         SideChangeKind::Jump => ["jump", ""],
         SideChangeKind::Undefined => ["edge", " of undefined points"],
-        SideChangeKind::NoneReliable => ["line", " within the limit throughout"],
-        SideChangeKind::NoneUnreliable => ["line", " beyond the limit throughout"],
-        SideChangeKind::NoneUndefined => ["line", " undefined throughout"],
+        SideChangeKind::AllReliable => ["line", " within the limit throughout"],
+        SideChangeKind::AllUnreliable => ["line", " beyond the limit throughout"],
+        SideChangeKind::AllUndefined => ["line", " undefined throughout"],
     }
 }
 

@@ -40,8 +40,8 @@ pub struct CompareArgs {
     /// Write the differences of maps, row by row, to a Parquet file that `sweep plot` draws
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Exit with 4 on such a difference: any, plan, flips, lost, sensitive, rows, ratio=PART,
-    /// gap=M, boundary=WIDTH or COLUMN=CHANGE; may be repeated
+    /// Exit with 4 if the files differ in WHAT: any, plan, flips, lost, sensitive, rows,
+    /// ratio=PART, gap=M, boundary=WIDTH or COLUMN=CHANGE, as --help explains; may be repeated
     #[arg(long, value_name = "WHAT", value_parser = str::parse::<FailOn>)]
     fail_on: Vec<FailOn>,
     /// Maximum number of rows shown of each kind

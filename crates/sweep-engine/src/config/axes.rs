@@ -3,7 +3,7 @@
 use sweep_parameter::{Range, decimal};
 use sweep_results::nearest;
 
-use super::draft::ClaimedNumbers;
+use super::draft::WrittenNumbers;
 use super::list::{self, PointList};
 use super::parameters::{MAX_COMPARED_NAMES, find};
 use super::report::{Diagnostic, Report};
@@ -14,18 +14,18 @@ use crate::design::{DesignRule, DistributionShape, MAX_AXES, TAIL_DEVIATIONS};
 use crate::plan::MAX_POINTS;
 use crate::{Axis, AxisTolerance, AxisValues, Design, Distribution, ModelParameter};
 
-/// Claims the numbers that an axis writes. Returns false, after a report, if another axis writes
+/// Records the numbers that an axis writes. Returns false, after a report, if another axis writes
 /// one of them. `has_tolerance` is true for an axis with a tolerance about the model's own number.
-fn claim_numbers<M: Model>(
+fn record_written_numbers<M: Model>(
     name: &Located<&str>,
     parameter: &ModelParameter<M>,
-    claimed: &mut ClaimedNumbers,
+    written_numbers: &mut WrittenNumbers,
     has_tolerance: bool,
     draft: &Draft<'_, M>,
 ) -> bool {
     let report = draft.report;
     let parts = &parameter.parts;
-    if !claimed.claim(name, parts.clone(), report) {
+    if !written_numbers.record(name, parts.clone(), report) {
         return false;
     }
     // The constant has an effect on a tolerance, as its nominal value.
@@ -53,7 +53,7 @@ fn is_fixed<M: Model>(swept_parameter: &ModelParameter<M>, draft: &Draft<'_, M>)
 /// Reads every `[[axis]]`: the values of a grid, or the ranges of a design.
 pub fn read_axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
     let report = root.report;
-    let mut claimed = ClaimedNumbers::default();
+    let mut written_numbers = WrittenNumbers::default();
     let sections = root.tables("axis");
     if let (Some(design), Some(location)) = (&design, report.location("design")) {
         let max_count = if matches!(design, Design::Spread { rule: DesignRule::Sobol, .. }) {
@@ -102,7 +102,7 @@ pub fn read_axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &m
             points = product;
         }
         if let (Some(name), Some(parameter)) = (name, parameter)
-            && claim_numbers(&name, &parameter, &mut claimed, has_tolerance, draft)
+            && record_written_numbers(&name, &parameter, &mut written_numbers, has_tolerance, draft)
             && let (Some(Located { value, location }), Some(_)) = (values, points)
         {
             let ValuesWithTolerance { values, tolerance } = value;
@@ -127,7 +127,7 @@ pub fn add_list_axes<M: Model>(root: &Section<'_>, mut list: PointList, draft: &
         let expected = "the columns of the list are the axes; remove this";
         report.refuse::<()>(section.location(), "an [[axis]] beside a list of points", expected);
     }
-    let mut claimed = ClaimedNumbers::default();
+    let mut written_numbers = WrittenNumbers::default();
     list.table.notes().into_iter().for_each(|note| report.add_note(format!("the list: {note}")));
     for column in std::mem::take(&mut list.table.columns) {
         let name =
@@ -155,7 +155,8 @@ pub fn add_list_axes<M: Model>(root: &Section<'_>, mut list: PointList, draft: &
                 )
             });
         }
-        if claim_numbers(&name, &parameter, &mut claimed, false, draft) && is_valid {
+        if record_written_numbers(&name, &parameter, &mut written_numbers, false, draft) && is_valid
+        {
             let values = AxisValues::List(column.values);
             let axis = Axis { parameter, values, tolerance: None };
             add_axis(axis, name.location.clone(), draft);
@@ -358,8 +359,8 @@ fn read_distribution(
         };
         (shape, bounds)
     } else {
-        let reason = "`tolerance` gives it, about the machine's own number";
-        section.misplace(&["mean", "sd", "median", "sigma", "from", "to"], reason);
+        let misplacement_reason = "`tolerance` gives it, about the machine's own number";
+        section.misplace(&["mean", "sd", "median", "sigma", "from", "to"], misplacement_reason);
         section.finish();
         let range = field.into_located()?.value;
         if kind? == 1 && range.from <= 0.0 {
@@ -420,8 +421,8 @@ fn read_design_values(
     swept_parameter: &SweptParameter<'_>,
     points: u64,
 ) -> Option<Located<ValuesWithTolerance>> {
-    let reason = "a design spreads its points over `range = { from = ..., to = ... }`";
-    section.misplace(&["values"], reason);
+    let misplacement_reason = "a design spreads its points over `range = { from = ..., to = ... }`";
+    section.misplace(&["values"], misplacement_reason);
     let tolerance = swept_parameter.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
         section.misplace(&["range", "distribution"], TOLERANCE_EXCLUDES);
@@ -559,8 +560,8 @@ pub fn read_range(
             section.require(section.whole_number("count", &(1..=MAX_POINTS)), "count", expected)
         }
         Some(value) => {
-            let reason = "the number of points belongs in [design], as `points`";
-            section.misplace(&["count"], reason);
+            let misplacement_reason = "the number of points belongs in [design], as `points`";
+            section.misplace(&["count"], misplacement_reason);
             Some(Located { value, location: location.clone() })
         }
     };

@@ -31,12 +31,12 @@ pub struct SetConstant<M: Model> {
 
 /// The single numbers that are written, each with the name that writes it.
 #[derive(Default)]
-pub(super) struct ClaimedNumbers(BTreeMap<Cow<'static, str>, Located<String>>);
+pub(super) struct WrittenNumbers(BTreeMap<Cow<'static, str>, Located<String>>);
 
-impl ClaimedNumbers {
-    /// Claims the numbers that a name writes. Returns false, after a report, if another name writes
-    /// one of them, because their order is not defined.
-    pub(super) fn claim(
+impl WrittenNumbers {
+    /// Records the numbers that a name writes. Returns false, after a report, if another name
+    /// writes one of them, because their order is not defined.
+    pub(super) fn record(
         &mut self,
         name: &Located<impl AsRef<str>>,
         parts: Vec<Cow<'static, str>>,

@@ -3,7 +3,7 @@
 use sweep_parameter::{Range, UnknownParameter};
 
 use super::arguments::argument_name;
-use super::draft::{ClaimedNumbers, Draft, SetConstant};
+use super::draft::{Draft, SetConstant, WrittenNumbers};
 use super::{
     Diagnostic, Located, NamedArgument, NamedValues, Section, quote, sections::describe_keys,
 };
@@ -137,9 +137,9 @@ pub fn unknown_parameter<M: Model>(
 
 /// Writes constants of equal precedence.
 fn apply<M: Model>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
-    let mut claimed = ClaimedNumbers::default();
+    let mut written_numbers = WrittenNumbers::default();
     for constant in constants {
-        if claimed.claim(&constant.name, constant.parameter.parts.clone(), draft.report) {
+        if written_numbers.record(&constant.name, constant.parameter.parts.clone(), draft.report) {
             draft.plan.write(&constant.parameter, constant.value.value);
             for part in &constant.parameter.parts {
                 draft.report.record_location(part.clone(), constant.value.location.clone());

@@ -263,7 +263,7 @@ impl<'a> Section<'a> {
         range: Range,
     ) -> Field<(Vec<Located<f64>>, bool)> {
         self.items(key, "an array of numbers").map(|items| {
-            let number = |item| self.parse_number(&array_entry(key), item, range);
+            let number = |item| self.parse_number(&describe_array_entry(key), item, range);
             let numbers: Vec<_> = items.value.iter().filter_map(number).collect();
             let are_all_valid = numbers.len() == items.value.len();
             (numbers, are_all_valid)
@@ -273,7 +273,11 @@ impl<'a> Section<'a> {
     /// Reads the valid strings of an array; others are reported.
     pub fn texts(&self, key: &'static str) -> Field<Vec<Located<&'a str>>> {
         self.items(key, "an array of strings").map(|items| {
-            items.value.iter().filter_map(|item| self.parse_text(&array_entry(key), item)).collect()
+            items
+                .value
+                .iter()
+                .filter_map(|item| self.parse_text(&describe_array_entry(key), item))
+                .collect()
         })
     }
 
@@ -300,7 +304,7 @@ impl<'a> Section<'a> {
         let items = self.items(key, &kind).into_located().map_or(&[][..], |items| items.value);
         let section = |(k, item): (usize, &'a Value<'a>)| {
             let DeValue::Table(table) = item.get_ref() else {
-                return self.report_wrong_type(&array_entry(key), item, &kind);
+                return self.report_wrong_type(&describe_array_entry(key), item, &kind);
             };
             let title = format!("[[{key}]] number {}", k + 1);
             Some(Section::new(title, self.locate(item.span()), table, self.report))
@@ -405,7 +409,7 @@ struct RemovedWord {
     reason: &'static str,
 }
 
-/// The words that were removed.
+/// The words that earlier versions of the program accepted as values of keys.
 const REMOVED_WORDS: [RemovedWord; 1] = [RemovedWord {
     key: "method",
     word: "rodas5p",
@@ -450,8 +454,8 @@ pub fn quote(key: &str) -> String {
     format!("`{}`", shorten(key))
 }
 
-/// Returns an entry of an array as messages show it.
-fn array_entry(key: &str) -> String {
+/// Returns the words by which messages refer to an entry of an array.
+fn describe_array_entry(key: &str) -> String {
     format!("an entry of `{key}`")
 }
 

@@ -17,7 +17,7 @@ pub enum StoreError {
     #[error("{} is in use by {}\n  = help: wait for it to end, or give another \
              --out", output.display(), describe_holders(holders))]
     Busy {
-        /// The output.
+        /// The path of the result that was asked for.
         output: PathBuf,
         /// The processes that work on it, as far as their names could be read.
         holders: Vec<Holder>,
@@ -122,7 +122,7 @@ pub enum StoreError {
 pub struct Holder {
     /// The process id.
     pub pid: u32,
-    /// The name of its host.
+    /// The name of the host on which the process runs.
     pub host: String,
     /// The shard that it computes, from 1; `None` for the whole run.
     pub shard: Option<u64>,

@@ -82,7 +82,7 @@ fn write_to<T>(
 pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Result<(), StoreError> {
     files::check_replaceable(output, job.layout.kind)?;
     let folder = atomic::parent(output);
-    files::prepare_folder(folder)?;
+    files::create_folder_without_leftovers(folder)?;
     let mut writer = MapWriter::begin(job, atomic::create_temporary(folder)?, output)?;
     batches.iter().try_for_each(|batch| writer.write(batch))?;
     let file = writer.finish()?;

@@ -28,7 +28,7 @@ pub(crate) fn run(
 ) -> Result<Exit, Error> {
     let write_error =
         |source| Error::File { action: "write manual pages to", path: args.folder.clone(), source };
-    files::prepare_folder(&args.folder)?;
+    files::create_folder_without_leftovers(&args.folder)?;
     let write =
         |name: &str, page: &[u8]| files::write(&args.folder.join(name), FileKind::ManPage, page);
     // Gives each command its full name, such as `sweep run`.

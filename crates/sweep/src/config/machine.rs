@@ -301,7 +301,7 @@ pub(crate) const MACHINE_KEYS: [&str; 16] = [
 fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
     let mut sheet = SheetKeys::new(keys);
     for (section, section_keys) in SECTIONS.iter().zip(&*KEYS) {
-        let table = keys::Key::new(section.name, "");
+        let table_key = keys::Key::new(section.name, "");
         match section.occurrence {
             _ if section.name.is_empty() => {
                 section.walk(section_keys, 0, machine, &mut sheet, keys)
@@ -310,8 +310,8 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 let expected = format!("a section {}", section.header());
                 let is_assumed = section_keys.iter().all(|key| key.is_assumed(section, machine));
                 let is_needed = !(is_assumed && (sheet.is_given || keys.is_schema()));
-                let table = if is_needed { table.required(&expected) } else { table };
-                let field = keys.walk_table(table, |keys| {
+                let table_key = if is_needed { table_key.required(&expected) } else { table_key };
+                let field = keys.walk_table(table_key, |keys| {
                     section.walk(section_keys, 0, machine, &mut sheet, keys)
                 });
                 if !is_needed && matches!(field, Field::Absent) && keys.section().is_some() {
@@ -329,7 +329,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                         .for_each(|key| mark_doubtful(key.names(&section.prefix), report));
                 }
             }
-            Occurrence::AtMostOnce => drop(keys.walk_table(table, |keys| {
+            Occurrence::AtMostOnce => drop(keys.walk_table(table_key, |keys| {
                 if keys.section().is_some() {
                     (section.fill)(machine, 1);
                 }
@@ -347,7 +347,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 // the same.
                 let count = (section.count)(machine);
                 if count > 0 || ["springs", "dampers"].contains(&section.name) {
-                    keys.walk_tables(table, sections, count, |keys, k| {
+                    keys.walk_tables(table_key, sections, count, |keys, k| {
                         section.walk(section_keys, k, machine, &mut sheet, keys);
                     });
                 }

@@ -50,11 +50,11 @@ pub(crate) fn check_corners(draft: &Draft<'_, Washer>) {
     if varying.refuse_too_many_points(draft, &input) {
         return;
     }
-    let mut check = CornerCheck { draft, reported: BTreeSet::new(), is_spin_valid: true };
+    let mut check = CornerCheck { draft, reported_keys: BTreeSet::new(), is_spin_valid: true };
     check.check_corner(&input, VaryingParts::ALL);
     for corner in 1..plan.corners() {
         if draft.report.is_full() {
-            // No further mistake would be shown.
+            // The report has as many mistakes as it shows.
             break;
         }
         write_axis_values(plan, &mut input, &plan.corner(corner));
@@ -122,7 +122,8 @@ impl VaryingParts {
 /// A check of corners that reports each mistake once.
 struct CornerCheck<'a> {
     draft: &'a Draft<'a, Washer>,
-    reported: BTreeSet<Vec<String>>,
+    /// The keys of each mistake that was reported.
+    reported_keys: BTreeSet<Vec<String>>,
     is_spin_valid: bool,
 }
 
@@ -139,17 +140,17 @@ impl CornerCheck<'_> {
             self.report_violations(violations);
         }
         if changed.window {
-            check_window(self.draft, input.window_s, &mut self.reported);
+            check_window(self.draft, input.window_s, &mut self.reported_keys);
         }
         if (changed.spin || changed.window) && self.is_spin_valid {
-            check_turns(self.draft, input, &mut self.reported);
+            refuse_too_many_turns(self.draft, input, &mut self.reported_keys);
         }
     }
 
     fn report_violations(&mut self, violations: Vec<Violation>) {
         for Violation { title, parameters, expected } in violations {
             let is_certain = !parameters.iter().any(|key| self.draft.report.is_invalid(key));
-            if is_certain && self.reported.insert(parameters.clone()) {
+            if is_certain && self.reported_keys.insert(parameters.clone()) {
                 refuse(self.draft, title, &parameters, &format!("expected {expected}"));
             }
         }
@@ -157,17 +158,19 @@ impl CornerCheck<'_> {
 }
 
 /// Refuses a window with more turns of the drum than the criterion that compares turns permits.
-fn check_turns(
+fn refuse_too_many_turns(
     draft: &Draft<'_, Washer>,
     input: &PointInput,
-    reported: &mut BTreeSet<Vec<String>>,
+    reported_keys: &mut BTreeSet<Vec<String>>,
 ) {
     let Some(criterion) = draft.report.location("reliability.criterion") else { return };
     if draft.plan.model.measures.criterion != Criterion::Envelope {
         return;
     }
     let turns = input.spin.turns_within(input.window_s);
-    if turns <= MAX_COMPARED_TURNS || !reported.insert(vec!["reliability.criterion".to_owned()]) {
+    if turns <= MAX_COMPARED_TURNS
+        || !reported_keys.insert(vec!["reliability.criterion".to_owned()])
+    {
         return;
     }
     let name = Criterion::Envelope.name();

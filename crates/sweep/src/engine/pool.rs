@@ -187,7 +187,7 @@ impl Pool<'_> {
     /// levels are found.
     fn rule(&self) -> Option<RefinementRule<'_>> {
         let ModelEngine { demand, rule, .. } = self.engine;
-        let levels = self.engine.levels_under(self.context)?;
+        let levels = self.engine.levels_unless_stopped(self.context)?;
         Some(RefinementRule { levels, purpose: *demand, row_rule: rule })
     }
 

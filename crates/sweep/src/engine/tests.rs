@@ -104,8 +104,8 @@ fn levels_are_found_anew_after_a_stop() {
     let stopped = Interrupt::new();
     let calm = Interrupt::new();
     stopped.raise(15);
-    assert!(engine.levels_under(&RunContext::new(&stopped)).is_none());
-    let found = engine.levels_under(&RunContext::new(&calm)).unwrap();
+    assert!(engine.levels_unless_stopped(&RunContext::new(&stopped)).is_none());
+    let found = engine.levels_unless_stopped(&RunContext::new(&calm)).unwrap();
     assert_eq!(found, ModelEngine::new(&plan).unwrap().levels());
 }
 

@@ -103,8 +103,9 @@ pub(crate) fn descend(
                     // the ratio of this step's actual and predicted decrease.
                     let decrease_ratio = (current.cost - trial_equations.cost)
                         / (step_length * dot(&solution, &rhs));
-                    let longer_scale = (step_length / (2.0 - decrease_ratio).max(0.25)).max(1.0);
-                    step_scale = if damping > MIN_DAMPING { 1.0 } else { longer_scale };
+                    let extended_step_scale =
+                        (step_length / (2.0 - decrease_ratio).max(0.25)).max(1.0);
+                    step_scale = if damping > MIN_DAMPING { 1.0 } else { extended_step_scale };
                     (x, current) = (trial, trial_equations);
                     damping = (damping * 0.1).max(MIN_DAMPING);
                     break;

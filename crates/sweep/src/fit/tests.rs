@@ -40,12 +40,13 @@ fn reference(name: &str, end_s: f64) -> Measurement {
 }
 
 fn case_at(numbers: &[(&str, f64)], factor: f64, measurement: Measurement) -> FitCase {
-    let settings = numbers.iter().map(|(name, value)| format!("{name}={}", value * factor));
-    let settings: Vec<String> =
-        settings.chain(["friction_linear_speed_m_per_s=0.1".to_owned()]).collect();
+    let parameter_settings =
+        numbers.iter().map(|(name, value)| format!("{name}={}", value * factor));
+    let parameter_settings: Vec<String> =
+        parameter_settings.chain(["friction_linear_speed_m_per_s=0.1".to_owned()]).collect();
     prepare_case(
         &WasherGridInput::text("reference", GRID.to_owned(), Vec::new()),
-        &settings,
+        &parameter_settings,
         measurement,
     )
     .unwrap()
@@ -83,12 +84,12 @@ fn fitted(cases: Vec<FitCase>, options: &FitOptions) -> FitReport {
 }
 
 /// Returns the errors of the fitted numbers in standard errors.
-fn error_ratios(report: &FitReport, truth: &[(&str, f64)]) -> Vec<f64> {
-    let error_ratio = |fit: &report::FittedNumber| {
+fn standardised_errors(report: &FitReport, truth: &[(&str, f64)]) -> Vec<f64> {
+    let standardised_error = |fit: &report::FittedNumber| {
         let (_, truth) = truth.iter().find(|(name, _)| *name == fit.name).unwrap();
         (fit.value - truth) / fit.standard_error.unwrap()
     };
-    report.parameters.iter().map(error_ratio).collect()
+    report.parameters.iter().map(standardised_error).collect()
 }
 
 /// Returns noise of standard deviation 1 with a correlation of neighbours.
@@ -131,11 +132,11 @@ fn reference_data_lead_to_the_truth() {
     for factor in [0.7, 1.3] {
         let cases = vec![case_at(&VISCOUS, factor, reference("viscous", 8.0))];
         let report = fitted(cases, &options(&names));
-        let error_ratios = error_ratios(&report, &VISCOUS);
+        let standardised_errors = standardised_errors(&report, &VISCOUS);
         assert!(report.follows && report.is_converged, "{report:?}");
         assert!(
-            error_ratios.iter().all(|error_ratios| error_ratios.abs() < 3.0),
-            "{error_ratios:?}: {}",
+            standardised_errors.iter().all(|error| error.abs() < 3.0),
+            "{standardised_errors:?}: {}",
             report.to_text()
         );
         assert!(report.evaluations < 25 && report.undetermined.is_empty(), "{}", report.to_text());
@@ -233,11 +234,11 @@ fn friction_is_told_from_viscous_damping() {
     for factor in [0.7, 1.3] {
         let cases = vec![case_at(&FRICTION, factor, reference("friction", 24.0))];
         let report = fitted(cases, &options(&names));
-        let error_ratios = error_ratios(&report, &FRICTION);
+        let standardised_errors = standardised_errors(&report, &FRICTION);
         assert!(report.follows, "{}", report.to_text());
         assert!(
-            error_ratios.iter().all(|error_ratios| error_ratios.abs() < 3.0),
-            "{error_ratios:?}: {}",
+            standardised_errors.iter().all(|error| error.abs() < 3.0),
+            "{standardised_errors:?}: {}",
             report.to_text()
         );
     }
@@ -248,7 +249,7 @@ fn friction_is_told_from_viscous_damping() {
 fn intervals_hold_the_truth_as_often_as_they_say() {
     const DRAWS: usize = 50;
     let names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
-    let mut count_within = vec![0; VISCOUS.len()];
+    let mut covering_counts = vec![0; VISCOUS.len()];
     for draw in 0..DRAWS {
         let mut measurement = reference("viscous_exact", 8.0);
         for (s, signal) in measurement.signals.iter_mut().enumerate() {
@@ -257,18 +258,18 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
         }
         let report = fitted(vec![case_at(&VISCOUS, 0.97, measurement)], &options(&names));
         assert!(report.follows, "draw {draw}: {}", report.to_text());
-        for ((count_within, fit), (_, truth)) in
-            count_within.iter_mut().zip(&report.parameters).zip(VISCOUS)
+        for ((covering_count, fit), (_, truth)) in
+            covering_counts.iter_mut().zip(&report.parameters).zip(VISCOUS)
         {
             let [from, to] = fit.interval_95.unwrap();
-            *count_within += usize::from(from <= truth && truth <= to);
+            *covering_count += usize::from(from <= truth && truth <= to);
         }
     }
-    println!("of {DRAWS} intervals hold the truth: {count_within:?}");
-    let total_within: usize = count_within.iter().sum();
-    let share = total_within as f64 / (DRAWS * VISCOUS.len()) as f64;
-    assert!((0.90..=0.99).contains(&share), "{count_within:?}");
-    assert!(count_within.iter().all(|count_within| *count_within >= 43), "{count_within:?}");
+    println!("of {DRAWS} intervals hold the truth: {covering_counts:?}");
+    let total_covering_count: usize = covering_counts.iter().sum();
+    let share = total_covering_count as f64 / (DRAWS * VISCOUS.len()) as f64;
+    assert!((0.90..=0.99).contains(&share), "{covering_counts:?}");
+    assert!(covering_counts.iter().all(|count| *count >= 43), "{covering_counts:?}");
 }
 
 /// Returns the seed of draws that the environment gives, or a default.
@@ -296,7 +297,7 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
             (0.6, 2.0, true),
             (0.9, 2.0, true),
         ] {
-            let mut count_within = vec![0; truth.len()];
+            let mut covering_counts = vec![0; truth.len()];
             let mut objections = 0;
             let mut quantile: f64 = 0.0;
             for draw in 0..DRAWS {
@@ -313,7 +314,7 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                             |k: usize| &noise_size[k.saturating_sub(12)..(k + 13).min(count)];
                         noise_size = (0..count).map(|k| square(neighbours(k)).sqrt()).collect();
                     }
-                    let rms_size =
+                    let rms_noise_size =
                         (algebra::dot(&noise_size, &noise_size) / noise_size.len() as f64).sqrt();
                     let draw = DRAWS * seed() + draw;
                     let noise =
@@ -321,7 +322,7 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                     let noise = noise.iter().zip(&noise_size).map(|(noise, noise_size)| {
                         NOISE[comparison.signal]
                             * noise
-                            * (1.0 + growth * (noise_size / rms_size).abs())
+                            * (1.0 + growth * (noise_size / rms_noise_size).abs())
                     });
                     comparison.residual = algebra::subtract_mean(noise.collect()).0;
                 }
@@ -344,23 +345,24 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                     }
                     objections += 1;
                 }
-                for (k, count_within) in count_within.iter_mut().enumerate() {
+                for (k, covering_count) in covering_counts.iter_mut().enumerate() {
                     let half_width = statistics.quantiles[k] * statistics.covariance[k][k].sqrt();
-                    *count_within += u64::from(step[k].abs() < half_width);
+                    *covering_count += u64::from(step[k].abs() < half_width);
                 }
                 quantile = f64::max(quantile, statistics.quantiles[0]);
             }
             let share =
-                count_within.iter().sum::<u64>() as f64 / (DRAWS * truth.len() as u64) as f64;
+                covering_counts.iter().sum::<u64>() as f64 / (DRAWS * truth.len() as u64) as f64;
             let kind = format!("{name}, {correlation}, {growth}, {by_envelope}");
             println!(
-                "{kind}: {count_within:?} of {DRAWS} hold the truth: {share:.3}; {objections} \
+                "{kind}: {covering_counts:?} of {DRAWS} hold the truth: {share:.3}; {objections} \
                  object; quantile up to {quantile:.2}"
             );
             assert!(growth > 0.0 || objections == 0, "{kind}: {objections}");
-            // Correlations are known less well than variances, and the widest estimate counts.
+            // Correlations are estimated less well than variances. An interval takes the widest of
+            // several estimates, and so may hold the truth in more than 95 % of draws.
             let expected = if correlation > 0.0 || growth > 0.0 { 0.90..=1.0 } else { 0.90..=0.99 };
-            assert!(expected.contains(&share), "{kind}: {count_within:?}");
+            assert!(expected.contains(&share), "{kind}: {covering_counts:?}");
         }
     }
 }
@@ -455,7 +457,8 @@ fn records_in_g_are_seen_where_the_search_starts() {
     const G: f64 = 9.806_65;
     for (factor, known) in [(1.0 / G, "seems to be in g"), (G, "from g once too often")] {
         let mut measurement = reference("viscous_exact", 8.0);
-        // Without angles a great damping makes the model as small as the record in degrees.
+        // Only accelerations are kept: a great damping makes those of the model as small as a
+        // record in g.
         measurement.signals.truncate(2);
         for signal in &mut measurement.signals {
             signal.values.iter_mut().for_each(|value| *value *= factor);
@@ -525,13 +528,14 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
         // The search does not go on in wrong units: an evaluation at the start and eight others.
         assert!(report.evaluations < 10, "{expected_text}: {} evaluations", report.evaluations);
         assert!(report.first.explained_ratio.values().all(|ratio| *ratio < 0.25), "{report:?}");
-        let is_of_unit = |note: &String| note.contains("it seems to");
-        assert!(!report.notes.iter().any(is_of_unit), "{expected_text}: {:?}", report.notes);
+        let suspects_unit = |note: &String| note.contains("it seems to");
+        assert!(!report.notes.iter().any(suspects_unit), "{expected_text}: {:?}", report.notes);
     }
     let report = fitted(vec![case_at(&start, 1.0, record(1.0, 1.0))], &free);
     println!("right units: {:?}", report.first.explained_ratio);
     assert!(report.first.explained_ratio.values().all(|ratio| *ratio > 0.75), "{report:?}");
-    // No unit is named for another machine in the right units.
+    // No wrong unit is suspected in a record in the right units, though another machine's model
+    // does not explain it.
     let report = fitted(vec![case_at(&VISCOUS, 0.8, record(1.0, 1.0))], &options(&[start[0].0]));
     assert!(report.objection.unwrap_or_default().contains("the model explains"));
     assert!(report.suspected_units.is_empty());
@@ -585,7 +589,7 @@ fn a_signal_in_white_noise_is_followed() {
         fitted(vec![case_at(&VISCOUS, 0.9, measurement)], &options(&["unbalance_mass_kg"]));
     assert!(report.first.explained_ratio.values().all(|ratio| *ratio < 0.5), "{report:?}");
     assert!(report.follows, "{}", report.to_text());
-    assert!(error_ratios(&report, &VISCOUS)[0].abs() < 3.0, "{}", report.to_text());
+    assert!(standardised_errors(&report, &VISCOUS)[0].abs() < 3.0, "{}", report.to_text());
 }
 
 #[test]

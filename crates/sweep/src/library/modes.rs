@@ -93,8 +93,9 @@ pub(crate) struct ModeAnalysis {
 }
 
 impl ModeAnalysis {
-    /// Computes the modes at each speed (rpm), with exact motions if `is_exact`; `None` after a
-    /// request to cancel. Friction is linearised at the speeds of the run.
+    /// Computes the modes at each speed (rpm) with theta frozen and, if `is_exact`, the Floquet
+    /// modes, with the drum turning; `None` after a request to cancel. Friction is linearised at
+    /// the speeds of the run.
     ///
     /// # Errors
     /// Returns an error if the machine has no equilibrium, or if its modes cannot be computed.

@@ -40,7 +40,7 @@ pub(crate) fn write_point_traces(
     on_point: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
     let plan = engine.plan();
-    files::prepare_folder(folder)?;
+    files::create_folder_without_leftovers(folder)?;
     remove_point_traces(folder)?;
     let methods = read::read_methods(result)?;
     threads::build_pool(threads)?.install(|| {

@@ -33,16 +33,16 @@ pub(super) struct SpectralLine {
     pub(super) residual: f64,
 }
 
-/// Returns Hann's window at sample `n` of `count`.
+/// Returns the weight of sample `n` of `count` in Hann's window.
 fn hann_window(n: usize, count: usize) -> f64 {
     let sin = libm::sin(0.5 * TAU * (n as f64 + 0.5) / count as f64);
     sin * sin
 }
 
-/// Returns the means of a windowed signal times exp(-2 pi i f n) at some frequencies f.
+/// Returns the weighted means of a signal times exp(-2 pi i f n) at some frequencies f.
 fn fourier_means<const M: usize>(
     signal: &[f64],
-    windows: &[f64],
+    hann_weights: &[f64],
     frequencies: [f64; M],
 ) -> [[f64; 2]; M] {
     let sin = frequencies.map(|frequency| libm::sin(TAU * frequency));
@@ -50,28 +50,29 @@ fn fourier_means<const M: usize>(
     let mut re = [1.0_f64; M];
     let mut im = [0.0_f64; M];
     let mut sums = [[0.0; 2]; M];
-    let mut window_sum = 0.0;
-    for (value, window_value) in signal.iter().zip(windows) {
-        let windowed_value = window_value * value;
-        window_sum += window_value;
+    let mut weight_sum = 0.0;
+    for (value, hann_weight) in signal.iter().zip(hann_weights) {
+        let weighted_value = hann_weight * value;
+        weight_sum += hann_weight;
         for k in 0..M {
-            sums[k][0] += windowed_value * re[k];
-            sums[k][1] -= windowed_value * im[k];
+            sums[k][0] += weighted_value * re[k];
+            sums[k][1] -= weighted_value * im[k];
             (re[k], im[k]) = (re[k] * cos[k] - im[k] * sin[k], re[k] * sin[k] + im[k] * cos[k]);
         }
     }
-    sums.map(|sum| sum.map(|component| component / window_sum))
+    sums.map(|sum| sum.map(|component| component / weight_sum))
 }
 
 /// Returns the power of all signals together at some frequencies.
 fn powers<const M: usize>(
     signals: &[Vec<f64>],
-    windows: &[f64],
+    hann_weights: &[f64],
     frequencies: [f64; M],
 ) -> [f64; M] {
     let mut powers = [0.0; M];
     for signal in signals {
-        for (power, [re, im]) in powers.iter_mut().zip(fourier_means(signal, windows, frequencies))
+        for (power, [re, im]) in
+            powers.iter_mut().zip(fourier_means(signal, hann_weights, frequencies))
         {
             *power += re * re + im * im;
         }
@@ -83,23 +84,23 @@ fn powers<const M: usize>(
 /// if the signals are too short or constant.
 pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> {
     let count = signals.first()?.len();
-    let windows: Vec<f64> = (0..count).map(|n| hann_window(n, count)).collect();
+    let hann_weights: Vec<f64> = (0..count).map(|n| hann_window(n, count)).collect();
     let mut residuals = signals.to_vec();
     for signal in &mut residuals {
-        let [[mean, _]] = fourier_means(signal, &windows, [0.0]);
+        let [[mean, _]] = fourier_means(signal, &hann_weights, [0.0]);
         signal.iter_mut().for_each(|value| *value -= mean);
     }
-    let windowed_power = |signals: &[Vec<f64>]| -> f64 {
+    let weighted_power = |signals: &[Vec<f64>]| -> f64 {
         let square = |signal: &Vec<f64>| -> f64 {
             signal
                 .iter()
-                .zip(&windows)
-                .map(|(value, window_value)| window_value * value * value)
+                .zip(&hann_weights)
+                .map(|(value, hann_weight)| hann_weight * value * value)
                 .sum()
         };
         signals.iter().map(square).sum()
     };
-    let total_power = windowed_power(&residuals);
+    let total_power = weighted_power(&residuals);
     let frequency_at = |trial: usize| 0.5 * trial as f64 / (TRIALS_PER_SAMPLE * count) as f64;
     // The lowest frequencies are excluded, because the mean dominates them.
     let trials: Vec<usize> = (2 * TRIALS_PER_SAMPLE * 2..=TRIALS_PER_SAMPLE * count).collect();
@@ -107,7 +108,7 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     for trials in trials.chunks(FREQUENCIES_AT_ONCE) {
         let frequencies =
             from_fn::<_, FREQUENCIES_AT_ONCE, _>(|k| frequency_at(trials[k.min(trials.len() - 1)]));
-        let powers = powers(&residuals, &windows, frequencies);
+        let powers = powers(&residuals, &hann_weights, frequencies);
         let trial_powers = powers.into_iter().zip(trials.iter().copied());
         strongest =
             trial_powers.fold(
@@ -124,7 +125,7 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
         let third_of_interval = (max_frequency - min_frequency) / 3.0;
         let [lower_power, upper_power] = powers(
             &residuals,
-            &windows,
+            &hann_weights,
             [min_frequency + third_of_interval, max_frequency - third_of_interval],
         );
         if lower_power < upper_power {
@@ -139,11 +140,11 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     for _ in 0..SUBTRACTION_PASSES {
         for harmonic in &harmonics {
             for signal in &mut residuals {
-                harmonic.subtract_from(signal, &windows);
+                harmonic.subtract_from(signal, &hann_weights);
             }
         }
     }
-    let residual = (windowed_power(&residuals) / total_power).sqrt();
+    let residual = (weighted_power(&residuals) / total_power).sqrt();
     (residual.is_finite()).then_some(SpectralLine { frequency, residual })
 }
 
@@ -162,8 +163,8 @@ impl Harmonic {
         Self { frequency, wave: wave.collect() }
     }
 
-    fn subtract_from(&self, signal: &mut [f64], windows: &[f64]) {
-        let [[re, im]] = fourier_means(signal, windows, [self.frequency]);
+    fn subtract_from(&self, signal: &mut [f64], hann_weights: &[f64]) {
+        let [[re, im]] = fourier_means(signal, hann_weights, [self.frequency]);
         // A real signal also has a line at the negative frequency. Both lines coincide at the
         // frequencies 0 and 0.5.
         let distance = self.frequency.min((self.frequency - 0.5).abs()).min(1.0 - self.frequency);

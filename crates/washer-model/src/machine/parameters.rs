@@ -38,11 +38,14 @@ pub enum Target {
     Machine,
     /// A number of the cabinet, which machines may lack.
     Cabinet,
-    /// The number of both bearings with this name after `bearing_front_` and `bearing_rear_`.
+    /// A value that both bearings share; the text is the end of a single bearing's parameter name,
+    /// after `bearing_front_` or `bearing_rear_`.
     Bearings(&'static str),
-    /// The number of every spring with this name after `spring_1_`.
+    /// A value that all springs share; the text is the end of a single spring's parameter name,
+    /// after `spring_1_` or the like.
     Springs(&'static str),
-    /// The number of every damper with this name after `damper_1_`.
+    /// A value that all dampers share; the text is the end of a single damper's parameter name,
+    /// after `damper_1_` or the like.
     Dampers(&'static str),
     /// A number of the spin's profile, or of a point of the spin's table.
     Spin,
@@ -182,10 +185,10 @@ impl MachineParameter {
                             _ => ("the machine", list.element),
                         };
                         let last_number = list.first + count - 1;
-                        let existing_numbers =
+                        let element_count_text =
                             format!("{owner} has {last_number} {}", plural(noun, last_number));
                         Err(UnknownParameter::in_other_models(format!(
-                            "{existing_numbers}, numbered from 1"
+                            "{element_count_text}, numbered from 1"
                         )))
                     }
                 };

@@ -184,10 +184,10 @@ impl<T: Lane> Coupling<T> {
                 let tub_response = tub.axis_response(tub_inertia);
                 let rotor_response = rotor.axis_response(rotor_inertia);
                 let speed_squared = (speed * speed).v();
-                let cap_and_speed_squared = (scaling.bearings_squared, speed_squared);
+                let squares_of_cap_and_speed = (scaling.bearings_squared, speed_squared);
                 mass_scaled_load(
                     bodies,
-                    cap_and_speed_squared,
+                    squares_of_cap_and_speed,
                     deflection,
                     sag,
                     &tub_response,

@@ -30,7 +30,8 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     let b = &machine.bodies;
     let mut tub = assemble_tub(machine, q, u);
     let mut rotor = assemble_rotor_in_lanes(b, spin, q, u);
-    // The change of the coordinates from `q` to the end of the stage, without the term g^2 a.
+    // The known part of the coordinates' change from `q` to the end of the stage. The unknown part
+    // is g^2 times the accelerations.
     let mut coordinate_change = *q;
     for i in 0..COORDINATES {
         coordinate_change[i] = r[i] + g * r[COORDINATES + i] - q[i];
@@ -47,7 +48,8 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
         deflection.offset[i] += deflection_change.offset[i];
         deflection.tilt[i] += deflection_change.tilt[i];
     }
-    // The deflection depends on the accelerations only, not on terms of constant speed.
+    // The bearings' deflection at the stage's end depends on the generalised accelerations, not on
+    // the drift of the axes, their acceleration at constant generalised speeds.
     let zero = g.lit(0.0);
     tub.chain.axis_drift = [zero; 2];
     rotor.chain.axis_drift = [zero; 2];
@@ -58,10 +60,11 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     let rotor = &rotor.chain;
     let tub_response = tub.axis_response(&tub_factors);
     let rotor_response = rotor.axis_response(&rotor_factors);
-    let cap_and_speed_squared = (g_squared.recip(), zero);
+    // The system is that of modes capped at 1 / g (rad/s), at standstill.
+    let squares_of_cap_and_speed = (g_squared.recip(), zero);
     let shaft_load = mass_scaled_load(
         b,
-        cap_and_speed_squared,
+        squares_of_cap_and_speed,
         &deflection,
         &no_sag,
         &tub_response,

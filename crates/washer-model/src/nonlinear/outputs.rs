@@ -86,7 +86,7 @@ pub(crate) struct Axes<T> {
     tub_axis: MovingVector<T>,
     shaft_axis: MovingVector<T>,
     /// The drum's axes d1 and d2.
-    drum: [MovingVector<T>; 2],
+    drum_axes: [MovingVector<T>; 2],
 }
 
 impl<T: Real> Axes<T> {
@@ -128,7 +128,7 @@ impl<T: Real> Axes<T> {
             tub_rates: [tub_motion.rate, angular_acceleration(&tub, &tub_motion, motion, TUB_YAW)],
             tub_axis: moving_axis(&tub, &tub_motion, motion, TUB_YAW),
             shaft_axis: moving_axis(&shaft, &shaft_motion, motion, SHAFT_YAW),
-            drum: [
+            drum_axes: [
                 moving_drum_vector(&shaft, spin, (s9, c9), &drum_rates, &[c10, s10, zero]),
                 moving_drum_vector(&shaft, spin, (s9, c9), &drum_rates, &[-s10, c10, zero]),
             ],
@@ -175,14 +175,15 @@ impl<T: Real> Axes<T> {
         let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let tub_centre = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_centre);
         let drum_front = self.drum_front(b, motion);
-        let mut rho = combine_moving_vectors(b.rho_1, &self.drum[0], b.rho_2, &self.drum[1]);
+        let mut rho =
+            combine_moving_vectors(b.rho_1, &self.drum_axes[0], b.rho_2, &self.drum_axes[1]);
         let one = b.tub_mass_share.lit(1.0);
         if b.is_skewed.holds() {
             rho = combine_moving_vectors(
                 one,
                 &rho,
                 b.rho_3,
-                &moving_cross_product(&self.drum[0], &self.drum[1]),
+                &moving_cross_product(&self.drum_axes[0], &self.drum_axes[1]),
             );
         }
         let rotor_centre = combine_moving_vectors(
@@ -204,8 +205,12 @@ impl<T: Real> Axes<T> {
     #[inline(always)]
     fn drum_front(&self, b: &Bodies<T>, motion: &MovingCoordinates<T>) -> MovingVector<T> {
         let one = b.drum_hinge.lit(1.0);
-        let front =
-            combine_moving_vectors(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]);
+        let front = combine_moving_vectors(
+            b.drum_hinge,
+            &self.shaft_axis,
+            b.hinge_to_front,
+            &self.drum_axes[0],
+        );
         moving_point(motion, SHAFT_Y, &front, one)
     }
 }

@@ -154,9 +154,9 @@ fn jumps_rad_per_s2(spin_segments: &[SpinSegment]) -> Vec<f64> {
 /// The modes that a step does not resolve, because it is longer than their periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnresolvedModes {
-    /// Hinge and bearings.
+    /// The modes of the hinge and of the bearings: the step resolves neither.
     HingeAndBearings,
-    /// The bearings.
+    /// The modes of the bearings only: the step resolves those of the hinge.
     Bearings,
 }
 

@@ -44,7 +44,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Returns the values of a gauge; none if the gauge was not in use.
+    /// Returns the recorded values of a gauge; none if the gauge was not in use.
     pub fn gauge(&self, gauge: Gauge) -> &[f64] {
         &self.gauges[gauge as usize]
     }

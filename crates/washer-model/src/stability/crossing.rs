@@ -19,8 +19,9 @@ use lane_ode::{Kernel, Lane, N, OutOfLine, Simd, System};
 pub struct Crossing<'a> {
     /// The times at which the run enters and leaves the band (s).
     pub interval_s: [f64; 2],
-    /// The periodic responses at the speeds of these two times, if they exist; if the drum turns
-    /// backwards, the responses of the mirrored machine, whose drum turns forwards.
+    /// The periodic responses at the speeds at which the run enters and leaves the band, if they
+    /// exist; if the drum turns backwards, the responses of the mirrored machine, whose drum turns
+    /// forwards.
     pub responses: [Option<&'a Response>; 2],
     /// Whether the drum turns backwards.
     pub is_backward: bool,

@@ -82,7 +82,8 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
             let [tub, shaft] = [4, 6].map(|i| Tilt::new(motion[i], motion[i + 1]));
             let d = Deflection::new(&motion, &tub, &shaft);
             let speed_squared = spin.speed.0 * spin.speed.0;
-            let mass_deflection = |d: [N<Dual<Dual<f64>>>; 2], sag: [N<f64>; 2]| {
+            // The deflection at which plain springs have the load of mass-scaled ones.
+            let mass_scaled_deflection = |d: [N<Dual<Dual<f64>>>; 2], sag: [N<f64>; 2]| {
                 let component = |i: usize| {
                     let Dual { value, slope } = d[i].0;
                     N((slope.slope + speed_squared * (value.value - sag[i].0)) / (cap * cap))
@@ -91,8 +92,8 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
             };
             let Deflection { offset, tilt } = sag.bearings;
             let deflection = Deflection {
-                offset: mass_deflection(d.offset, offset),
-                tilt: mass_deflection(d.tilt, tilt),
+                offset: mass_scaled_deflection(d.offset, offset),
+                tilt: mass_scaled_deflection(d.tilt, tilt),
             };
             let load = deflection.load_on_shaft(&machine.bodies);
             let mut halves = assemble_coupled_halves(machine, spin, q, u);

@@ -143,7 +143,7 @@ fn traced_stretches(row: &BoundaryRow) -> Vec<RowStretch> {
     let is_reliable = |distance: Option<f64>| distance.is_some_and(|distance| distance < 0.0);
     let first = match row.side_changes[0].bracket {
         Some(_) => is_reliable(row.side_changes[0].distances[0]),
-        None => row.side_changes[0].kind == SideChangeKind::NoneReliable,
+        None => row.side_changes[0].kind == SideChangeKind::AllReliable,
     };
     let changes = row.side_changes.iter().filter_map(|side_change| {
         let [low, high] = side_change.bracket?;

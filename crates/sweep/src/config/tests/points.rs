@@ -7,7 +7,7 @@ const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n\
     [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.5, 0.3]\n\
     [[axis]]\nparameter = \"tub_mass_kg\"\nvalues = [20]\n";
 
-fn check(columns: &[(&str, &[f64])]) -> Result<Vec<Option<usize>>, String> {
+fn find_axis_columns(columns: &[(&str, &[f64])]) -> Result<Vec<Option<usize>>, String> {
     let plan = WasherGridInput::text("plan", GRID.to_owned(), Vec::new()).load().unwrap();
     let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
     let values = |k: usize| columns[k].1.iter().map(|&value| value.is_finite().then_some(value));
@@ -16,15 +16,18 @@ fn check(columns: &[(&str, &[f64])]) -> Result<Vec<Option<usize>>, String> {
 
 #[test]
 fn a_million_mistakes_are_counted() {
-    let text = check(&[("unbalance_mass_kg", &[9.0; 1_000_000])]).unwrap_err();
+    let text = find_axis_columns(&[("unbalance_mass_kg", &[9.0; 1_000_000])]).unwrap_err();
     assert!(text.contains("1000000 mistakes (100 shown)"), "{}", &text[text.len() - 200..]);
 }
 
 #[test]
 fn columns_are_found_by_name_and_an_axis_of_one_value_may_be_left_out() {
-    assert_eq!(check(&[("unbalance_mass_kg", &[0.1, 0.2, 0.5])]), Ok(vec![Some(0), None]));
+    assert_eq!(
+        find_axis_columns(&[("unbalance_mass_kg", &[0.1, 0.2, 0.5])]),
+        Ok(vec![Some(0), None])
+    );
     let columns: [(&str, &[f64]); 2] = [("tub_mass_kg", &[20.0]), ("unbalance_mass_kg", &[0.3])];
-    assert_eq!(check(&columns), Ok(vec![Some(1), Some(0)]));
+    assert_eq!(find_axis_columns(&columns), Ok(vec![Some(1), Some(0)]));
 }
 
 #[test]
@@ -44,7 +47,7 @@ fn every_mistake_names_its_column_and_row() {
             "`shaft_mass_kg` is no axis of this plan",
         ),
     ] {
-        let text = check(columns).unwrap_err();
+        let text = find_axis_columns(columns).unwrap_err();
         assert!(text.contains(part), "{text}");
     }
 }

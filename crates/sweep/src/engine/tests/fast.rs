@@ -210,12 +210,12 @@ fn rows_by_other_criteria_agree_with_rk4() {
              [reliability]\ncriterion = \"{criterion}\"\n"
         ));
         let rows = compare_with_rk4(&plan, 1e-3);
-        let mut by_peaks = plan.clone();
-        by_peaks.model.measures = Default::default();
-        let peaks = compare_with_rk4(&by_peaks, 1e-3);
+        let mut peak_plan = plan.clone();
+        peak_plan.model.measures = Default::default();
+        let rows_by_peaks = compare_with_rk4(&peak_plan, 1e-3);
         let clashing = rows.iter().filter(|row| row.nonlinear.metrics[1] > 0.0).count();
         assert!((1..rows.len()).contains(&clashing), "{clashing} of {} rows", rows.len());
-        for (row, peak) in rows.iter().zip(&peaks) {
+        for (row, row_by_peaks) in rows.iter().zip(&rows_by_peaks) {
             assert!(
                 row.static_sag_m.is_some_and(|sag_m| (0.012..0.016).contains(&sag_m)),
                 "{row:?}"
@@ -224,7 +224,7 @@ fn rows_by_other_criteria_agree_with_rk4() {
             assert!(force_n > 300.0 && (0.0..=10.0).contains(&clash_s), "{row:?}");
             assert!(clash_s == 0.0 || row.nonlinear.min_gap_m.unwrap() < 0.0, "{row:?}");
             if criterion == "rms" {
-                let smaller = row.linear.amplitudes.iter().zip(&peak.linear.amplitudes);
+                let smaller = row.linear.amplitudes.iter().zip(&row_by_peaks.linear.amplitudes);
                 assert!(
                     smaller.into_iter().all(|(rms, peak)| 0.1 * peak < *rms && rms < peak),
                     "{row:?}"
@@ -233,7 +233,7 @@ fn rows_by_other_criteria_agree_with_rk4() {
             }
             // The ratio in the turn of the nonlinear model's peak is at least that of the peaks: in
             // this turn the linear amplitude is at most its own peak.
-            let peak_ratios = &peak.verdict.ratios;
+            let peak_ratios = &row_by_peaks.verdict.ratios;
             for (by_turn, by_peaks) in row.turn_ratios.iter().zip(peak_ratios) {
                 assert!(by_turn.unwrap() > 0.99 * by_peaks.unwrap(), "{row:?}");
             }
@@ -244,14 +244,14 @@ fn rows_by_other_criteria_agree_with_rk4() {
 #[test]
 fn a_row_near_the_limit_is_refined() {
     let plan = load(include_str!("../../../../../sweeps/fig12.toml"));
-    let at = [vec![0.4, 140.0]];
-    let row = &ModelEngine::new(&plan).unwrap().outcomes_at(&at)[0];
+    let axis_values = [vec![0.4, 140.0]];
+    let row = &ModelEngine::new(&plan).unwrap().outcomes_at(&axis_values)[0];
     assert_eq!(row.method, MethodKind::Capped1);
     let ratio = row.verdict.greatest.unwrap().1;
     let reliability =
         sweep_engine::Reliability { limits: ratio.into(), ..plan.reliability.clone() };
     let plan = Plan { reliability, ..plan };
-    let row = &ModelEngine::new(&plan).unwrap().outcomes_at(&at)[0];
+    let row = &ModelEngine::new(&plan).unwrap().outcomes_at(&axis_values)[0];
     assert_eq!((row.method, row.sensitive), (MethodKind::Rk4, Some(false)));
     // This is the error of the uncapped level, which the capped level does not reach.
     assert!(row.error.unwrap() < 1e-5, "{row:?}");

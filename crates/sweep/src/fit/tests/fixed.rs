@@ -12,7 +12,7 @@ fn intervals_count_what_the_fixed_numbers_may_be_off() {
     let names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
     let exact = fitted(vec![case.clone()], &options(&names));
     assert!(exact.follows && exact.to_text().contains("fixed numbers are taken as exact"));
-    assert!(error_ratios(&exact, &VISCOUS)[0].abs() > 10.0, "{}", exact.to_text());
+    assert!(standardised_errors(&exact, &VISCOUS)[0].abs() > 10.0, "{}", exact.to_text());
     let assert_dependence = |known: &[&str]| {
         let known = known.iter().map(|text| (*text).to_owned()).collect();
         FitOptions { known, ..options(&names) }
@@ -21,7 +21,7 @@ fn intervals_count_what_the_fixed_numbers_may_be_off() {
         let report = fitted(vec![case.clone()], &options);
         let mass = &report.parameters[0];
         assert!(
-            error_ratios(&report, &VISCOUS).iter().all(|ratio| ratio.abs() < 3.0),
+            standardised_errors(&report, &VISCOUS).iter().all(|error| error.abs() < 3.0),
             "{}",
             report.to_text()
         );
