@@ -36,16 +36,17 @@
 //! first difference is beyond the accuracy. A row goes to the first level whose unresolved ringing
 //! is within the accuracy.
 //!
-//! Fifteen constants decide `error`, `converged` and `sensitive`. Eleven are in this file (of
-//! [`RESOLVING_RAD`], both numbers count); [`STEP_CONTRACTION`] follows from them. Four are limits
-//! of the model beside their use: the steps relative to the limit of stability (`STABILITY_SHARE`,
+//! Fifteen constants decide `error`, `converged` and `sensitive`. Seven are in this file (of
+//! [`RESOLVING_RAD`], both numbers count); [`STEP_CONTRACTION`] follows from them. The number of
+//! levels of a method is in `levels.rs`, and the three of chaos are in `separation.rs`. Four are
+//! limits of the model: the steps relative to the limit of stability (`STABILITY_SHARE`,
 //! `CAP_LIMIT_SHARE` and `MIN_HINGE_SPEED_RATIO` beside [`StepSelector`]), and the swing of a body
 //! under a jump of its load (`SWING_FACTOR`). Each metric has a scale besides.
 
 use lane_ode::Tolerance;
 use washer_model::{Formula, Method, MethodKind, ModelKind, StepSelector, capped_method};
 
-use crate::levels::{FamilyStart, RefinementLevels};
+use crate::levels::{FamilyStart, LEVELS_PER_METHOD, RefinementLevels};
 use crate::separation::Separation;
 
 /// Safety factor: the estimated error of a level, divided by its difference from the level before.
@@ -78,9 +79,6 @@ const TOLERANCE_RATIO: f64 = 0.1;
 /// Basis: for a motion of 2 cm both are equal. Doubling it lengthens the steps of smaller motions.
 const ABSOLUTE_TO_RELATIVE: f64 = 2e-2;
 
-/// The number of levels of a method: two give one difference.
-pub(crate) const LEVELS_PER_METHOD: usize = 2;
-
 /// The number of levels of order 8 at corners.
 ///
 /// Basis: in `sweeps/friction.toml` two levels leave 9 rows of 120 not converged, three leave 6 at
@@ -95,26 +93,6 @@ const CORNER_LEVELS: usize = 3;
 /// 1.4. With 0.7 for order 4, rows of `differential_test -- 180 965457 jumps` have errors up to
 /// 3.5e-4. Doubling it damps the ringing away.
 const RESOLVING_RAD: [f64; 2] = [1.4, 0.2];
-
-/// The least separation of two different motions, and of a chaotic one from its perturbed run,
-/// relative to the motion.
-///
-/// Basis: a tenth is far more than the error of any step. Doubling it misses chaos that begins late
-/// in the run.
-pub(crate) const LEAST_SEPARATION: f64 = 0.1;
-
-/// The least growth of the separation, as a logarithm.
-///
-/// Basis: e^9 = 8,100, which is more than the amplification in a passage through a band of
-/// instability in `sweeps/fig12.toml`. With double the value the separation, which starts at 1e-10,
-/// could not grow enough in any motion.
-pub(crate) const LEAST_LOG_GROWTH: f64 = 9.0;
-
-/// The least mean exponent of the growth (1/s).
-///
-/// Basis: every chaotic attractor in `docs/dwell.md` has a greater exponent. Doubling it misses the
-/// attractors with the smallest exponents.
-pub(crate) const LEAST_EXPONENT_PER_S: f64 = 0.1;
 
 /// The greatest number of steps of an adaptive trajectory.
 ///

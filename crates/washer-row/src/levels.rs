@@ -2,7 +2,8 @@
 
 use washer_model::{Method, MethodKind, UnresolvedModes};
 
-use crate::error_control::LEVELS_PER_METHOD;
+/// The number of levels of a method: two give one difference.
+pub(crate) const LEVELS_PER_METHOD: usize = 2;
 
 /// The change by which a level starts a family, whose errors have other terms than those of the
 /// level before.

@@ -1,7 +1,25 @@
 //! Measures the separation of two runs of a point: of two levels, or of a perturbed run from the
 //! unperturbed one. Exponential growth of the latter is the sign of chaos.
 
-use crate::error_control::{LEAST_EXPONENT_PER_S, LEAST_LOG_GROWTH, LEAST_SEPARATION};
+/// The least separation of two different motions, and of a chaotic one from its perturbed run,
+/// relative to the motion.
+///
+/// Basis: a tenth is far more than the error of any step. Doubling it misses chaos that begins late
+/// in the run.
+const LEAST_SEPARATION: f64 = 0.1;
+
+/// The least growth of the separation, as a logarithm.
+///
+/// Basis: e^9 = 8,100, which is more than the amplification in a passage through a band of
+/// instability in `sweeps/fig12.toml`. With double the value the separation, which starts at 1e-10,
+/// could not grow enough in any motion.
+const LEAST_LOG_GROWTH: f64 = 9.0;
+
+/// The least mean exponent of the growth (1/s).
+///
+/// Basis: every chaotic attractor in `docs/dwell.md` has a greater exponent. Doubling it misses the
+/// attractors with the smallest exponents.
+const LEAST_EXPONENT_PER_S: f64 = 0.1;
 
 /// The growth of the separation of two runs from its least value to the greatest value after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
