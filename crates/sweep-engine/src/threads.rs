@@ -66,7 +66,7 @@ pub fn parse_count(text: &str) -> Result<usize, String> {
 /// Checks a number of threads that a program requests.
 ///
 /// # Errors
-/// [`ThreadsError::Asked`].
+/// [`ThreadsError::InvalidCount`].
 pub fn check_count(threads: usize) -> Result<usize, ThreadsError> {
     let is_valid = (1..=MAX_THREADS).contains(&threads);
     if is_valid { Ok(threads) } else { Err(ThreadsError::InvalidCount { threads }) }
