@@ -36,10 +36,10 @@ pub fn blank_digest() -> KeyValue {
     KeyValue::new(key::DIGEST.to_owned(), String::from_utf8_lossy(&BLANK).into_owned())
 }
 
-/// Writes the digest into a finished file that has a [`blank`] one.
+/// Writes the digest into a finished file that has a blank one ([`blank_digest`]).
 ///
 /// # Errors
-/// Fails if the file cannot be read or written, or has no [`blank`] digest.
+/// Fails if the file cannot be read or written, or has no blank digest.
 pub fn seal(file: &mut (impl Read + Write + Seek)) -> io::Result<()> {
     let digest_offset = find_digest_offset(file)?
         .ok_or_else(|| io::Error::other("it has no place for its digest"))?;
