@@ -12,7 +12,7 @@
 //! its extrapolation: the difference of two levels bounds the error of the finer one where the step
 //! shrinks by enough. The second term is for two levels that agree by chance: c is the contraction
 //! of the error from level to level: 1.5 where the step shrinks ([`STEP_CONTRACTION`]), 10 where
-//! the tolerance does ([`TOLERANCE_RATIO`]), and 100 where another method begins, which is at least
+//! the tolerance does ([`TOLERANCE_RATIO`]), and 100 where another method begins, which is about
 //! as accurate as two further tolerances of the method before.
 //!
 //! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge's
@@ -42,6 +42,8 @@
 //! limits of the model: the steps relative to the limit of stability (`STABILITY_SHARE`,
 //! `CAP_LIMIT_SHARE` and `MIN_HINGE_SPEED_RATIO` beside [`StepSelector`]), and the swing of a body
 //! under a jump of its load (`SWING_FACTOR`). Each metric has a scale besides.
+
+use std::iter::repeat_n;
 
 use lane_ode::Tolerance;
 use washer_model::{Formula, Method, MethodKind, ModelKind, StepSelector, capped_method};
@@ -129,10 +131,11 @@ pub(crate) fn difference_of_levels(numbers: f64, separation: Separation) -> f64 
     if separation.is_complete() { numbers.max(separation.greatest_distance) } else { numbers }
 }
 
-/// Returns the error of a level from its difference from the level before, and from that level's
-/// own difference divided by its contraction; `None` if the error is not a finite number.
-pub(crate) fn error_of_level(difference: f64, contracted_difference: f64) -> Option<f64> {
-    let error = SAFETY_FACTOR * difference.max(contracted_difference);
+/// Returns the error of a level from its difference from the level before, and from another
+/// difference: that level's own one divided by its contraction, or for a chaotic trajectory that of
+/// the perturbed run. `None` if the error is not a finite number.
+pub(crate) fn error_of_level(difference: f64, other_difference: f64) -> Option<f64> {
+    let error = SAFETY_FACTOR * difference.max(other_difference);
     error.is_finite().then_some(error)
 }
 
@@ -142,12 +145,6 @@ pub(crate) fn error_of_level(difference: f64, contracted_difference: f64) -> Opt
 /// and accuracy.
 pub(crate) fn amplification(first_difference: f64, accuracy: f64) -> f64 {
     (first_difference / accuracy).max(1.0)
-}
-
-/// Returns the error of a chaotic trajectory from its difference and that of a perturbed run.
-pub(crate) fn error_of_chaos(difference: f64, perturbed: f64) -> Option<f64> {
-    let error = SAFETY_FACTOR * difference.max(perturbed);
-    error.is_finite().then_some(error)
 }
 
 /// Returns the refinement levels of a model for these machines.
@@ -183,7 +180,9 @@ pub fn refinement_levels(
 fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevels {
     let longest_s = steps.plain_step_s(Formula::Dop853).unwrap_or(UNKNOWN_STEP_S);
     let tolerance = |level: usize| {
-        let relative = accuracy * TOLERANCE_RATIO.powi(level as i32 + 1);
+        // A product, because the bits of `powi` may depend on the platform.
+        let ratio: f64 = repeat_n(TOLERANCE_RATIO, level + 1).product();
+        let relative = accuracy * ratio;
         Tolerance {
             relative,
             absolute: ABSOLUTE_TO_RELATIVE * relative,

@@ -3,9 +3,7 @@
 
 use washer_model::{MethodKind, ModelKind, Point, UnresolvedModes};
 
-use crate::error_control::{
-    amplification, contraction, difference_of_levels, error_of_chaos, error_of_level,
-};
+use crate::error_control::{amplification, contraction, difference_of_levels, error_of_level};
 use crate::levels::{FamilyStart, RefinementLevels};
 use crate::measures::TURN_FLOOR;
 use crate::metrics::Metric;
@@ -90,8 +88,6 @@ struct ModelRefinement {
     differences: Vec<LevelDifference>,
     /// The difference of the first two levels; zero before there are two.
     first_difference: f64,
-    /// Whether the last two levels follow different motions.
-    is_separated: bool,
     /// The comparison with a perturbed run, once it has run.
     perturbed: Option<PerturbedComparison>,
 }
@@ -101,19 +97,24 @@ struct ModelRefinement {
 struct LevelDifference {
     /// The relative difference of the numbers; `None` if the levels cannot be compared.
     numbers: Option<f64>,
-    /// The relative difference of the levels: that of the numbers, or the distance of the motions
-    /// if the levels follow different ones.
-    relative: Option<f64>,
+    /// The separation of the motions.
+    separation: Separation,
     /// The change by which the level starts a family.
     start: FamilyStart,
 }
 
 impl LevelDifference {
+    /// Returns the relative difference of the levels: that of the numbers, or the distance of the
+    /// motions if the levels follow different ones. `None` if the levels cannot be compared.
+    fn relative(self) -> Option<f64> {
+        Some(difference_of_levels(self.numbers?, self.separation))
+    }
+
     /// Returns the difference divided by the contraction of the error from this level to the
     /// next, whose method is of this kind. Families that cannot be compared say nothing of each
     /// other's errors.
     fn contracted_to(self, kind: MethodKind) -> f64 {
-        match (self.relative, self.start) {
+        match (self.relative(), self.start) {
             (Some(relative), start) => relative / contraction(kind, start),
             (None, FamilyStart::None) => f64::INFINITY,
             (None, _) => 0.0,
@@ -151,15 +152,19 @@ impl ModelRefinement {
             self.run = Some(previous_run);
             return;
         }
-        let relative = difference.map(|numbers| difference_of_levels(numbers, separation));
         let start = rule.levels.family_start(level);
-        self.differences.push(LevelDifference { numbers: difference, relative, start });
+        let level_difference = LevelDifference { numbers: difference, separation, start };
+        self.differences.push(level_difference);
         if self.differences.len() == 1 && self.level == 0 {
-            self.first_difference = relative.unwrap_or(f64::INFINITY);
+            self.first_difference = level_difference.relative().unwrap_or(f64::INFINITY);
         }
-        self.is_separated = separation.is_complete();
         self.level = level;
         self.run = Some(run);
+    }
+
+    /// Whether the last two levels follow different motions.
+    fn is_separated(&self) -> bool {
+        self.differences.last().is_some_and(|difference| difference.separation.is_complete())
     }
 
     fn is_chaotic(&self) -> bool {
@@ -173,13 +178,13 @@ impl ModelRefinement {
     /// Returns the relative difference of the last two levels; `None` if there are no two, or they
     /// cannot be compared.
     fn last_difference(&self) -> Option<f64> {
-        self.differences.last()?.relative
+        self.differences.last()?.relative()
     }
 
     /// Returns the error of the finest run; `None` if there is no estimate.
     fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
         if let Some(PerturbedComparison { is_chaotic: true, difference }) = self.perturbed {
-            return error_of_chaos(self.differences.last()?.numbers?, difference?);
+            return error_of_level(self.differences.last()?.numbers?, difference?);
         }
         let kind = rule.levels.levels[self.level].kind;
         let contracted_difference = match self.differences[..] {
@@ -213,7 +218,7 @@ impl ModelRefinement {
             // A chaotic motion does not converge at any step, and its levels separate, because they
             // differ by more than a perturbed run does. A perturbed run tells such a motion from
             // one that needs finer steps.
-            let may_be_chaos = !is_converged && self.is_separated;
+            let may_be_chaos = !is_converged && self.is_separated();
             let needs_perturbed_run = may_be_chaos && self.perturbed.is_none();
             return needs_perturbed_run.then(|| levels.perturbed_index(self.level));
         }
