@@ -23,12 +23,12 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
 
     /// Sets the integrals of one lane to zero.
     pub fn reset(&mut self, lane: usize) {
-        self.integrals.iter_mut().for_each(|integrals| integrals.0.set(lane, 0.0));
+        self.integrals.iter_mut().for_each(|integral| integral.0.set(lane, 0.0));
     }
 
     /// Returns the integrals of one lane, in the square of the output's unit times seconds.
     pub fn lane(&self, lane: usize) -> [f64; M] {
-        self.integrals.map(|integrals| integrals.0.get(lane))
+        self.integrals.map(|integral| integral.0.get(lane))
     }
 
     /// Sets the samples at the start of the first step.
