@@ -27,7 +27,7 @@ COLOURED_PIXELS = """
         }
         return hued;
     };
-    const [left, right] = [CHART.left, width - CHART.right];
+    const [left, right] = [CHART_MARGINS.left, width - CHART_MARGINS.right];
     return [left - 2, left + 1, right + 1, right - 2].map(column);
 """
 
