@@ -9,17 +9,17 @@ use super::*;
 use crate::store::synthetic;
 use crate::{Evaluator, RowSink, RowSource};
 
-const POINTS: u64 = 81;
+const POINT_COUNT: u64 = 81;
 
 /// An engine that calls a function before each point and counts the points that it has evaluated.
 struct FormulaEngine<F: Fn(u64) + Sync> {
     before_point: F,
-    evaluated: AtomicU64,
+    evaluated_points: AtomicU64,
 }
 
 impl<F: Fn(u64) + Sync> FormulaEngine<F> {
     fn new(before_point: F) -> Self {
-        Self { before_point, evaluated: AtomicU64::new(0) }
+        Self { before_point, evaluated_points: AtomicU64::new(0) }
     }
 }
 
@@ -31,7 +31,7 @@ impl<F: Fn(u64) + Sync> Evaluator for &FormulaEngine<F> {
                 if context.must_stop() {
                     return;
                 }
-                self.evaluated.fetch_add(1, Ordering::Relaxed);
+                self.evaluated_points.fetch_add(1, Ordering::Relaxed);
                 sink(synthetic::point_rows(point));
             }
         });
@@ -39,7 +39,7 @@ impl<F: Fn(u64) + Sync> Evaluator for &FormulaEngine<F> {
 }
 
 /// Runs a job with the engine of a formula.
-fn run(
+fn run_job(
     formula: &FormulaEngine<impl Fn(u64) + Sync>,
     job: &Job<'_>,
     output: &Path,
@@ -49,7 +49,7 @@ fn run(
     super::run(&Engine::new(formula, "none"), job, output, options, interrupt)
 }
 
-fn options(threads: usize) -> RunOptions<'static> {
+fn run_options(threads: usize) -> RunOptions<'static> {
     RunOptions {
         threads,
         fresh: false,
@@ -60,61 +60,62 @@ fn options(threads: usize) -> RunOptions<'static> {
     }
 }
 
-fn output(home: &tempfile::TempDir) -> PathBuf {
-    home.path().join("x.parquet")
+fn result_path(test_folder: &tempfile::TempDir) -> PathBuf {
+    test_folder.path().join("x.parquet")
 }
 
 /// Runs a job without interruption on a number of threads, and returns the bytes of the result.
-fn whole_run(points: u64, threads: usize) -> Vec<u8> {
-    let home = tempfile::tempdir().unwrap();
-    let report = run(
+fn uninterrupted_result_bytes(points: u64, threads: usize) -> Vec<u8> {
+    let test_folder = tempfile::tempdir().unwrap();
+    let report = run_job(
         &FormulaEngine::new(|_| {}),
         &synthetic::job(points),
-        &output(&home),
-        options(threads),
+        &result_path(&test_folder),
+        run_options(threads),
         &Interrupt::new(),
     )
     .unwrap();
     assert!(matches!(report.end, RunEnd::Finished(_)), "{report:?}");
     assert_eq!(report.session.unwrap().points, points);
-    fs::read(output(&home)).unwrap()
+    fs::read(result_path(&test_folder)).unwrap()
 }
 
 #[test]
 fn strides_visit_every_chunk_once_in_long_steps() {
     for chunks in [1, 2, 3, 4, 41, 42, 1000, 4096] {
         let stride = chunk_stride(chunks);
-        let order: Vec<u64> = (0..chunks).map(|k| k * stride % chunks).collect();
-        let mut sorted = order.clone();
-        sorted.sort_unstable();
-        assert_eq!(sorted, (0..chunks).collect::<Vec<_>>());
-        let is_far = order.windows(2).all(|pair| pair[0].abs_diff(pair[1]) > chunks / 4);
-        assert!(is_far || chunks < 5, "{order:?}");
+        let visit_order: Vec<u64> = (0..chunks).map(|k| k * stride % chunks).collect();
+        let mut sorted_order = visit_order.clone();
+        sorted_order.sort_unstable();
+        assert_eq!(sorted_order, (0..chunks).collect::<Vec<_>>());
+        let are_far_apart =
+            visit_order.windows(2).all(|pair| pair[0].abs_diff(pair[1]) > chunks / 4);
+        assert!(are_far_apart || chunks < 5, "{visit_order:?}");
     }
 }
 
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
-    let bytes = whole_run(1000, 1);
+    let expected_bytes = uninterrupted_result_bytes(1000, 1);
     for threads in [2, 4] {
-        assert!(whole_run(1000, threads) == bytes, "{threads} threads");
+        assert!(uninterrupted_result_bytes(1000, threads) == expected_bytes, "{threads} threads");
     }
 }
 
 #[test]
 fn results_do_not_depend_on_the_number_of_shards() {
-    let bytes = whole_run(POINTS, 1);
+    let expected_bytes = uninterrupted_result_bytes(POINT_COUNT, 1);
     for count in [1, 2, 3, 20] {
-        let home = tempfile::tempdir().unwrap();
-        let job = synthetic::job(POINTS);
+        let test_folder = tempfile::tempdir().unwrap();
+        let job = synthetic::job(POINT_COUNT);
         for index in (1..=count).rev() {
             let shard = Some(ShardRequest::Given(Shard { index, count }));
             let engine = FormulaEngine::new(|_| {});
-            let report = run(
+            let report = run_job(
                 &engine,
                 &job,
-                &output(&home),
-                RunOptions { shard, ..options(2) },
+                &result_path(&test_folder),
+                RunOptions { shard, ..run_options(2) },
                 &Interrupt::new(),
             )
             .unwrap();
@@ -124,94 +125,134 @@ fn results_do_not_depend_on_the_number_of_shards() {
             );
         }
         let engine = FormulaEngine::new(|_| {});
-        run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap();
-        assert_eq!(engine.evaluated.into_inner(), 0, "the shards left nothing to compute");
-        assert!(fs::read(output(&home)).unwrap() == bytes, "{count} shards");
+        run_job(&engine, &job, &result_path(&test_folder), run_options(1), &Interrupt::new())
+            .unwrap();
+        assert_eq!(engine.evaluated_points.into_inner(), 0, "the shards left nothing to compute");
+        assert!(fs::read(result_path(&test_folder)).unwrap() == expected_bytes, "{count} shards");
     }
 }
 
 #[test]
 fn a_run_interrupted_at_any_point_is_resumed_to_the_same_bytes() {
-    let bytes = whole_run(POINTS, 1);
-    let job = synthetic::job(POINTS);
+    let expected_bytes = uninterrupted_result_bytes(POINT_COUNT, 1);
+    let job = synthetic::job(POINT_COUNT);
     // Chunks have eight points, so that some runs are interrupted at the edge of a chunk and others
     // within one.
-    for interrupted_point in (0..POINTS).step_by(4) {
-        let home = tempfile::tempdir().unwrap();
+    for interrupted_point in (0..POINT_COUNT).step_by(4) {
+        let test_folder = tempfile::tempdir().unwrap();
         let interrupt = Interrupt::new();
         let interrupting_engine = FormulaEngine::new(|point| {
             if point == interrupted_point {
                 interrupt.raise(15);
             }
         });
-        let report =
-            run(&interrupting_engine, &job, &output(&home), options(1), &interrupt).unwrap();
-        let RunEnd::Interrupted { signal: 15, stored_points, points: POINTS } = report.end else {
+        let report = run_job(
+            &interrupting_engine,
+            &job,
+            &result_path(&test_folder),
+            run_options(1),
+            &interrupt,
+        )
+        .unwrap();
+        let RunEnd::Interrupted { signal: 15, stored_points, points: POINT_COUNT } = report.end
+        else {
             panic!("{report:?}")
         };
-        let evaluated = interrupting_engine.evaluated.into_inner();
-        assert_eq!(stored_points, evaluated, "rows of incomplete chunks are stored_points too");
-        assert!(!output(&home).exists());
+        let evaluated_points = interrupting_engine.evaluated_points.into_inner();
+        assert_eq!(stored_points, evaluated_points, "rows of incomplete chunks are stored too");
+        assert!(!result_path(&test_folder).exists());
         let resumed_engine = FormulaEngine::new(|_| {});
-        run(&resumed_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-        assert_eq!(resumed_engine.evaluated.into_inner(), POINTS - stored_points);
-        assert!(fs::read(output(&home)).unwrap() == bytes, "interrupted at {interrupted_point}");
+        run_job(
+            &resumed_engine,
+            &job,
+            &result_path(&test_folder),
+            run_options(2),
+            &Interrupt::new(),
+        )
+        .unwrap();
+        assert_eq!(resumed_engine.evaluated_points.into_inner(), POINT_COUNT - stored_points);
+        assert!(
+            fs::read(result_path(&test_folder)).unwrap() == expected_bytes,
+            "interrupted at {interrupted_point}"
+        );
     }
 }
 
 #[test]
 fn a_finished_run_is_not_repeated() {
-    let home = tempfile::tempdir().unwrap();
-    let job = synthetic::job(POINTS);
-    run(&FormulaEngine::new(|_| {}), &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+    let test_folder = tempfile::tempdir().unwrap();
+    let job = synthetic::job(POINT_COUNT);
+    run_job(
+        &FormulaEngine::new(|_| {}),
+        &job,
+        &result_path(&test_folder),
+        run_options(2),
+        &Interrupt::new(),
+    )
+    .unwrap();
     let second_engine = FormulaEngine::new(|_| {});
-    let report = run(&second_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+    let report = run_job(
+        &second_engine,
+        &job,
+        &result_path(&test_folder),
+        run_options(2),
+        &Interrupt::new(),
+    )
+    .unwrap();
     assert!(matches!(report.end, RunEnd::AlreadyFinished(..)), "{report:?}");
-    assert_eq!(second_engine.evaluated.into_inner(), 0);
+    assert_eq!(second_engine.evaluated_points.into_inner(), 0);
 }
 
 #[test]
 fn a_panic_of_the_engine_loses_only_unfinished_rows() {
-    let home = tempfile::tempdir().unwrap();
-    let job = synthetic::job(POINTS);
+    let test_folder = tempfile::tempdir().unwrap();
+    let job = synthetic::job(POINT_COUNT);
     let engine = FormulaEngine::new(|point| assert_ne!(point, 20, "twenty is too much"));
-    let error = run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap_err();
-    let stored = engine.evaluated.into_inner();
-    assert!(stored >= 4, "points 16 to 19 come before the panic");
+    let error =
+        run_job(&engine, &job, &result_path(&test_folder), run_options(1), &Interrupt::new())
+            .unwrap_err();
+    let stored_points = engine.evaluated_points.into_inner();
+    assert!(stored_points >= 4, "points 16 to 19 come before the panic");
     assert!(!error.is_refusal());
     let text = error.to_string();
     assert!(text.contains("points 16 to 23") && text.contains("twenty is too much"), "{text}");
     let resumed_engine = FormulaEngine::new(|_| {});
-    run(&resumed_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+    run_job(&resumed_engine, &job, &result_path(&test_folder), run_options(2), &Interrupt::new())
+        .unwrap();
     assert_eq!(
-        resumed_engine.evaluated.into_inner(),
-        POINTS - stored,
+        resumed_engine.evaluated_points.into_inner(),
+        POINT_COUNT - stored_points,
         "the rows before the panic are kept"
     );
-    assert!(fs::read(output(&home)).unwrap() == whole_run(POINTS, 1));
+    assert!(
+        fs::read(result_path(&test_folder)).unwrap() == uninterrupted_result_bytes(POINT_COUNT, 1)
+    );
 }
 
 #[test]
 fn a_folder_that_vanishes_ends_the_run_with_an_error() {
-    let home = tempfile::tempdir().unwrap();
+    let test_folder = tempfile::tempdir().unwrap();
     let job = synthetic::job(1000);
-    let partial = home.path().join("x.parquet.partial");
-    let moved_folder = home.path().join("gone");
+    let partial_folder = test_folder.path().join("x.parquet.partial");
+    let moved_folder = test_folder.path().join("gone");
     let engine = FormulaEngine::new(|point| {
         if point == 40 {
-            while !partial.join("part-00000000.parquet").exists() {
+            while !partial_folder.join("part-00000000.parquet").exists() {
                 std::thread::yield_now();
             }
-            fs::rename(&partial, &moved_folder).unwrap();
+            fs::rename(&partial_folder, &moved_folder).unwrap();
         }
     });
-    let error = run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap_err();
+    let error =
+        run_job(&engine, &job, &result_path(&test_folder), run_options(1), &Interrupt::new())
+            .unwrap_err();
     let text = error.to_string();
     assert!(text.contains("x.parquet.partial") && text.contains("bring it back"), "{text}");
-    assert!(engine.evaluated.into_inner() < 1000, "the run ends early");
-    fs::rename(&moved_folder, &partial).unwrap();
+    assert!(engine.evaluated_points.into_inner() < 1000, "the run ends early");
+    fs::rename(&moved_folder, &partial_folder).unwrap();
     let resumed_engine = FormulaEngine::new(|_| {});
-    run(&resumed_engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    assert!(resumed_engine.evaluated.into_inner() < 1000, "the rows of the folder are used");
-    assert!(fs::read(output(&home)).unwrap() == whole_run(1000, 1));
+    run_job(&resumed_engine, &job, &result_path(&test_folder), run_options(2), &Interrupt::new())
+        .unwrap();
+    assert!(resumed_engine.evaluated_points.into_inner() < 1000, "the rows of the folder are used");
+    assert!(fs::read(result_path(&test_folder)).unwrap() == uninterrupted_result_bytes(1000, 1));
 }

@@ -10,26 +10,26 @@ pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverge
 
 /// Returns a layout with two axes and the columns of one channel.
 pub fn layout() -> Layout {
-    let column =
+    let make_column =
         |name: &str, unit: &str, kind| DeclaredColumn::new(name, unit, format!("the {name}"), kind);
-    let measured = |name: &str| column(name, "m", CellType::Measured);
+    let measured_column = |name: &str| make_column(name, "m", CellType::Measured);
     Layout {
         axes: vec![
-            column("mass_kg", "kg", CellType::Axis),
-            column("damping", "N s/m", CellType::Axis),
+            make_column("mass_kg", "kg", CellType::Axis),
+            make_column("damping", "N s/m", CellType::Axis),
         ],
         columns: vec![
-            measured("nonlinear_a"),
-            measured("linear_a"),
-            column("ratio_max", "1", CellType::Measured),
-            column("reliable", "", CellType::Flag),
-            column("sensitive", "", CellType::Flag),
-            column("method", "", CellType::Name(vec!["rk4", "dopri5"])),
-            column("error", "1", CellType::Measured),
-            column("converged", "", CellType::Flag),
-            column("status", "", CellType::Name(STATUSES.to_vec())),
-            column("fail_time_s", "s", CellType::Time),
-            column("steps", "1", CellType::Count),
+            measured_column("nonlinear_a"),
+            measured_column("linear_a"),
+            make_column("ratio_max", "1", CellType::Measured),
+            make_column("reliable", "", CellType::Flag),
+            make_column("sensitive", "", CellType::Flag),
+            make_column("method", "", CellType::Name(vec!["rk4", "dopri5"])),
+            make_column("error", "1", CellType::Measured),
+            make_column("converged", "", CellType::Flag),
+            make_column("status", "", CellType::Name(STATUSES.to_vec())),
+            make_column("fail_time_s", "s", CellType::Time),
+            make_column("steps", "1", CellType::Count),
         ],
         kind: FileKind::Map,
         tasks_per_point: 1,
@@ -56,24 +56,26 @@ pub fn job(points: u64) -> Job<'static> {
 /// Returns the row of a point. The first 60 points have every kind of row: reliable, unreliable,
 /// undefined, and failed in each way.
 pub fn row(point: u64) -> RowCells {
-    let index = point as f64;
+    let point_number = point as f64;
     let status = if [4, 7].contains(&(point % 20)) { 1 + point / 20 % 3 } else { 0 };
-    let linear = if point % 30 == 11 { 0.0 } else { 1.0 + (0.37 * index).sin().abs() };
-    let nonlinear = linear * (0.5 + index % 5.0);
+    let linear_amplitude =
+        if point % 30 == 11 { 0.0 } else { 1.0 + (0.37 * point_number).sin().abs() };
+    let nonlinear_amplitude = linear_amplitude * (0.5 + point_number % 5.0);
     let is_ok = status == 0;
-    let number = |value: f64| Some(value.to_bits()).filter(|_| is_ok);
-    let ratio = (is_ok && linear != 0.0).then_some(nonlinear / linear);
+    let cell_unless_failed = |value: f64| Some(value.to_bits()).filter(|_| is_ok);
+    let ratio =
+        (is_ok && linear_amplitude != 0.0).then_some(nonlinear_amplitude / linear_amplitude);
     vec![
-        number(nonlinear),
-        number(linear),
+        cell_unless_failed(nonlinear_amplitude),
+        cell_unless_failed(linear_amplitude),
         ratio.map(f64::to_bits),
         ratio.map(|ratio| u64::from(ratio < 2.0)),
         [None, Some(0), Some(1)][(point % 3) as usize],
         Some(point % 2),
-        (!point.is_multiple_of(5)).then_some((1e-5 * (1.0 + index)).to_bits()),
-        (!point.is_multiple_of(5)).then_some(u64::from(index < 30.0)),
+        (!point.is_multiple_of(5)).then_some((1e-5 * (1.0 + point_number)).to_bits()),
+        (!point.is_multiple_of(5)).then_some(u64::from(point_number < 30.0)),
         Some(status),
-        (!is_ok).then_some((index / 7.0).to_bits()),
+        (!is_ok).then_some((point_number / 7.0).to_bits()),
         Some(1000 + point),
     ]
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::names::ColumnNames;
 use super::notation::Notation;
-use super::units::is_unit;
+use super::units::is_unit_name;
 use super::{ListError, MAX_COLUMNS};
 
 /// Maximum number of lines among which the line of names is searched. Basis: no logger writes a
@@ -367,8 +367,8 @@ fn parse_units(line: TextLine<'_>, separator: char, columns: usize) -> Option<Ve
     let is_empty = |cell: &String| ["", "-", "1"].contains(&cell.as_str());
     let is_row = cells.len() == columns
         && cells.iter().all(|cell| is_empty(cell) || !is_number(cell))
-        && cells.iter().any(|cell| is_unit(cell));
-    let known_count = cells.iter().filter(|cell| is_empty(cell) || is_unit(cell)).count();
+        && cells.iter().any(|cell| is_unit_name(cell));
+    let known_count = cells.iter().filter(|cell| is_empty(cell) || is_unit_name(cell)).count();
     // Units of ignored columns may be unknown, such as volts or degrees Celsius.
     let is_row = is_row && 2 * known_count > cells.len();
     is_row.then(|| {

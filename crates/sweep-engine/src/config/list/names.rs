@@ -2,7 +2,7 @@
 //! header, and by its unit in brackets, in a row of units or at the end of the header.
 
 use super::super::section::shorten;
-use super::units::{UnitScale, is_unit, unit_from_suffix, unit_scale, unit_suffixes};
+use super::units::{UnitScale, find_unit_scale, is_unit_name, unit_from_suffix, unit_suffixes};
 
 /// The unit of a quantity whose scale does not matter, such as a signal of pulses. Its column may
 /// have any unit, and is not converted.
@@ -118,7 +118,7 @@ fn match_with_scale(
     if unit == unit_of_name || unit_of_name == ANY_UNIT {
         return Ok(KnownName { name, scale: UnitScale::ONE });
     }
-    match unit_scale(unit, unit_of_name) {
+    match find_unit_scale(unit, unit_of_name) {
         Some(scale) => Ok(KnownName { name, scale }),
         None => {
             let title = format!(
@@ -127,7 +127,7 @@ fn match_with_scale(
                 shorten(unit)
             );
             let kind =
-                if is_unit(unit) { "a unit of the same kind as" } else { "a known unit, as" };
+                if is_unit_name(unit) { "a unit of the same kind as" } else { "a known unit, as" };
             Err([title, format!("expected {kind} {unit_of_name}, the unit of `{name}`")])
         }
     }
@@ -154,7 +154,7 @@ fn normalise(text: &str) -> String {
 /// Splits a name into its stem and the unit at its end.
 fn split_unit_suffix(name: &str) -> Option<(&str, &str)> {
     let splits = name.match_indices('_').map(|(index, _)| (&name[..index], &name[index + 1..]));
-    splits.into_iter().find(|(_, suffix)| is_unit(&unit_from_suffix(suffix)))
+    splits.into_iter().find(|(_, suffix)| is_unit_name(&unit_from_suffix(suffix)))
 }
 
 #[cfg(test)]

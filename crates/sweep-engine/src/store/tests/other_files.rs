@@ -5,18 +5,18 @@ use super::*;
 
 #[test]
 fn starting_over_deletes_only_files_that_a_run_wrote() {
-    let home = Home::new();
-    let job = synthetic::job(POINTS);
-    let run = open(&home.output(), &job);
-    write_missing(&run);
+    let test_folder = TestFolder::new();
+    let job = synthetic::job(POINT_COUNT);
+    let run = open_run(&test_folder.result_path(), &job);
+    write_missing_chunks(&run);
     drop(run);
     let foreign_names = ["part-notes.txt", "session-notes.md", "shard-plan.txt", "plan.json.old"];
     for name in foreign_names.into_iter().chain(["shard-3.lock"]) {
-        fs::write(home.partial().join(name), "").unwrap();
+        fs::write(test_folder.partial_folder().join(name), "").unwrap();
     }
-    drop(OpenRun::open(&home.output(), &job, fresh()).unwrap());
+    drop(OpenRun::open(&test_folder.result_path(), &job, fresh_options()).unwrap());
     assert_eq!(
-        file_names(&home),
+        file_names(&test_folder),
         [
             "lock",
             "part-notes.txt",
@@ -29,13 +29,13 @@ fn starting_over_deletes_only_files_that_a_run_wrote() {
 }
 
 /// Returns the options of a run that starts over.
-fn fresh() -> OpenOptions<'static> {
-    OpenOptions { fresh: true, ..options() }
+fn fresh_options() -> OpenOptions<'static> {
+    OpenOptions { fresh: true, ..default_options() }
 }
 
 /// Returns the names of the files in the folder, sorted.
-fn file_names(home: &Home) -> Vec<String> {
-    let entries = fs::read_dir(home.partial()).unwrap();
+fn file_names(test_folder: &TestFolder) -> Vec<String> {
+    let entries = fs::read_dir(test_folder.partial_folder()).unwrap();
     let mut names: Vec<String> =
         entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
@@ -43,7 +43,7 @@ fn file_names(home: &Home) -> Vec<String> {
 }
 
 /// Names of files that a run writes, and similar ones.
-const SIMILAR_NAMES: [&str; 12] = [
+const RUN_LIKE_FILE_NAMES: [&str; 12] = [
     "part-00000002.parquet",
     "part-00000002.parquet.damaged",
     "plan.json.damaged",
@@ -60,50 +60,59 @@ const SIMILAR_NAMES: [&str; 12] = [
 
 #[test]
 fn foreign_files_are_kept_under_any_name() {
-    let job = synthetic::job(POINTS);
-    for text in ["my thesis", "{}", "SWEEP", "2026 pages", "{\"shards\": 0}"] {
+    let job = synthetic::job(POINT_COUNT);
+    for foreign_text in ["my thesis", "{}", "SWEEP", "2026 pages", "{\"shards\": 0}"] {
         for is_fresh in [false, true] {
-            let home = Home::new();
-            let run = open(&home.output(), &job);
-            write(&run, 1);
+            let test_folder = TestFolder::new();
+            let run = open_run(&test_folder.result_path(), &job);
+            write_complete_chunk(&run, 1);
             drop(run);
-            for name in SIMILAR_NAMES {
-                fs::write(home.partial().join(name), text).unwrap();
+            for name in RUN_LIKE_FILE_NAMES {
+                fs::write(test_folder.partial_folder().join(name), foreign_text).unwrap();
             }
-            let options = OpenOptions { fresh: is_fresh, ..options() };
-            let OpenOutcome::Open(run) = OpenRun::open(&home.output(), &job, options).unwrap()
+            let options = OpenOptions { fresh: is_fresh, ..default_options() };
+            let OpenOutcome::Open(run) =
+                OpenRun::open(&test_folder.result_path(), &job, options).unwrap()
             else {
                 panic!("is not done")
             };
-            write_missing(&run);
-            let (_, notes) = finish(run, &job);
-            let note = notes.last().unwrap();
-            assert!(note.contains("stays, for it holds what this run did not write"), "{note}");
+            write_missing_chunks(&run);
+            let (_, notes) = finish_run(run, &job);
+            let last_note = notes.last().unwrap();
+            assert!(
+                last_note.contains("stays, for it holds what this run did not write"),
+                "{last_note}"
+            );
             // A file is kept under its name, or renamed to `*.damaged`.
-            let remaining_names = file_names(&home);
-            assert_eq!(remaining_names.len(), SIMILAR_NAMES.len(), "{remaining_names:?}");
+            let remaining_names = file_names(&test_folder);
+            assert_eq!(remaining_names.len(), RUN_LIKE_FILE_NAMES.len(), "{remaining_names:?}");
             for name in remaining_names {
-                let content = fs::read_to_string(home.partial().join(&name)).unwrap();
-                assert_eq!(content, text, "{name}");
+                let content = fs::read_to_string(test_folder.partial_folder().join(&name)).unwrap();
+                assert_eq!(content, foreign_text, "{name}");
             }
-            assert_eq!(fs::read(home.output()).unwrap(), uninterrupted_result(POINTS));
+            assert_eq!(
+                fs::read(test_folder.result_path()).unwrap(),
+                uninterrupted_result_bytes(POINT_COUNT)
+            );
         }
     }
 }
 
 #[test]
 fn starting_over_deletes_all_files_of_an_unfinished_run() {
-    let home = Home::new();
-    let job = synthetic::job(POINTS);
+    let test_folder = TestFolder::new();
+    let job = synthetic::job(POINT_COUNT);
     let shard = Some(ShardRequest::Given(Shard { index: 2, count: 4 }));
-    let shard_options = OpenOptions { shard, ..options() };
-    let OpenOutcome::Open(run) = OpenRun::open(&home.output(), &job, shard_options).unwrap() else {
+    let shard_options = OpenOptions { shard, ..default_options() };
+    let OpenOutcome::Open(run) =
+        OpenRun::open(&test_folder.result_path(), &job, shard_options).unwrap()
+    else {
         panic!("is not done")
     };
-    write_missing(&run);
-    run.record_session(&session()).unwrap();
+    write_missing_chunks(&run);
+    run.record_session(&test_session()).unwrap();
     drop(run);
-    let remaining_names = file_names(&home);
+    let remaining_names = file_names(&test_folder);
     for name in ["plan.json", "shards.json", "shard-2.lock", "part-00000001.parquet"] {
         assert!(
             remaining_names.iter().any(|remaining_name| remaining_name == name),
@@ -111,39 +120,40 @@ fn starting_over_deletes_all_files_of_an_unfinished_run() {
         );
     }
     assert!(remaining_names.iter().any(|name| name.starts_with("session-")), "{remaining_names:?}");
-    fs::write(home.partial().join(sweep_files::atomic::temporary_name()), "half").unwrap();
-    drop(OpenRun::open(&home.output(), &job, fresh()).unwrap());
-    assert_eq!(file_names(&home), ["lock", "plan.json"]);
+    fs::write(test_folder.partial_folder().join(sweep_files::atomic::temporary_name()), "half")
+        .unwrap();
+    drop(OpenRun::open(&test_folder.result_path(), &job, fresh_options()).unwrap());
+    assert_eq!(file_names(&test_folder), ["lock", "plan.json"]);
 }
 
 #[test]
 fn several_damaged_files_of_one_part_are_all_kept() {
-    let home = Home::new();
-    let job = synthetic::job(POINTS);
-    let run = open(&home.output(), &job);
-    write_missing(&run);
+    let test_folder = TestFolder::new();
+    let job = synthetic::job(POINT_COUNT);
+    let run = open_run(&test_folder.result_path(), &job);
+    write_missing_chunks(&run);
     drop(run);
     for text in ["first", "second", "third"] {
-        fs::write(home.partial().join(part_name(3)), text).unwrap();
-        write_missing(&open(&home.output(), &job));
+        fs::write(test_folder.partial_folder().join(part_name(3)), text).unwrap();
+        write_missing_chunks(&open_run(&test_folder.result_path(), &job));
     }
-    let (_, notes) = finish(open(&home.output(), &job), &job);
+    let (_, notes) = finish_run(open_run(&test_folder.result_path(), &job), &job);
     assert!(notes[0].contains("part-00000003.parquet.damaged-2"), "{notes:?}");
-    let read_damaged = |ending| {
+    let read_damaged_file = |ending| {
         let name = format!("{}.damaged{ending}", part_name(3));
-        fs::read_to_string(home.partial().join(name)).unwrap()
+        fs::read_to_string(test_folder.partial_folder().join(name)).unwrap()
     };
-    assert_eq!(["", "-2", "-3"].map(read_damaged), ["first", "second", "third"]);
+    assert_eq!(["", "-2", "-3"].map(read_damaged_file), ["first", "second", "third"]);
     // A run whose result exists keeps the damaged files as well.
     assert!(matches!(
-        OpenRun::open(&home.output(), &job, options()).unwrap(),
+        OpenRun::open(&test_folder.result_path(), &job, default_options()).unwrap(),
         OpenOutcome::Finished(..)
     ));
-    assert_eq!(file_names(&home).len(), 3);
+    assert_eq!(file_names(&test_folder).len(), 3);
 }
 
 /// Returns the record of a process's work.
-fn session() -> Session {
+fn test_session() -> Session {
     Session {
         started_unix_s: 1,
         wall_s: 1.0,
@@ -162,65 +172,69 @@ fn session() -> Session {
 
 #[test]
 fn a_foreign_file_at_the_output_is_not_overwritten() {
-    let home = Home::new();
-    let job = synthetic::job(POINTS);
-    fs::write(home.output(), "my thesis").unwrap();
+    let test_folder = TestFolder::new();
+    let job = synthetic::job(POINT_COUNT);
+    fs::write(test_folder.result_path(), "my thesis").unwrap();
     for fresh in [false, true] {
-        let error =
-            OpenRun::open(&home.output(), &job, OpenOptions { fresh, ..options() }).unwrap_err();
+        let error = OpenRun::open(
+            &test_folder.result_path(),
+            &job,
+            OpenOptions { fresh, ..default_options() },
+        )
+        .unwrap_err();
         assert!(error.is_refusal());
         assert!(error.to_string().contains("is no result of `sweep run`"), "{error}");
     }
     for error in [
-        OpenRun::open_for_merge(&home.output(), &job).unwrap_err(),
-        read_status(&home.output(), &job).unwrap_err(),
+        OpenRun::open_for_merge(&test_folder.result_path(), &job).unwrap_err(),
+        read_status(&test_folder.result_path(), &job).unwrap_err(),
     ] {
         assert!(error.to_string().contains("is no result of `sweep run`"), "{error}");
     }
-    assert_eq!(fs::read(home.output()).unwrap(), b"my thesis");
-    assert!(!home.partial().exists());
-    let error = OpenRun::open(home.0.path(), &job, options()).unwrap_err();
+    assert_eq!(fs::read(test_folder.result_path()).unwrap(), b"my thesis");
+    assert!(!test_folder.partial_folder().exists());
+    let error = OpenRun::open(test_folder.0.path(), &job, default_options()).unwrap_err();
     assert!(error.to_string().contains("it is a folder"), "{error}");
 }
 
 #[test]
 fn a_process_killed_before_it_removes_the_folder_loses_nothing() {
-    let home = Home::new();
-    let job = synthetic::job(POINTS);
-    let mut run = open(&home.output(), &job);
-    write_missing(&run);
+    let test_folder = TestFolder::new();
+    let job = synthetic::job(POINT_COUNT);
+    let mut run = open_run(&test_folder.result_path(), &job);
+    write_missing_chunks(&run);
     run.join(&job, &|| false).unwrap().unwrap();
     drop(run);
-    let bytes = fs::read(home.output()).unwrap();
-    let run = open(&home.output(), &job);
-    assert_eq!(write_missing(&run), 0);
-    finish(run, &job);
-    assert_eq!(fs::read(home.output()).unwrap(), bytes);
+    let result_bytes = fs::read(test_folder.result_path()).unwrap();
+    let run = open_run(&test_folder.result_path(), &job);
+    assert_eq!(write_missing_chunks(&run), 0);
+    finish_run(run, &job);
+    assert_eq!(fs::read(test_folder.result_path()).unwrap(), result_bytes);
 
     // A process that is killed while it removes the folder has deleted the plan first.
-    fs::create_dir(home.partial()).unwrap();
-    fs::write(home.partial().join(part_name(3)), part_bytes(&job, 3)).unwrap();
+    fs::create_dir(test_folder.partial_folder()).unwrap();
+    fs::write(test_folder.partial_folder().join(part_name(3)), part_bytes(&job, 3)).unwrap();
     assert!(matches!(
-        OpenRun::open(&home.output(), &job, options()).unwrap(),
+        OpenRun::open(&test_folder.result_path(), &job, default_options()).unwrap(),
         OpenOutcome::Finished(..)
     ));
-    assert!(!home.partial().exists());
+    assert!(!test_folder.partial_folder().exists());
 }
 
 #[test]
 fn temporary_files_are_deleted_and_foreign_files_kept() {
-    let home = Home::new();
-    let job = synthetic::job(POINTS);
-    drop(open(&home.output(), &job));
-    let temporary = home.partial().join(sweep_files::atomic::temporary_name());
-    let foreign = home.partial().join("notes.txt");
-    fs::write(&temporary, "half a part").unwrap();
-    fs::write(&foreign, "mine").unwrap();
-    let run = open(&home.output(), &job);
-    assert!(!temporary.exists());
-    write_missing(&run);
-    let (_, notes) = finish(run, &job);
-    assert!(foreign.exists());
+    let test_folder = TestFolder::new();
+    let job = synthetic::job(POINT_COUNT);
+    drop(open_run(&test_folder.result_path(), &job));
+    let temporary_file = test_folder.partial_folder().join(sweep_files::atomic::temporary_name());
+    let foreign_file = test_folder.partial_folder().join("notes.txt");
+    fs::write(&temporary_file, "half a part").unwrap();
+    fs::write(&foreign_file, "mine").unwrap();
+    let run = open_run(&test_folder.result_path(), &job);
+    assert!(!temporary_file.exists());
+    write_missing_chunks(&run);
+    let (_, notes) = finish_run(run, &job);
+    assert!(foreign_file.exists());
     assert!(notes[0].contains("or has set aside: notes.txt; delete"), "{:?}", notes);
-    assert_eq!(fs::read_dir(home.partial()).unwrap().count(), 1);
+    assert_eq!(fs::read_dir(test_folder.partial_folder()).unwrap().count(), 1);
 }
