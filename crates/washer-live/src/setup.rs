@@ -77,7 +77,7 @@ impl Setup {
         for list in ElementList::all() {
             let count = walk.walk_count((list.count)(machine))?;
             if walk.is_reading() {
-                (list.fill)(machine, count);
+                (list.resize)(machine, count);
             }
         }
         let cabinet_count = walk.walk_count(usize::from(machine.cabinet.is_some()))?;

@@ -30,15 +30,17 @@ pub fn evaluate(
 ) {
     let arguments = (point, part, caps, evaluations);
     match model {
-        ModelKind::Nonlinear => simd.dispatch(Evaluate::<NonlinearFamily>(arguments, PhantomData)),
-        ModelKind::Linear => simd.dispatch(Evaluate::<LinearFamily>(arguments, PhantomData)),
+        ModelKind::Nonlinear => {
+            simd.dispatch(RhsPartKernel::<NonlinearFamily>(arguments, PhantomData))
+        }
+        ModelKind::Linear => simd.dispatch(RhsPartKernel::<LinearFamily>(arguments, PhantomData)),
     }
 }
 
 /// The kernel that evaluates a part of the right-hand side.
-struct Evaluate<'a, F>((&'a Point, RhsPart, Option<Caps>, u64), PhantomData<F>);
+struct RhsPartKernel<'a, F>((&'a Point, RhsPart, Option<Caps>, u64), PhantomData<F>);
 
-impl<F: ModelFamily> Kernel for Evaluate<'_, F> {
+impl<F: ModelFamily> Kernel for RhsPartKernel<'_, F> {
     type Output = ();
 
     #[inline(always)]

@@ -33,9 +33,9 @@ pub(crate) const HINGE_PITCH: usize = 9;
 pub(crate) const FIRST_ANGLE: usize = TUB_YAW;
 
 /// The coordinates of the tub.
-pub(crate) const TUB: [usize; 4] = [TUB_Y, TUB_Z, TUB_YAW, TUB_PITCH];
+pub(crate) const TUB_COORDINATES: [usize; 4] = [TUB_Y, TUB_Z, TUB_YAW, TUB_PITCH];
 /// The coordinates of the shaft.
-pub(crate) const SHAFT: [usize; 4] = [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH];
+pub(crate) const SHAFT_COORDINATES: [usize; 4] = [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH];
 /// The angles of the tub.
 pub(crate) const TUB_ROTATIONS: [usize; 2] = [TUB_YAW, TUB_PITCH];
 /// The angles of the rotor. The rotor's forces depend on q3 and q4 through the bearings only.
@@ -43,30 +43,30 @@ pub(crate) const ROTOR_ROTATIONS: [usize; 4] = [SHAFT_YAW, SHAFT_PITCH, HINGE_YA
 
 /// The coordinates whose sign changes when a state is mirrored in the vertical plane through the
 /// drum's axis.
-const MIRRORED: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
+const SIGN_CHANGING_COORDINATES: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
 
 /// Returns a state's mirror image: the state of a mirrored machine whose drum turns in the opposite
 /// direction.
 pub(crate) fn mirror_state(state: &[f64; STATES]) -> [f64; STATES] {
-    let mut mirrored = *state;
-    for i in MIRRORED {
-        mirrored[i] = -mirrored[i];
-        mirrored[COORDINATES + i] = -mirrored[COORDINATES + i];
+    let mut mirrored_state = *state;
+    for i in SIGN_CHANGING_COORDINATES {
+        mirrored_state[i] = -mirrored_state[i];
+        mirrored_state[COORDINATES + i] = -mirrored_state[COORDINATES + i];
     }
-    mirrored
+    mirrored_state
 }
 
-/// Returns `values` as dual numbers with the derivative `slope` in coordinate `j` and 0 elsewhere.
+/// Returns `values` as dual numbers with a derivative in coordinate `j`, and 0 elsewhere.
 #[inline(always)]
 pub(crate) fn with_derivative<T: Lane>(
     values: &[N<T>; COORDINATES],
     j: usize,
-    slope: f64,
+    derivative: f64,
 ) -> [N<Dual<T>>; COORDINATES] {
     let mut duals = [values[0].constant(); COORDINATES];
     for i in 0..COORDINATES {
         duals[i] = values[i].constant();
     }
-    duals[j].0.slope = values[j].lit(slope).0;
+    duals[j].0.slope = values[j].lit(derivative).0;
     duals
 }

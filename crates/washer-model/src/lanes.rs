@@ -118,42 +118,42 @@ impl<A: ToDual> ToDual for Vec<A> {
 
 /// A boolean property of machines that is true if any machine that was written to a lane has it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct InAnyLane<T>(bool, PhantomData<T>);
+pub(crate) struct AnyLaneFlag<T>(bool, PhantomData<T>);
 
-impl<T> InAnyLane<T> {
+impl<T> AnyLaneFlag<T> {
     /// Creates the property for one machine.
-    pub(crate) fn new(holds: bool) -> Self {
-        Self(holds, PhantomData)
+    pub(crate) fn new(is_set: bool) -> Self {
+        Self(is_set, PhantomData)
     }
 
     /// Returns whether any machine has the property.
     #[inline(always)]
-    pub(crate) fn holds(self) -> bool {
+    pub(crate) fn is_set(self) -> bool {
         self.0
     }
 }
 
-impl<T: Lane> InLanes<T> for InAnyLane<T> {
-    type SingleLane = InAnyLane<f64>;
+impl<T: Lane> InLanes<T> for AnyLaneFlag<T> {
+    type SingleLane = AnyLaneFlag<f64>;
     #[inline(always)]
-    fn splat(_: N<T>, single: &InAnyLane<f64>) -> Self {
+    fn splat(_: N<T>, single: &AnyLaneFlag<f64>) -> Self {
         Self::new(single.0)
     }
     #[inline(always)]
-    fn set_lane(&mut self, _: usize, single: &InAnyLane<f64>) {
+    fn set_lane(&mut self, _: usize, single: &AnyLaneFlag<f64>) {
         self.0 |= single.0;
     }
     #[inline(always)]
-    fn get_lane(&self, _: usize) -> InAnyLane<f64> {
-        InAnyLane::new(self.0)
+    fn get_lane(&self, _: usize) -> AnyLaneFlag<f64> {
+        AnyLaneFlag::new(self.0)
     }
 }
 
-impl<T: Real> ToDual for InAnyLane<T> {
-    type Dual = InAnyLane<Dual<T>>;
+impl<T: Real> ToDual for AnyLaneFlag<T> {
+    type Dual = AnyLaneFlag<Dual<T>>;
     #[inline(always)]
-    fn constant(&self) -> InAnyLane<Dual<T>> {
-        InAnyLane::new(self.0)
+    fn constant(&self) -> AnyLaneFlag<Dual<T>> {
+        AnyLaneFlag::new(self.0)
     }
 }
 

@@ -15,13 +15,12 @@ pub(crate) mod symmetric;
 
 use crate::COORDINATES;
 use crate::coordinates::{
-    ROTOR_ROTATIONS, SHAFT_Y, SHAFT_Z, TUB, TUB_ROTATIONS, TUB_Y, TUB_Z, with_derivative,
+    ROTOR_ROTATIONS, SHAFT_Y, SHAFT_Z, TUB_COORDINATES, TUB_ROTATIONS, TUB_Y, TUB_Z,
+    with_derivative,
 };
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLE_ANGLES};
-use crate::linear::rotor_terms::{
-    self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients,
-};
+use crate::linear::rotor_terms::{ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
@@ -34,9 +33,9 @@ const ALL_ENTRIES: usize = ENTRIES + INERTIA_ENTRIES;
 
 lane_struct! {
     /// The coefficients that do not depend on the spin. Rows are forces (y, z) and torques about a
-    /// half's mass centre, columns the coordinates of `TUB`.
+    /// half's mass centre, columns the coordinates of `TUB_COORDINATES`.
     #[derive(Clone, Copy, Debug)]
-    Constants {
+    LinearConstants {
         tub_inverse_mass: N<T>,
         /// The partial velocities of the tub's mass centre.
         tub_arm: [[N<T>; 2]; 2],
@@ -51,22 +50,22 @@ lane_struct! {
 
 /// The linear model of a machine.
 #[derive(Clone, Debug)]
-pub(crate) struct LinearPoint {
-    pub(crate) constants: Constants<f64>,
+pub(crate) struct LinearModel {
+    pub(crate) constants: LinearConstants<f64>,
     pub(crate) rotor_coefficients: RotorCoefficients<f64>,
 }
 
 /// The linearisation of one machine per lane about the equilibrium `q`.
-pub(crate) struct Linearise<'a, T> {
+pub(crate) struct Linearisation<'a, T> {
     pub(crate) machine: &'a Coefficients<T>,
     pub(crate) q: &'a [N<T>; COORDINATES],
 }
 
-impl<T: Lane> OutOfLine for Linearise<'_, T> {
-    type Output = Vec<LinearPoint>;
+impl<T: Lane> OutOfLine for Linearisation<'_, T> {
+    type Output = Vec<LinearModel>;
 
     #[inline(always)]
-    fn run(self) -> Vec<LinearPoint> {
+    fn run(self) -> Vec<LinearModel> {
         let Self { machine, q } = self;
         let zero = q[0].lit(0.0);
         let zeros = [zero; COORDINATES];
@@ -93,38 +92,43 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
                 let dual_spin = spin.constant();
                 // The stiffness depends on speed and acceleration. The damping is proportional to
                 // the speed, so that a unit speed determines it.
-                let directions = if spin_case == 1 { 8 } else { 4 };
-                for direction in 0..directions {
+                let direction_count = if spin_case == 1 { 8 } else { 4 };
+                for direction in 0..direction_count {
                     let column = direction % 4;
-                    let entry = if direction < 4 { entry::stiffness } else { entry::damping };
+                    let entry_index = if direction < 4 {
+                        rotor_terms::stiffness_entry
+                    } else {
+                        rotor_terms::damping_entry
+                    };
                     let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
                     let q = with_derivative(q, ROTOR_ROTATIONS[column], dq);
                     let u = with_derivative(&zeros, ROTOR_ROTATIONS[column], du);
                     let Half { mut chain, .. } =
                         assemble_rotor_in_lanes(&dual_machine.bodies, &dual_spin, &q, &u);
                     chain.add_load(&shaft_load.constant());
-                    let rows: [_; ROWS] =
+                    let row_slopes: [_; ROWS] =
                         transform_to_mass_centre(chain.generalised_forces(), &arm);
                     for row in 0..ROWS {
-                        samples[spin_case][entry(row, column)][k] = -rows[row];
+                        samples[spin_case][entry_index(row, column)][k] = -row_slopes[row];
                     }
                 }
                 for i in 0..2 {
-                    samples[spin_case][entry::force(i)][k] = force[i];
+                    samples[spin_case][rotor_terms::force_entry(i)][k] = force[i];
                 }
                 for r in 0..4 {
-                    samples[spin_case][entry::force(2 + r)][k] =
+                    samples[spin_case][rotor_terms::force_entry(2 + r)][k] =
                         torque[r] - arm[r][0] * force[0] - arm[r][1] * force[1];
                     for s in 0..=r {
-                        samples[spin_case][ENTRIES + entry::inertia(r, s)][k] = inertia[r][s];
+                        samples[spin_case][ENTRIES + rotor_terms::inertia_entry(r, s)][k] =
+                            inertia[r][s];
                     }
-                    samples[spin_case][entry::arm(r, 0)][k] = arm[r][0];
-                    samples[spin_case][entry::arm(r, 1)][k] = arm[r][1];
+                    samples[spin_case][rotor_terms::arm_entry(r, 0)][k] = arm[r][0];
+                    samples[spin_case][rotor_terms::arm_entry(r, 1)][k] = arm[r][1];
                 }
             }
         }
 
-        let constants = Constants {
+        let constants = LinearConstants {
             tub_inverse_mass: bodies.tub_inverse_mass,
             tub_arm: tub_at_rest.chain.arm,
             tub_axis: tub_at_rest.chain.axis,
@@ -135,7 +139,7 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
             rotor_axis: Tilt::shaft(q).axis_partials(),
         };
         (0..T::LANES)
-            .map(|lane| LinearPoint {
+            .map(|lane| LinearModel {
                 constants: constants.get_lane(lane),
                 rotor_coefficients: lane_rotor_coefficients(
                     &samples,
@@ -147,7 +151,7 @@ impl<T: Lane> OutOfLine for Linearise<'_, T> {
     }
 }
 
-/// Computes stiffness and damping of the tub about the equilibrium `q`, as in [`Constants`].
+/// Computes stiffness and damping of the tub about the equilibrium `q`, as in [`LinearConstants`].
 #[inline(always)]
 pub(crate) fn tub_tangents<T: Lane>(
     machine: &Coefficients<T>,
@@ -161,7 +165,7 @@ pub(crate) fn tub_tangents<T: Lane>(
     let arm = assemble_tub(machine, q, &zeros).chain.arm;
     let dual_machine = machine.constant();
     let mut tangents = [[[zero; 4]; 4]; 2];
-    for (column, &j) in TUB.iter().enumerate() {
+    for (column, &j) in TUB_COORDINATES.iter().enumerate() {
         for (tangent, (dq, du)) in tangents.iter_mut().zip([(1.0, 0.0), (0.0, 1.0)]) {
             let Half { mut chain, .. } = assemble_tub(
                 &dual_machine,
@@ -203,21 +207,23 @@ fn lane_rotor_coefficients<T: Lane>(
 ) -> RotorCoefficients<f64> {
     let entry_coefficients = |entry: usize| {
         let mut coefficients = [0.0; FUNCTIONS];
-        let harmonics_at = |spin_case: usize| {
+        let coefficients_at = |spin_case: usize| {
             harmonics::harmonic_coefficients(samples[spin_case][entry].map(|v| v.0.get(lane)))
         };
-        let values_at_rest = harmonics_at(0);
-        let values_at_speed = harmonics_at(1);
-        let values_at_acceleration = harmonics_at(2);
-        coefficients[harmonics::ONE..harmonics::SPEED].copy_from_slice(&values_at_rest);
-        if (entry::damping(0, 0)..ENTRIES).contains(&entry) {
-            coefficients[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&values_at_speed);
+        let rest_coefficients = coefficients_at(0);
+        let unit_speed_coefficients = coefficients_at(1);
+        let unit_acceleration_coefficients = coefficients_at(2);
+        coefficients[harmonics::CONSTANT..harmonics::SPEED].copy_from_slice(&rest_coefficients);
+        if (rotor_terms::damping_entry(0, 0)..ENTRIES).contains(&entry) {
+            coefficients[harmonics::SPEED..harmonics::SPIN]
+                .copy_from_slice(&unit_speed_coefficients);
         } else {
             for harmonic in 0..HARMONICS {
                 coefficients[harmonics::SPIN + harmonic] =
-                    values_at_speed[harmonic] - values_at_rest[harmonic];
+                    unit_speed_coefficients[harmonic] - rest_coefficients[harmonic];
             }
-            coefficients[harmonics::ACCELERATION] = values_at_acceleration[0] - values_at_rest[0];
+            coefficients[harmonics::ACCELERATION] =
+                unit_acceleration_coefficients[0] - rest_coefficients[0];
         }
         coefficients
     };
@@ -243,7 +249,7 @@ pub struct Matrices {
     pub force: [f64; COORDINATES],
 }
 
-impl LinearPoint {
+impl LinearModel {
     /// Returns the model with another stiffness and damping of the tub.
     pub(crate) fn with_tub_tangents(
         &self,
@@ -261,13 +267,13 @@ impl LinearPoint {
         &self,
         bodies: &Bodies<f64>,
     ) -> [[f64; COORDINATES]; COORDINATES] {
-        let Constants { tub_axis, rotor_axis, .. } = &self.constants;
+        let LinearConstants { tub_axis, rotor_axis, .. } = &self.constants;
         let unit_deflection = |i: usize| {
-            let mut unit = [N(0.0); COORDINATES];
-            unit[i] = N(1.0);
-            Deflection::linear(&unit, tub_axis, rotor_axis)
+            let mut unit_coordinates = [N(0.0); COORDINATES];
+            unit_coordinates[i] = N(1.0);
+            Deflection::linear(&unit_coordinates, tub_axis, rotor_axis)
         };
-        let generalized_force = |i: usize, load: &AxisLoad<f64>| {
+        let generalised_force = |i: usize, load: &AxisLoad<f64>| {
             let Deflection { offset, tilt } = unit_deflection(i);
             let force = load.force[0] * offset[0] + load.force[1] * offset[1];
             -(force + (load.moment[0] * tilt[0] + load.moment[1] * tilt[1])).0
@@ -276,7 +282,7 @@ impl LinearPoint {
         for j in 0..COORDINATES {
             let load = unit_deflection(j).load_on_shaft(bodies);
             for (i, row) in stiffness.iter_mut().enumerate() {
-                row[j] = generalized_force(i, &load);
+                row[j] = generalised_force(i, &load);
             }
         }
         stiffness
@@ -294,13 +300,13 @@ impl LinearPoint {
         let rotor = MassCentreMap {
             midpoint: [SHAFT_Y, SHAFT_Z],
             rotations: ROTOR_ROTATIONS,
-            arm: entry::arms(&entries),
+            arm: rotor_terms::arms(&entries),
         };
         let mut matrices = Matrices {
             mass: [[0.0; COORDINATES]; COORDINATES],
             damping: [[0.0; COORDINATES]; COORDINATES],
             stiffness: self.bearing_stiffness(bodies),
-            force: rotor.generalised_forces(|row| entries[entry::force(row)]),
+            force: rotor.generalised_forces(|row| entries[rotor_terms::force_entry(row)]),
         };
         let mut add_column =
             |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
@@ -312,22 +318,23 @@ impl LinearPoint {
         for column in 0..4 {
             let stiffness = tub.generalised_forces(|row| constants.tub_stiffness[row][column]);
             add_column(
-                TUB[column],
+                TUB_COORDINATES[column],
                 stiffness,
                 tub.generalised_forces(|row| constants.tub_damping[row][column]),
             );
-            let stiffness = rotor.generalised_forces(|row| entries[entry::stiffness(row, column)]);
+            let stiffness =
+                rotor.generalised_forces(|row| entries[rotor_terms::stiffness_entry(row, column)]);
             add_column(
                 ROTOR_ROTATIONS[column],
                 stiffness,
-                rotor.generalised_forces(|row| entries[entry::damping(row, column)]),
+                rotor.generalised_forces(|row| entries[rotor_terms::damping_entry(row, column)]),
             );
         }
         tub.write_mass(&mut matrices.mass, constants.tub_inverse_mass, |r, s| {
             constants.tub_inertia[r][s]
         });
         rotor.write_mass(&mut matrices.mass, constants.rotor_inverse_mass, |r, s| {
-            inertia[entry::inertia(r, s)]
+            inertia[rotor_terms::inertia_entry(r, s)]
         });
         matrices
     }
@@ -374,8 +381,8 @@ impl<const R: usize> MassCentreMap<R> {
         }
         for r in 0..R {
             for s in 0..=r {
-                let product = arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0;
-                let mass_entry = inertia(r, s).0 + mass_kg * product;
+                let arm_product = arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0;
+                let mass_entry = inertia(r, s).0 + mass_kg * arm_product;
                 mass[rotations[r]][rotations[s]] = mass_entry;
                 mass[rotations[s]][rotations[r]] = mass_entry;
             }

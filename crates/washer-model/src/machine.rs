@@ -211,7 +211,7 @@ pub struct Cabinet {
     pub mass_kg: f64,
     pub centre_m: [f64; 3],
     /// The coefficient of friction between feet and floor.
-    pub friction: f64,
+    pub friction_coefficient: f64,
 }
 
 /// A foot of the cabinet.
@@ -255,33 +255,33 @@ impl Machine {
     /// turning forwards.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        let mut mirrored = self.clone();
+        let mut mirror_image = self.clone();
         let negate_z = |position: &mut [f64; 3]| position[2] = -position[2];
-        for spring in &mut mirrored.springs {
+        for spring in &mut mirror_image.springs {
             negate_z(&mut spring.cabinet_m);
             negate_z(&mut spring.tub_m);
         }
-        for damper in &mut mirrored.dampers {
+        for damper in &mut mirror_image.dampers {
             negate_z(&mut damper.cabinet_m);
             negate_z(&mut damper.tub_m);
         }
-        for stop in &mut mirrored.stops {
+        for stop in &mut mirror_image.stops {
             negate_z(&mut stop.tub_m);
             negate_z(&mut stop.direction);
         }
-        for bushing in &mut mirrored.bushings {
+        for bushing in &mut mirror_image.bushings {
             negate_z(&mut bushing.tub_m);
         }
-        for unbalance in mirrored.unbalances_mut() {
+        for unbalance in mirror_image.unbalances_mut() {
             unbalance.angle_deg = -unbalance.angle_deg;
         }
-        for foot in &mut mirrored.feet {
+        for foot in &mut mirror_image.feet {
             negate_z(&mut foot.foot_m);
         }
-        if let Some(cabinet) = &mut mirrored.cabinet {
+        if let Some(cabinet) = &mut mirror_image.cabinet {
             negate_z(&mut cabinet.centre_m);
         }
-        mirrored
+        mirror_image
     }
 
     /// Iterates over all unbalances, beginning with the one that every machine has.

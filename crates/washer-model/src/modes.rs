@@ -6,8 +6,8 @@
 pub(crate) mod campbell;
 pub(crate) mod shape;
 
-use crate::coordinates::{HINGE_PITCH, HINGE_YAW, SHAFT, STATES, TUB};
-use crate::linear::LinearPoint;
+use crate::coordinates::{HINGE_PITCH, HINGE_YAW, SHAFT_COORDINATES, STATES, TUB_COORDINATES};
+use crate::linear::LinearModel;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::BACKWARD_WHIRL_RATIO;
 use crate::{COORDINATES, Caps, Matrices, ModelKind, Point};
@@ -299,14 +299,14 @@ pub(crate) fn highest_capped_frequency_rad_per_s(
 /// The errors of [`modes`].
 pub(crate) fn highest_rigid_frequency_rad_per_s(
     point: &Point,
-    model: &LinearPoint,
+    model: &LinearModel,
 ) -> Result<f64, ModesError> {
     let zero_spin = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &zero_spin);
     let add_rigid_pairs = |matrix: &[[f64; COORDINATES]; COORDINATES]| {
-        Mat::from_fn(TUB.len(), TUB.len(), |i, j| {
-            let [i, k] = [TUB[i], SHAFT[i]];
-            let [j, l] = [TUB[j], SHAFT[j]];
+        Mat::from_fn(TUB_COORDINATES.len(), TUB_COORDINATES.len(), |i, j| {
+            let [i, k] = [TUB_COORDINATES[i], SHAFT_COORDINATES[i]];
+            let [j, l] = [TUB_COORDINATES[j], SHAFT_COORDINATES[j]];
             matrix[i][j] + matrix[i][l] + matrix[k][j] + matrix[k][l]
         })
     };
@@ -331,7 +331,7 @@ struct FirstOrderSystem {
 /// Computes the first-order form at a frozen angle and a spin speed.
 fn first_order_system(
     point: &Point,
-    model: &LinearPoint,
+    model: &LinearModel,
     theta_rad: f64,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,

@@ -18,7 +18,8 @@ pub(crate) mod outputs;
 
 use crate::COORDINATES;
 use crate::coordinates::{
-    HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_YAW, TUB, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
+    HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_YAW, TUB_COORDINATES, TUB_PITCH, TUB_Y, TUB_YAW,
+    TUB_Z,
 };
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
@@ -89,7 +90,7 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
-) -> [[N<T>; COORDINATES]; TUB.len()] {
+) -> [[N<T>; COORDINATES]; TUB_COORDINATES.len()] {
     let (tub, rotor) = assemble_uncoupled_halves(machine, coupling, sag, spin, q, u);
     let tub_factors = LdltFactors::new(tub.inertia);
     let rotor_factors = LdltFactors::new(rotor.inertia);
@@ -100,7 +101,7 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     let mut per_load = [[speed; COORDINATES]; 4];
     // The first pass of the loop has no load, so that the code with and without a load is compiled
     // once.
-    for load_case in 0..=TUB.len() {
+    for load_case in 0..=TUB_COORDINATES.len() {
         let mut chain = tub.chain;
         if load_case > 0 {
             chain.add_unit_force(load_case - 1);
@@ -225,7 +226,7 @@ pub(crate) fn assemble_rotor_in_lanes<T: Lane>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Half<T, 4> {
-    if b.is_skewed.holds() {
+    if b.is_skewed.is_set() {
         let zero = q[0].lit(0.0);
         return zero.0.run_out_of_line(SkewedRotor { b, spin, q, u });
     }

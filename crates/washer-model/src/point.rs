@@ -8,8 +8,8 @@ pub(crate) mod ringing;
 use crate::channel::CHANNELS;
 use crate::coordinates::{TUB_PITCH, TUB_Y};
 use crate::lanes::InLanes as _;
-use crate::linear::outputs::{LinearOutputs, LineariseOutputs};
-use crate::linear::{LinearPoint, Linearise, tub_tangents};
+use crate::linear::outputs::{LinearOutputs, OutputLinearisation};
+use crate::linear::{LinearModel, Linearisation, tub_tangents};
 use crate::machine::feet::Feet;
 use crate::machine::spin::{SpinSegment, SpinState, segment_index};
 use crate::nonlinear::coefficients::Coefficients;
@@ -77,13 +77,13 @@ pub struct Point {
     pub(crate) equilibrium: [f64; COORDINATES],
     /// The channels at the equilibrium (m, rad).
     pub(crate) channels_at_rest: [f64; CHANNELS],
-    pub(crate) linear: LinearPoint,
+    pub(crate) linear: LinearModel,
     pub(crate) linear_outputs: LinearOutputs<f64>,
     /// The speed amplitudes of the dampers with friction.
     pub(crate) friction_speeds: Vec<FrictionSpeed>,
     /// The linear model with the steepest tangents of all elements, which limits explicit steps;
     /// `None` if these are the tangents at equilibrium.
-    pub(crate) steepest_model: Option<Box<LinearPoint>>,
+    pub(crate) steepest_model: Option<Box<LinearModel>>,
     pub(crate) spin_segments: Arc<[SpinSegment]>,
     pub(crate) segments: Arc<[PlannedSegment]>,
     pub(crate) ringing: Ringing,
@@ -274,12 +274,12 @@ impl Kernel for PreparationKernel<'_> {
             let steepest_tangents = steepest_tangents(&machines, &q);
             let viscous_machines: Vec<_> =
                 machines.iter().map(Coefficients::with_viscous_friction).collect();
-            let linear = zero.0.run_out_of_line(Linearise {
+            let linear = zero.0.run_out_of_line(Linearisation {
                 machine: &copy_to_lanes(zero, &viscous_machines),
                 q: &q,
             });
             let linear_outputs =
-                zero.0.run_out_of_line(LineariseOutputs { bodies: &lanes.bodies, q: &q });
+                zero.0.run_out_of_line(OutputLinearisation { bodies: &lanes.bodies, q: &q });
             let zeros = [zero; COORDINATES];
             let rest_coordinates = MovingCoordinates { q, u: zeros, a: zeros };
             let spin_at_rest = SpinState::new((zero, zero.lit(1.0)), zero, zero);

@@ -9,7 +9,7 @@
 //! Friction at speeds below 4 v_s / pi is viscous by its force law, with the damping F / v_s. This
 //! speed is the least amplitude; a damper that sticks has it.
 
-use crate::coordinates::TUB;
+use crate::coordinates::TUB_COORDINATES;
 use crate::modes::{highest_rigid_frequency_rad_per_s, modes};
 use crate::point::{self, plan_segments};
 use crate::steps::round_down_to_bits;
@@ -68,7 +68,7 @@ pub(crate) struct SpeedAmplitudeSearch {
     /// The greatest reciprocals (s/m).
     max_reciprocals: Vec<f64>,
     /// The reciprocals of the previous iteration, and their residuals.
-    previous: Option<[Vec<f64>; 2]>,
+    previous_iteration: Option<[Vec<f64>; 2]>,
     /// The inverse of the residuals' Jacobian, by rows.
     inverse_jacobian: Vec<Vec<f64>>,
 }
@@ -77,26 +77,26 @@ impl SpeedAmplitudeSearch {
     /// Starts a search at the point's friction speeds. Returns `None` if none of them follows from
     /// the motion.
     pub(crate) fn new(point: &Point) -> Option<Self> {
-        let motion_dampers: Vec<_> = point
+        let motion_friction_speeds: Vec<_> = point
             .friction_speeds
             .iter()
             .filter(|friction_speed| friction_speed.is_from_motion)
             .collect();
-        let damper_count = motion_dampers.len();
-        let max_reciprocals: Vec<f64> = motion_dampers
+        let damper_count = motion_friction_speeds.len();
+        let max_reciprocals: Vec<f64> = motion_friction_speeds
             .iter()
             .map(|friction_speed| 1.0 / friction_speed.viscous_limit_m_per_s)
             .collect();
-        let to_first_reciprocal = |(friction_speed, max): (&&FrictionSpeed, &f64)| {
-            max.min(1.0 / friction_speed.speed_m_per_s)
+        let to_first_reciprocal = |(friction_speed, max_reciprocal): (&&FrictionSpeed, &f64)| {
+            max_reciprocal.min(1.0 / friction_speed.speed_m_per_s)
         };
         (damper_count > 0).then(|| Self {
-            reciprocals: motion_dampers
+            reciprocals: motion_friction_speeds
                 .iter()
                 .zip(&max_reciprocals)
                 .map(to_first_reciprocal)
                 .collect(),
-            previous: None,
+            previous_iteration: None,
             inverse_jacobian: (0..damper_count)
                 .map(|i| (0..damper_count).map(|j| if i == j { -1.0 } else { 0.0 }).collect())
                 .collect(),
@@ -122,18 +122,21 @@ impl SpeedAmplitudeSearch {
         let amplitudes = motion_m_per_s.iter().zip(&self.max_reciprocals);
         let residuals: Vec<f64> = amplitudes
             .zip(&self.reciprocals)
-            .map(|((speed, max), current)| (1.0 / speed).min(*max) - current)
+            .map(|((speed, max_reciprocal), current_reciprocal)| {
+                (1.0 / speed).min(*max_reciprocal) - current_reciprocal
+            })
             .collect();
-        if let Some([previous_reciprocals, previous_residuals]) = &self.previous {
+        if let Some([previous_reciprocals, previous_residuals]) = &self.previous_iteration {
             // Broyden's update of the inverse B by the step s and the change y of the residuals:
             // B += (s - B y) (s^T B) / (s^T B y).
-            let s: Vec<f64> = difference(&self.reciprocals, previous_reciprocals);
-            let y = difference(&residuals, previous_residuals);
-            let b_y = self.inverse_jacobian.iter().map(|row| dot(row, &y)).collect::<Vec<_>>();
+            let s: Vec<f64> = subtract(&self.reciprocals, previous_reciprocals);
+            let y = subtract(&residuals, previous_residuals);
+            let b_y =
+                self.inverse_jacobian.iter().map(|row| dot_product(row, &y)).collect::<Vec<_>>();
             let s_b: Vec<f64> = (0..s.len())
                 .map(|j| self.inverse_jacobian.iter().zip(&s).map(|(row, s)| s * row[j]).sum())
                 .collect();
-            let s_b_y = dot(&s_b, &y);
+            let s_b_y = dot_product(&s_b, &y);
             if s_b_y != 0.0 {
                 for (row, (s, b_y)) in self.inverse_jacobian.iter_mut().zip(s.iter().zip(&b_y)) {
                     let factor = (s - b_y) / s_b_y;
@@ -141,24 +144,29 @@ impl SpeedAmplitudeSearch {
                 }
             }
         }
-        let steps: Vec<f64> =
-            self.inverse_jacobian.iter().map(|row| -dot(row, &residuals)).collect();
+        let broyden_steps: Vec<f64> =
+            self.inverse_jacobian.iter().map(|row| -dot_product(row, &residuals)).collect();
         // Dampers that move together may need steps against their own residuals.
-        let relative = |number: f64, k: usize| number / self.reciprocals[k];
-        let step_residual_product = |k: usize| relative(steps[k], k) * relative(residuals[k], k);
-        let follows_residuals = (0..steps.len()).map(step_residual_product).sum::<f64>() > 0.0;
-        let next_reciprocals: Vec<f64> = (0..steps.len())
-            .map(|k| self.next_reciprocal(k, residuals[k], steps[k], follows_residuals))
-            .collect();
-        let changes = difference(&next_reciprocals, &self.reciprocals);
-        let is_small = |differences: &[f64]| {
-            let mut pairs = differences.iter().zip(&self.reciprocals);
-            pairs.all(|(difference, current)| difference.abs() <= SPEED_TOLERANCE * current)
+        let relative_to_current = |number: f64, k: usize| number / self.reciprocals[k];
+        let step_residual_product = |k: usize| {
+            relative_to_current(broyden_steps[k], k) * relative_to_current(residuals[k], k)
         };
-        if is_small(&residuals) && is_small(&changes) {
+        let follows_residuals =
+            (0..broyden_steps.len()).map(step_residual_product).sum::<f64>() > 0.0;
+        let next_reciprocals: Vec<f64> = (0..broyden_steps.len())
+            .map(|k| self.next_reciprocal(k, residuals[k], broyden_steps[k], follows_residuals))
+            .collect();
+        let changes = subtract(&next_reciprocals, &self.reciprocals);
+        let are_small = |differences: &[f64]| {
+            let mut pairs = differences.iter().zip(&self.reciprocals);
+            pairs.all(|(difference, current_reciprocal)| {
+                difference.abs() <= SPEED_TOLERANCE * current_reciprocal
+            })
+        };
+        if are_small(&residuals) && are_small(&changes) {
             return true;
         }
-        self.previous =
+        self.previous_iteration =
             Some([core::mem::replace(&mut self.reciprocals, next_reciprocals), residuals]);
         false
     }
@@ -173,37 +181,42 @@ impl SpeedAmplitudeSearch {
         step: f64,
         follows_residuals: bool,
     ) -> f64 {
-        let current = self.reciprocals[damper];
-        let max = self.max_reciprocals[damper];
-        let next = match (follows_residuals || step * residual > 0.0, residual > 0.0) {
-            // The motion is slower than assumed, and slows down more than the assumed speed does,
-            // and the speed of a fixed point would be negative: the damper sticks.
-            (false, true) if current + step <= 0.0 => max,
-            (false, false) => current + residual,
-            _ => current + step,
-        };
-        if next > 0.0 { next.min(max) } else { 0.5 * current }
+        let current_reciprocal = self.reciprocals[damper];
+        let max_reciprocal = self.max_reciprocals[damper];
+        let unbounded_reciprocal =
+            match (follows_residuals || step * residual > 0.0, residual > 0.0) {
+                // The motion is slower than assumed, and slows down more than the assumed speed
+                // does, and the speed of a fixed point would be negative: the damper sticks.
+                (false, true) if current_reciprocal + step <= 0.0 => max_reciprocal,
+                (false, false) => current_reciprocal + residual,
+                _ => current_reciprocal + step,
+            };
+        if unbounded_reciprocal > 0.0 {
+            unbounded_reciprocal.min(max_reciprocal)
+        } else {
+            0.5 * current_reciprocal
+        }
     }
 
     /// Discards the previous residuals, because those of runs with a finer step are not comparable.
-    fn forget_previous(&mut self) {
-        self.previous = None;
+    fn forget_previous_iteration(&mut self) {
+        self.previous_iteration = None;
     }
 }
 
-fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+fn subtract(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot_product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Selects the speeds of the dampers whose speed amplitude follows from the motion.
-pub(crate) fn motion_speeds(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
-    let motion_dampers =
+pub(crate) fn select_motion_speeds(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
+    let motion_friction_speeds =
         point.friction_speeds.iter().filter(|friction_speed| friction_speed.is_from_motion);
-    motion_dampers.map(|friction_speed| speeds_m_per_s[friction_speed.damper]).collect()
+    motion_friction_speeds.map(|friction_speed| speeds_m_per_s[friction_speed.damper]).collect()
 }
 
 /// A point and the search for its speed amplitudes.
@@ -231,7 +244,7 @@ pub fn prepare(
     points: &[(Machine, Spin)],
     timing: &Timing,
 ) -> Vec<Result<Point, NoEquilibrium>> {
-    let mut prepared = point::prepare(points, timing);
+    let mut prepared_points = point::prepare(points, timing);
     let timing_to_window = Timing { end_s: timing.window_s[1], checkpoints: 0, ..*timing };
     let to_point_search = |(index, point): (usize, &Result<Point, NoEquilibrium>)| {
         let point = point.as_ref().ok()?;
@@ -258,48 +271,49 @@ pub fn prepare(
         })
     };
     let mut point_searches: Vec<PointSearch> =
-        prepared.iter().enumerate().filter_map(to_point_search).collect();
+        prepared_points.iter().enumerate().filter_map(to_point_search).collect();
     let recorders = Recorders::gauge(Gauge::DamperSpeed);
     for _ in 0..MAX_RUNS {
-        let mut unfinished: Vec<&mut PointSearch> =
+        let mut unfinished_searches: Vec<&mut PointSearch> =
             point_searches.iter_mut().filter(|point_search| !point_search.is_finished).collect();
-        unfinished.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));
+        unfinished_searches.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));
         // Points with equal steps run in one batch.
-        for batch in unfinished.chunk_by_mut(|a, b| a.step_s == b.step_s) {
+        for batch in unfinished_searches.chunk_by_mut(|a, b| a.step_s == b.step_s) {
             let step_s = batch[0].step_s;
-            let cap = CAP_STABILITY_SHARE * RK4_STABILITY_LIMIT / step_s;
-            let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
+            let cap_rad_per_s = CAP_STABILITY_SHARE * RK4_STABILITY_LIMIT / step_s;
+            let caps =
+                Caps { bearings_rad_per_s: cap_rad_per_s, hinge_rad_per_s: Some(cap_rad_per_s) };
             let method = Method::capped(MethodKind::Capped0, step_s, caps);
             let batch_points: Vec<&Point> =
                 batch.iter().map(|point_search| &point_search.point).collect();
             let simd = simd.narrowed(batch_points.len());
-            let (_, readings) =
+            let (_, gauge_readings) =
                 simulate_with(simd, ModelKind::Linear, &method, &batch_points, recorders);
-            for (point_search, reading) in batch.iter_mut().zip(readings) {
+            for (point_search, reading) in batch.iter_mut().zip(gauge_readings) {
                 point_search.update(reading.gauge(Gauge::DamperSpeed));
             }
         }
     }
     for PointSearch { index, search, .. } in point_searches {
-        if let Ok(point) = &mut prepared[index] {
+        if let Ok(point) = &mut prepared_points[index] {
             *point = point.with_motion_friction_speeds(&search.speeds_m_per_s());
         }
     }
-    for point in prepared.iter_mut().flatten() {
+    for point in prepared_points.iter_mut().flatten() {
         if point.ringing.depends_on_decay() && !point.machine.elements.has_nonsmooth_force() {
             let decay_per_s = ringing_decay_per_s(point);
             point.ringing.set_decay(decay_per_s);
         }
     }
-    prepared
+    prepared_points
 }
 
 /// Returns the rate at which the swing of hinge and bearings decays while the drum stands (1/s),
 /// that of their slowest mode; zero if the modes are unknown.
 fn ringing_decay_per_s(point: &Point) -> f64 {
     let Ok(modes) = modes(point, 0.0, 0.0) else { return 0.0 };
-    let decays = modes.modes[TUB.len()..].iter().map(|mode| -mode.re_per_s);
-    let slowest_per_s = decays.fold(f64::INFINITY, f64::min);
+    let decays_per_s = modes.modes[TUB_COORDINATES.len()..].iter().map(|mode| -mode.re_per_s);
+    let slowest_per_s = decays_per_s.fold(f64::INFINITY, f64::min);
     // The last digits of an eigenvalue depend on the processor.
     round_down_to_bits(slowest_per_s.max(0.0), DECAY_BITS)
 }
@@ -313,11 +327,11 @@ impl PointSearch {
             self.is_finished = self.step_s < self.min_step_s;
             return;
         }
-        if self.search.update(&motion_speeds(&self.point, speeds_m_per_s)) {
+        if self.search.update(&select_motion_speeds(&self.point, speeds_m_per_s)) {
             self.is_finished = self.has_fine_step;
             self.has_fine_step = true;
             self.step_s *= FINE_STEP_SHARE;
-            self.search.forget_previous();
+            self.search.forget_previous_iteration();
         }
         self.point = self.point.with_motion_friction_speeds(&self.search.speeds_m_per_s());
     }

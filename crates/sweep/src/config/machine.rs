@@ -218,9 +218,9 @@ static SECTIONS: LazyLock<Vec<MachineSection>> = LazyLock::new(|| {
         count: |machine| usize::from(machine.cabinet.is_some()),
         fill: |machine, count| machine.cabinet = (count > 0).then(Cabinet::default),
     };
-    let to_section = |&ElementList { name, element, first, count, fill, .. }: &_| {
-        let occurrence = Occurrence::Many(first);
-        MachineSection { name, prefix: format!("{element}_"), occurrence, count, fill }
+    let to_section = |&ElementList { name, element_name, first_number, count, resize, .. }: &_| {
+        let occurrence = Occurrence::Many(first_number);
+        MachineSection { name, prefix: format!("{element_name}_"), occurrence, count, fill: resize }
     };
     let single_sections =
         ["", "tub", "shaft", "drum", "unbalance", "flexure", "bearings"].map(single_section);

@@ -21,7 +21,7 @@ pub(crate) fn schema_of_set() -> Value {
     let mut patterns = Map::new();
     for parameter in parameters.iter().flatten() {
         let name = &parameter.name;
-        let lists = ElementList::all().map(|list| (list.element, list.first));
+        let lists = ElementList::all().map(|list| (list.element_name, list.first_number));
         let mut lists = lists.chain([("spin_table", 1)]);
         let suffix_after = |element| name.strip_prefix(element)?.strip_prefix('_');
         match lists.find_map(|(element, first)| Some((element, first, suffix_after(element)?))) {

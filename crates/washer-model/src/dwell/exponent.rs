@@ -3,7 +3,7 @@
 
 use super::starts::largest_deviation;
 use super::turns::{HeldState, integrate_turns};
-use crate::coordinates::{COORDINATES, STATES, TUB};
+use crate::coordinates::{COORDINATES, STATES, TUB_COORDINATES};
 use crate::stability::period_map::TurnSetup;
 use core::f64::consts::TAU;
 use lane_ode::Simd;
@@ -49,7 +49,7 @@ pub(super) fn distance(setup: &TurnSetup<'_>, a: &[f64; STATES], b: &[f64; STATE
         let j = COORDINATES + i;
         (a[i] - b[i]).abs() + (a[j] - b[j]).abs() / speed_rad_per_s
     };
-    TUB.iter().map(difference).fold(0.0, f64::max)
+    TUB_COORDINATES.iter().map(difference).fold(0.0, f64::max)
 }
 
 /// Returns the largest Lyapunov exponents of trajectories from `requests`: initial states, each

@@ -1,6 +1,6 @@
 //! The starts of trajectories: perturbed periodic responses, and kicks.
 
-use crate::coordinates::{STATES, TUB, TUB_PITCH, TUB_YAW};
+use crate::coordinates::{STATES, TUB_COORDINATES, TUB_PITCH, TUB_YAW};
 use crate::modes::shape;
 use crate::stability::round_last_digits;
 use crate::steps::SUSPENSION_MODES;
@@ -31,7 +31,7 @@ pub(super) type Directions = Vec<[f64; COORDINATES]>;
 /// Returns the largest deviation of the tub's coordinates from equilibrium (m, rad), at least 1e-4.
 pub(super) fn largest_deviation(point: &Point, state: &[f64; STATES]) -> f64 {
     let equilibrium = point.equilibrium();
-    TUB.iter().map(|&i| (state[i] - equilibrium[i]).abs()).fold(1e-4, f64::max)
+    TUB_COORDINATES.iter().map(|&i| (state[i] - equilibrium[i]).abs()).fold(1e-4, f64::max)
 }
 
 /// Returns a state that is perturbed in each of the suspension's modes.
@@ -39,7 +39,8 @@ pub(super) fn perturb(point: &Point, frozen_modes: &Modes, state: &[f64; STATES]
     let size = PERTURBATION * largest_deviation(point, state);
     let mut perturbed = *state;
     for mode in &frozen_modes.modes[..SUSPENSION_MODES] {
-        let max_displacement = TUB.iter().map(|&i| mode.shape[i][0].abs()).fold(0.0, f64::max);
+        let max_displacement =
+            TUB_COORDINATES.iter().map(|&i| mode.shape[i][0].abs()).fold(0.0, f64::max);
         for i in 0..COORDINATES {
             perturbed[i] += size * round_last_digits(mode.shape[i][0] / max_displacement);
         }

@@ -18,19 +18,19 @@ pub(crate) const SAMPLE_ANGLES: [(f64, f64); HARMONICS] = [
 /// Computes the coefficients of 1, cos, sin, cos 2, sin 2 from values at [`SAMPLE_ANGLES`] (a
 /// discrete Fourier transform).
 pub(crate) fn harmonic_coefficients(values: [f64; HARMONICS]) -> [f64; HARMONICS] {
-    let mut c = [0.0; HARMONICS];
+    let mut coefficients = [0.0; HARMONICS];
     for (k, value) in values.into_iter().enumerate() {
         let (cos, sin) = SAMPLE_ANGLES[k];
         let (cos_2, sin_2) = SAMPLE_ANGLES[2 * k % HARMONICS];
-        for (c, basis) in c.iter_mut().zip([0.5, cos, sin, cos_2, sin_2]) {
-            *c = (0.4 * value).mul_add(basis, *c);
+        for (coefficient, basis) in coefficients.iter_mut().zip([0.5, cos, sin, cos_2, sin_2]) {
+            *coefficient = (0.4 * value).mul_add(basis, *coefficient);
         }
     }
-    c
+    coefficients
 }
 
 /// The index of the constant function 1.
-pub(crate) const ONE: usize = 0;
+pub(crate) const CONSTANT: usize = 0;
 /// The index of cos theta.
 pub(crate) const COS: usize = 1;
 /// The index of sin theta.
@@ -70,21 +70,21 @@ pub(crate) const FUNCTIONS: usize = 16;
 pub(crate) fn spin_functions<T: Real>(spin: &SpinState<T>) -> [N<T>; FUNCTIONS] {
     let SpinState { sin, cos, sin_2, cos_2, speed, acceleration, .. } = *spin;
     let speed_squared = (speed * speed).v();
-    let mut f = [sin.lit(1.0); FUNCTIONS];
-    f[COS] = cos;
-    f[SIN] = sin;
-    f[COS_2] = cos_2;
-    f[SIN_2] = sin_2;
-    f[SPEED] = speed;
-    f[SPEED_COS] = (speed * cos).v();
-    f[SPEED_SIN] = (speed * sin).v();
-    f[SPEED_COS_2] = (speed * cos_2).v();
-    f[SPEED_SIN_2] = (speed * sin_2).v();
-    f[SPIN] = speed_squared;
-    f[SPIN_COS] = speed_squared * cos + acceleration * sin;
-    f[SPIN_SIN] = speed_squared * sin - acceleration * cos;
-    f[SPIN_COS_2] = speed_squared * cos_2 + acceleration * sin_2;
-    f[SPIN_SIN_2] = speed_squared * sin_2 - acceleration * cos_2;
-    f[ACCELERATION] = acceleration;
-    f
+    let mut functions = [sin.lit(1.0); FUNCTIONS];
+    functions[COS] = cos;
+    functions[SIN] = sin;
+    functions[COS_2] = cos_2;
+    functions[SIN_2] = sin_2;
+    functions[SPEED] = speed;
+    functions[SPEED_COS] = (speed * cos).v();
+    functions[SPEED_SIN] = (speed * sin).v();
+    functions[SPEED_COS_2] = (speed * cos_2).v();
+    functions[SPEED_SIN_2] = (speed * sin_2).v();
+    functions[SPIN] = speed_squared;
+    functions[SPIN_COS] = speed_squared * cos + acceleration * sin;
+    functions[SPIN_SIN] = speed_squared * sin - acceleration * cos;
+    functions[SPIN_COS_2] = speed_squared * cos_2 + acceleration * sin_2;
+    functions[SPIN_SIN_2] = speed_squared * sin_2 - acceleration * cos_2;
+    functions[ACCELERATION] = acceleration;
+    functions
 }

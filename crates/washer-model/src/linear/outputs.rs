@@ -87,14 +87,14 @@ const fn channel_entry(channel: Channel, harmonic_part: usize) -> usize {
 }
 
 /// The components of the radial distance that have harmonics of theta, which are both.
-const HARMONIC_RADIAL: [usize; RADIAL_COMPONENTS] = [0, 1];
+const HARMONIC_RADIAL_COMPONENTS: [usize; RADIAL_COMPONENTS] = [0, 1];
 /// The number of entries of the radial distance's terms.
 const RADIAL_ENTRIES: usize = 3 * RADIAL_COMPONENTS;
 /// The entries of the radial distance's parts of order zero, which are all.
 const RADIAL_REST_ENTRIES: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
 
 const fn radial_entry(component: usize, harmonic_part: usize) -> usize {
-    entry_index(component, harmonic_part, &HARMONIC_RADIAL, RADIAL_COMPONENTS)
+    entry_index(component, harmonic_part, &HARMONIC_RADIAL_COMPONENTS, RADIAL_COMPONENTS)
 }
 
 sparse_sums! {
@@ -113,13 +113,13 @@ lane_struct! {
     /// The coefficients of the outputs, for one machine in `f64`, for one machine per lane in `T`.
     #[derive(Clone, Debug)]
     LinearOutputs {
-        channels: ChannelTerms<T>,
-        channels_at_rest: [N<T>; CHANNEL_REST_ENTRIES.len()],
-        radial: RadialTerms<T>,
-        radial_at_rest: [N<T>; RADIAL_REST_ENTRIES.len()],
+        channel_terms: ChannelTerms<T>,
+        channel_rest_values: [N<T>; CHANNEL_REST_ENTRIES.len()],
+        radial_terms: RadialTerms<T>,
+        radial_rest_values: [N<T>; RADIAL_REST_ENTRIES.len()],
         /// The terms that only skewed drums have, by entry, then column.
-        further_channels: FurtherTerms<T>,
-        further_radial: FurtherTerms<T>,
+        further_channel_terms: FurtherTerms<T>,
+        further_radial_terms: FurtherTerms<T>,
     }
 }
 
@@ -128,24 +128,30 @@ impl<T: Lane> LinearOutputs<T> {
     #[inline(always)]
     pub(crate) fn channels(&self, motion: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
         let mut sums = [[motion.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
-        self.channels.sum(&motion.coordinates, &mut sums);
-        add_rest_values(&mut sums, CHANNEL_REST_ENTRIES, &self.channels_at_rest);
-        if !self.further_channels.is_empty() {
-            self.further_channels.add(&motion.columns(), &mut sums);
+        self.channel_terms.sum(&motion.coordinates, &mut sums);
+        add_rest_values(&mut sums, CHANNEL_REST_ENTRIES, &self.channel_rest_values);
+        if !self.further_channel_terms.is_empty() {
+            self.further_channel_terms.add(&motion.columns(), &mut sums);
         }
         motion.combine_harmonics::<CHANNEL_ENTRIES, CHANNELS>(sums, HARMONIC_CHANNELS)
     }
 
     /// Computes the position of the drum's front centre relative to the tub axis, along t2 and t3.
     #[inline(always)]
-    pub(crate) fn radial(&self, motion: &LinearMotion<T>) -> [Sample<T>; RADIAL_COMPONENTS] {
+    pub(crate) fn radial_position(
+        &self,
+        motion: &LinearMotion<T>,
+    ) -> [Sample<T>; RADIAL_COMPONENTS] {
         let mut sums = [[motion.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
-        self.radial.sum(&motion.coordinates, &mut sums);
-        add_rest_values(&mut sums, &RADIAL_REST_ENTRIES, &self.radial_at_rest);
-        if !self.further_radial.is_empty() {
-            self.further_radial.add(&motion.columns(), &mut sums);
+        self.radial_terms.sum(&motion.coordinates, &mut sums);
+        add_rest_values(&mut sums, &RADIAL_REST_ENTRIES, &self.radial_rest_values);
+        if !self.further_radial_terms.is_empty() {
+            self.further_radial_terms.add(&motion.columns(), &mut sums);
         }
-        motion.combine_harmonics::<RADIAL_ENTRIES, RADIAL_COMPONENTS>(sums, &HARMONIC_RADIAL)
+        motion.combine_harmonics::<RADIAL_ENTRIES, RADIAL_COMPONENTS>(
+            sums,
+            &HARMONIC_RADIAL_COMPONENTS,
+        )
     }
 }
 
@@ -244,12 +250,12 @@ fn multiply_derivatives<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
 }
 
 /// The linearisation of the outputs of one machine per lane about the equilibrium `q`.
-pub(crate) struct LineariseOutputs<'a, T> {
+pub(crate) struct OutputLinearisation<'a, T> {
     pub(crate) bodies: &'a Bodies<T>,
     pub(crate) q: &'a [N<T>; COORDINATES],
 }
 
-impl<T: Lane> OutOfLine for LineariseOutputs<'_, T> {
+impl<T: Lane> OutOfLine for OutputLinearisation<'_, T> {
     type Output = Vec<LinearOutputs<f64>>;
 
     #[inline(always)]
@@ -266,7 +272,7 @@ impl<T: Lane> OutOfLine for LineariseOutputs<'_, T> {
                     MovingCoordinates { q: with_derivative(q, j, 1.0), u: zeros, a: zeros };
                 let axes = Axes::new(&spin, &motion);
                 let channels = axes.channels(&dual_bodies, &motion);
-                let radial = axes.radial(&dual_bodies, &motion);
+                let radial = axes.radial_position(&dual_bodies, &motion);
                 for (output, y) in channels.iter().chain(&radial).enumerate() {
                     samples[k][output][REST_COLUMN] = N(y.value.0.value);
                     samples[k][output][j] = N(y.value.0.slope);
@@ -286,10 +292,10 @@ fn select_lane_coefficients(
     samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3],
     is_skewed: bool,
 ) -> LinearOutputs<f64> {
-    let mut channels = [[0.0; COORDINATES]; CHANNEL_ENTRIES];
-    let mut channels_at_rest = [0.0; CHANNEL_ENTRIES];
-    let mut radial = [[0.0; COORDINATES]; RADIAL_ENTRIES];
-    let mut radial_at_rest = [0.0; RADIAL_ENTRIES];
+    let mut channel_terms = [[0.0; COORDINATES]; CHANNEL_ENTRIES];
+    let mut channel_rest_values = [0.0; CHANNEL_ENTRIES];
+    let mut radial_terms = [[0.0; COORDINATES]; RADIAL_ENTRIES];
+    let mut radial_rest_values = [0.0; RADIAL_ENTRIES];
     for output in 0..OUTPUTS {
         for column in 0..COLUMNS {
             let values = samples.map(|sample| sample[output][column].0);
@@ -304,10 +310,10 @@ fn select_lane_coefficients(
             {
                 let (entry, terms, at_rest) = if output >= CHANNELS {
                     let entry = radial_entry(output - CHANNELS, harmonic_part);
-                    (entry, &mut radial[..], &mut radial_at_rest[..])
+                    (entry, &mut radial_terms[..], &mut radial_rest_values[..])
                 } else if harmonic_part == 0 || HARMONIC_CHANNELS.contains(&output) {
                     let entry = entry_index(output, harmonic_part, HARMONIC_CHANNELS, CHANNELS);
-                    (entry, &mut channels[..], &mut channels_at_rest[..])
+                    (entry, &mut channel_terms[..], &mut channel_rest_values[..])
                 } else {
                     continue;
                 };
@@ -319,17 +325,17 @@ fn select_lane_coefficients(
             }
         }
     }
-    let [further_channels, further_radial] = if is_skewed {
+    let [further_channel_terms, further_radial_terms] = if is_skewed {
         [
             select_further_terms(
-                &channels,
-                &channels_at_rest,
+                &channel_terms,
+                &channel_rest_values,
                 &ChannelTerms::POSITIONS,
                 CHANNEL_REST_ENTRIES,
             ),
             select_further_terms(
-                &radial,
-                &radial_at_rest,
+                &radial_terms,
+                &radial_rest_values,
                 &RadialTerms::POSITIONS,
                 &RADIAL_REST_ENTRIES,
             ),
@@ -338,12 +344,12 @@ fn select_lane_coefficients(
         [FurtherTerms::NONE, FurtherTerms::NONE]
     };
     LinearOutputs {
-        further_channels,
-        further_radial,
-        channels: ChannelTerms::select_coefficients(&channels),
-        channels_at_rest: from_fn(|k| N(channels_at_rest[CHANNEL_REST_ENTRIES[k]])),
-        radial: RadialTerms::select_coefficients(&radial),
-        radial_at_rest: RADIAL_REST_ENTRIES.map(|entry| N(radial_at_rest[entry])),
+        further_channel_terms,
+        further_radial_terms,
+        channel_terms: ChannelTerms::select_coefficients(&channel_terms),
+        channel_rest_values: from_fn(|k| N(channel_rest_values[CHANNEL_REST_ENTRIES[k]])),
+        radial_terms: RadialTerms::select_coefficients(&radial_terms),
+        radial_rest_values: RADIAL_REST_ENTRIES.map(|entry| N(radial_rest_values[entry])),
     }
 }
 

@@ -7,8 +7,8 @@
 
 use crate::lanes::lane_struct;
 use crate::linear::harmonics::{
-    ACCELERATION, COS, COS_2, FUNCTIONS, ONE, SIN, SIN_2, SPEED, SPEED_COS, SPEED_COS_2, SPEED_SIN,
-    SPEED_SIN_2, SPIN, SPIN_COS, SPIN_COS_2, SPIN_SIN, SPIN_SIN_2,
+    ACCELERATION, CONSTANT, COS, COS_2, FUNCTIONS, SIN, SIN_2, SPEED, SPEED_COS, SPEED_COS_2,
+    SPEED_SIN, SPEED_SIN_2, SPIN, SPIN_COS, SPIN_COS_2, SPIN_SIN, SPIN_SIN_2,
 };
 use crate::linear::sparse::{FurtherTerms, sparse_sums};
 use lane_ode::{Lane, N};
@@ -33,17 +33,17 @@ pub(crate) const ENTRIES: usize = FIRST_DAMPING + ROWS * ROTATIONS;
 pub(crate) const INERTIA_ENTRIES: usize = ROTATIONS * (ROTATIONS + 1) / 2;
 
 /// Returns the entry of the inertia about the mass centre, for `row` not less than `column`.
-pub(crate) const fn inertia(row: usize, column: usize) -> usize {
+pub(crate) const fn inertia_entry(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
 
 /// Returns the entry of the mass centre's partial velocity by a rotation, along y (0) or z (1).
-pub(crate) const fn arm(rotation: usize, direction: usize) -> usize {
+pub(crate) const fn arm_entry(rotation: usize, direction: usize) -> usize {
     FIRST_ARM + 2 * rotation + direction
 }
 
 /// Returns the entry of the force.
-pub(crate) const fn force(row: usize) -> usize {
+pub(crate) const fn force_entry(row: usize) -> usize {
     FIRST_FORCE + row
 }
 
@@ -54,12 +54,12 @@ pub(crate) const fn depends_on_rotation(row: usize, column: usize) -> bool {
 }
 
 /// Returns the entry of the stiffness matrix.
-pub(crate) const fn stiffness(row: usize, column: usize) -> usize {
+pub(crate) const fn stiffness_entry(row: usize, column: usize) -> usize {
     FIRST_STIFFNESS + row * ROTATIONS + column
 }
 
 /// Returns the entry of the damping and gyroscopic matrix.
-pub(crate) const fn damping(row: usize, column: usize) -> usize {
+pub(crate) const fn damping_entry(row: usize, column: usize) -> usize {
     FIRST_DAMPING + row * ROTATIONS + column
 }
 
@@ -68,10 +68,10 @@ lane_struct! {
     /// lane in `T`.
     #[derive(Clone, Debug)]
     RotorCoefficients {
-        inertia: InertiaTerms<T>,
-        loads: RotorTerms<T>,
-        further_inertia: FurtherTerms<T>,
-        further_loads: FurtherTerms<T>,
+        inertia_terms: InertiaTerms<T>,
+        load_terms: RotorTerms<T>,
+        further_inertia_terms: FurtherTerms<T>,
+        further_load_terms: FurtherTerms<T>,
     }
 }
 
@@ -83,16 +83,16 @@ impl<T: Lane> RotorCoefficients<T> {
         functions: &[N<T>; FUNCTIONS],
         sums: &mut [N<T>; INERTIA_ENTRIES],
     ) {
-        self.inertia.sum(functions, sums);
-        self.further_inertia.add(functions, sums);
+        self.inertia_terms.sum(functions, sums);
+        self.further_inertia_terms.add(functions, sums);
     }
 
     /// Computes the entries of arms, force, stiffness and damping from the functions of the spin at
     /// an instant.
     #[inline(always)]
     pub(crate) fn sum_loads(&self, functions: &[N<T>; FUNCTIONS], sums: &mut [N<T>; ENTRIES]) {
-        self.loads.sum(functions, sums);
-        self.further_loads.add(functions, sums);
+        self.load_terms.sum(functions, sums);
+        self.further_load_terms.add(functions, sums);
     }
 }
 
@@ -104,15 +104,16 @@ impl RotorCoefficients<f64> {
         is_skewed: bool,
     ) -> Self {
         let mut terms = Self {
-            inertia: InertiaTerms::select_coefficients(inertia),
-            loads: RotorTerms::select_coefficients(loads),
-            further_inertia: FurtherTerms::NONE,
-            further_loads: FurtherTerms::NONE,
+            inertia_terms: InertiaTerms::select_coefficients(inertia),
+            load_terms: RotorTerms::select_coefficients(loads),
+            further_inertia_terms: FurtherTerms::NONE,
+            further_load_terms: FurtherTerms::NONE,
         };
         if is_skewed {
-            terms.further_inertia =
+            terms.further_inertia_terms =
                 FurtherTerms::select_coefficients(inertia, &InertiaTerms::POSITIONS);
-            terms.further_loads = FurtherTerms::select_coefficients(loads, &RotorTerms::POSITIONS);
+            terms.further_load_terms =
+                FurtherTerms::select_coefficients(loads, &RotorTerms::POSITIONS);
         }
         terms
     }
@@ -136,7 +137,7 @@ impl RotorCoefficients<f64> {
 pub(crate) fn arms<T: Copy>(entries: &[N<T>; ENTRIES]) -> [[N<T>; 2]; ROTATIONS] {
     let mut arms = [[entries[0]; 2]; ROTATIONS];
     for r in 0..ROTATIONS {
-        arms[r] = [entries[arm(r, 0)], entries[arm(r, 1)]];
+        arms[r] = [entries[arm_entry(r, 0)], entries[arm_entry(r, 1)]];
     }
     arms
 }
@@ -144,78 +145,78 @@ pub(crate) fn arms<T: Copy>(entries: &[N<T>; ENTRIES]) -> [[N<T>; 2]; ROTATIONS]
 sparse_sums! {
     /// The coefficients of the inertia's terms.
     InertiaTerms: FUNCTIONS => INERTIA_ENTRIES;
-    inertia(0, 0) => ONE COS SIN COS_2 SIN_2;
-    inertia(1, 0) => ONE COS SIN COS_2 SIN_2;
-    inertia(1, 1) => ONE COS COS_2;
-    inertia(2, 0) => ONE COS SIN COS_2 SIN_2;
-    inertia(2, 1) => ONE COS SIN COS_2 SIN_2;
-    inertia(2, 2) => ONE COS_2 SIN_2;
-    inertia(3, 0) => ONE COS SIN COS_2 SIN_2;
-    inertia(3, 1) => ONE COS SIN COS_2 SIN_2;
-    inertia(3, 2) => COS SIN COS_2 SIN_2;
-    inertia(3, 3) => ONE COS SIN COS_2 SIN_2;
+    inertia_entry(0, 0) => CONSTANT COS SIN COS_2 SIN_2;
+    inertia_entry(1, 0) => CONSTANT COS SIN COS_2 SIN_2;
+    inertia_entry(1, 1) => CONSTANT COS COS_2;
+    inertia_entry(2, 0) => CONSTANT COS SIN COS_2 SIN_2;
+    inertia_entry(2, 1) => CONSTANT COS SIN COS_2 SIN_2;
+    inertia_entry(2, 2) => CONSTANT COS_2 SIN_2;
+    inertia_entry(3, 0) => CONSTANT COS SIN COS_2 SIN_2;
+    inertia_entry(3, 1) => CONSTANT COS SIN COS_2 SIN_2;
+    inertia_entry(3, 2) => COS SIN COS_2 SIN_2;
+    inertia_entry(3, 3) => CONSTANT COS SIN COS_2 SIN_2;
 }
 
 sparse_sums! {
     /// The coefficients of the terms of arms, force, stiffness and damping.
     RotorTerms: FUNCTIONS => ENTRIES;
-    arm(0, 1) => ONE COS SIN;
-    arm(1, 0) => ONE COS;
-    arm(1, 1) => ONE COS;
-    arm(2, 0) => SIN;
-    arm(2, 1) => COS SIN;
-    arm(3, 0) => ONE COS;
-    arm(3, 1) => ONE COS SIN;
-    force(0) => SPIN_COS;
-    force(1) => SPIN_COS SPIN_SIN;
-    force(2) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    force(3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    force(4) => SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    force(5) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
-    stiffness(0, 1) => SPIN_COS;
-    stiffness(0, 2) => SPIN_SIN;
-    stiffness(0, 3) => SPIN_COS;
-    stiffness(1, 0) => SPIN_COS SPIN_SIN;
-    stiffness(1, 1) => SPIN_COS;
-    stiffness(1, 2) => SPIN_COS SPIN_SIN;
-    stiffness(1, 3) => SPIN_COS SPIN_SIN;
-    stiffness(2, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
-    stiffness(2, 1) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(2, 2) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(2, 3) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(3, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(3, 1) => ONE COS SPIN SPIN_COS SPIN_COS_2;
-    stiffness(3, 2) => SIN SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(3, 3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(4, 0) => SPIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(4, 1) => SIN SPIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(4, 2) => ONE SPIN SPIN_COS_2 SPIN_SIN_2;
-    stiffness(4, 3) => SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(5, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(5, 1) => ONE COS SPIN SPIN_COS SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(5, 2) => SIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
-    stiffness(5, 3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
-    damping(0, 1) => SPEED_SIN;
-    damping(0, 2) => SPEED_COS;
-    damping(0, 3) => SPEED_SIN;
-    damping(1, 0) => SPEED_COS SPEED_SIN;
-    damping(1, 1) => SPEED_SIN;
-    damping(1, 2) => SPEED_COS SPEED_SIN;
-    damping(1, 3) => SPEED_COS SPEED_SIN;
-    damping(2, 0) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(2, 1) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(2, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(2, 3) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(3, 0) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(3, 1) => SPEED_SIN SPEED_SIN_2;
-    damping(3, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(3, 3) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(4, 0) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(4, 1) => SPEED SPEED_COS SPEED_COS_2 SPEED_SIN_2;
-    damping(4, 2) => SPEED_COS_2 SPEED_SIN_2;
-    damping(4, 3) => SPEED SPEED_COS_2 SPEED_SIN_2;
-    damping(5, 0) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(5, 1) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(5, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
-    damping(5, 3) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    arm_entry(0, 1) => CONSTANT COS SIN;
+    arm_entry(1, 0) => CONSTANT COS;
+    arm_entry(1, 1) => CONSTANT COS;
+    arm_entry(2, 0) => SIN;
+    arm_entry(2, 1) => COS SIN;
+    arm_entry(3, 0) => CONSTANT COS;
+    arm_entry(3, 1) => CONSTANT COS SIN;
+    force_entry(0) => SPIN_COS;
+    force_entry(1) => SPIN_COS SPIN_SIN;
+    force_entry(2) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force_entry(3) => CONSTANT COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force_entry(4) => SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force_entry(5) => CONSTANT COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness_entry(0, 1) => SPIN_COS;
+    stiffness_entry(0, 2) => SPIN_SIN;
+    stiffness_entry(0, 3) => SPIN_COS;
+    stiffness_entry(1, 0) => SPIN_COS SPIN_SIN;
+    stiffness_entry(1, 1) => SPIN_COS;
+    stiffness_entry(1, 2) => SPIN_COS SPIN_SIN;
+    stiffness_entry(1, 3) => SPIN_COS SPIN_SIN;
+    stiffness_entry(2, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness_entry(2, 1) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(2, 2) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(2, 3) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(3, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(3, 1) => CONSTANT COS SPIN SPIN_COS SPIN_COS_2;
+    stiffness_entry(3, 2) => SIN SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(3, 3) => CONSTANT COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(4, 0) => SPIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(4, 1) => SIN SPIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(4, 2) => CONSTANT SPIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness_entry(4, 3) => SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(5, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(5, 1) => CONSTANT COS SPIN SPIN_COS SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(5, 2) => SIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness_entry(5, 3) => CONSTANT COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    damping_entry(0, 1) => SPEED_SIN;
+    damping_entry(0, 2) => SPEED_COS;
+    damping_entry(0, 3) => SPEED_SIN;
+    damping_entry(1, 0) => SPEED_COS SPEED_SIN;
+    damping_entry(1, 1) => SPEED_SIN;
+    damping_entry(1, 2) => SPEED_COS SPEED_SIN;
+    damping_entry(1, 3) => SPEED_COS SPEED_SIN;
+    damping_entry(2, 0) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(2, 1) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(2, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(2, 3) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(3, 0) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(3, 1) => SPEED_SIN SPEED_SIN_2;
+    damping_entry(3, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(3, 3) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(4, 0) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(4, 1) => SPEED SPEED_COS SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(4, 2) => SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(4, 3) => SPEED SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(5, 0) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(5, 1) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(5, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping_entry(5, 3) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
 }

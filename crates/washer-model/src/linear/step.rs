@@ -6,13 +6,13 @@
 //! earlier, so that few operations wait for the accelerations of the stage before.
 
 use crate::COORDINATES;
-use crate::coordinates::{HINGE_PITCH, HINGE_YAW, ROTOR_ROTATIONS, STATES, TUB};
+use crate::coordinates::{HINGE_PITCH, HINGE_YAW, ROTOR_ROTATIONS, STATES, TUB_COORDINATES};
 use crate::lanes::lane_struct;
 use crate::linear::rotor_terms::{
-    self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients,
+    self as rotor_terms, ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients,
 };
 use crate::linear::symmetric::Symmetric4;
-use crate::linear::{Constants, harmonics};
+use crate::linear::{LinearConstants, harmonics};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::coupling::{Coupling, HingeMass, mass_scaled_system};
@@ -24,8 +24,8 @@ lane_struct! {
     /// The constants of one machine that the stages read; `N<f64>` for one, `N<T>` for one per
     /// lane.
     ///
-    /// The tub's accelerations are in the order of `TUB`; loads are forces (y, z) and moments (y,
-    /// z) on the shaft's axis.
+    /// The tub's accelerations are in the order of `TUB_COORDINATES`; loads are forces (y, z) and
+    /// moments (y, z) on the shaft's axis.
     #[derive(Clone, Copy, Debug)]
     StepConstants {
         tub_acceleration_per_position: [[N<T>; 4]; 4],
@@ -46,7 +46,7 @@ lane_struct! {
 
 impl StepConstants<f64> {
     /// Computes the constants of a machine.
-    pub(crate) fn new(bodies: &Bodies<f64>, linear: &Constants<f64>) -> Self {
+    pub(crate) fn new(bodies: &Bodies<f64>, linear: &LinearConstants<f64>) -> Self {
         let zero = N(0.0);
         let inertia = LdltFactors::new(linear.tub_inertia);
         // Computes the tub's accelerations from forces and torques about its mass centre and from
@@ -197,26 +197,26 @@ impl<T: Lane> RotorArrays<T> {
         rotor_coefficients.sum_loads(&functions, &mut self.entries);
         // The inverse is a long chain of dependent operations. It comes last, because a stage
         // begins with operations that do not need it.
-        let mut sums = [zero; INERTIA_ENTRIES];
-        rotor_coefficients.sum_inertia(&functions, &mut sums);
+        let mut inertia_entries = [zero; INERTIA_ENTRIES];
+        rotor_coefficients.sum_inertia(&functions, &mut inertia_entries);
         let mut inertia = [[zero; 4]; 4];
         for row in 0..4 {
             for column in 0..=row {
-                inertia[row][column] = sums[entry::inertia(row, column)];
+                inertia[row][column] = inertia_entries[rotor_terms::inertia_entry(row, column)];
             }
         }
         if let Some(mass) = hinge_mass {
             for (index, r) in [2, 3].into_iter().enumerate() {
                 inertia[r][r] += mass.inertia;
-                self.entries[entry::force(2 + r)] += mass.torque[index];
+                self.entries[rotor_terms::force_entry(2 + r)] += mass.torque[index];
             }
-            self.entries[entry::damping(4, 3)] -= mass.torque_per_speed;
-            self.entries[entry::damping(5, 2)] += mass.torque_per_speed;
+            self.entries[rotor_terms::damping_entry(4, 3)] -= mass.torque_per_speed;
+            self.entries[rotor_terms::damping_entry(5, 2)] += mass.torque_per_speed;
         }
         self.inverse_inertia = Symmetric4(inertia).inverse();
         if let Coupling::MassScaled(scaling) = coupling {
             let cap_squared = scaling.bearings_squared;
-            let arms = entry::arms(&self.entries);
+            let arms = rotor_terms::arms(&self.entries);
             let (rotor, compliance) =
                 RotorLoadResponse::new(constants, &self.inverse_inertia, &arms);
             let system = bearing_system(constants, cap_squared, &compliance);
@@ -376,7 +376,7 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     let rotor_arrays =
         RotorArrays::new(constants, &Coupling::Springs, rotor_coefficients, spin, Some(hinge_mass));
     let mut halves = HalfAccelerations::new(constants, &rotor_arrays, None, q, u);
-    let arms = entry::arms(&rotor_arrays.entries);
+    let arms = rotor_terms::arms(&rotor_arrays.entries);
     let (accelerations_per_load, compliance) =
         RotorLoadResponse::new(constants, &rotor_arrays.inverse_inertia, &arms);
     let inverse_g_squared = g_squared.recip();
@@ -418,20 +418,22 @@ impl<T: Lane> HalfAccelerations<T> {
     ) -> Self {
         let mut tub = [q[0]; 4];
         for row in 0..4 {
-            tub[row] = (constants.tub_acceleration_per_position[row][0] * q[TUB[0]]).v();
+            tub[row] =
+                (constants.tub_acceleration_per_position[row][0] * q[TUB_COORDINATES[0]]).v();
             for column in 1..4 {
-                tub[row] += constants.tub_acceleration_per_position[row][column] * q[TUB[column]];
+                tub[row] += constants.tub_acceleration_per_position[row][column]
+                    * q[TUB_COORDINATES[column]];
             }
         }
         let entries = &rotor_arrays.entries;
-        let arm = entry::arms(entries);
+        let arm = rotor_terms::arms(entries);
         let mut rotor = [q[0]; ROWS];
         for row in 0..ROWS {
-            rotor[row] = entries[entry::force(row)];
+            rotor[row] = entries[rotor_terms::force_entry(row)];
             for column in 0..4 {
-                if entry::depends_on_rotation(row, column) {
-                    rotor[row] -=
-                        entries[entry::stiffness(row, column)] * q[ROTOR_ROTATIONS[column]];
+                if rotor_terms::depends_on_rotation(row, column) {
+                    rotor[row] -= entries[rotor_terms::stiffness_entry(row, column)]
+                        * q[ROTOR_ROTATIONS[column]];
                 }
             }
         }
@@ -456,13 +458,15 @@ impl<T: Lane> HalfAccelerations<T> {
         }
         for row in 0..4 {
             for column in 0..4 {
-                tub[row] += constants.tub_acceleration_per_speed[row][column] * u[TUB[column]];
+                tub[row] +=
+                    constants.tub_acceleration_per_speed[row][column] * u[TUB_COORDINATES[column]];
             }
         }
         for row in 0..ROWS {
             for column in 0..4 {
-                if entry::depends_on_rotation(row, column) {
-                    rotor[row] -= entries[entry::damping(row, column)] * u[ROTOR_ROTATIONS[column]];
+                if rotor_terms::depends_on_rotation(row, column) {
+                    rotor[row] -= entries[rotor_terms::damping_entry(row, column)]
+                        * u[ROTOR_ROTATIONS[column]];
                 }
             }
         }

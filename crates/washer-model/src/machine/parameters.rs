@@ -12,7 +12,7 @@ pub use assumed::{Assumption, DataSheet, ExpectedRange};
 pub use sweep_parameter::{Range, UnknownParameter, decimal, unit_suffix};
 
 use crate::{BumpStop, Damper, Machine, Spin, Spring};
-use table::{LISTS, TABLE};
+use table::{ELEMENT_LISTS, SINGLE_ENTRIES};
 
 /// A number of the machine, the spin or the window that a user can name, set and sweep.
 ///
@@ -21,7 +21,7 @@ use table::{LISTS, TABLE};
 #[derive(Clone)]
 pub struct MachineParameter {
     name: Cow<'static, str>,
-    row: &'static ParameterRow,
+    entry: &'static ParameterEntry,
     /// The index of the element, from 0; 0 for a number that does not belong to a list.
     index: usize,
 }
@@ -54,9 +54,9 @@ pub enum Target {
     Window(usize),
 }
 
-/// A row of the table: the properties of a parameter, which elements of a list share.
+/// An entry of the table: the properties of a parameter, which elements of a list share.
 #[derive(Debug)]
-struct ParameterRow {
+struct ParameterEntry {
     /// The name, or the part of the name after `spring_1_` and the like.
     name: &'static str,
     unit: &'static str,
@@ -84,34 +84,39 @@ type Setter = fn(&mut Machine, &mut Spin, usize, f64);
 pub struct ElementList {
     /// The key in machine files; empty for a spin's table.
     pub name: &'static str,
-    /// The beginning of the parameters' names, before the number and the row's name.
-    pub element: &'static str,
+    /// The beginning of the parameters' names, before the number and the entry's name.
+    pub element_name: &'static str,
     /// The number of the first element in parameters' names: 2 for unbalances, else 1.
-    pub first: usize,
+    pub first_number: usize,
     /// The function that returns the number of elements of a machine.
     pub count: fn(&Machine) -> usize,
     /// The function that replaces a machine's elements by a number of elements with default values.
-    pub fill: fn(&mut Machine, usize),
-    rows: &'static [&'static [ParameterRow]],
+    pub resize: fn(&mut Machine, usize),
+    entries: &'static [&'static [ParameterEntry]],
 }
 
 impl ElementList {
     /// Iterates over the lists of a machine, in the order of machine files.
     pub fn all() -> impl Iterator<Item = &'static Self> {
-        LISTS.iter().filter(|list| !list.name.is_empty())
+        ELEMENT_LISTS.iter().filter(|list| !list.name.is_empty())
     }
 
     fn element_count(&self, machine: &Machine, spin: &Spin) -> usize {
         if self.name.is_empty() { table_point_count(spin) } else { (self.count)(machine) }
     }
 
-    fn rows(&self) -> impl Iterator<Item = &'static ParameterRow> {
-        self.rows.iter().copied().flatten()
+    fn entries(&self) -> impl Iterator<Item = &'static ParameterEntry> {
+        self.entries.iter().copied().flatten()
     }
 
-    fn parameter(&self, row: &'static ParameterRow, index: usize) -> MachineParameter {
-        let name = Cow::Owned(format!("{}_{}_{}", self.element, index + self.first, row.name));
-        MachineParameter { name, row, index }
+    fn element_parameter(&self, entry: &'static ParameterEntry, index: usize) -> MachineParameter {
+        let name = Cow::Owned(format!(
+            "{}_{}_{}",
+            self.element_name,
+            index + self.first_number,
+            entry.name
+        ));
+        MachineParameter { name, entry, index }
     }
 }
 
@@ -153,11 +158,12 @@ impl MachineParameter {
     /// Returns every parameter of a machine and a spin in the table's order, those of lists element
     /// by element.
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
-        let exists = |row: &&ParameterRow| row.target.check_exists(machine, spin).is_ok();
-        let single_parameters = TABLE.iter().filter(exists).map(Self::from_row);
-        let list_parameters = LISTS.iter().flat_map(|list| {
-            (0..list.element_count(machine, spin))
-                .flat_map(move |k| list.rows().map(move |row| list.parameter(row, k)))
+        let exists = |entry: &&ParameterEntry| entry.target.check_exists(machine, spin).is_ok();
+        let single_parameters = SINGLE_ENTRIES.iter().filter(exists).map(Self::from_entry);
+        let list_parameters = ELEMENT_LISTS.iter().flat_map(|list| {
+            (0..list.element_count(machine, spin)).flat_map(move |k| {
+                list.entries().map(move |entry| list.element_parameter(entry, k))
+            })
         });
         single_parameters.chain(list_parameters).collect()
     }
@@ -167,24 +173,25 @@ impl MachineParameter {
     /// # Errors
     /// A name that the table does not have, or a number that the machine or the spin does not have.
     pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
-        if let Some(row) = TABLE.iter().find(|row| row.name == name) {
-            return row.target.check_exists(machine, spin).map(|()| Self::from_row(row));
+        if let Some(entry) = SINGLE_ENTRIES.iter().find(|entry| entry.name == name) {
+            return entry.target.check_exists(machine, spin).map(|()| Self::from_entry(entry));
         }
-        for list in LISTS {
-            if let Some((number, name_after_number)) = split_numbered_name(name, list.element) {
-                let row = list
-                    .rows()
-                    .find(|row| row.name == name_after_number)
+        for list in ELEMENT_LISTS {
+            if let Some((number, name_after_number)) = split_numbered_name(name, list.element_name)
+            {
+                let entry = list
+                    .entries()
+                    .find(|entry| entry.name == name_after_number)
                     .ok_or_else(UnknownParameter::in_no_model)?;
                 let count = list.element_count(machine, spin);
-                return match number.checked_sub(list.first) {
-                    Some(k) if k < count => Ok(list.parameter(row, k)),
+                return match number.checked_sub(list.first_number) {
+                    Some(k) if k < count => Ok(list.element_parameter(entry, k)),
                     _ => {
                         let (owner, noun) = match list.name {
                             "" => ("the spin's table", "point"),
-                            _ => ("the machine", list.element),
+                            _ => ("the machine", list.element_name),
                         };
-                        let last_number = list.first + count - 1;
+                        let last_number = list.first_number + count - 1;
                         let element_count_text =
                             format!("{owner} has {last_number} {}", plural(noun, last_number));
                         Err(UnknownParameter::in_other_models(format!(
@@ -204,23 +211,23 @@ impl MachineParameter {
 
     /// Returns the SI unit (rpm for speeds of the spin).
     pub fn unit(&self) -> &'static str {
-        self.row.unit
+        self.entry.unit
     }
 
     pub fn description(&self) -> &'static str {
-        self.row.description
+        self.entry.description
     }
 
     /// Returns the source of the built-in machine's value: a place in the paper, `derived` or
     /// `assumed` with the reason, a convention, or the grid file.
     pub fn source(&self) -> &'static str {
-        self.row.source
+        self.entry.source
     }
 
     /// Returns the range of values. Coordinates are at most `MAX_COORDINATE_M`, so that
     /// millimetres are refused.
     pub fn range(&self) -> Range {
-        match (self.row.unit, self.row.range) {
+        match (self.entry.unit, self.entry.range) {
             ("m", Range::Any) => Range::Within(-MAX_COORDINATE_M, MAX_COORDINATE_M),
             ("m", Range::NonNegative) => Range::Within(0.0, MAX_COORDINATE_M),
             (_, range) => range,
@@ -229,28 +236,28 @@ impl MachineParameter {
 
     /// Returns the value if a machine file leaves the number out; `None` if the number is required.
     pub fn default_value(&self) -> Option<f64> {
-        self.row.default_value
+        self.entry.default_value
     }
 
     /// Returns the rule for the value if a file with a data sheet's numbers leaves the number out.
     pub fn assumption(&self) -> Option<&'static Assumption> {
-        self.row.assumption.as_ref()
+        self.entry.assumption.as_ref()
     }
 
     pub fn target(&self) -> Target {
-        self.row.target
+        self.entry.target
     }
 
     /// Returns the value; `None` for several numbers that differ, and for a number that the machine
     /// does not have.
     pub fn get(&self, machine: &Machine, spin: &Spin) -> Option<f64> {
-        (self.row.get)(machine, spin, self.index)
+        (self.entry.get)(machine, spin, self.index)
     }
 
     /// Writes the value without a check: [`Machine::violations`] checks the machine as a whole. A
     /// number that the machine does not have is ignored; [`MachineParameter::find`] refuses it.
     pub fn set(&self, machine: &mut Machine, spin: &mut Spin, value: f64) {
-        (self.row.set)(machine, spin, self.index, value);
+        (self.entry.set)(machine, spin, self.index, value);
     }
 
     /// Returns the names of the single numbers that the parameter writes.
@@ -258,7 +265,7 @@ impl MachineParameter {
         let numbered_names = |count: usize, element: &str, number: &str| {
             (1..=count).map(|k| format!("{element}_{k}_{number}").into()).collect()
         };
-        match self.row.target {
+        match self.entry.target {
             Target::Bearings(number) => {
                 ["front", "rear"].map(|end| format!("bearing_{end}_{number}").into()).into()
             }
@@ -270,8 +277,8 @@ impl MachineParameter {
         }
     }
 
-    fn from_row(row: &'static ParameterRow) -> Self {
-        Self { name: Cow::Borrowed(row.name), row, index: 0 }
+    fn from_entry(entry: &'static ParameterEntry) -> Self {
+        Self { name: Cow::Borrowed(entry.name), entry, index: 0 }
     }
 }
 
@@ -304,8 +311,8 @@ fn split_numbered_name<'a>(name: &'a str, element: &str) -> Option<(usize, &'a s
 
 /// Returns the value that all items share; `None` if items differ or are missing.
 fn common_value<T>(items: &[T], value: fn(&T) -> f64) -> Option<f64> {
-    let first = value(items.first()?);
-    items.iter().all(|item| value(item).to_bits() == first.to_bits()).then_some(first)
+    let first_value = value(items.first()?);
+    items.iter().all(|item| value(item).to_bits() == first_value.to_bits()).then_some(first_value)
 }
 
 impl Spring {

@@ -95,13 +95,13 @@ pub(crate) type SpinSegment = SpinSegmentLanes<f64>;
 
 impl SpinSegment {
     /// Returns the segment of a drum at constant speed, with its unbalance up at time 0.
-    pub(crate) fn steady(speed_rpm: f64) -> Self {
+    pub(crate) fn at_constant_speed(speed_rpm: f64) -> Self {
         Self { turns_per_s: N(speed_rpm / 60.0), ..Self::at_rest(0.0, 0.0) }
     }
 
     /// Returns the acceleration at a time within the segment.
     pub(crate) fn acceleration_rad_per_s2(&self, t_s: f64) -> f64 {
-        self.at(N(t_s)).acceleration.0
+        self.state_at(N(t_s)).acceleration.0
     }
 
     /// Whether the drum stands throughout the segment.
@@ -111,38 +111,46 @@ impl SpinSegment {
 
     /// Returns the speed at a time within the segment.
     pub(crate) fn speed_rad_per_s(&self, t_s: f64) -> f64 {
-        self.at(N(t_s)).speed.0
+        self.state_at(N(t_s)).speed.0
     }
 }
 
 impl Spin {
     /// Returns the spin as segments in order of time; the first starts at 0.
     pub(crate) fn segments(&self) -> Vec<SpinSegment> {
-        let per_s = |rpm: f64| rpm / 60.0;
+        let to_turns_per_s = |rpm: f64| rpm / 60.0;
         match self {
             Self::Ramped { profile: Profile::Cycloidal, peak_rpm, ramp_s } => {
-                let peak = per_s(*peak_rpm);
+                let peak_turns_per_s = to_turns_per_s(*peak_rpm);
                 // Eq. 42 integrated: theta = w (t^2 / 2T + T (cos(2 pi t / T) - 1) / 4 pi^2).
-                let ramp = SpinSegment {
-                    turns_per_s2: N(peak / (2.0 * ramp_s)),
-                    wave_turns: N(peak * ramp_s / (TAU * TAU)),
+                let ramp_segment = SpinSegment {
+                    turns_per_s2: N(peak_turns_per_s / (2.0 * ramp_s)),
+                    wave_turns: N(peak_turns_per_s * ramp_s / (TAU * TAU)),
                     wave_hz: N(1.0 / ramp_s),
                     ..SpinSegment::at_rest(0.0, 0.0)
                 };
-                let turns = ramp.turns_at_start.0 + ramp_fractional_turns(0.0, peak, *ramp_s);
-                let plateau =
-                    SpinSegment { turns_per_s: N(peak), ..SpinSegment::at_rest(*ramp_s, turns) };
-                vec![ramp, plateau]
+                let ramp_turns = ramp_segment.turns_at_start.0
+                    + ramp_fractional_turns(0.0, peak_turns_per_s, *ramp_s);
+                let plateau_segment = SpinSegment {
+                    turns_per_s: N(peak_turns_per_s),
+                    ..SpinSegment::at_rest(*ramp_s, ramp_turns)
+                };
+                vec![ramp_segment, plateau_segment]
             }
-            Self::Ramped { profile: Profile::Triangular, peak_rpm, ramp_s } => {
-                linear_segments(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm)), (2.0 * ramp_s, 0.0)])
-            }
+            Self::Ramped { profile: Profile::Triangular, peak_rpm, ramp_s } => linear_segments(&[
+                (0.0, 0.0),
+                (*ramp_s, to_turns_per_s(*peak_rpm)),
+                (2.0 * ramp_s, 0.0),
+            ]),
             Self::Ramped { profile: Profile::Ramp, peak_rpm, ramp_s } => {
-                linear_segments(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm))])
+                linear_segments(&[(0.0, 0.0), (*ramp_s, to_turns_per_s(*peak_rpm))])
             }
             Self::Table { time_s, speed_rpm } => {
-                let points: Vec<_> =
-                    time_s.iter().zip(speed_rpm).map(|(&t, &rpm)| (t, per_s(rpm))).collect();
+                let points: Vec<_> = time_s
+                    .iter()
+                    .zip(speed_rpm)
+                    .map(|(&t, &rpm)| (t, to_turns_per_s(rpm)))
+                    .collect();
                 linear_segments(&points)
             }
         }
@@ -150,24 +158,28 @@ impl Spin {
 
     /// Returns the greatest speed from 0 to `end_s`, rad/s.
     pub fn max_speed_rad_per_s(&self, end_s: f64) -> f64 {
-        let starts: Vec<f64> = self.segments().iter().map(|segment| segment.start_s.0).collect();
-        let times_s = starts.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);
+        let segment_starts_s: Vec<f64> =
+            self.segments().iter().map(|segment| segment.start_s.0).collect();
+        let times_s = segment_starts_s.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);
         self.speeds_rpm(times_s).map(f64::abs).fold(0.0, f64::max) * TAU / 60.0
     }
 
     /// Returns the speeds at times (rpm).
     pub fn speeds_rpm(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
-        self.at(times_s).map(|spin| spin.speed.0 * 60.0 / TAU)
+        self.states_at(times_s).map(|spin| spin.speed.0 * 60.0 / TAU)
     }
 
     /// Returns the angles of the drum at times (rad), from 0, where the unbalance is up, to a turn.
     pub fn angles_rad(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
-        self.at(times_s).map(|spin| spin.sin.0.atan2(spin.cos.0).rem_euclid(TAU))
+        self.states_at(times_s).map(|spin| spin.sin.0.atan2(spin.cos.0).rem_euclid(TAU))
     }
 
-    fn at(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = SpinState<f64>> {
+    fn states_at(
+        &self,
+        times_s: impl IntoIterator<Item = f64>,
+    ) -> impl Iterator<Item = SpinState<f64>> {
         let segments = self.segments();
-        times_s.into_iter().map(move |t_s| segments[segment_index(&segments, t_s)].at(N(t_s)))
+        times_s.into_iter().map(move |t_s| segments[segment_index(&segments, t_s)].state_at(N(t_s)))
     }
 }
 
@@ -178,11 +190,11 @@ pub(crate) fn segment_index(segments: &[SpinSegment], t_s: f64) -> usize {
 
 /// Returns the fractional part of the turns made in a ramp between two speeds (turns/s).
 fn ramp_fractional_turns(start_speed: f64, end_speed: f64, duration_s: f64) -> f64 {
-    let mean = 0.5 * (start_speed + end_speed);
-    let turns = mean * duration_s;
+    let mean_speed = 0.5 * (start_speed + end_speed);
+    let turns = mean_speed * duration_s;
     // The rounding error of the product is added to the fractional part, because it is too small to
     // change the whole product.
-    (turns - turns.round_ties_even()) + mean.mul_add(duration_s, -turns)
+    (turns - turns.round_ties_even()) + mean_speed.mul_add(duration_s, -turns)
 }
 
 /// Returns the segments between points (s, turns/s), with constant speed beyond the last.
@@ -219,34 +231,35 @@ impl SpinSegment {
 impl<T: Lane> SpinSegmentLanes<T> {
     /// Computes the spin at a time.
     #[inline(always)]
-    pub(crate) fn at(&self, t_s: N<T>) -> SpinState<T> {
+    pub(crate) fn state_at(&self, t_s: N<T>) -> SpinState<T> {
         let t = t_s - self.start_s;
         // turns = t (a + b t) in twofold arithmetic, with the rounding errors of both products and
         // of the sum, so that the fractional part is exact for any number of turns.
         let bt = (self.turns_per_s2 * t).v();
         let bt_error = self.turns_per_s2 * t - bt;
-        let slope = self.turns_per_s + bt;
-        let slope_error = {
+        let mean_rate = self.turns_per_s + bt;
+        let mean_rate_error = {
             // Knuth's two-sum.
-            let rounded_bt = slope - self.turns_per_s;
-            (self.turns_per_s - (slope - rounded_bt)) + (bt - rounded_bt)
+            let rounded_bt = mean_rate - self.turns_per_s;
+            (self.turns_per_s - (mean_rate - rounded_bt)) + (bt - rounded_bt)
         };
-        let product = (slope * t).v();
-        let remainder = (slope * t - product) + (bt_error + slope_error) * t;
-        let mut turns = (product - N(product.0.round())) + (remainder + self.turns_at_start);
-        let mut turn_rate = slope + bt;
+        let rounded_turns = (mean_rate * t).v();
+        let turns_error = (mean_rate * t - rounded_turns) + (bt_error + mean_rate_error) * t;
+        let mut turns =
+            (rounded_turns - N(rounded_turns.0.round())) + (turns_error + self.turns_at_start);
+        let mut turn_rate = mean_rate + bt;
         let mut turn_acceleration = self.turns_per_s2 + self.turns_per_s2;
         let zero = t.lit(0.0);
         // Only cycloidal ramps have the term of the cosine, which is skipped if no lane has it.
         if T::bits(zero.0.less(self.wave_hz.0)) != 0 {
             let phase = (self.wave_hz * t).v();
             let (sin, cos) = trig::sin_cos_turns(phase);
-            let rate = (TAU * (self.wave_turns * self.wave_hz).v()).v();
+            let wave_rate = (TAU * (self.wave_turns * self.wave_hz).v()).v();
             turns += self.wave_turns * (cos - 1.0);
-            turn_rate -= rate * sin;
-            turn_acceleration -= (TAU * (rate * self.wave_hz).v()).v() * cos;
+            turn_rate -= wave_rate * sin;
+            turn_acceleration -= (TAU * (wave_rate * self.wave_hz).v()).v() * cos;
         }
-        let angle = trig::sin_cos_turns(turns);
-        SpinState::new(angle, (TAU * turn_rate).v(), (TAU * turn_acceleration).v())
+        let sin_cos = trig::sin_cos_turns(turns);
+        SpinState::new(sin_cos, (TAU * turn_rate).v(), (TAU * turn_acceleration).v())
     }
 }

@@ -10,9 +10,9 @@ use crate::{Machine, MachineParameter, Range, Spin, decimal};
 const MIN_DISTANCE_M: f64 = 1e-6;
 
 /// The range of times of a spin table, s.
-const TABLE_TIMES: Range = Range::NonNegative;
+const TABLE_TIME_RANGE_S: Range = Range::NonNegative;
 /// The range of speeds of a spin table, rpm, which is also the range of `spin_peak_rpm`.
-const TABLE_SPEEDS: Range = Range::Within(-1e5, 1e5);
+const TABLE_SPEED_RANGE_RPM: Range = Range::Within(-1e5, 1e5);
 
 /// A reason why a machine or a spin is impossible.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -88,20 +88,23 @@ impl Machine {
             ("shaft", self.shaft.inertia_kg_m2),
             ("drum", self.drum.inertia_kg_m2),
         ] {
-            let largest =
-                (1..3).fold(0, |g, i| if moments_kg_m2[i] > moments_kg_m2[g] { i } else { g });
-            let sum: f64 = moments_kg_m2.iter().sum();
+            let largest_axis = (1..3).fold(0, |greatest, i| {
+                if moments_kg_m2[i] > moments_kg_m2[greatest] { i } else { greatest }
+            });
+            let moment_sum: f64 = moments_kg_m2.iter().sum();
             // A thin disc reaches equality, which rounding must not violate.
-            if moments_kg_m2[largest] > (sum - moments_kg_m2[largest]) * (1.0 + 1e-9) {
-                let axes = 11 * (largest + 1);
-                let moment = decimal(moments_kg_m2[largest]);
-                let sum_of_others = format_rounded(sum - moments_kg_m2[largest]);
+            if moments_kg_m2[largest_axis]
+                > (moment_sum - moments_kg_m2[largest_axis]) * (1.0 + 1e-9)
+            {
+                let axis_number = 11 * (largest_axis + 1);
+                let moment_text = decimal(moments_kg_m2[largest_axis]);
+                let sum_of_others = format_rounded(moment_sum - moments_kg_m2[largest_axis]);
                 joint_violations.push(Violation::new(
                     format!(
-                        "no rigid body has the {body}'s inertia: I{axes} = {moment} exceeds the \
-                         other two's sum, {sum_of_others}"
+                        "no rigid body has the {body}'s inertia: I{axis_number} = {moment_text} \
+                         exceeds the other two's sum, {sum_of_others}"
                     ),
-                    [11, 22, 33].map(|axes| format!("{body}_inertia_{axes}_kg_m2")),
+                    [11, 22, 33].map(|axis_number| format!("{body}_inertia_{axis_number}_kg_m2")),
                     "each moment at most the sum of the other two",
                 ));
             }
@@ -112,12 +115,13 @@ impl Machine {
             if length_m < MIN_DISTANCE_M {
                 let number = k + 1;
                 let length_m = format_rounded(length_m);
-                let end = |end: &str| component_names(&format!("{element}_{number}_{end}_"), "_m");
+                let end_names =
+                    |end: &str| component_names(&format!("{element}_{number}_{end}_"), "_m");
                 joint_violations.push(Violation::new(
                     format!(
                         "the ends of {element} {number} are {length_m} m apart: it has no direction"
                     ),
-                    ["tub", "cabinet"].into_iter().flat_map(end),
+                    ["tub", "cabinet"].into_iter().flat_map(end_names),
                     format!("ends at least {MIN_DISTANCE_M:e} m apart"),
                 ));
             }
@@ -169,11 +173,11 @@ impl Machine {
                         "a section [cabinet] with mass_kg, centre_m and friction, or no [[feet]]"
                     }
                 };
-                let feet =
+                let foot_parameters =
                     (1..=count).flat_map(|foot| component_names(&format!("foot_{foot}_"), "_m"));
                 joint_violations.push(Violation::new(
                     feet_title(count, has_cabinet),
-                    feet,
+                    foot_parameters,
                     expected,
                 ));
             }
@@ -183,13 +187,13 @@ impl Machine {
             for (k, unbalance) in self.unbalances().enumerate() {
                 if unbalance.mass_kg != 0.0 && unbalance.radius_m == 0.0 {
                     let number = k + 1;
-                    let name_number = if k == 0 { String::new() } else { format!("{number}_") };
+                    let number_prefix = if k == 0 { String::new() } else { format!("{number}_") };
                     joint_violations.push(Violation::new(
                         format!(
                             "unbalance {number} is on the drum's axis and unbalances nothing, \
                              beside others"
                         ),
-                        [format!("unbalance_{name_number}radius_m")],
+                        [format!("unbalance_{number_prefix}radius_m")],
                         "a distance from the axis, negative on the other side; a mass on the axis \
                          belongs to the drum",
                     ));
@@ -217,7 +221,7 @@ impl Machine {
 /// Returns the violations of single numbers. Parameters of several numbers are skipped, because
 /// each of their numbers has a parameter of its own.
 fn range_violations(machine: &Machine, spin: &Spin) -> Vec<Violation> {
-    let check = |parameter: MachineParameter| {
+    let find_violation = |parameter: MachineParameter| {
         let name = parameter.name();
         let value = parameter.get(machine, spin)?;
         let range = parameter.range();
@@ -227,7 +231,7 @@ fn range_violations(machine: &Machine, spin: &Spin) -> Vec<Violation> {
         let title = format!("{name} = {} is out of range", decimal(value));
         Some(Violation::new(title, [name.to_owned()], range.describe_for(value)))
     };
-    MachineParameter::all(machine, spin).into_iter().filter_map(check).collect()
+    MachineParameter::all(machine, spin).into_iter().filter_map(find_violation).collect()
 }
 
 impl Spin {
@@ -251,21 +255,23 @@ impl Spin {
                 "as many speeds as times, at least one of each",
             ));
         }
-        for (column, values, range) in
-            [("time_s", time_s, TABLE_TIMES), ("speed_rpm", speed_rpm, TABLE_SPEEDS)]
-        {
+        for (column, values, range) in [
+            ("time_s", time_s, TABLE_TIME_RANGE_S),
+            ("speed_rpm", speed_rpm, TABLE_SPEED_RANGE_RPM),
+        ] {
             let out_of_range_values =
                 values.iter().enumerate().filter(|(_, value)| !range.contains(**value));
             violations.extend(out_of_range_values.map(|(index, &value)| {
-                let number = decimal(value);
-                let entry = index + 1;
+                let value_text = decimal(value);
+                let entry_number = index + 1;
                 let expected = match column {
                     "time_s" => range.describe_for(value),
                     _ => range.to_string(),
                 };
                 Violation::new(
                     format!(
-                        "{column} = {number} (entry {entry}) of the spin table is out of range"
+                        "{column} = {value_text} (entry {entry_number}) of the spin table is out \
+                         of range"
                     ),
                     [format!("spin_{column}[{index}]")],
                     expected,
@@ -273,7 +279,7 @@ impl Spin {
             }));
         }
         if let Some(&time_s) = time_s.first()
-            && TABLE_TIMES.contains(time_s)
+            && TABLE_TIME_RANGE_S.contains(time_s)
             && time_s != 0.0
         {
             violations.push(Violation::new(
@@ -284,8 +290,8 @@ impl Spin {
         }
         for (k, pair) in time_s.windows(2).enumerate() {
             if let &[before_s, time_s] = pair
-                && TABLE_TIMES.contains(before_s)
-                && TABLE_TIMES.contains(time_s)
+                && TABLE_TIME_RANGE_S.contains(before_s)
+                && TABLE_TIME_RANGE_S.contains(time_s)
                 && time_s <= before_s
             {
                 violations.push(Violation::new(

@@ -1,7 +1,7 @@
 //! The coefficients of the equations, one machine per lane.
 
 use crate::Machine;
-use crate::lanes::{InAnyLane, lane_struct};
+use crate::lanes::{AnyLaneFlag, lane_struct};
 use crate::nonlinear::elements::Elements;
 use lane_ode::{Lane, N};
 
@@ -52,7 +52,7 @@ lane_struct! {
         drum_i23: N<T>,
         /// True if a drum has an unbalance outside the plane of d1 and d2. Otherwise `rho_3`,
         /// `drum_i13` and `drum_i23` are zero, and the equations skip their terms.
-        is_skewed: InAnyLane<T>,
+        is_skewed: AnyLaneFlag<T>,
         flexure_stiffness: N<T>,
         bearing_front: N<T>, bearing_rear: N<T>, front_stiffness: N<T>, rear_stiffness: N<T>,
         /// The inverse of the bearings' stiffness matrix over (offset, tilt) of their midpoint.
@@ -155,7 +155,7 @@ impl Bodies<f64> {
             drum_i12: N(i12 - mu * rho_1 * rho_2),
             drum_i13: N(i13 - mu * rho_1 * rho_3),
             drum_i23: N(i23 - mu * rho_2 * rho_3),
-            is_skewed: InAnyLane::new(is_skewed),
+            is_skewed: AnyLaneFlag::new(is_skewed),
             flexure_stiffness: N(flexure.stiffness_n_m_per_rad),
             bearing_front: N(bearings.front_x_m),
             bearing_rear: N(bearings.rear_x_m),

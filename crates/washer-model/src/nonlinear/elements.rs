@@ -9,8 +9,8 @@
 pub(crate) mod bounds;
 pub(crate) mod corners;
 
-use crate::coordinates::{COORDINATES, TUB};
-use crate::lanes::{InAnyLane, lane_struct};
+use crate::coordinates::{COORDINATES, TUB_COORDINATES};
+use crate::lanes::{AnyLaneFlag, lane_struct};
 use crate::nonlinear::frame::{Tilt, Vec3, add, add_cross_product, dot, scale, subtract};
 use crate::{BumpStop, Bushing, Damper, Machine, Spring};
 use core::f64::consts::PI;
@@ -25,12 +25,12 @@ lane_struct! {
         stops: Vec<StopCoefficients<T>>,
         bushings: Vec<BushingCoefficients<T>>,
         /// True if a machine has springs with a cubic term.
-        has_cubic_springs: InAnyLane<T>,
+        has_cubic_springs: AnyLaneFlag<T>,
         /// True if a machine has dampers with friction or outer damping.
-        has_friction: InAnyLane<T>,
+        has_friction: AnyLaneFlag<T>,
         /// True if a machine has optional forces: cubic springs, friction, stops or bushings.
         /// Without them the equations skip their evaluation.
-        has_optional_forces: InAnyLane<T>,
+        has_optional_forces: AnyLaneFlag<T>,
     }
 }
 
@@ -47,9 +47,9 @@ impl Elements<f64> {
             dampers: machine.dampers.iter().map(DamperCoefficients::new).collect(),
             stops: machine.stops.iter().map(StopCoefficients::new).collect(),
             bushings: machine.bushings.iter().map(BushingCoefficients::new).collect(),
-            has_cubic_springs: InAnyLane::new(has_cubic_springs),
-            has_friction: InAnyLane::new(has_friction),
-            has_optional_forces: InAnyLane::new(has_optional_forces),
+            has_cubic_springs: AnyLaneFlag::new(has_cubic_springs),
+            has_friction: AnyLaneFlag::new(has_friction),
+            has_optional_forces: AnyLaneFlag::new(has_optional_forces),
         }
     }
 
@@ -64,7 +64,7 @@ impl Elements<f64> {
 
     /// Centres the free strokes of dampers about their lengths at the equilibrium `q`.
     pub(crate) fn centre_free_strokes(&mut self, q: &[f64; COORDINATES]) {
-        let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
+        let tub = TubMotion::new(&TUB_COORDINATES.map(|i| N(q[i])), &[N(0.0); 4]);
         for index in 0..self.dampers.len() {
             let [length, _] = self.damper_motion(index, &tub);
             self.dampers[index].rest_length = length;
@@ -100,7 +100,7 @@ impl<T: Lane> Elements<T> {
         let mut load = ([zero; 3], [zero; 3]);
         add_forces(&mut load, &self.springs, tub, false);
         add_forces(&mut load, &self.dampers, tub, false);
-        if self.has_optional_forces.holds() {
+        if self.has_optional_forces.is_set() {
             // The copy lets `load` stay in registers if there are no optional forces.
             let mut load_copy = load;
             let motion = *tub;
@@ -165,10 +165,10 @@ impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Self { elements, tub, load } = self;
-        if elements.has_cubic_springs.holds() {
+        if elements.has_cubic_springs.is_set() {
             add_forces(load, &elements.springs, tub, true);
         }
-        if elements.has_friction.holds() {
+        if elements.has_friction.is_set() {
             add_forces(load, &elements.dampers, tub, true);
         }
         for stop in &elements.stops {
@@ -250,7 +250,7 @@ lane_struct! {
         /// without a free stroke.
         softness_squared: N<T>,
         /// True if a damper has a free stroke or outer damping.
-        has_second_stage: InAnyLane<T>,
+        has_second_stage: AnyLaneFlag<T>,
     }
 }
 
@@ -287,7 +287,7 @@ impl DamperCoefficients<f64> {
             half_inverse_stroke: N(if has_stroke { 0.5 / stroke_m } else { 0.0 }),
             half_stroke: N(if has_stroke { 0.5 * stroke_m } else { -1.0 }),
             softness_squared: N(if has_stroke { softness_m * softness_m } else { 0.0 }),
-            has_second_stage: InAnyLane::new(has_stroke || damper.outer_damping_n_s_per_m != 0.0),
+            has_second_stage: AnyLaneFlag::new(has_stroke || damper.outer_damping_n_s_per_m != 0.0),
         }
     }
 
@@ -482,7 +482,7 @@ impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
     #[inline(always)]
     fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
         let friction = line.friction_force(self.friction, self.friction_speed_squared);
-        if self.has_second_stage.holds() {
+        if self.has_second_stage.is_set() {
             let force = friction + line.damping_force(self.outer_damping);
             return -(self.engaged_share(line.length()) * force).v();
         }
@@ -504,7 +504,7 @@ pub(crate) struct TubMotion<T> {
 
 impl<T: Real> TubMotion<T> {
     /// Computes the motion from the tub's coordinates (m, rad) and speeds, both in the order of
-    /// [`TUB`](crate::coordinates::TUB).
+    /// [`TUB_COORDINATES`](crate::coordinates::TUB).
     #[inline(always)]
     pub(crate) fn new(q: &[N<T>; 4], u: &[N<T>; 4]) -> Self {
         let tilt = Tilt::new(q[2], q[3]);

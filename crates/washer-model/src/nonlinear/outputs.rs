@@ -139,7 +139,7 @@ impl<T: Real> Axes<T> {
     /// Computes the position of the drum's front centre relative to the tub axis, along t2 and t3
     /// (m).
     #[inline(always)]
-    pub(crate) fn radial(
+    pub(crate) fn radial_position(
         &self,
         b: &Bodies<T>,
         motion: &MovingCoordinates<T>,
@@ -178,7 +178,7 @@ impl<T: Real> Axes<T> {
         let mut rho =
             combine_moving_vectors(b.rho_1, &self.drum_axes[0], b.rho_2, &self.drum_axes[1]);
         let one = b.tub_mass_share.lit(1.0);
-        if b.is_skewed.holds() {
+        if b.is_skewed.is_set() {
             rho = combine_moving_vectors(
                 one,
                 &rho,

@@ -5,7 +5,7 @@
 
 use super::load_components::LoadSelection;
 use super::suspension::{compute_forces, dual, tub_with_deviation};
-use crate::coordinates::{STATES, TUB};
+use crate::coordinates::{STATES, TUB_COORDINATES};
 use crate::lanes::{InLanes as _, ToDual as _};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::dot;
@@ -105,7 +105,7 @@ impl<T: Lane> LoadLaws<T> {
         let cabinet_force_at =
             |state: &[f64; STATES]| compute_forces(point, ModelKind::Linear, state).cabinet_n;
         for k in 0..4 {
-            let [coordinate, speed] = [TUB[k], COORDINATES + TUB[k]];
+            let [coordinate, speed] = [TUB_COORDINATES[k], COORDINATES + TUB_COORDINATES[k]];
             let slopes = components_by(coordinate).into_iter().zip(components_by(speed));
             for (component, (N(coordinate_derivative), N(speed_derivative))) in
                 components.iter_mut().zip(slopes)

@@ -82,7 +82,8 @@ pub(crate) struct Loads<T> {
     stops: Vec<StopRecord<T>>,
     /// The speed of each damper, if dampers are recorded.
     damper_speed_peaks: Vec<Peaks<T, 1>>,
-    /// The coordinates, speeds and accelerations of [`TUB`] at the start of the next step.
+    /// The coordinates, speeds and accelerations of [`TUB_COORDINATES`] at the start of the next
+    /// step.
     previous_tub: [Sample<T>; 4],
     /// The number of parts of a step.
     substeps: u32,
@@ -281,7 +282,7 @@ fn distances_below_reference<T: Lane>(
     let mut load = [reference; LOAD_COMPONENTS];
     load.copy_from_slice(&components[..LOAD_COMPONENTS]);
     let mut distances_below_reference_n = [to_sample(reference); MAX_FEET + 2];
-    let mut foot_loads = distribution.weight_loads;
+    let mut foot_loads = distribution.cabinet_weight_loads;
     for k in 0..MAX_FEET {
         for i in 0..LOAD_COMPONENTS {
             foot_loads[k] += distribution.loads_per_component[k][i] * load[i];
@@ -289,9 +290,10 @@ fn distances_below_reference<T: Lane>(
         distances_below_reference_n[k] = to_sample(reference - foot_loads[k]);
     }
     let force_squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(ROOT_SUMMAND_N2);
-    let slip_margin =
-        distribution.friction * (distribution.weight - load[1]) - force_squared.sqrt();
-    let walk_margin = slip_margin - turning_force_n(&distribution.positions, &foot_loads, &load);
+    let slip_margin = distribution.friction_coefficient * (distribution.cabinet_weight - load[1])
+        - force_squared.sqrt();
+    let walk_margin =
+        slip_margin - turning_force_n(&distribution.foot_positions, &foot_loads, &load);
     distances_below_reference_n[SLIP_INDEX] = to_sample(reference - slip_margin);
     distances_below_reference_n[WALK_INDEX] = to_sample(reference - walk_margin);
     distances_below_reference_n

@@ -1,7 +1,7 @@
 //! The two models as systems of ordinary differential equations over lanes.
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{FIRST_ANGLE, STATES, TUB};
+use crate::coordinates::{FIRST_ANGLE, STATES, TUB_COORDINATES};
 use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
 use crate::linear::rotor_terms::RotorCoefficients;
@@ -64,7 +64,7 @@ pub(crate) fn split_state<T: Copy>(
 /// Returns the tub's coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
 pub(super) fn tub_samples<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> [Sample<T>; 4] {
-    TUB.map(|q| Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] })
+    TUB_COORDINATES.map(|q| Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] })
 }
 
 /// Joins speeds and accelerations to the derivative of a state.
@@ -102,7 +102,7 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
 
     #[inline(always)]
     fn forcing(&self, t_s: N<T>) -> SpinState<T> {
-        self.spin.at(t_s)
+        self.spin.state_at(t_s)
     }
 
     #[inline(always)]
@@ -137,7 +137,10 @@ impl<T: Lane> Nonlinear<T> {
     /// Computes the motions on which forces with corners depend: depth (m) and speed (m/s) of each.
     #[inline(always)]
     pub(crate) fn corner_motions(&self, x: &[N<T>; STATES]) -> Vec<[N<T>; 2]> {
-        let tub = TubMotion::new(&TUB.map(|i| x[i]), &TUB.map(|i| x[COORDINATES + i]));
+        let tub = TubMotion::new(
+            &TUB_COORDINATES.map(|i| x[i]),
+            &TUB_COORDINATES.map(|i| x[COORDINATES + i]),
+        );
         self.machine.elements.corner_motions(&tub)
     }
 
@@ -148,7 +151,7 @@ impl<T: Lane> Nonlinear<T> {
         &self,
         spin: &SpinState<T>,
         x: &[N<T>; STATES],
-    ) -> [[N<T>; COORDINATES]; TUB.len()] {
+    ) -> [[N<T>; COORDINATES]; TUB_COORDINATES.len()] {
         let (q, u) = split_state(x);
         nonlinear::accelerations_per_load(&self.machine, &self.coupling, &self.sag, spin, &q, &u)
     }
@@ -213,7 +216,7 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
             }
             channels = Some(samples);
         }
-        (axes.radial(bodies, &motion), channels)
+        (axes.radial_position(bodies, &motion), channels)
     }
 }
 
@@ -241,7 +244,7 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
 
     #[inline(always)]
     fn forcing(&self, t_s: N<T>) -> LinearForcing<T> {
-        let spin = self.spin.at(t_s);
+        let spin = self.spin.state_at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &spin, self.sag);
         let rotor = RotorArrays::new(
             &self.constants,
@@ -255,7 +258,7 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
 
     #[inline(always)]
     fn update_forcing(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
-        forcing.spin = self.spin.at(t_s);
+        forcing.spin = self.spin.state_at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &forcing.spin, self.sag);
         let Self { constants, coupling, rotor_coefficients, .. } = self;
         forcing.rotor.update(constants, coupling, rotor_coefficients, &forcing.spin, hinge_mass);
@@ -348,6 +351,6 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
     ) -> ([Sample<T>; RADIAL_COMPONENTS], Option<[Sample<T>; CHANNELS]>) {
         let motion = LinearMotion::new(&forcing.spin, &moving_coordinates(x, dx));
         let channels = if with_channels { Some(self.outputs.channels(&motion)) } else { None };
-        (self.outputs.radial(&motion), channels)
+        (self.outputs.radial_position(&motion), channels)
     }
 }

@@ -1,7 +1,7 @@
 //! Records the outputs at given instants, which fits compare with measurements.
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{STATES, TUB};
+use crate::coordinates::{STATES, TUB_COORDINATES};
 use crate::run::model::tub_samples;
 use crate::run::suspension::compute_forces;
 use crate::{COORDINATES, ModelKind, Point};
@@ -35,7 +35,7 @@ impl Snapshot {
     /// are those of the trajectory.
     pub fn cabinet_force_n(&self, point: &Point, model: ModelKind) -> [f64; 3] {
         let mut state = [0.0; STATES];
-        for (q, [position, speed]) in TUB.into_iter().zip(self.tub) {
+        for (q, [position, speed]) in TUB_COORDINATES.into_iter().zip(self.tub) {
             state[q] = position;
             state[COORDINATES + q] = speed;
         }

@@ -4,7 +4,7 @@
 //! The force laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces
 //! are first order in its deviations, by automatic differentiation at the equilibrium.
 
-use crate::coordinates::{STATES, TUB, TUB_Y, TUB_Z};
+use crate::coordinates::{STATES, TUB_COORDINATES, TUB_Y, TUB_Z};
 use crate::lanes::ToDual as _;
 use crate::machine::feet::LOAD_COMPONENTS;
 use crate::nonlinear::elements::{CabinetLine, Ends, ForceLaw, PointMotion, TubMotion};
@@ -139,8 +139,8 @@ pub(super) fn tub_with_deviation(
     deviations: &[f64; STATES],
 ) -> TubMotion<Dual<f64>> {
     TubMotion::new(
-        &TUB.map(|q| dual(point.equilibrium[q], deviations[q])),
-        &TUB.map(|q| dual(0.0, deviations[COORDINATES + q])),
+        &TUB_COORDINATES.map(|q| dual(point.equilibrium[q], deviations[q])),
+        &TUB_COORDINATES.map(|q| dual(0.0, deviations[COORDINATES + q])),
     )
 }
 
@@ -154,7 +154,8 @@ pub(crate) fn load_on_cabinet(
     let elements = &point.machine.elements;
     let (elements, tub) = match model {
         ModelKind::Nonlinear => {
-            let [q, u] = [0, COORDINATES].map(|first| TUB.map(|q| dual(state[first + q], 0.0)));
+            let [q, u] =
+                [0, COORDINATES].map(|first| TUB_COORDINATES.map(|q| dual(state[first + q], 0.0)));
             (elements.constant(), TubMotion::new(&q, &u))
         }
         ModelKind::Linear => {

@@ -5,7 +5,7 @@
 //! abruptly, within a step. The vector r, its derivative dr, and the dependence of the motion on
 //! the tub's coordinates are smooth over a turn.
 
-use crate::coordinates::{COORDINATES, ROTOR_ROTATIONS, STATES, TUB};
+use crate::coordinates::{COORDINATES, ROTOR_ROTATIONS, STATES, TUB_COORDINATES};
 use crate::lanes::lane_struct;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::elements::corners::CornerForce;
@@ -16,8 +16,8 @@ use lane_ode::{Dual, Lane, N, OutOfLine};
 pub(super) type AccelerationDerivatives = [[N<f64>; STATES]; COORDINATES];
 
 /// The coordinates on which accelerations per unit of force depend; those of the tub come first.
-const LOAD_RESPONSE_COORDINATES: [usize; TUB.len() + ROTOR_ROTATIONS.len()] = {
-    let [a, b, c, d] = TUB;
+const LOAD_RESPONSE_COORDINATES: [usize; TUB_COORDINATES.len() + ROTOR_ROTATIONS.len()] = {
+    let [a, b, c, d] = TUB_COORDINATES;
     let [e, f, g, h] = ROTOR_ROTATIONS;
     [a, b, c, d, e, f, g, h]
 };
@@ -28,9 +28,9 @@ lane_struct! {
     CornerMotion {
         /// The derivatives of the motion's speed by the tub's speeds, which equal those of its
         /// depth by the tub's coordinates.
-        speed_per_tub_speed: [N<T>; TUB.len()],
+        speed_per_tub_speed: [N<T>; TUB_COORDINATES.len()],
         /// The derivatives of the motion's speed by the tub's coordinates.
-        speed_per_coordinate: [N<T>; TUB.len()],
+        speed_per_coordinate: [N<T>; TUB_COORDINATES.len()],
         /// The accelerations that a unit of force along the motion causes.
         acceleration_per_force: [N<T>; COORDINATES],
         /// The derivatives of `acceleration_per_force` by [`LOAD_RESPONSE_COORDINATES`].
@@ -41,7 +41,7 @@ lane_struct! {
 impl<T: Lane> CornerMotion<T> {
     #[inline(always)]
     pub(super) fn zero(zero: N<T>) -> Self {
-        let zeros = [zero; TUB.len()];
+        let zeros = [zero; TUB_COORDINATES.len()];
         Self {
             speed_per_tub_speed: zeros,
             speed_per_coordinate: zeros,
@@ -75,19 +75,19 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
             state[LOAD_RESPONSE_COORDINATES[direction]].0.slope = zero.lit(1.0).0;
             let motions = model.corner_motions(&state);
             let accelerations_per_load = model.accelerations_per_load(spin, &state);
-            if direction < TUB.len() {
+            if direction < TUB_COORDINATES.len() {
                 for m in 0..corners.len() {
                     corners[m].speed_per_coordinate[direction] = N(motions[m][1].0.slope);
                 }
             }
             // A force loads a coordinate by the derivative of the motion's speed by that
             // coordinate's speed (virtual power). The motion's speed is linear in the tub's speeds.
-            for k in 0..TUB.len() {
+            for k in 0..TUB_COORDINATES.len() {
                 let mut unit_speed_state = state;
-                for tub_coordinate in TUB {
+                for tub_coordinate in TUB_COORDINATES {
                     unit_speed_state[COORDINATES + tub_coordinate] = zero.constant();
                 }
-                unit_speed_state[COORDINATES + TUB[k]] = zero.lit(1.0).constant();
+                unit_speed_state[COORDINATES + TUB_COORDINATES[k]] = zero.lit(1.0).constant();
                 let speeds = model.corner_motions(&unit_speed_state);
                 for m in 0..corners.len() {
                     let corner = &mut corners[m];
@@ -113,7 +113,7 @@ impl CornerMotion<f64> {
     #[inline(always)]
     pub(super) fn add_scaled(&mut self, other: &Self, factor: f64) {
         let factor = N(factor);
-        for k in 0..TUB.len() {
+        for k in 0..TUB_COORDINATES.len() {
             self.speed_per_tub_speed[k] += factor * other.speed_per_tub_speed[k];
             self.speed_per_coordinate[k] += factor * other.speed_per_coordinate[k];
         }
@@ -140,14 +140,14 @@ impl CornerMotion<f64> {
                     (force.force * self.acceleration_per_force_derivative[i][k]).v() * factor;
             }
         }
-        for k in 0..TUB.len() {
+        for k in 0..TUB_COORDINATES.len() {
             let speed_per_tub_speed = (force.force_per_speed * self.speed_per_tub_speed[k]).v();
             let speed_per_coordinate = force.force_per_depth * self.speed_per_tub_speed[k]
                 + force.force_per_speed * self.speed_per_coordinate[k];
             for i in 0..COORDINATES {
-                derivatives[i][TUB[k]] +=
+                derivatives[i][TUB_COORDINATES[k]] +=
                     (self.acceleration_per_force[i] * speed_per_coordinate).v() * factor;
-                derivatives[i][COORDINATES + TUB[k]] +=
+                derivatives[i][COORDINATES + TUB_COORDINATES[k]] +=
                     (self.acceleration_per_force[i] * speed_per_tub_speed).v() * factor;
             }
         }

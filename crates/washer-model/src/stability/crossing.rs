@@ -327,7 +327,7 @@ fn response_state_at(
     }
     let steps = (end_s / step_s).ceil().max(1.0);
     let sequence = StepSequence {
-        spin: SpinSegment::steady(direction * response.speed_rpm),
+        spin: SpinSegment::at_constant_speed(direction * response.speed_rpm),
         start_s: 0.0,
         step_s: end_s / steps,
         steps: steps as usize,
@@ -337,7 +337,7 @@ fn response_state_at(
 
 /// Returns the drum's angle (rad) at a time, from -pi to pi.
 fn theta_rad(point: &Point, time_s: f64) -> f64 {
-    let spin = point.spin_segments[segment_index(&point.spin_segments, time_s)].at(N(time_s));
+    let spin = point.spin_segments[segment_index(&point.spin_segments, time_s)].state_at(N(time_s));
     libm::atan2(spin.sin.0, spin.cos.0)
 }
 

@@ -14,7 +14,7 @@ use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::squared_distance;
 use crate::point::Point;
-use crate::preparation::{MAX_RUNS, SpeedAmplitudeSearch, motion_speeds};
+use crate::preparation::{MAX_RUNS, SpeedAmplitudeSearch, select_motion_speeds};
 use crate::run::active_recorders::{ActiveRecorders, ObservedState};
 use crate::run::all_lanes;
 use crate::run::model::{LaneModel, Linear, Nonlinear};
@@ -206,7 +206,7 @@ pub(crate) fn lane_model<T: Lane, M: LaneModel<T>>(zero: N<T>, setups: &[TurnSet
     for lane in 0..T::LANES {
         let setup = &setups[lane.min(setups.len() - 1)];
         model.set_point(lane, setup.point);
-        model.set_spin(lane, &SpinSegment::steady(setup.speed_rpm));
+        model.set_spin(lane, &SpinSegment::at_constant_speed(setup.speed_rpm));
         if let Some(caps) = &setup.caps {
             model.set_caps(lane, caps);
         }
@@ -359,7 +359,8 @@ pub(super) fn linear_responses_with_motion_friction(
         for (((k, mut search), point), response) in
             unfinished_searches.into_iter().zip(&points).zip(batch_responses)
         {
-            if !search.update(&motion_speeds(point, &response.damper_speeds_m_per_s(point))) {
+            if !search.update(&select_motion_speeds(point, &response.damper_speeds_m_per_s(point)))
+            {
                 next_searches.push((k, search));
             }
             responses[k] = response;

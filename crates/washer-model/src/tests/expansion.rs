@@ -177,8 +177,10 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let channels_at_rest =
             instant.point.channels_at_rest.into_iter().chain([0.0; RADIAL_COMPONENTS]);
         let computed = channels.unwrap().into_iter().chain(radial);
-        let expected =
-            axes.channels(&bodies, &motion).into_iter().chain(axes.radial(&bodies, &motion));
+        let expected = axes
+            .channels(&bodies, &motion)
+            .into_iter()
+            .chain(axes.radial_position(&bodies, &motion));
         for ((computed, expected), channels_at_rest) in computed.zip(expected).zip(channels_at_rest)
         {
             let order_zero = expected.value.0.value - channels_at_rest;

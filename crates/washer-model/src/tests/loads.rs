@@ -16,7 +16,8 @@ const INTERVAL_S: f64 = 1e-4;
 
 /// Adds a cabinet on four feet to a machine.
 fn with_cabinet(mut machine: Machine) -> Machine {
-    machine.cabinet = Some(Cabinet { mass_kg: 35.0, centre_m: [0.18, -0.1, 0.02], friction: 0.4 });
+    machine.cabinet =
+        Some(Cabinet { mass_kg: 35.0, centre_m: [0.18, -0.1, 0.02], friction_coefficient: 0.4 });
     let corners = [[0.47, 0.26], [0.47, -0.26], [-0.07, 0.26], [-0.07, -0.26]];
     machine.feet = corners.map(|[x, z]| Foot { foot_m: [x, -0.45, z] }).to_vec();
     machine
@@ -120,7 +121,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         let loads_n = feet.loads_n(&load);
         assert_close("a history's load of foot", &forces.feet_n, &loads_n, 1e-9);
         let horizontal_n = (load[0] * load[0] + load[2] * load[2]).sqrt();
-        let slip_margin_now_n = 0.4 * (feet.distribution.weight.0 - load[1]) - horizontal_n;
+        let slip_margin_now_n = 0.4 * (feet.distribution.cabinet_weight.0 - load[1]) - horizontal_n;
         assert!((forces.slip_margin_n.unwrap() - slip_margin_now_n).abs() < 1e-9);
         slip_margin_n = slip_margin_n.min(slip_margin_now_n);
         // The moment is taken about the centre of the feet's loads; feet that lift have no load.

@@ -122,7 +122,7 @@ fn val_linear_matrices_match_an_independent_expansion() {
     for case in read_reference("linear_matrices.json")["cases"].as_array().unwrap() {
         let coefficients = Coefficients::new(&machine(case));
         let (q, _) = equilibrium::solve_equilibrium(N(0.0), &coefficients);
-        let point = linear::Linearise { machine: &coefficients, q: &q }.run().remove(0);
+        let point = linear::Linearisation { machine: &coefficients, q: &q }.run().remove(0);
         let computed = point.matrices(&coefficients.bodies, &spin(case));
         for (name, computed) in
             [("M", computed.mass), ("C", computed.damping), ("K", computed.stiffness)]

@@ -22,7 +22,7 @@ pub struct DataSheet {
 #[derive(Debug)]
 pub struct Assumption {
     /// The function that computes the value from the data sheet and the machine's other numbers.
-    pub(super) value: fn(&DataSheet, &Machine) -> f64,
+    pub(super) compute_value: fn(&DataSheet, &Machine) -> f64,
     /// The rule in words, as listings show it.
     pub rule: &'static str,
     /// The range in which real machines are expected.
@@ -56,14 +56,14 @@ impl DataSheet {
     pub fn fill(&self, omitted: &[MachineParameter], machine: &mut Machine) {
         let mut no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
         for _ in omitted {
-            let previous = machine.clone();
+            let previous_machine = machine.clone();
             for parameter in omitted {
                 if let Some(assumption) = parameter.assumption() {
-                    let value = (assumption.value)(self, machine);
+                    let value = (assumption.compute_value)(self, machine);
                     parameter.set(machine, &mut no_spin, value);
                 }
             }
-            if *machine == previous {
+            if *machine == previous_machine {
                 return;
             }
         }
@@ -73,6 +73,6 @@ impl DataSheet {
 /// Returns the moments of inertia of a thin-walled open cylinder about its mass centre, along and
 /// across its axis.
 pub(super) fn cylinder_inertia_kg_m2(mass_kg: f64, radius_m: f64, length_m: f64) -> [f64; 2] {
-    let about_axis = mass_kg * radius_m * radius_m;
-    [about_axis, about_axis / 2.0 + mass_kg * length_m * length_m / 12.0]
+    let axial_inertia_kg_m2 = mass_kg * radius_m * radius_m;
+    [axial_inertia_kg_m2, axial_inertia_kg_m2 / 2.0 + mass_kg * length_m * length_m / 12.0]
 }

@@ -78,10 +78,10 @@ fn monotone_pieces(segments: &[SpinSegment], [from_s, to_s]: [f64; 2]) -> Vec<Mo
     {
         let end_s =
             segments.get(k + 1).map_or(to_s, |next_segment| next_segment.start_s.0.min(to_s));
-        let length_s = end_s - segment.start_s.0;
-        let mut boundaries_s = vec![0.0, length_s];
+        let duration_s = end_s - segment.start_s.0;
+        let mut boundaries_s = vec![0.0, duration_s];
         let mut add_boundary = |t_s: f64| {
-            if 0.0 < t_s && t_s < length_s {
+            if 0.0 < t_s && t_s < duration_s {
                 boundaries_s.push(t_s);
             }
         };
@@ -125,29 +125,34 @@ impl MonotonePiece<'_> {
                 if segment.turns(self.to_s) < segment.turns(self.from_s) { -1.0 } else { 1.0 };
             let turn_rate = sign * segment.turn_rate(self.from_s);
             // Solves turns = turn_rate t + sign b t^2 by the formula without cancellation.
-            let root = (turn_rate * turn_rate + 4.0 * sign * segment.turns_per_s2.0 * turns)
+            let discriminant_root = (turn_rate * turn_rate
+                + 4.0 * sign * segment.turns_per_s2.0 * turns)
                 .max(0.0)
                 .sqrt();
-            let elapsed_s = if turns > 0.0 { 2.0 * turns / (turn_rate + root) } else { 0.0 };
+            let elapsed_s =
+                if turns > 0.0 { 2.0 * turns / (turn_rate + discriminant_root) } else { 0.0 };
             return (self.from_s + elapsed_s).clamp(earliest_s, self.to_s);
         }
-        let mut low = earliest_s;
-        let mut high = self.to_s;
-        let mut t = low;
+        let mut lower_bound_s = earliest_s;
+        let mut upper_bound_s = self.to_s;
+        let mut t = lower_bound_s;
         for _ in 0..MAX_ITERATIONS {
             let remaining_turns = turns - self.turns_until(t);
             if remaining_turns > 0.0 {
-                low = t;
+                lower_bound_s = t;
             } else {
-                high = t;
+                upper_bound_s = t;
             }
             let newton_s = t + remaining_turns / segment.turn_rate(t).abs();
-            let next_estimate =
-                if low < newton_s && newton_s < high { newton_s } else { 0.5 * (low + high) };
-            if next_estimate == t {
+            let next_estimate_s = if lower_bound_s < newton_s && newton_s < upper_bound_s {
+                newton_s
+            } else {
+                0.5 * (lower_bound_s + upper_bound_s)
+            };
+            if next_estimate_s == t {
                 break;
             }
-            t = next_estimate;
+            t = next_estimate_s;
         }
         t
     }
@@ -174,10 +179,10 @@ mod tests {
     use crate::Profile;
 
     /// Returns the fractional part of the angle in turns, from the equations' sine and cosine.
-    fn phase(spin: &Spin, t_s: f64) -> f64 {
+    fn phase_turns(spin: &Spin, t_s: f64) -> f64 {
         let segments = spin.segments();
         let segment = segments.iter().rev().find(|segment| segment.start_s.0 <= t_s).unwrap();
-        let state = segment.at(N(t_s));
+        let state = segment.state_at(N(t_s));
         state.sin.0.atan2(state.cos.0) / TAU
     }
 
@@ -193,17 +198,17 @@ mod tests {
             },
         ] {
             for window_s in [[0.0, 30.0], [13.3, 29.9]] {
-                let times = whole_turn_times_s(&spin.segments(), window_s);
+                let times_s = whole_turn_times_s(&spin.segments(), window_s);
                 let turns = spin.turns_within(window_s);
                 assert!(
-                    (times.len() as f64 - turns).abs() <= 1.0,
+                    (times_s.len() as f64 - turns).abs() <= 1.0,
                     "{} for {turns}: {spin:?}",
-                    times.len()
+                    times_s.len()
                 );
-                assert!(times.is_sorted() && times.len() > 30, "{spin:?}");
-                for t_s in &times {
+                assert!(times_s.is_sorted() && times_s.len() > 30, "{spin:?}");
+                for t_s in &times_s {
                     assert!(window_s[0] <= *t_s && *t_s <= window_s[1]);
-                    assert!(phase(&spin, *t_s).abs() < 1e-9, "{t_s}: {spin:?}");
+                    assert!(phase_turns(&spin, *t_s).abs() < 1e-9, "{t_s}: {spin:?}");
                 }
             }
         }

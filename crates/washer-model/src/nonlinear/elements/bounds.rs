@@ -1,7 +1,7 @@
 //! Bounds the tangents of the elements by linear elements with the greatest stiffness and damping
 //! that the machine's elements reach. The steps of integrators are chosen by these bounds.
 
-use crate::coordinates::{COORDINATES, TUB};
+use crate::coordinates::{COORDINATES, TUB_COORDINATES};
 use crate::nonlinear::elements::{
     DamperCoefficients, Elements, SpringCoefficients, StopCoefficients, TubMotion,
 };
@@ -21,11 +21,11 @@ impl Elements<f64> {
     /// Returns linear elements with the greatest tangents that the elements have near the
     /// equilibrium `q`; `None` if all elements are linear along their lines.
     pub(crate) fn with_steepest_tangents(&self, q: &[f64; COORDINATES]) -> Option<Self> {
-        if !self.has_optional_forces.holds() {
+        if !self.has_optional_forces.is_set() {
             return None;
         }
         let mut linear_elements = self.clone();
-        let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
+        let tub = TubMotion::new(&TUB_COORDINATES.map(|i| N(q[i])), &[N(0.0); 4]);
         for spring in &mut linear_elements.springs {
             let ends = &spring.ends;
             let displacement = tub.point_motion(&ends.tub).displacement;

@@ -47,7 +47,7 @@ impl<T: Lane> Elements<T> {
             line.length_rate.0.slope = zero.lit(1.0).0;
             let N(force_per_speed) = damper.optional_force(&line);
             let mut force_per_depth = zero;
-            if damper.has_second_stage.holds() {
+            if damper.has_second_stage.is_set() {
                 line.length_rate.0.slope = zero.0;
                 line.length.0.slope = zero.lit(1.0).0;
                 force_per_depth = N(damper.optional_force(&line).0.slope);
