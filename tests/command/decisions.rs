@@ -9,47 +9,48 @@ use arrow_array::{ArrayRef, Float64Array, RecordBatch};
 use serde_json::{Value, json};
 use sweep_files::Writer;
 
-use crate::test_folder::{TestFolder, all_output, grid};
+use crate::test_folder::{TestFolder, all_output, grid_text};
 
 /// Returns a folder with a finished map of six points, `results/short.parquet`.
 fn folder_with_map() -> TestFolder {
-    let test_folder = TestFolder::new(&grid(3, 2));
-    let command_output = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+    let test_folder = TestFolder::new(&grid_text(3, 2));
+    let command_output = test_folder.run_sweep(&["run", "g.toml", "--progress", "none"]);
     assert_eq!(command_output.status.code(), Some(0), "{}", all_output(&command_output));
     test_folder
 }
 
-const MAP: &str = "results/short.parquet";
+const MAP_FILE: &str = "results/short.parquet";
 
 fn exit_code(output: &Output) -> Option<i32> {
     output.status.code()
 }
 
-fn stdout(output: &Output) -> String {
+fn stdout_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 fn json_output(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
-        panic!("{error} in {}\n{}", stdout(output), all_output(output));
+        panic!("{error} in {}\n{}", stdout_text(output), all_output(output));
     })
 }
 
 #[test]
 fn report_does_not_overwrite_a_page_of_plot_and_takes_an_option_for_each_expression() {
     let test_folder = folder_with_map();
-    let page = "results/short.html";
-    assert_eq!(exit_code(&test_folder.sweep(&["plot", MAP, "-o", page])), Some(0));
-    let before = fs::read(test_folder.path(page)).unwrap();
-    let written_output = test_folder.sweep(&["report", MAP]);
+    let plot_page = "results/short.html";
+    assert_eq!(exit_code(&test_folder.run_sweep(&["plot", MAP_FILE, "-o", plot_page])), Some(0));
+    let page_bytes_before = fs::read(test_folder.path(plot_page)).unwrap();
+    let written_output = test_folder.run_sweep(&["report", MAP_FILE]);
     assert_eq!(exit_code(&written_output), Some(0), "{}", all_output(&written_output));
-    assert!(fs::read(test_folder.path(page)).unwrap() == before);
+    assert!(fs::read(test_folder.path(plot_page)).unwrap() == page_bytes_before);
     assert!(test_folder.path("results/short.report.html").exists());
-    let failed = test_folder.sweep(&["report", MAP, "--require", "count(point >= 0) < 0"]);
-    assert_eq!(exit_code(&failed), Some(4), "{}", all_output(&failed));
-    assert!(all_output(&failed).contains("FAILS  count(point >= 0) < 0: 6\n"));
+    let failed_report =
+        test_folder.run_sweep(&["report", MAP_FILE, "--require", "count(point >= 0) < 0"]);
+    assert_eq!(exit_code(&failed_report), Some(4), "{}", all_output(&failed_report));
+    assert!(all_output(&failed_report).contains("FAILS  count(point >= 0) < 0: 6\n"));
     let refused_output =
-        test_folder.sweep(&["report", MAP, "--require", "point >= 0", "point < 9"]);
+        test_folder.run_sweep(&["report", MAP_FILE, "--require", "point >= 0", "point < 9"]);
     assert_eq!(exit_code(&refused_output), Some(2));
     assert!(
         all_output(&refused_output).contains("a `--require` of its own"),
@@ -61,8 +62,12 @@ fn report_does_not_overwrite_a_page_of_plot_and_takes_an_option_for_each_express
 #[test]
 fn require_names_the_failing_rows_and_exits_with_4() {
     let test_folder = folder_with_map();
-    let passed_gate =
-        test_folder.sweep(&["require", MAP, "ratio_max < 1e6", "count(status == 'ok') == 6"]);
+    let passed_gate = test_folder.run_sweep(&[
+        "require",
+        MAP_FILE,
+        "ratio_max < 1e6",
+        "count(status == 'ok') == 6",
+    ]);
     assert_eq!(exit_code(&passed_gate), Some(0), "{}", all_output(&passed_gate));
     assert!(
         all_output(&passed_gate).contains("holds  ratio_max < 1e6: 6 rows"),
@@ -70,19 +75,25 @@ fn require_names_the_failing_rows_and_exits_with_4() {
         all_output(&passed_gate)
     );
 
-    let closed =
-        test_folder.sweep(&["require", MAP, "unbalance_mass_kg < 0.9", "share(reliable) >= 0"]);
-    assert_eq!(exit_code(&closed), Some(4));
-    let text = all_output(&closed);
-    assert!(text.contains("FAILS  unbalance_mass_kg < 0.9: 2 of 6 rows false"), "{text}");
-    assert!(text.contains("holds  share(reliable) >= 0"), "{text}");
+    let failed_gate = test_folder.run_sweep(&[
+        "require",
+        MAP_FILE,
+        "unbalance_mass_kg < 0.9",
+        "share(reliable) >= 0",
+    ]);
+    assert_eq!(exit_code(&failed_gate), Some(4));
+    let gate_text = all_output(&failed_gate);
+    assert!(gate_text.contains("FAILS  unbalance_mass_kg < 0.9: 2 of 6 rows false"), "{gate_text}");
+    assert!(gate_text.contains("holds  share(reliable) >= 0"), "{gate_text}");
 
-    let gate = json_output(&test_folder.sweep(&["require", MAP, "point < 2", "--json"]));
-    assert_eq!(gate["holds"], false);
-    assert_eq!(gate["expressions"][0]["failing"], 4);
-    assert_eq!(gate["expressions"][0]["offenders"][0]["row"], 2);
+    let gate_json =
+        json_output(&test_folder.run_sweep(&["require", MAP_FILE, "point < 2", "--json"]));
+    assert_eq!(gate_json["holds"], false);
+    assert_eq!(gate_json["expressions"][0]["failing"], 4);
+    assert_eq!(gate_json["expressions"][0]["offenders"][0]["row"], 2);
 
-    let empty_selection = test_folder.sweep(&["require", MAP, "reliable", "--where", "false"]);
+    let empty_selection =
+        test_folder.run_sweep(&["require", MAP_FILE, "reliable", "--where", "false"]);
     assert_eq!(exit_code(&empty_selection), Some(4));
     assert!(all_output(&empty_selection).contains("no row"), "{}", all_output(&empty_selection));
 }
@@ -90,41 +101,42 @@ fn require_names_the_failing_rows_and_exits_with_4() {
 #[test]
 fn only_results_go_to_standard_output() {
     let test_folder = folder_with_map();
-    for words in [
+    for command_words in [
         &["check", "g.toml"][..],
         &["status", "g.toml"],
-        &["show", MAP],
-        &["require", MAP, "point < 2"],
-        &["compare", MAP, MAP],
+        &["show", MAP_FILE],
+        &["require", MAP_FILE, "point < 2"],
+        &["compare", MAP_FILE, MAP_FILE],
         &["modes", "--speed", "0:300:100"],
     ] {
-        let command_output = test_folder.sweep(words);
+        let command_output = test_folder.run_sweep(command_words);
         assert!(
             command_output.stdout.len() > 40 && command_output.stderr.is_empty(),
-            "{words:?}: {}",
+            "{command_words:?}: {}",
             all_output(&command_output)
         );
     }
-    for words in [&["run", "g.toml"][..], &["plot", MAP]] {
-        let command_output = test_folder.sweep(words);
+    for command_words in [&["run", "g.toml"][..], &["plot", MAP_FILE]] {
+        let command_output = test_folder.run_sweep(command_words);
         assert!(
             command_output.stdout.is_empty() && !command_output.stderr.is_empty(),
-            "{words:?}: {}",
+            "{command_words:?}: {}",
             all_output(&command_output)
         );
     }
 }
 
-/// Writes a result with a ratio for each of several masses.
+/// Writes a result of 400 rows, one for each mass, with the ratio that a function returns for the
+/// row's index.
 fn write_ratios(test_folder: &TestFolder, name: &str, ratio: impl Fn(u32) -> Option<f64>) {
     let number_array = |value: &dyn Fn(u32) -> Option<f64>| -> ArrayRef {
         Arc::new((0..400).map(value).collect::<Float64Array>())
     };
     let columns = [
-        ("unbalance_mass_kg", number_array(&|row| Some(0.01 * f64::from(row)))),
+        ("unbalance_mass_kg", number_array(&|row_index| Some(0.01 * f64::from(row_index)))),
         ("nonlinear_tub_yaw", number_array(&ratio)),
         ("ratio_max", number_array(&ratio)),
-        ("min_gap_nonlinear_m", number_array(&|row| Some(0.01 * ratio(row)?))),
+        ("min_gap_nonlinear_m", number_array(&|row_index| Some(0.01 * ratio(row_index)?))),
         ("status", number_array(&|_| None)),
     ];
     let rows = RecordBatch::try_from_iter(columns).expect("columns of one length");
@@ -136,84 +148,105 @@ fn write_ratios(test_folder: &TestFolder, name: &str, ratio: impl Fn(u32) -> Opt
 
 #[test]
 fn conditions_do_not_hold_if_points_failed() {
-    let test_folder = TestFolder::new(&grid(1, 1));
+    let test_folder = TestFolder::new(&grid_text(1, 1));
     write_ratios(&test_folder, "whole.parquet", |_| Some(1.5));
     write_ratios(&test_folder, "half.parquet", |row| (row % 2 == 0).then_some(1.5));
     write_ratios(&test_folder, "nan.parquet", |_| Some(f64::NAN));
-    for (file, over) in [("half.parquet", 200), ("nan.parquet", 0)] {
-        for gate in
+    for (file, null_row_count) in [("half.parquet", 200), ("nan.parquet", 0)] {
+        for condition in
             ["max(ratio_max)<2", "mean(ratio_max)<2", "min(ratio_max)>1", "count(ratio_max>=2)==0"]
         {
-            let failed_gate = test_folder.sweep(&["require", file, gate]);
-            assert_eq!(exit_code(&failed_gate), Some(4), "{file}: {gate}");
-            let expected = format!("over {over} of 400 rows");
-            assert!(all_output(&failed_gate).contains(&expected), "{}", all_output(&failed_gate));
+            let failed_gate = test_folder.run_sweep(&["require", file, condition]);
+            assert_eq!(exit_code(&failed_gate), Some(4), "{file}: {condition}");
+            let expected_text = format!("over {null_row_count} of 400 rows");
+            assert!(
+                all_output(&failed_gate).contains(&expected_text),
+                "{}",
+                all_output(&failed_gate)
+            );
         }
-        for gate in ["ratio=0.05", "gap=0.001"] {
-            let failed_gate =
-                test_folder.sweep(&["compare", "whole.parquet", file, "--fail-on", gate]);
+        for gate_option in ["ratio=0.05", "gap=0.001"] {
+            let failed_gate = test_folder.run_sweep(&[
+                "compare",
+                "whole.parquet",
+                file,
+                "--fail-on",
+                gate_option,
+            ]);
             assert_eq!(
                 exit_code(&failed_gate),
                 Some(4),
-                "{file}: {gate}\n{}",
-                stdout(&failed_gate)
+                "{file}: {gate_option}\n{}",
+                stdout_text(&failed_gate)
             );
-            let same_output = test_folder.sweep(&["compare", file, file, "--fail-on", gate]);
+            let self_comparison =
+                test_folder.run_sweep(&["compare", file, file, "--fail-on", gate_option]);
             assert_eq!(
-                exit_code(&same_output),
+                exit_code(&self_comparison),
                 Some(0),
-                "{file}: {gate}\n{}",
-                stdout(&same_output)
+                "{file}: {gate_option}\n{}",
+                stdout_text(&self_comparison)
             );
         }
     }
     let allowed_output =
-        test_folder.sweep(&["require", "half.parquet", "max(ratio_max)<2", "--allow-null"]);
+        test_folder.run_sweep(&["require", "half.parquet", "max(ratio_max)<2", "--allow-null"]);
     assert_eq!(exit_code(&allowed_output), Some(0), "{}", all_output(&allowed_output));
-    let words = ["compare", "half.parquet", "half.parquet", "--fail-on", "flips"];
-    let lacking_output = test_folder.sweep(&words);
-    assert_eq!(exit_code(&lacking_output), Some(2), "{}", all_output(&lacking_output));
-    assert!(
-        all_output(&lacking_output).contains("two files with verdicts"),
+    let comparison_words = ["compare", "half.parquet", "half.parquet", "--fail-on", "flips"];
+    let missing_verdict_output = test_folder.run_sweep(&comparison_words);
+    assert_eq!(
+        exit_code(&missing_verdict_output),
+        Some(2),
         "{}",
-        all_output(&lacking_output)
+        all_output(&missing_verdict_output)
+    );
+    assert!(
+        all_output(&missing_verdict_output).contains("two files with verdicts"),
+        "{}",
+        all_output(&missing_verdict_output)
     );
 }
 
 #[test]
 fn all_mistakes_in_conditions_are_reported() {
     let test_folder = folder_with_map();
-    let refused_output = test_folder.sweep(&["require", MAP, "ratio_mx < 2", "reliable = true"]);
+    let refused_output =
+        test_folder.run_sweep(&["require", MAP_FILE, "ratio_mx < 2", "reliable = true"]);
     assert_eq!(exit_code(&refused_output), Some(2));
     let text = all_output(&refused_output);
     assert!(text.contains("did you mean `ratio_max`?") && text.contains("expected `==`"), "{text}");
-    let misplaced_extreme =
-        test_folder.sweep(&["require", MAP, "reliable", "--where", "max(ratio_max) > 2"]);
-    assert_eq!(exit_code(&misplaced_extreme), Some(2), "{}", all_output(&misplaced_extreme));
-    let absent_output = test_folder.sweep(&["require", "no.parquet", "reliable"]);
+    let misplaced_aggregate_output =
+        test_folder.run_sweep(&["require", MAP_FILE, "reliable", "--where", "max(ratio_max) > 2"]);
+    assert_eq!(
+        exit_code(&misplaced_aggregate_output),
+        Some(2),
+        "{}",
+        all_output(&misplaced_aggregate_output)
+    );
+    let absent_output = test_folder.run_sweep(&["require", "no.parquet", "reliable"]);
     assert_eq!(exit_code(&absent_output), Some(2), "{}", all_output(&absent_output));
     for invalid_name in ["short.parquet", "resluts/short.parquet", "results/short"] {
-        let absent_output = test_folder.sweep(&["show", invalid_name]);
+        let absent_output = test_folder.run_sweep(&["show", invalid_name]);
         assert!(
             all_output(&absent_output).contains("results/short.parquet is there"),
             "{}",
             all_output(&absent_output)
         );
     }
-    let no_grid = test_folder.sweep(&["check", MAP]);
+    let map_as_grid_output = test_folder.run_sweep(&["check", MAP_FILE]);
     assert!(
-        all_output(&no_grid).contains("it is a Parquet file, not text"),
+        all_output(&map_as_grid_output).contains("it is a Parquet file, not text"),
         "{}",
-        all_output(&no_grid)
+        all_output(&map_as_grid_output)
     );
 }
 
 #[test]
 fn show_sorts_and_filters_rows_and_prints_json() {
     let test_folder = folder_with_map();
-    let top_rows = json_output(&test_folder.sweep(&[
+    let top_rows = json_output(&test_folder.run_sweep(&[
         "show",
-        MAP,
+        MAP_FILE,
         "--top",
         "2",
         "--by",
@@ -223,14 +256,20 @@ fn show_sorts_and_filters_rows_and_prints_json() {
     let rows = top_rows.as_array().expect("rows");
     let ratios: Vec<f64> = rows.iter().filter_map(|row| row["ratio_tub_yaw"].as_f64()).collect();
     assert!(ratios.len() == 2 && ratios[0] >= ratios[1], "{top_rows}");
-    // The table has every column, and counts are integers.
+    // The JSON output has every column, and its counts are integers.
     assert!(rows[0]["point"].is_u64() && rows[0]["nonlinear_tub_yaw"].is_f64(), "{top_rows}");
-    let whole_table = json_output(&test_folder.sweep(&["show", MAP, "--json"]));
+    let whole_table = json_output(&test_folder.run_sweep(&["show", MAP_FILE, "--json"]));
     assert_eq!(whole_table["summary"]["points"], 6);
     assert_eq!(whole_table["plan"]["name"], "short");
-    let filtered_output = test_folder.sweep(&["show", MAP, "--where", "damping_n_s_per_m > 200"]);
-    assert_eq!(stdout(&filtered_output).lines().count(), 4, "{}", stdout(&filtered_output));
-    let invalid_output = test_folder.sweep(&["show", MAP, "--by", "ratio_tub_yw"]);
+    let filtered_output =
+        test_folder.run_sweep(&["show", MAP_FILE, "--where", "damping_n_s_per_m > 200"]);
+    assert_eq!(
+        stdout_text(&filtered_output).lines().count(),
+        4,
+        "{}",
+        stdout_text(&filtered_output)
+    );
+    let invalid_output = test_folder.run_sweep(&["show", MAP_FILE, "--by", "ratio_tub_yw"]);
     assert_eq!(exit_code(&invalid_output), Some(2));
     assert!(
         all_output(&invalid_output).contains("`ratio_tub_yaw`"),
@@ -242,79 +281,101 @@ fn show_sorts_and_filters_rows_and_prints_json() {
 #[test]
 fn compare_reports_the_differences_of_two_maps() {
     let test_folder = folder_with_map();
-    let same_output = test_folder.sweep(&["compare", MAP, MAP, "--fail-on", "any"]);
-    assert_eq!(exit_code(&same_output), Some(0), "{}", stdout(&same_output));
-    assert!(stdout(&same_output).contains("not at all"), "{}", stdout(&same_output));
+    let self_comparison =
+        test_folder.run_sweep(&["compare", MAP_FILE, MAP_FILE, "--fail-on", "any"]);
+    assert_eq!(exit_code(&self_comparison), Some(0), "{}", stdout_text(&self_comparison));
+    assert!(
+        stdout_text(&self_comparison).contains("not at all"),
+        "{}",
+        stdout_text(&self_comparison)
+    );
 
-    let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--name", "light"];
-    let command_output = test_folder.sweep(&[&light[..], &["--progress", "none"]].concat());
+    let light_machine_words = ["run", "g.toml", "--set", "tub_mass_kg=20", "--name", "light"];
+    let command_output =
+        test_folder.run_sweep(&[&light_machine_words[..], &["--progress", "none"]].concat());
     assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
-    let shown = stdout(&test_folder.sweep(&["show", "results/light.parquet"]));
-    assert!(shown.contains("--set  tub_mass_kg = 20"), "{shown}");
+    let shown_table = stdout_text(&test_folder.run_sweep(&["show", "results/light.parquet"]));
+    assert!(shown_table.contains("--set  tub_mass_kg = 20"), "{shown_table}");
 
-    let arguments = ["compare", MAP, "results/light.parquet"];
-    let differs =
-        test_folder.sweep(&[&arguments[..], &["--fail-on", "ratio=0", "--json"]].concat());
-    assert_eq!(exit_code(&differs), Some(4), "{}", all_output(&differs));
-    let comparison = json_output(&differs);
-    let paths: Vec<&str> = comparison["plan"]
+    let comparison_words = ["compare", MAP_FILE, "results/light.parquet"];
+    let differing_output = test_folder
+        .run_sweep(&[&comparison_words[..], &["--fail-on", "ratio=0", "--json"]].concat());
+    assert_eq!(exit_code(&differing_output), Some(4), "{}", all_output(&differing_output));
+    let comparison = json_output(&differing_output);
+    let changed_paths: Vec<&str> = comparison["plan"]
         .as_array()
         .expect("changes")
         .iter()
         .filter_map(|change| change["path"].as_str())
         .collect();
-    assert!(paths.contains(&"machine.tub.mass_kg") && paths.contains(&"set"), "{paths:?}");
+    assert!(
+        changed_paths.contains(&"machine.tub.mass_kg") && changed_paths.contains(&"set"),
+        "{changed_paths:?}"
+    );
     assert_eq!(comparison["rows"]["in_both"], 6);
 
-    let markdown = stdout(&test_folder.sweep(&[&arguments[..], &["--markdown"]].concat()));
-    assert!(markdown.starts_with("### `results/light.parquet` compared with"), "{markdown}");
-    let written_output = test_folder.sweep(&[&arguments[..], &["--out", "d.parquet"]].concat());
+    let markdown_table =
+        stdout_text(&test_folder.run_sweep(&[&comparison_words[..], &["--markdown"]].concat()));
+    assert!(
+        markdown_table.starts_with("### `results/light.parquet` compared with"),
+        "{markdown_table}"
+    );
+    let written_output =
+        test_folder.run_sweep(&[&comparison_words[..], &["--out", "d.parquet"]].concat());
     assert_eq!(exit_code(&written_output), Some(0), "{}", all_output(&written_output));
     for (quantity, title) in [
         (None, "Greatest ratio of B over that of A"),
         (Some("gap_change_m"), "Least gap of the nonlinear model in B less that in A"),
         (Some("ratio_max_b"), "Greatest ratio of B"),
     ] {
-        let option = quantity.map(|column| ["--quantity", column]);
-        let options = option.as_ref().map_or(&[][..], |option| option);
+        let quantity_option = quantity.map(|column| ["--quantity", column]);
+        let plot_options =
+            quantity_option.as_ref().map_or(&[][..], |quantity_option| quantity_option);
         let plot_output =
-            test_folder.sweep(&[&["plot", "d.parquet", "-o", "d.svg"], options].concat());
+            test_folder.run_sweep(&[&["plot", "d.parquet", "-o", "d.svg"], plot_options].concat());
         assert_eq!(exit_code(&plot_output), Some(0), "{}", all_output(&plot_output));
-        let picture = fs::read_to_string(test_folder.path("d.svg")).expect("it was drawn");
-        assert!(picture.contains(&format!(">{title}<")), "{quantity:?}");
-        // The limits of both files are unknown.
-        assert!(!picture.contains("boundary: "), "{quantity:?}");
+        let figure = fs::read_to_string(test_folder.path("d.svg")).expect("it was drawn");
+        assert!(figure.contains(&format!(">{title}<")), "{quantity:?}");
+        // Files of differences do not store the limits of both maps, so that no boundary is drawn.
+        assert!(!figure.contains("boundary: "), "{quantity:?}");
     }
-    let shown = json_output(&test_folder.sweep(&["show", "d.parquet", "--json"]));
-    let columns = shown["columns"].as_array().expect("a list").iter();
-    let worse: Vec<_> = columns.filter_map(|column| column["worse"].as_str()).collect();
-    assert_eq!(worse, ["greater", "less"], "of the ratio's change and of the gap's");
-    let refused_output = test_folder.sweep(&["compare", MAP, "d.parquet"]);
+    let comparison_json = json_output(&test_folder.run_sweep(&["show", "d.parquet", "--json"]));
+    let columns = comparison_json["columns"].as_array().expect("a list").iter();
+    let worse_directions: Vec<_> = columns.filter_map(|column| column["worse"].as_str()).collect();
+    assert_eq!(worse_directions, ["greater", "less"], "of the ratio's change and of the gap's");
+    let refused_output = test_folder.run_sweep(&["compare", MAP_FILE, "d.parquet"]);
     assert_eq!(exit_code(&refused_output), Some(2), "{}", all_output(&refused_output));
 }
 
 #[test]
 fn compare_matches_points_of_tolerances_about_other_numbers() {
-    let tolerance = |parameter: &str| {
+    let tolerance_axis = |parameter: &str| {
         format!("[[axis]]\nparameter = \"{parameter}\"\ntolerance = \"5 %\"\ncount = 2\n")
     };
-    let plain = grid(3, 2);
-    let start = plain.split("[[axis]]").next().expect("the keys before the axes");
-    let axes = tolerance("tub_mass_kg") + &tolerance("damping_n_s_per_m");
-    let test_folder = TestFolder::new(&format!("{start}{axes}"));
+    let plain_grid = grid_text(3, 2);
+    let grid_head = plain_grid.split("[[axis]]").next().expect("the keys before the axes");
+    let axis_text = tolerance_axis("tub_mass_kg") + &tolerance_axis("damping_n_s_per_m");
+    let test_folder = TestFolder::new(&format!("{grid_head}{axis_text}"));
     for (name, mass) in [("a", "20"), ("b", "24")] {
-        let mass = format!("[set]\ntub_mass_kg = {mass}\n");
-        fs::write(test_folder.path("g.toml"), format!("{start}{mass}{axes}")).expect("written");
+        let mass_section = format!("[set]\ntub_mass_kg = {mass}\n");
+        fs::write(test_folder.path("g.toml"), format!("{grid_head}{mass_section}{axis_text}"))
+            .expect("written");
         let command_output =
-            test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
+            test_folder.run_sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
         assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     }
-    let arguments = ["compare", "results/a.parquet", "results/b.parquet", "--fail-on", "rows"];
-    let compare_output = test_folder.sweep(&arguments);
+    let comparison_words =
+        ["compare", "results/a.parquet", "results/b.parquet", "--fail-on", "rows"];
+    let compare_output = test_folder.run_sweep(&comparison_words);
     assert_eq!(exit_code(&compare_output), Some(0), "{}", all_output(&compare_output));
-    let text = stdout(&compare_output);
-    assert!(text.contains("4 in both") && text.contains("rows are matched by point"), "{text}");
-    let comparison = json_output(&test_folder.sweep(&[&arguments[..], &["--json"]].concat()));
+    let comparison_text = stdout_text(&compare_output);
+    assert!(
+        comparison_text.contains("4 in both")
+            && comparison_text.contains("rows are matched by point"),
+        "{comparison_text}"
+    );
+    let comparison =
+        json_output(&test_folder.run_sweep(&[&comparison_words[..], &["--json"]].concat()));
     assert_eq!(
         (&comparison["matched_by"], &comparison["rows"]["in_both"]),
         (&"point".into(), &4.into())
@@ -324,97 +385,117 @@ fn compare_matches_points_of_tolerances_about_other_numbers() {
 
 #[test]
 fn compare_names_differences_that_an_axis_overrides() {
-    let axis = "[[axis]]\nparameter = \"spring_1_stiffness_n_per_m\"\nvalues = [7e3, 9e3]\n";
-    let plain = grid(3, 2);
-    let start = plain.split("[[axis]]").next().expect("the keys before the axes");
-    let test_folder = TestFolder::new(&format!("{start}{axis}"));
-    for (name, mass) in [("a", ""), ("b", "[set]\nspring_stiffness_n_per_m = 9e3\n")] {
-        fs::write(test_folder.path("g.toml"), format!("{start}{mass}{axis}")).expect("written");
+    let stiffness_axis =
+        "[[axis]]\nparameter = \"spring_1_stiffness_n_per_m\"\nvalues = [7e3, 9e3]\n";
+    let plain_grid = grid_text(3, 2);
+    let grid_head = plain_grid.split("[[axis]]").next().expect("the keys before the axes");
+    let test_folder = TestFolder::new(&format!("{grid_head}{stiffness_axis}"));
+    for (name, stiffness_section) in [("a", ""), ("b", "[set]\nspring_stiffness_n_per_m = 9e3\n")] {
+        fs::write(
+            test_folder.path("g.toml"),
+            format!("{grid_head}{stiffness_section}{stiffness_axis}"),
+        )
+        .expect("written");
         let command_output =
-            test_folder.sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
+            test_folder.run_sweep(&["run", "g.toml", "--name", name, "--progress", "none"]);
         assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     }
-    let arguments = ["compare", "results/a.parquet", "results/b.parquet"];
-    let text = stdout(&test_folder.sweep(&arguments));
+    let comparison_words = ["compare", "results/a.parquet", "results/b.parquet"];
+    let comparison_text = stdout_text(&test_folder.run_sweep(&comparison_words));
     let expected_text = "overridden  machine.springs.1.stiffness_n_per_m: the axis \
                 spring_1_stiffness_n_per_m sets this in both, so that the change does not show";
-    assert!(text.contains(expected_text), "{text}");
-    let comparison = json_output(&test_folder.sweep(&[&arguments[..], &["--json"]].concat()));
-    // The other springs are another machine's.
-    let paths = &comparison["overridden"][0]["paths"];
-    assert_eq!(paths.as_array().map(Vec::len), Some(1), "{paths}");
-    let markdown = stdout(&test_folder.sweep(&[&arguments[..], &["--markdown"]].concat()));
-    assert!(markdown.contains("- overridden: machine.springs.1"), "{markdown}");
+    assert!(comparison_text.contains(expected_text), "{comparison_text}");
+    let comparison =
+        json_output(&test_folder.run_sweep(&[&comparison_words[..], &["--json"]].concat()));
+    // Only spring 1 is overridden: the other springs differ between the maps.
+    let overridden_paths = &comparison["overridden"][0]["paths"];
+    assert_eq!(overridden_paths.as_array().map(Vec::len), Some(1), "{overridden_paths}");
+    let markdown_table =
+        stdout_text(&test_folder.run_sweep(&[&comparison_words[..], &["--markdown"]].concat()));
+    assert!(markdown_table.contains("- overridden: machine.springs.1"), "{markdown_table}");
 }
 
 #[test]
 fn compare_can_limit_the_difference_of_any_column() {
     let test_folder = folder_with_map();
-    let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--out", "light.parquet"];
-    let command_output = test_folder.sweep(&light);
+    let light_machine_words =
+        ["run", "g.toml", "--set", "tub_mass_kg=20", "--out", "light.parquet"];
+    let command_output = test_folder.run_sweep(&light_machine_words);
     assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
-    let compare_output =
-        |gate: &str| test_folder.sweep(&["compare", MAP, "light.parquet", "--fail-on", gate]);
-    assert_eq!(exit_code(&compare_output("nonlinear_tub_yaw=1e9")), Some(0));
-    let failed = compare_output("nonlinear_tub_yaw=0");
-    assert_eq!(exit_code(&failed), Some(4), "{}", all_output(&failed));
-    let text = stdout(&failed);
-    assert!(text.contains("--fail-on: nonlinear_tub_yaw changed by up to "), "{text}");
-    assert!(text.contains("greatest changes of nonlinear_tub_yaw, rad"), "{text}");
-    for unfit in ["nonlinear_tub_yow=1", "unbalance_mass_kg=1", "status=1"] {
-        let refused_output = compare_output(unfit);
-        assert_eq!(exit_code(&refused_output), Some(2), "{unfit}");
+    let run_comparison = |gate: &str| {
+        test_folder.run_sweep(&["compare", MAP_FILE, "light.parquet", "--fail-on", gate])
+    };
+    assert_eq!(exit_code(&run_comparison("nonlinear_tub_yaw=1e9")), Some(0));
+    let failed_gate = run_comparison("nonlinear_tub_yaw=0");
+    assert_eq!(exit_code(&failed_gate), Some(4), "{}", all_output(&failed_gate));
+    let gate_text = stdout_text(&failed_gate);
+    assert!(gate_text.contains("--fail-on: nonlinear_tub_yaw changed by up to "), "{gate_text}");
+    assert!(gate_text.contains("greatest changes of nonlinear_tub_yaw, rad"), "{gate_text}");
+    for unsuitable_gate in ["nonlinear_tub_yow=1", "unbalance_mass_kg=1", "status=1"] {
+        let refused_output = run_comparison(unsuitable_gate);
+        assert_eq!(exit_code(&refused_output), Some(2), "{unsuitable_gate}");
         assert!(
             all_output(&refused_output).contains("a column of numbers in both files"),
-            "{unfit}"
+            "{unsuitable_gate}"
         );
     }
 }
 
 #[test]
 fn compare_shows_both_ratios_of_a_changed_verdict() {
-    let test_folder = TestFolder::new(&grid(3, 2));
-    for (name, least, mass) in [("a", "ratio_min=0.5", "20"), ("b", "ratio_min=1", "22")] {
-        let mass = format!("tub_mass_kg={mass}");
-        let run = ["run", "g.toml", "--name", name, "--set", least, "--set", &mass];
-        let command_output = test_folder.sweep(&[&run[..], &["--progress", "none"]].concat());
+    let test_folder = TestFolder::new(&grid_text(3, 2));
+    for (name, ratio_min_option, mass) in [("a", "ratio_min=0.5", "20"), ("b", "ratio_min=1", "22")]
+    {
+        let mass_option = format!("tub_mass_kg={mass}");
+        let run_words =
+            ["run", "g.toml", "--name", name, "--set", ratio_min_option, "--set", &mass_option];
+        let command_output =
+            test_folder.run_sweep(&[&run_words[..], &["--progress", "none"]].concat());
         assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
     }
-    let output = stdout(&test_folder.sweep(&["compare", "results/a.parquet", "results/b.parquet"]));
-    let flips = output.split("verdicts that flipped").nth(1).expect("some");
-    let row = flips.lines().nth(2).expect("a row");
-    assert_eq!(row.matches(" to ").count(), 2, "{output}");
-    assert!(row.contains(" reliable") && row.ends_with(" not"), "{output}");
+    let comparison_text =
+        stdout_text(&test_folder.run_sweep(&["compare", "results/a.parquet", "results/b.parquet"]));
+    let flipped_verdicts = comparison_text.split("verdicts that flipped").nth(1).expect("some");
+    let flipped_row = flipped_verdicts.lines().nth(2).expect("a row");
+    assert_eq!(flipped_row.matches(" to ").count(), 2, "{comparison_text}");
+    assert!(
+        flipped_row.contains(" reliable") && flipped_row.ends_with(" not"),
+        "{comparison_text}"
+    );
 }
 
 #[test]
 fn trace_says_which_limit_is_violated() {
-    let test_folder = TestFolder::new(&grid(3, 2));
-    let run_summary = |sets: &[&str]| {
-        let trace = ["trace", "g.toml", "--point", "1", "--out", "t.parquet"];
-        all_output(&test_folder.sweep(&[&trace[..], sets].concat()))
+    let test_folder = TestFolder::new(&grid_text(3, 2));
+    let trace_summary = |set_options: &[&str]| {
+        let trace_words = ["trace", "g.toml", "--point", "1", "--out", "t.parquet"];
+        all_output(&test_folder.run_sweep(&[&trace_words[..], set_options].concat()))
     };
-    let high = run_summary(&[]);
-    assert!(high.contains("the greatest ratio is ") && high.contains("the limit 2"), "{high}");
+    let high_ratio_summary = trace_summary(&[]);
+    assert!(
+        high_ratio_summary.contains("the greatest ratio is ")
+            && high_ratio_summary.contains("the limit 2"),
+        "{high_ratio_summary}"
+    );
     // The ratios of so short a run are almost 1, and one of this point is less.
-    let low = run_summary(&["--set", "ratio_min=1"]);
-    let expected = "not reliable: the least ratio is 1 (tub_yaw), the limit 1";
-    assert!(low.contains(expected), "{low}");
+    let low_ratio_summary = trace_summary(&["--set", "ratio_min=1"]);
+    let expected_text = "not reliable: the least ratio is 1 (tub_yaw), the limit 1";
+    assert!(low_ratio_summary.contains(expected_text), "{low_ratio_summary}");
 }
 
 #[test]
 fn a_report_describes_quantities_and_both_limits() {
-    let grid = grid(3, 2).replace("ratio_limit = 2.0", "ratio_limit = 2.0\nratio_min = 0.999");
+    let grid = grid_text(3, 2).replace("ratio_limit = 2.0", "ratio_limit = 2.0\nratio_min = 0.999");
     let test_folder =
         TestFolder::new(&format!("metrics = [\"damper_speed\", \"static_sag\"]\n{grid}"));
-    let sets = ["--set", "spin_ramp_s=0.05", "--set", "damper_1_friction_n=3"];
-    let command_output =
-        test_folder.sweep(&[&["run", "g.toml", "--progress", "none"], &sets[..]].concat());
+    let set_options = ["--set", "spin_ramp_s=0.05", "--set", "damper_1_friction_n=3"];
+    let command_output = test_folder
+        .run_sweep(&[&["run", "g.toml", "--progress", "none"], &set_options[..]].concat());
     assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
-    let written_output = test_folder.sweep(&["report", MAP, "-o", "r.html"]);
+    let written_output = test_folder.run_sweep(&["report", MAP_FILE, "-o", "r.html"]);
     assert_eq!(exit_code(&written_output), Some(0), "{}", all_output(&written_output));
     let page = fs::read_to_string(test_folder.path("r.html")).expect("it was written");
-    for text in [
+    for page_text in [
         "is between 0.999 and 2",
         ">Tub front, vertical<",
         ">Least ratio<",
@@ -426,13 +507,13 @@ fn a_report_describes_quantities_and_both_limits() {
         // This is the only damper with friction.
         "with friction of 0 to 3 N",
     ] {
-        assert!(page.contains(text), "{text}");
+        assert!(page.contains(page_text), "{page_text}");
     }
     assert_eq!(page.matches(">Tub front, vertical<").count(), 1, "of the nonlinear model alone");
-    // The file does not say where a number comes from, not even this one, which `--set` gave.
+    // The page does not say where numbers come from, not even those that `--set` gave.
     assert!(!page.contains("assumed") && page.contains("sweep parameters"), "where from");
-    // The column of all dampers replaces those of each, and lines do not break between numbers and
-    // units.
+    // The column of all dampers replaces the columns of single dampers. Numbers and units are
+    // joined by spaces at which lines do not break.
     assert!(!page.contains("Damper 1 speed"), "numbered");
     assert!(page.contains("\u{a0}N\u{a0}s/m") && page.contains("\u{a0}m/s"), "units");
 }
@@ -440,93 +521,120 @@ fn a_report_describes_quantities_and_both_limits() {
 #[test]
 fn exports_overwrite_only_files_of_the_same_kind() {
     let test_folder = folder_with_map();
-    for (name, begins) in [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04")] {
+    for (name, magic_bytes) in [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04")]
+    {
         for _ in 0..2 {
-            let command_output = test_folder.sweep(&["export", MAP, name]);
+            let command_output = test_folder.run_sweep(&["export", MAP_FILE, name]);
             assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
         }
-        let bytes = fs::read(test_folder.path(name)).expect("the export is there");
-        assert!(bytes.starts_with(begins), "{name}");
+        let export_bytes = fs::read(test_folder.path(name)).expect("the export is there");
+        assert!(export_bytes.starts_with(magic_bytes), "{name}");
     }
     // The output may be an option, as with every other command.
-    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "--out", "o.csv"])), Some(0));
-    let bytes = |name| fs::read(test_folder.path(name)).expect("the export is there");
-    assert_eq!(bytes("o.csv"), bytes("m.csv"));
-    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "p.csv", "-o", "q.csv"])), Some(2));
-    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP])), Some(2));
+    assert_eq!(exit_code(&test_folder.run_sweep(&["export", MAP_FILE, "--out", "o.csv"])), Some(0));
+    let export_bytes = |name| fs::read(test_folder.path(name)).expect("the export is there");
+    assert_eq!(export_bytes("o.csv"), export_bytes("m.csv"));
+    assert_eq!(
+        exit_code(&test_folder.run_sweep(&["export", MAP_FILE, "p.csv", "-o", "q.csv"])),
+        Some(2)
+    );
+    assert_eq!(exit_code(&test_folder.run_sweep(&["export", MAP_FILE])), Some(2));
     fs::write(test_folder.path("mine.csv"), "my,own\n1,2\n").expect("written");
-    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "mine.csv"])), Some(2));
-    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "m.ods"])), Some(2));
+    assert_eq!(exit_code(&test_folder.run_sweep(&["export", MAP_FILE, "mine.csv"])), Some(2));
+    assert_eq!(exit_code(&test_folder.run_sweep(&["export", MAP_FILE, "m.ods"])), Some(2));
 }
 
 #[test]
 #[cfg(unix)]
 fn a_refused_temporary_file_of_an_export_is_a_failure_of_the_system() {
     let test_folder = folder_with_map();
-    let mut command = test_folder.under(&[]);
-    command.args(["export", MAP, "m.xlsx"]).env("TMPDIR", test_folder.path("missing"));
+    let mut command = test_folder.command_under(&[]);
+    command.args(["export", MAP_FILE, "m.xlsx"]).env("TMPDIR", test_folder.path("missing"));
     let refused_output = command.output().expect("the command starts");
     assert_eq!(exit_code(&refused_output), Some(1), "{}", all_output(&refused_output));
-    let text = all_output(&refused_output);
-    assert!(text.contains("cannot write a temporary file to export"), "{text}");
+    let error_text = all_output(&refused_output);
+    assert!(error_text.contains("cannot write a temporary file to export"), "{error_text}");
 }
 
 #[test]
 fn trace_selects_a_point_by_number_or_the_worst_one() {
     let test_folder = folder_with_map();
-    let traced = test_folder.sweep(&["trace", "g.toml", "--point", "3", "--out", "t.parquet"]);
-    assert_eq!(exit_code(&traced), Some(0), "{}", all_output(&traced));
-    let row = json_output(&test_folder.sweep(&["show", MAP, "--where", "point == 3", "--json"]));
-    let ratio = row[0]["ratio_max"].as_f64().expect("a ratio");
-    let text = all_output(&traced);
-    assert!(text.contains("verdict  ") && text.contains(&format!("{ratio:.4}")[..5]), "{text}");
+    let trace_output =
+        test_folder.run_sweep(&["trace", "g.toml", "--point", "3", "--out", "t.parquet"]);
+    assert_eq!(exit_code(&trace_output), Some(0), "{}", all_output(&trace_output));
+    let row_json =
+        json_output(&test_folder.run_sweep(&["show", MAP_FILE, "--where", "point == 3", "--json"]));
+    let ratio = row_json[0]["ratio_max"].as_f64().expect("a ratio");
+    let trace_text = all_output(&trace_output);
+    assert!(
+        trace_text.contains("verdict  ") && trace_text.contains(&format!("{ratio:.4}")[..5]),
+        "{trace_text}"
+    );
 
-    let worst = test_folder.sweep(&["trace", "g.toml", "--worst", "--out", "t.parquet"]);
-    assert_eq!(exit_code(&worst), Some(0), "{}", all_output(&worst));
-    let first = json_output(&test_folder.sweep(&[
+    let worst_trace_output =
+        test_folder.run_sweep(&["trace", "g.toml", "--worst", "--out", "t.parquet"]);
+    assert_eq!(exit_code(&worst_trace_output), Some(0), "{}", all_output(&worst_trace_output));
+    let worst_row = json_output(&test_folder.run_sweep(&[
         "show",
-        MAP,
+        MAP_FILE,
         "--top",
         "1",
         "--by",
         "ratio_max",
         "--json",
     ]));
-    let expected = format!("point {} is where ratio_max is greatest", first[0]["point"]);
-    assert!(all_output(&worst).contains(&expected), "{expected}: {}", all_output(&worst));
+    let expected_text = format!("point {} is where ratio_max is greatest", worst_row[0]["point"]);
+    assert!(
+        all_output(&worst_trace_output).contains(&expected_text),
+        "{expected_text}: {}",
+        all_output(&worst_trace_output)
+    );
 
-    let beyond = test_folder.sweep(&["trace", "g.toml", "--point", "6", "--out", "t.parquet"]);
-    assert_eq!(exit_code(&beyond), Some(2));
-    assert!(all_output(&beyond).contains("from 0 to 5"), "{}", all_output(&beyond));
-    let other = ["trace", "g.toml", "--worst", "--set", "tub_mass_kg=20", "--out", "t.parquet"];
-    let other = test_folder.sweep(&other);
-    assert_eq!(exit_code(&other), Some(2));
-    assert!(all_output(&other).contains("of this very grid"), "{}", all_output(&other));
+    let out_of_range_output =
+        test_folder.run_sweep(&["trace", "g.toml", "--point", "6", "--out", "t.parquet"]);
+    assert_eq!(exit_code(&out_of_range_output), Some(2));
+    assert!(
+        all_output(&out_of_range_output).contains("from 0 to 5"),
+        "{}",
+        all_output(&out_of_range_output)
+    );
+    let other_grid_words =
+        ["trace", "g.toml", "--worst", "--set", "tub_mass_kg=20", "--out", "t.parquet"];
+    let other_grid_output = test_folder.run_sweep(&other_grid_words);
+    assert_eq!(exit_code(&other_grid_output), Some(2));
+    assert!(
+        all_output(&other_grid_output).contains("of this very grid"),
+        "{}",
+        all_output(&other_grid_output)
+    );
 }
 
 #[test]
 fn every_scalar_of_the_grid_file_can_be_set() {
-    let test_folder = TestFolder::new(&grid(3, 2));
-    let plan = |sets: &[&str]| {
-        json_output(&test_folder.sweep(&[&["check", "g.toml", "--json"], sets].concat()))
+    let test_folder = TestFolder::new(&grid_text(3, 2));
+    let check_plan = |set_options: &[&str]| {
+        json_output(&test_folder.run_sweep(&[&["check", "g.toml", "--json"], set_options].concat()))
     };
-    let set = plan(&["--set", "end_s=0.2", "--ratio-limit", "1.5", "--set", "step_s=1e-4"]);
-    assert_eq!(set["time"]["end_s"], 0.2);
-    assert_eq!(set["reliability"]["ratio_limit"], 1.5);
-    assert_eq!(set["integrator"]["step_s"], 1e-4);
-    assert_eq!(set["set"]["ratio_limit"], 1.5);
-    let method = plan(&["--set", "method=dopri5", "--set", "rtol=1e-5", "--set", "criterion=rms"]);
-    assert_eq!(method["integrator"]["rtol"], 1e-5);
-    assert_eq!(method["reliability"]["criterion"], "rms");
-    assert!(plan(&[])["set"].is_null(), "a plan without --set reads as ever");
-    let named = ["--set", "profile=ramp", "--set", "channels=tub_yaw, tub_pitch"];
-    let named = plan(&[&named[..], &["--set", "metrics=static_sag,clash_time"]].concat());
-    assert_eq!(named["spin"]["profile"], "ramp");
-    assert_eq!(named["spin"]["peak_rpm"], plan(&[])["spin"]["peak_rpm"]);
-    assert_eq!(named["reliability"]["channels"], json!(["tub_yaw", "tub_pitch"]));
-    assert_eq!(named["metrics"], json!(["static_sag", "clash_time"]));
-    assert_eq!(named["set"]["metrics"], "static_sag,clash_time");
-    for (sets, expected) in [
+    let set_plan =
+        check_plan(&["--set", "end_s=0.2", "--ratio-limit", "1.5", "--set", "step_s=1e-4"]);
+    assert_eq!(set_plan["time"]["end_s"], 0.2);
+    assert_eq!(set_plan["reliability"]["ratio_limit"], 1.5);
+    assert_eq!(set_plan["integrator"]["step_s"], 1e-4);
+    assert_eq!(set_plan["set"]["ratio_limit"], 1.5);
+    let method_plan =
+        check_plan(&["--set", "method=dopri5", "--set", "rtol=1e-5", "--set", "criterion=rms"]);
+    assert_eq!(method_plan["integrator"]["rtol"], 1e-5);
+    assert_eq!(method_plan["reliability"]["criterion"], "rms");
+    assert!(check_plan(&[])["set"].is_null(), "a plan without --set reads as ever");
+    let named_words = ["--set", "profile=ramp", "--set", "channels=tub_yaw, tub_pitch"];
+    let named_plan =
+        check_plan(&[&named_words[..], &["--set", "metrics=static_sag,clash_time"]].concat());
+    assert_eq!(named_plan["spin"]["profile"], "ramp");
+    assert_eq!(named_plan["spin"]["peak_rpm"], check_plan(&[])["spin"]["peak_rpm"]);
+    assert_eq!(named_plan["reliability"]["channels"], json!(["tub_yaw", "tub_pitch"]));
+    assert_eq!(named_plan["metrics"], json!(["static_sag", "clash_time"]));
+    assert_eq!(named_plan["set"]["metrics"], "static_sag,clash_time");
+    for (set_options, expected_text) in [
         (["--set", "rtol=1e-5"], "the method \"rk4\" has no `rtol`"),
         (["--set", "method=dopri"], "did you mean `dopri5`?"),
         (["--set", "end_s=-1"], "`end_s`"),
@@ -540,16 +648,17 @@ fn every_scalar_of_the_grid_file_can_be_set() {
         (["--ratio-limit", "nan"], "ratio_limit"),
         (["--name", "a/b"], "expected letters"),
     ] {
-        let refused_output = test_folder.sweep(&[&["check", "g.toml"], &sets[..]].concat());
+        let refused_output =
+            test_folder.run_sweep(&[&["check", "g.toml"], &set_options[..]].concat());
         assert_eq!(
             exit_code(&refused_output),
             Some(2),
-            "{sets:?}: {}",
+            "{set_options:?}: {}",
             all_output(&refused_output)
         );
         assert!(
-            all_output(&refused_output).contains(expected),
-            "{sets:?}: {}",
+            all_output(&refused_output).contains(expected_text),
+            "{set_options:?}: {}",
             all_output(&refused_output)
         );
     }
@@ -557,29 +666,30 @@ fn every_scalar_of_the_grid_file_can_be_set() {
 
 #[test]
 fn show_describes_lists_and_unfinished_runs() {
-    let test_folder = TestFolder::new(&grid(3, 2));
+    let test_folder = TestFolder::new(&grid_text(3, 2));
     fs::write(test_folder.path("list.csv"), "unbalance_mass_kg\n0.1\n0.2\n").expect("written");
-    let listed = "name = \"short\"\n\
+    let list_grid = "name = \"short\"\n\
         spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 50 }\n\
         time = { end_s = 0.1 }\n\
         integrator = { method = \"rk4\" }\n\
         design = { method = \"list\", file = \"list.csv\" }\n";
-    fs::write(test_folder.path("list.toml"), listed).expect("written");
-    let command_output = test_folder.sweep(&["run", "list.toml", "--progress", "none"]);
+    fs::write(test_folder.path("list.toml"), list_grid).expect("written");
+    let command_output = test_folder.run_sweep(&["run", "list.toml", "--progress", "none"]);
     assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
-    let shown = stdout(&test_folder.sweep(&["show", MAP]));
-    assert!(shown.contains("design  file list.csv"), "{shown}");
-    assert!(shown.contains("axis  unbalance_mass_kg\n"), "{shown}");
+    let shown_table = stdout_text(&test_folder.run_sweep(&["show", MAP_FILE]));
+    assert!(shown_table.contains("design  file list.csv"), "{shown_table}");
+    assert!(shown_table.contains("axis  unbalance_mass_kg\n"), "{shown_table}");
 
-    // A shard has every second chunk of 8 rows, or 16 of 32 rows.
-    fs::write(test_folder.path("g.toml"), grid(8, 4)).expect("written");
-    let part = test_folder.sweep(&["run", "g.toml", "--out", "part.parquet", "--shard", "1/2"]);
-    assert_eq!(exit_code(&part), Some(0), "{}", all_output(&part));
-    for path in ["part.parquet", "part.parquet.partial"] {
-        let shown = stdout(&test_folder.sweep(&["show", path]));
-        assert!(shown.contains("unfinished: 16 of 32 points done (50.0 %)"), "{shown}");
-        let output = json_output(&test_folder.sweep(&["show", path, "--json"]));
-        assert_eq!((&output["points"], &output["points_done"]), (&json!(32), &json!(16)));
+    // The shard 1/2 has every second chunk of 8 rows, which are 16 of the 32 rows.
+    fs::write(test_folder.path("g.toml"), grid_text(8, 4)).expect("written");
+    let shard_output =
+        test_folder.run_sweep(&["run", "g.toml", "--out", "part.parquet", "--shard", "1/2"]);
+    assert_eq!(exit_code(&shard_output), Some(0), "{}", all_output(&shard_output));
+    for result_path in ["part.parquet", "part.parquet.partial"] {
+        let shown_table = stdout_text(&test_folder.run_sweep(&["show", result_path]));
+        assert!(shown_table.contains("unfinished: 16 of 32 points done (50.0 %)"), "{shown_table}");
+        let shown_json = json_output(&test_folder.run_sweep(&["show", result_path, "--json"]));
+        assert_eq!((&shown_json["points"], &shown_json["points_done"]), (&json!(32), &json!(16)));
     }
     for words in [
         &["show", "part.parquet", "--top", "3"][..],
@@ -587,49 +697,71 @@ fn show_describes_lists_and_unfinished_runs() {
         &["require", "part.parquet", "ratio_max < 2"],
         &["plot", "part.parquet"],
         &["export", "part.parquet", "part.csv"],
-        &["compare", MAP, "part.parquet"],
+        &["compare", MAP_FILE, "part.parquet"],
     ] {
-        let refused_output = test_folder.sweep(words);
+        let refused_output = test_folder.run_sweep(words);
         assert_eq!(exit_code(&refused_output), Some(2), "{words:?}");
         let text = all_output(&refused_output);
         assert!(text.contains("is not finished: 16 of 32 points done"), "{words:?}: {text}");
     }
 
     fs::create_dir(test_folder.path("x.parquet.partial")).expect("made");
-    let folder = test_folder.sweep(&["show", "x.parquet.partial"]);
-    assert!(all_output(&folder).contains("a run that is not finished"), "{}", all_output(&folder));
+    let folder_output = test_folder.run_sweep(&["show", "x.parquet.partial"]);
+    assert!(
+        all_output(&folder_output).contains("a run that is not finished"),
+        "{}",
+        all_output(&folder_output)
+    );
 }
 
 #[test]
 fn require_names_the_failing_part_and_the_confidence_of_shares() {
-    let test_folder = TestFolder::new(&designed("monte_carlo"));
-    let command_output = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+    let test_folder = TestFolder::new(&design_grid("monte_carlo"));
+    let command_output = test_folder.run_sweep(&["run", "g.toml", "--progress", "none"]);
     assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
-    let text = "share(unbalance_mass_kg < 0.5) > 0.99 and count(true) == 32";
-    let closed = test_folder.sweep(&["require", MAP, text]);
-    assert_eq!(exit_code(&closed), Some(4), "{}", all_output(&closed));
-    let output = json_output(&test_folder.sweep(&["require", MAP, text, "--json"]));
-    let whole_table = &output["expressions"][0];
-    let share = whole_table["folded"][0].as_f64().expect("a share");
-    let ends = [0, 1].map(|end| whole_table["intervals"][0][end].as_f64().expect("an interval"));
-    assert!(ends[0] < share && share < ends[1] && ends[1] - ends[0] < 0.4, "{ends:?}");
-    let holds: Vec<&Value> =
-        whole_table["parts"].as_array().expect("parts").iter().map(|part| &part["holds"]).collect();
-    assert_eq!(holds, [&json!(false), &json!(true)]);
-    let text = stdout(&closed);
-    assert!(text.contains("95 % confidence"), "{text}");
-    assert!(text.contains("       FAILS  share(unbalance_mass_kg < 0.5) > 0.99"), "{text}");
-    assert!(text.contains("       holds  count(true) == 32"), "{text}");
+    let condition = "share(unbalance_mass_kg < 0.5) > 0.99 and count(true) == 32";
+    let failed_gate = test_folder.run_sweep(&["require", MAP_FILE, condition]);
+    assert_eq!(exit_code(&failed_gate), Some(4), "{}", all_output(&failed_gate));
+    let gate_json =
+        json_output(&test_folder.run_sweep(&["require", MAP_FILE, condition, "--json"]));
+    let expression_json = &gate_json["expressions"][0];
+    let share_value = expression_json["folded"][0].as_f64().expect("a share");
+    let interval_ends =
+        [0, 1].map(|end| expression_json["intervals"][0][end].as_f64().expect("an interval"));
+    assert!(
+        interval_ends[0] < share_value
+            && share_value < interval_ends[1]
+            && interval_ends[1] - interval_ends[0] < 0.4,
+        "{interval_ends:?}"
+    );
+    let part_holds: Vec<&Value> = expression_json["parts"]
+        .as_array()
+        .expect("parts")
+        .iter()
+        .map(|part| &part["holds"])
+        .collect();
+    assert_eq!(part_holds, [&json!(false), &json!(true)]);
+    let gate_text = stdout_text(&failed_gate);
+    assert!(gate_text.contains("95 % confidence"), "{gate_text}");
+    assert!(
+        gate_text.contains("       FAILS  share(unbalance_mass_kg < 0.5) > 0.99"),
+        "{gate_text}"
+    );
+    assert!(gate_text.contains("       holds  count(true) == 32"), "{gate_text}");
     // The share of a grid has no confidence interval.
-    let grid = folder_with_map();
-    let open = stdout(&grid.sweep(&["require", MAP, "share(unbalance_mass_kg < 0.5) > 0"]));
-    assert!(!open.contains("confidence"), "{open}");
+    let map_folder = folder_with_map();
+    let passed_gate = stdout_text(&map_folder.run_sweep(&[
+        "require",
+        MAP_FILE,
+        "share(unbalance_mass_kg < 0.5) > 0",
+    ]));
+    assert!(!passed_gate.contains("confidence"), "{passed_gate}");
 }
 
 #[test]
 fn plot_suggests_the_nearest_name_of_a_quantity() {
     let test_folder = folder_with_map();
-    let refused_output = test_folder.sweep(&["plot", MAP, "--quantity", "ratio_mx"]);
+    let refused_output = test_folder.run_sweep(&["plot", MAP_FILE, "--quantity", "ratio_mx"]);
     assert_eq!(exit_code(&refused_output), Some(2));
     assert!(
         all_output(&refused_output).contains("is `ratio_max` meant?"),
@@ -641,11 +773,13 @@ fn plot_suggests_the_nearest_name_of_a_quantity() {
 #[test]
 fn figures_show_the_constants_of_set() {
     let test_folder = folder_with_map();
-    let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--set", "channels=tub_yaw"];
-    let command_output =
-        test_folder.sweep(&[&light[..], &["--name", "light", "--progress", "none"]].concat());
+    let light_machine_words =
+        ["run", "g.toml", "--set", "tub_mass_kg=20", "--set", "channels=tub_yaw"];
+    let command_output = test_folder.run_sweep(
+        &[&light_machine_words[..], &["--name", "light", "--progress", "none"]].concat(),
+    );
     assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
-    let plot_output = test_folder.sweep(&["plot", "results/light.parquet", "-o", "light.svg"]);
+    let plot_output = test_folder.run_sweep(&["plot", "results/light.parquet", "-o", "light.svg"]);
     assert_eq!(exit_code(&plot_output), Some(0), "{}", all_output(&plot_output));
     let figure = fs::read_to_string(test_folder.path("light.svg")).expect("a figure");
     assert!(figure.contains("tub_mass_kg = 20") && figure.contains("channels = tub_yaw"));
@@ -654,16 +788,20 @@ fn figures_show_the_constants_of_set() {
 #[test]
 fn the_size_of_a_small_result_is_that_of_check() {
     let test_folder = folder_with_map();
-    let checked = all_output(&test_folder.sweep(&["check", "g.toml"]));
-    let end = checked.find(" kB for the result").expect("a size in kB");
-    let most = checked[..end].rsplit(' ').next().and_then(|kb| kb.parse::<f64>().ok());
-    let most = most.expect("a number") * 1e3;
-    let bytes = fs::metadata(test_folder.path(MAP)).expect("a result").len() as f64;
-    assert!(bytes <= most && most < 2.0 * bytes, "{bytes} of {most}: {checked}");
+    let check_text = all_output(&test_folder.run_sweep(&["check", "g.toml"]));
+    let size_end = check_text.find(" kB for the result").expect("a size in kB");
+    let estimated_bytes =
+        check_text[..size_end].rsplit(' ').next().and_then(|kb| kb.parse::<f64>().ok());
+    let estimated_bytes = estimated_bytes.expect("a number") * 1e3;
+    let result_bytes = fs::metadata(test_folder.path(MAP_FILE)).expect("a result").len() as f64;
+    assert!(
+        result_bytes <= estimated_bytes && estimated_bytes < 2.0 * result_bytes,
+        "{result_bytes} of {estimated_bytes}: {check_text}"
+    );
 }
 
 /// Returns a grid file with a design over two parameters.
-fn designed(method: &str) -> String {
+fn design_grid(method: &str) -> String {
     format!(
         "name = \"short\"\n\
          spin = {{ profile = \"triangular\", peak_rpm = 350, ramp_s = 50 }}\n\
@@ -678,28 +816,33 @@ fn designed(method: &str) -> String {
 #[test]
 fn run_recommends_a_figure_that_can_be_drawn_for_a_design() {
     for method in ["latin_hypercube", "sobol", "monte_carlo"] {
-        let test_folder = TestFolder::new(&designed(method));
-        let command_output = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+        let test_folder = TestFolder::new(&design_grid(method));
+        let command_output = test_folder.run_sweep(&["run", "g.toml", "--progress", "none"]);
         assert_eq!(exit_code(&command_output), Some(0), "{}", all_output(&command_output));
-        let text = all_output(&command_output);
-        assert!(text.contains("share  ") && text.contains("next  sweep plot "), "{text}");
-        let next = test_folder.sweep(&["plot", MAP]);
-        assert_eq!(exit_code(&next), Some(0), "{}", all_output(&next));
-        for (view, expected) in [
+        let run_text = all_output(&command_output);
+        assert!(
+            run_text.contains("share  ") && run_text.contains("next  sweep plot "),
+            "{run_text}"
+        );
+        let plot_output = test_folder.run_sweep(&["plot", MAP_FILE]);
+        assert_eq!(exit_code(&plot_output), Some(0), "{}", all_output(&plot_output));
+        for (view, expected_text) in [
             ("scatter", "Greatest ratio"),
             ("histogram", "% confidence"),
             ("influence", "Rank correlation (Spearman)"),
         ] {
-            for name in ["a.svg", "a.png", "a.html"] {
-                let plot_output = test_folder.sweep(&["plot", MAP, "--view", view, "-o", name]);
+            for figure_name in ["a.svg", "a.png", "a.html"] {
+                let plot_output =
+                    test_folder.run_sweep(&["plot", MAP_FILE, "--view", view, "-o", figure_name]);
                 assert_eq!(exit_code(&plot_output), Some(0), "{}", all_output(&plot_output));
             }
             let figure = fs::read_to_string(test_folder.path("a.svg")).expect("a figure");
-            assert!(figure.contains(expected), "{method}, {view}");
+            assert!(figure.contains(expected_text), "{method}, {view}");
         }
     }
     let test_folder = folder_with_map();
-    let refused_output = test_folder.sweep(&["plot", MAP, "--view", "influence", "-o", "a.svg"]);
+    let refused_output =
+        test_folder.run_sweep(&["plot", MAP_FILE, "--view", "influence", "-o", "a.svg"]);
     assert_eq!(exit_code(&refused_output), Some(2));
     assert!(
         all_output(&refused_output).contains("`--view` is for designs"),

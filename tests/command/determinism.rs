@@ -37,41 +37,43 @@ channels = ["tub_front_y", "tub_front_z", "drum_front_y", "drum_front_z", "tub_y
 
 /// Runs the grid and returns the bytes of the result; `None` if this processor lacks the
 /// instruction set.
-fn bytes(integrator: &str, threads: u32, simd: &str) -> Option<Vec<u8>> {
+fn result_bytes(integrator: &str, threads: u32, simd: &str) -> Option<Vec<u8>> {
     let test_folder = tempfile::tempdir().expect("a temporary folder");
-    let [grid, result] = ["grid.toml", "result.parquet"].map(|name| test_folder.path().join(name));
-    fs::write(&grid, format!("{GRID}{integrator}")).expect("the grid is written");
-    let run = Command::new(sweep_binary())
+    let [grid_path, result_path] =
+        ["grid.toml", "result.parquet"].map(|name| test_folder.path().join(name));
+    fs::write(&grid_path, format!("{GRID}{integrator}")).expect("the grid is written");
+    let run_output = Command::new(sweep_binary())
         .args(["run", "--progress", "none", "--threads", &threads.to_string()])
-        .arg(&grid)
+        .arg(&grid_path)
         .arg("--out")
-        .arg(&result)
+        .arg(&result_path)
         .env("SWEEP_SIMD", simd)
         .env_remove("SLURM_ARRAY_TASK_ID")
         .env_remove("JOB_COMPLETION_INDEX")
         .output()
         .expect("the command starts");
-    let messages = String::from_utf8_lossy(&run.stderr);
-    if !run.status.success() && messages.contains("expected one that this machine has") {
+    let messages = String::from_utf8_lossy(&run_output.stderr);
+    if !run_output.status.success() && messages.contains("expected one that this machine has") {
         eprintln!("this machine has no {simd}");
         return None;
     }
-    assert!(run.status.success(), "{integrator}, {threads} threads, {simd}: {messages}");
-    Some(fs::read(result).expect("a finished run has an output"))
+    assert!(run_output.status.success(), "{integrator}, {threads} threads, {simd}: {messages}");
+    Some(fs::read(result_path).expect("a finished run has an output"))
 }
 
-fn same_bytes(integrator: &str) {
-    let single_thread_bytes = bytes(integrator, 1, "scalar").expect("every machine runs scalars");
+fn assert_same_bytes(integrator: &str) {
+    let single_thread_bytes =
+        result_bytes(integrator, 1, "scalar").expect("every machine runs scalars");
     for threads in [2, 4] {
         assert!(
-            bytes(integrator, threads, "scalar").as_ref() == Some(&single_thread_bytes),
+            result_bytes(integrator, threads, "scalar").as_ref() == Some(&single_thread_bytes),
             "{threads} threads"
         );
     }
     for simd in ["avx2", "avx512", "neon"] {
         for threads in [1, 2, 4] {
-            if let Some(other) = bytes(integrator, threads, simd) {
-                assert!(other == single_thread_bytes, "{simd} on {threads} threads");
+            if let Some(other_bytes) = result_bytes(integrator, threads, simd) {
+                assert!(other_bytes == single_thread_bytes, "{simd} on {threads} threads");
             }
         }
     }
@@ -79,24 +81,24 @@ fn same_bytes(integrator: &str) {
 
 #[test]
 fn same_bytes_for_1_2_and_4_threads_on_every_instruction_set_rk4() {
-    same_bytes("method = \"rk4\"\nstep_s = 2e-4\n");
+    assert_same_bytes("method = \"rk4\"\nstep_s = 2e-4\n");
 }
 
 #[test]
 fn same_bytes_for_1_2_and_4_threads_on_every_instruction_set_dopri5() {
-    same_bytes("method = \"dopri5\"\nrtol = 1e-5\natol = 1e-8\n");
+    assert_same_bytes("method = \"dopri5\"\nrtol = 1e-5\natol = 1e-8\n");
 }
 
 #[test]
 fn same_bytes_for_1_2_and_4_threads_on_every_instruction_set_mass_scaled() {
-    same_bytes("method = \"rk4-mass-scaled\"\naccuracy = 1e-3\n");
+    assert_same_bytes("method = \"rk4-mass-scaled\"\naccuracy = 1e-3\n");
 }
 
 /// A generator of random numbers (Marsaglia's xorshift).
-struct Numbers(u64);
+struct RandomNumbers(u64);
 
-impl Numbers {
-    fn next(&mut self) -> f64 {
+impl RandomNumbers {
+    fn next_unit(&mut self) -> f64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -104,7 +106,7 @@ impl Numbers {
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
+        low + (high - low) * self.next_unit()
     }
 }
 
@@ -113,65 +115,70 @@ fn from_environment(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().expect("it is a number"))
 }
 
-/// Returns a random machine's file, with the elements of `kinds`' bits: friction, stops, bushings,
-/// stiffening springs, a second unbalance.
-fn machine(kinds: u64, numbers: &mut Numbers) -> String {
-    let template = include_str!("../../crates/sweep/tests/held/m_fine17.toml");
-    let (bare, _) = template.split_once("[[bushings]]").expect("the file's last element");
-    let is_kept = |line: &&str| !line.starts_with("cubic");
-    let mut text: String = bare.lines().filter(is_kept).map(|line| format!("{line}\n")).collect();
-    let mut number = |low: f64, high: f64| format!("{}", numbers.between(low, high));
-    if kinds & 1 != 0 {
-        let friction = format!("[[dampers]]\nfriction_n = {}", number(5.0, 60.0));
-        text = text.replace("[[dampers]]", &friction);
+/// Returns the text of a random machine's file. The bits of `element_bits`, from the lowest one,
+/// add friction, stops, bushings, stiffening springs and a second unbalance.
+fn random_machine_file(element_bits: u64, numbers: &mut RandomNumbers) -> String {
+    let machine_template = include_str!("../../crates/sweep/tests/held/m_fine17.toml");
+    let (machine_without_bushings, _) =
+        machine_template.split_once("[[bushings]]").expect("the file's last element");
+    let is_not_cubic = |line: &&str| !line.starts_with("cubic");
+    let mut machine_text: String = machine_without_bushings
+        .lines()
+        .filter(is_not_cubic)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let mut random_text = |low: f64, high: f64| format!("{}", numbers.between(low, high));
+    if element_bits & 1 != 0 {
+        let friction = format!("[[dampers]]\nfriction_n = {}", random_text(5.0, 60.0));
+        machine_text = machine_text.replace("[[dampers]]", &friction);
     }
-    if kinds & 8 != 0 {
-        let cubic = format!("[[springs]]\ncubic_n_per_m3 = {}", number(1e5, 3e6));
-        text = text.replace("[[springs]]", &cubic);
+    if element_bits & 8 != 0 {
+        let cubic = format!("[[springs]]\ncubic_n_per_m3 = {}", random_text(1e5, 3e6));
+        machine_text = machine_text.replace("[[springs]]", &cubic);
     }
-    if kinds & 2 != 0 {
+    if element_bits & 2 != 0 {
         for side in [1, -1] {
-            let clearance = number(0.004, 0.02);
-            let stiffness = number(1e4, 1e5);
-            text += &format!(
+            let clearance = random_text(0.004, 0.02);
+            let stiffness = random_text(1e4, 1e5);
+            machine_text += &format!(
                 "\n[[stops]]\ntub_m = [0.35, 0.0, {}]\ndirection = [0.0, 0.1, {side}]\n\
                  clearance_m = {clearance}\nstiffness_n_per_m = {stiffness}\n\
                  damping_n_s_per_m = {}\n",
                 0.28 * f64::from(side),
-                number(0.0, 300.0)
+                random_text(0.0, 300.0)
             );
         }
     }
-    if kinds & 4 != 0 {
-        text += &format!(
+    if element_bits & 4 != 0 {
+        machine_text += &format!(
             "\n[[bushings]]\ntub_m = [0.45, 0.0, 0.0]\nstiffness_n_per_m = [0.0, {}, {}]\n\
              cubic_n_per_m3 = [0.0, 1e7, 5e6]\ndamping_n_s_per_m = [0.0, 10.0, 15.0]\n",
-            number(500.0, 2e3),
-            number(500.0, 2e3)
+            random_text(500.0, 2e3),
+            random_text(500.0, 2e3)
         );
     }
-    if kinds & 16 != 0 {
-        text += &format!(
+    if element_bits & 16 != 0 {
+        machine_text += &format!(
             "\n[[further_unbalances]]\nmass_kg = {}\nx_m = {}\nradius_m = 0.18\n",
-            number(0.05, 0.3),
-            number(0.1, 0.3)
+            random_text(0.05, 0.3),
+            random_text(0.1, 0.3)
         );
     }
-    text
+    machine_text
 }
 
 /// Returns the rows of a result as text, without the point's number.
-fn rows(folder: &std::path::Path, name: &str) -> Vec<String> {
+fn exported_rows(folder: &std::path::Path, name: &str) -> Vec<String> {
     let command_output = Command::new(sweep_binary())
         .current_dir(folder)
         .args(["export", name, "rows.csv"])
         .output()
         .expect("the command starts");
     assert!(command_output.status.success(), "{}", String::from_utf8_lossy(&command_output.stderr));
-    let text = fs::read_to_string(folder.join("rows.csv")).expect("it was written");
-    let lines = text.lines().filter(|line| !line.starts_with('#'));
-    let without_point = |line: &str| line.split_once(',').map(|(_, rest)| rest.to_owned());
-    lines.filter_map(without_point).collect()
+    let csv_text = fs::read_to_string(folder.join("rows.csv")).expect("it was written");
+    let lines = csv_text.lines().filter(|line| !line.starts_with('#'));
+    let row_without_point = |line: &str| line.split_once(',').map(|(_, rest)| rest.to_owned());
+    lines.filter_map(row_without_point).collect()
 }
 
 /// The bytes of random machines with random elements do not depend on the number of threads, and
@@ -179,80 +186,89 @@ fn rows(folder: &std::path::Path, name: &str) -> Vec<String> {
 /// SECONDS sets the duration; from 60 s on, all commands and the slow metrics are tested.
 #[test]
 fn rows_of_random_machines_do_not_depend_on_other_points() {
-    let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    let seed = from_environment("SEED", clock.expect("it is after 1970").as_secs());
+    let time_since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let seed = from_environment("SEED", time_since_epoch.expect("it is after 1970").as_secs());
     let seconds = from_environment("SECONDS", 5);
     println!("SEED={seed} SECONDS={seconds}");
-    let begin = std::time::Instant::now();
-    let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-    let mut compared = 0;
+    let start_instant = std::time::Instant::now();
+    let mut numbers = RandomNumbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut compared_count = 0;
     let is_thorough = seconds >= 60;
-    while compared == 0 || begin.elapsed().as_secs() < seconds {
-        let kinds = (32.0 * numbers.next()) as u64;
+    while compared_count == 0 || start_instant.elapsed().as_secs() < seconds {
+        let element_bits = (32.0 * numbers.next_unit()) as u64;
         let test_folder = tempfile::tempdir().expect("a temporary folder");
-        fs::write(test_folder.path().join("m.toml"), machine(kinds, &mut numbers))
-            .expect("it is written");
-        let masses: [f64; 3] = core::array::from_fn(|k| {
-            let third = 0.2 + 0.2 * k as f64;
-            numbers.between(third, third + 0.15)
+        fs::write(
+            test_folder.path().join("m.toml"),
+            random_machine_file(element_bits, &mut numbers),
+        )
+        .expect("it is written");
+        let masses_kg: [f64; 3] = core::array::from_fn(|k| {
+            let mass_from_kg = 0.2 + 0.2 * k as f64;
+            numbers.between(mass_from_kg, mass_from_kg + 0.15)
         });
-        let speeds: [f64; 3] = core::array::from_fn(|k| {
-            let fast = if is_thorough { 230.0 } else { 80.0 };
-            (fast + 15.0 * (k as f64 + numbers.next())).round()
+        let speeds_rpm: [f64; 3] = core::array::from_fn(|k| {
+            let lowest_speed_rpm = if is_thorough { 230.0 } else { 80.0 };
+            (lowest_speed_rpm + 15.0 * (k as f64 + numbers.next_unit())).round()
         });
         let mut metrics = vec!["cabinet_force", "clash_time", "static_sag", "damper_speed"];
-        if kinds & 2 != 0 {
+        if element_bits & 2 != 0 {
             metrics.extend(["stop_force", "stop_contact"]);
         }
         if is_thorough {
             metrics.extend(["growth", "dwell"]);
         }
         // Only the slow metrics need this section.
-        let stability = match is_thorough {
-            true => format!("[stability]\nspeed_rpm = \"{}\"\n", speeds[1]),
+        let stability_section = match is_thorough {
+            true => format!("[stability]\nspeed_rpm = \"{}\"\n", speeds_rpm[1]),
             false => String::new(),
         };
-        let grid = |masses: &[f64]| {
+        let grid_text = |masses_kg: &[f64]| {
             format!(
                 "machine = \"m.toml\"\nmetrics = {metrics:?}\n[spin]\nprofile = \"ramp\"\n\
                  peak_rpm = 250.0\nramp_s = 2.0\n[time]\nend_s = 2.5\nwindow_s = [1.0, 2.5]\n\
-                 {stability}[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n"
+                 {stability_section}[[axis]]\nparameter = \"unbalance_mass_kg\"\n\
+                 values = {masses_kg:?}\n"
             )
         };
-        fs::write(test_folder.path().join("all.toml"), grid(&masses)).expect("it is written");
-        let few = [masses[0], masses[2]];
-        fs::write(test_folder.path().join("few.toml"), grid(&few)).expect("it is written");
-        let second = "[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [40.0, 150.0, 260.0]\n";
-        let plane =
-            grid(&masses).replace(&format!("metrics = {metrics:?}\n"), "").replace(&stability, "");
-        let plane = plane + second;
-        fs::write(test_folder.path().join("plane.toml"), plane).expect("it is written");
-        let three = speeds.map(|speed| speed.to_string()).join(",");
-        let single_thread_bytes = speeds[1].to_string();
-        let search = ["--starts", "1", "--longest", "2"];
-        // Each command runs with other points; commands with rows of points and speeds also run
-        // with a single point.
-        let commands: [(&str, Vec<&str>, Vec<&str>); 4] = [
+        fs::write(test_folder.path().join("all.toml"), grid_text(&masses_kg))
+            .expect("it is written");
+        let outer_masses_kg = [masses_kg[0], masses_kg[2]];
+        fs::write(test_folder.path().join("few.toml"), grid_text(&outer_masses_kg))
+            .expect("it is written");
+        let damping_axis =
+            "[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [40.0, 150.0, 260.0]\n";
+        let plane_grid = grid_text(&masses_kg)
+            .replace(&format!("metrics = {metrics:?}\n"), "")
+            .replace(&stability_section, "");
+        let plane_grid = plane_grid + damping_axis;
+        fs::write(test_folder.path().join("plane.toml"), plane_grid).expect("it is written");
+        let three_speeds = speeds_rpm.map(|speed| speed.to_string()).join(",");
+        let middle_speed = speeds_rpm[1].to_string();
+        let search_options = ["--starts", "1", "--longest", "2"];
+        // Each command runs with all points. Commands that have rows also run with a part of the
+        // points and speeds.
+        let commands_with_arguments: [(&str, Vec<&str>, Vec<&str>); 4] = [
             ("run", vec!["all.toml"], vec!["few.toml"]),
             (
                 "stability",
-                vec!["all.toml", "--speed", &three],
-                vec!["few.toml", "--speed", &single_thread_bytes],
+                vec!["all.toml", "--speed", &three_speeds],
+                vec!["few.toml", "--speed", &middle_speed],
             ),
             (
                 "dwell",
-                [&["all.toml", "--speed", three.as_str()][..], &search].concat(),
-                [&["few.toml", "--speed", single_thread_bytes.as_str()][..], &search].concat(),
+                [&["all.toml", "--speed", three_speeds.as_str()][..], &search_options].concat(),
+                [&["few.toml", "--speed", middle_speed.as_str()][..], &search_options].concat(),
             ),
             ("boundary", vec!["plane.toml"], Vec::new()),
         ];
-        let first = (4.0 * numbers.next()) as usize;
-        for k in 0..commands.len() {
-            if compared > 0 && begin.elapsed().as_secs() >= seconds {
+        let first_command_index = (4.0 * numbers.next_unit()) as usize;
+        for k in 0..commands_with_arguments.len() {
+            if compared_count > 0 && start_instant.elapsed().as_secs() >= seconds {
                 break;
             }
-            let (verb, together, alone) = &commands[(first + k) % commands.len()];
-            let make = |options: &[&str], threads: &str, name: &str| {
+            let (verb, all_points_arguments, few_points_arguments) =
+                &commands_with_arguments[(first_command_index + k) % commands_with_arguments.len()];
+            let result_of_command = |options: &[&str], threads: &str, name: &str| {
                 let out = &format!("{verb}-{name}.parquet");
                 let command_output = Command::new(sweep_binary())
                     .current_dir(test_folder.path())
@@ -266,31 +282,37 @@ fn rows_of_random_machines_do_not_depend_on_other_points() {
                 let messages = String::from_utf8_lossy(&command_output.stderr);
                 assert!(
                     command_output.status.success(),
-                    "{verb} {options:?} of {kinds:05b}: {messages}"
+                    "{verb} {options:?} of {element_bits:05b}: {messages}"
                 );
                 fs::read(test_folder.path().join(out)).expect("it was written")
             };
-            let whole = make(together, "1", "one");
+            let single_thread_bytes = result_of_command(all_points_arguments, "1", "one");
             for threads in ["2", "5"] {
-                let other = make(together, threads, "other");
-                assert!(other == whole, "{verb} of {kinds:05b} on {threads} threads, SEED={seed}");
-            }
-            if alone.is_empty() {
-                compared += 1;
-                continue;
-            }
-            make(alone, "2", "alone");
-            let [all, alone] = ["one", "alone"]
-                .map(|name| rows(test_folder.path(), &format!("{verb}-{name}.parquet")));
-            assert!(alone.len() > 1, "{verb} has rows");
-            for row in &alone {
+                let other_bytes = result_of_command(all_points_arguments, threads, "other");
                 assert!(
-                    all.contains(row),
-                    "{verb} of {kinds:05b} beside others, SEED={seed}: {row}"
+                    other_bytes == single_thread_bytes,
+                    "{verb} of {element_bits:05b} on {threads} threads, SEED={seed}"
                 );
             }
-            compared += alone.len() - 1;
+            if few_points_arguments.is_empty() {
+                compared_count += 1;
+                continue;
+            }
+            result_of_command(few_points_arguments, "2", "alone");
+            let [all_rows, few_rows] = ["one", "alone"]
+                .map(|name| exported_rows(test_folder.path(), &format!("{verb}-{name}.parquet")));
+            assert!(few_rows.len() > 1, "{verb} has rows");
+            for row in &few_rows {
+                assert!(
+                    all_rows.contains(row),
+                    "{verb} of {element_bits:05b} beside others, SEED={seed}: {row}"
+                );
+            }
+            compared_count += few_rows.len() - 1;
         }
     }
-    println!("{compared} rows are the same in {:.0} s", begin.elapsed().as_secs_f64());
+    println!(
+        "{compared_count} rows are the same in {:.0} s",
+        start_instant.elapsed().as_secs_f64()
+    );
 }

@@ -5,10 +5,12 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use crate::test_folder::{TestFolder, all_output, grid};
+use crate::test_folder::{TestFolder, all_output, grid_text};
 
-const FLIPS: u64 = 300;
+/// The number of random bits that are flipped, one in each run of all commands.
+const FLIP_COUNT: u64 = 300;
 
+/// The commands that read the result.
 const COMMANDS: [&[&str]; 5] = [
     &["run", "g.toml", "--threads", "1", "--out", "x.parquet"],
     &["show", "x.parquet"],
@@ -19,85 +21,81 @@ const COMMANDS: [&[&str]; 5] = [
 
 /// The exit code of a command, its output, and the files that it wrote.
 #[derive(PartialEq)]
-struct RemainingFiles {
+struct CommandEffect {
     output: Output,
-    result: Vec<u8>,
-    picture: Option<Vec<u8>>,
+    result_bytes: Vec<u8>,
+    figure: Option<Vec<u8>>,
 }
 
 /// Returns a folder with a grid and its finished result, `x.parquet`.
-pub(super) fn finished() -> TestFolder {
-    let test_folder = TestFolder::new(&grid(12, 12));
-    let run = test_folder.sweep(COMMANDS[0]);
-    assert!(run.status.success(), "{}", all_output(&run));
+pub(super) fn folder_with_result() -> TestFolder {
+    let test_folder = TestFolder::new(&grid_text(12, 12));
+    let run_output = test_folder.run_sweep(COMMANDS[0]);
+    assert!(run_output.status.success(), "{}", all_output(&run_output));
     test_folder
 }
 
 impl TestFolder {
     /// Runs a command with these bytes as the result.
-    fn run_on(&self, bytes: &[u8], words: &[&str]) -> RemainingFiles {
+    fn run_on_result(&self, bytes: &[u8], words: &[&str]) -> CommandEffect {
         fs::write(self.path("x.parquet"), bytes).expect("the result is written");
         // The figure exists only if a command drew it before.
         let _ = fs::remove_file(self.path("x.svg"));
-        let output = self.sweep(words);
-        let read = |path: &Path| fs::read(path).ok();
-        let result = read(&self.path("x.parquet")).expect("nobody removes a result");
-        RemainingFiles { output, result, picture: read(&self.path("x.svg")) }
+        let output = self.run_sweep(words);
+        let read_if_present = |path: &Path| fs::read(path).ok();
+        let result_bytes =
+            read_if_present(&self.path("x.parquet")).expect("nobody removes a result");
+        CommandEffect { output, result_bytes, figure: read_if_present(&self.path("x.svg")) }
     }
 }
 
 /// Returns a random number for a seed (splitmix64).
-fn random(seed: u64) -> u64 {
-    let z = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+fn random_bits(seed: u64) -> u64 {
+    let mixed_bits = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed_bits = (mixed_bits ^ (mixed_bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let mixed_bits = (mixed_bits ^ (mixed_bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    mixed_bits ^ (mixed_bits >> 31)
 }
 
 #[test]
 fn a_flipped_bit_of_a_result_is_an_error_or_without_effect() {
-    let test_folder = finished();
+    let test_folder = folder_with_result();
     let whole_file = fs::read(test_folder.path("x.parquet")).expect("there is a result");
-    let mut undisturbed_output = Vec::new();
+    let mut undisturbed_effects = Vec::new();
     for words in COMMANDS {
-        let remaining_files = test_folder.run_on(&whole_file, words);
-        assert!(
-            remaining_files.output.status.success(),
-            "{words:?}: {}",
-            all_output(&remaining_files.output)
-        );
-        undisturbed_output.push(remaining_files);
+        let effect = test_folder.run_on_result(&whole_file, words);
+        assert!(effect.output.status.success(), "{words:?}: {}", all_output(&effect.output));
+        undisturbed_effects.push(effect);
     }
-    let mut refused_output = [0_u64; COMMANDS.len()];
-    for flip in 0..FLIPS {
-        let bit = random(flip + 1) % (8 * whole_file.len() as u64);
+    let mut refusal_counts = [0_u64; COMMANDS.len()];
+    for flip_index in 0..FLIP_COUNT {
+        let bit = random_bits(flip_index + 1) % (8 * whole_file.len() as u64);
         let mut bytes = whole_file.clone();
         bytes[(bit / 8) as usize] ^= 1 << (bit % 8);
         for (k, words) in COMMANDS.iter().enumerate() {
-            let remaining_files = test_folder.run_on(&bytes, words);
-            let messages = all_output(&remaining_files.output);
-            if remaining_files.output.status.success() {
-                let expected_files =
-                    RemainingFiles { result: whole_file.clone(), ..remaining_files };
+            let effect = test_folder.run_on_result(&bytes, words);
+            let messages = all_output(&effect.output);
+            if effect.output.status.success() {
+                let effect_but_for_result =
+                    CommandEffect { result_bytes: whole_file.clone(), ..effect };
                 assert!(
-                    expected_files == undisturbed_output[k],
+                    effect_but_for_result == undisturbed_effects[k],
                     "bit {bit}: {words:?} took it: {messages}"
                 );
                 continue;
             }
-            refused_output[k] += 1;
-            let is_named = messages.contains("error: ") && messages.contains("x.parquet");
-            assert!(is_named && !messages.contains("panicked"), "bit {bit}, {words:?}: {messages}");
-            assert_eq!(
-                remaining_files.output.status.code(),
-                Some(2),
+            refusal_counts[k] += 1;
+            let names_result = messages.contains("error: ") && messages.contains("x.parquet");
+            assert!(
+                names_result && !messages.contains("panicked"),
                 "bit {bit}, {words:?}: {messages}"
             );
+            assert_eq!(effect.output.status.code(), Some(2), "bit {bit}, {words:?}: {messages}");
             assert!(
-                remaining_files.result == bytes && remaining_files.picture.is_none(),
+                effect.result_bytes == bytes && effect.figure.is_none(),
                 "bit {bit}, {words:?}: {messages}"
             );
         }
     }
-    println!("{FLIPS} flips; refused by run, show, plot, status, merge: {refused_output:?}");
+    println!("{FLIP_COUNT} flips; refused by run, show, plot, status, merge: {refusal_counts:?}");
 }

@@ -30,8 +30,8 @@ use std::process::Command;
 /// Sends a signal by its short name. It uses the shell's `kill`, because not all systems have the
 /// program.
 #[cfg(unix)]
-fn signal(name: &str, process: u32) {
-    let script = format!("kill -{name} {process}");
-    let status = Command::new("sh").args(["-c", &script]).status().expect("sh runs");
-    assert!(status.success(), "process {process} takes no {name}");
+fn send_signal(signal_name: &str, process_id: u32) {
+    let script = format!("kill -{signal_name} {process_id}");
+    let exit_status = Command::new("sh").args(["-c", &script]).status().expect("sh runs");
+    assert!(exit_status.success(), "process {process_id} takes no {signal_name}");
 }
