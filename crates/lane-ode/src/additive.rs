@@ -145,7 +145,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut length_s = zero;
     let mut is_start = lanes.start_pending_lanes(task, &mut x);
     while lanes.has_active_lane() && !task.cancel().is_requested() {
-        let forcing = task.system().forcing_out_of_line(lanes.time);
+        let forcing = task.system().forcing_out_of_line(lanes.time_s);
         k[0] = task.system().derivative(&forcing, &x);
         if is_start {
             task.begin(&forcing, &x, &k[0]);
@@ -153,7 +153,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
             task.observe(
                 &forcing,
                 &ObservedStep {
-                    end_s: lanes.time,
+                    end_s: lanes.time_s,
                     length_s,
                     start_state: &start_state,
                     start_slope: &start_slope,
@@ -185,7 +185,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
                 y[i] = x[i] + h * explicit;
                 r[i] = x[i] + h * implicit;
             }
-            let forcing = task.system().forcing(h * C[stage] + lanes.time);
+            let forcing = task.system().forcing(h * C[stage] + lanes.time_s);
             k[stage] = task.system().solve_implicit_stage(&forcing, &y, &r, g);
         }
         let mut error = [zero; D];

@@ -26,16 +26,16 @@ impl Tolerance {
         error: &[N<T>; D],
     ) -> N<T> {
         let zero = start_state[0].lit(0.0);
-        let mut largest = zero;
+        let mut largest_ratio = zero;
         let mut nan_sum = zero;
         for i in 0..D {
-            let size = N(start_state[i].0.abs().larger(end_state[i].0.abs()));
-            let ratio = error[i].abs() / (size * self.relative + self.absolute);
-            largest = N(ratio.0.larger(largest.0));
+            let magnitude = N(start_state[i].0.abs().larger(end_state[i].0.abs()));
+            let ratio = error[i].abs() / (magnitude * self.relative + self.absolute);
+            largest_ratio = N(ratio.0.larger(largest_ratio.0));
             // The maximum ignores a NaN, so that the product with zero passes it on to the result.
             nan_sum += ratio * zero;
         }
-        largest + nan_sum
+        largest_ratio + nan_sum
     }
 }
 

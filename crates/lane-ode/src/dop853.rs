@@ -128,9 +128,9 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let clock = segments.clock;
         let mut index = segments.step_index;
         let h = clock.h;
-        let mut time = clock.time_after(index);
+        let mut time_s = clock.time_after(index);
         // `black_box` prevents the compiler from copying the forcing repeatedly.
-        let mut forcing = task.system().forcing_out_of_line(time);
+        let mut forcing = task.system().forcing_out_of_line(time_s);
         let forcing = black_box(&mut forcing);
         // The states at the start of this step and of the last one, which swap places, and the
         // state of a stage.
@@ -149,7 +149,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             // The iteration after the last step only evaluates the slope, because observers need it
             // at both ends of a step.
             let is_last = step_count == step_limit;
-            let next_time = clock.time_after(index + 1.0);
+            let next_time_s = clock.time_after(index + 1.0);
             for stage in 0..DOP853_STAGES {
                 if stage == 0 {
                     slopes[0] = task.system().derivative(forcing, &states[current_index]);
@@ -160,7 +160,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                         task.observe(
                             forcing,
                             &ObservedStep {
-                                end_s: time,
+                                end_s: time_s,
                                 length_s: h,
                                 start_state: &states[previous_index],
                                 start_slope: &slopes[PREVIOUS_SLOPE],
@@ -178,7 +178,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                 }
                 let stage_time = clock.time_after(index + C[stage]);
                 task.system().update_forcing(
-                    if stage == DOP853_STAGES - 1 { next_time } else { stage_time },
+                    if stage == DOP853_STAGES - 1 { next_time_s } else { stage_time },
                     forcing,
                 );
                 add_slopes(h, A[stage - 1], &slopes, &mut states, current_index, STAGE_STATE);
@@ -190,10 +190,10 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             add_slopes(h, B, &slopes, &mut states, current_index, previous_index);
             (current_index, previous_index) = (previous_index, current_index);
             index = index + 1.0;
-            time = next_time;
+            time_s = next_time_s;
             step_count += 1;
             let in_range = task.system().in_range(&states[current_index]);
-            if !T::all(in_range) && segments.end_failed_segments(in_range, time, step_count) {
+            if !T::all(in_range) && segments.end_failed_segments(in_range, time_s, step_count) {
                 step_limit = step_count;
             }
         }
@@ -246,10 +246,10 @@ pub(crate) fn amplification(y: f64) -> f64 {
             [re + weight * slopes[*stage][0], im + weight * slopes[*stage][1]]
         })
     };
-    let slope = |[re, im]: [f64; 2]| [-y * im, y * re];
-    let mut slopes = vec![slope([1.0, 0.0])];
+    let slope_at = |[re, im]: [f64; 2]| [-y * im, y * re];
+    let mut slopes = vec![slope_at([1.0, 0.0])];
     for row in A {
-        slopes.push(slope(combine(row, &slopes)));
+        slopes.push(slope_at(combine(row, &slopes)));
     }
     let [re, im] = combine(B, &slopes);
     re.hypot(im)

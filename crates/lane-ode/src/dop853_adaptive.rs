@@ -55,7 +55,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut is_start = lanes.start_pending_lanes(task, &mut states[START_STATE]);
     while lanes.has_active_lane() && !task.cancel().is_requested() {
         // `black_box` prevents the compiler from copying the forcing repeatedly.
-        let mut forcing = task.system().forcing_out_of_line(lanes.time);
+        let mut forcing = task.system().forcing_out_of_line(lanes.time_s);
         let forcing = black_box(&mut forcing);
         slopes[0] = task.system().derivative(forcing, &states[START_STATE]);
         if is_start {
@@ -64,7 +64,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
             task.observe(
                 forcing,
                 &ObservedStep {
-                    end_s: lanes.time,
+                    end_s: lanes.time_s,
                     length_s,
                     start_state: &start_state,
                     start_slope: &start_slope,
@@ -82,7 +82,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 
         let h = lanes.steps(tolerance);
         for stage in 1..DOP853_STAGES {
-            task.system().update_forcing(h * C[stage] + lanes.time, forcing);
+            task.system().update_forcing(h * C[stage] + lanes.time_s, forcing);
             add_slopes(h, A[stage - 1], &slopes, &mut states, START_STATE, STAGE_STATE);
             slopes[stage] = task.system().derivative(forcing, &states[STAGE_STATE]);
         }

@@ -37,7 +37,7 @@ const E: [f64; STAGES] = [
 ];
 
 /// Coefficients of the dense output's fourth-order term (Hairer's `dopri5.f`, d1 to d7).
-const DENSE: [f64; STAGES] = [
+const DENSE_WEIGHTS: [f64; STAGES] = [
     -12_715_105_075.0 / 11_282_082_432.0,
     0.0,
     87_487_479_700.0 / 32_700_410_799.0,
@@ -87,13 +87,13 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         // The last stage of a step is the first of the next, except after the start of a segment.
         let mut y = x;
         for stage in usize::from(!is_start)..STAGES {
-            let forcing = task.system().forcing(h * C[stage] + lanes.time);
+            let forcing = task.system().forcing(h * C[stage] + lanes.time_s);
             for i in 0..D {
-                let mut sum = zero;
+                let mut slope_sum = zero;
                 for j in 0..stage {
-                    sum += k[j][i] * A[stage][j];
+                    slope_sum += k[j][i] * A[stage][j];
                 }
-                y[i] = x[i] + h * sum;
+                y[i] = x[i] + h * slope_sum;
             }
             k[stage] = task.system().derivative(&forcing, &y);
             if stage == 0 {
@@ -107,18 +107,18 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         let accepted_lanes = error.0.less(zero.lit(1.0).0);
         let start_state = x;
         let start_slope = k[0];
-        let dense_term = combine_stages(h, &k, &DENSE);
+        let dense_term = combine_stages(h, &k, &DENSE_WEIGHTS);
         for i in 0..D {
             x[i] = N(T::select(accepted_lanes, y[i].0, x[i].0));
             k[0][i] = N(T::select(accepted_lanes, k[STAGES - 1][i].0, k[0][i].0));
         }
-        let length = lanes.accept_or_reject(h, error, [accepted_lanes, in_range], tolerance);
-        let forcing = task.system().forcing_out_of_line(lanes.time);
+        let length_s = lanes.accept_or_reject(h, error, [accepted_lanes, in_range], tolerance);
+        let forcing = task.system().forcing_out_of_line(lanes.time_s);
         task.observe(
             &forcing,
             &ObservedStep {
-                end_s: lanes.time,
-                length_s: length,
+                end_s: lanes.time_s,
+                length_s,
                 start_state: &start_state,
                 start_slope: &start_slope,
                 end_state: &x,

@@ -19,8 +19,8 @@ pub(crate) fn fixed_steps(segment: &Segment) -> u64 {
 /// error.
 #[derive(Clone, Copy)]
 pub(crate) struct SegmentClock<T> {
-    start: N<T>,
-    end: N<T>,
+    start_s: N<T>,
+    end_s: N<T>,
     /// The step of each lane; zero in an idle lane.
     pub(crate) h: N<T>,
     /// The number of steps in the segment.
@@ -31,7 +31,7 @@ impl<T: Lane> SegmentClock<T> {
     /// Returns the time after `step_index` steps.
     #[inline(always)]
     pub(crate) fn time_after(&self, step_index: N<T>) -> N<T> {
-        step_index.where_less(self.step_total, step_index * self.h + self.start, self.end)
+        step_index.where_less(self.step_total, step_index * self.h + self.start_s, self.end_s)
     }
 }
 
@@ -48,7 +48,7 @@ pub(crate) struct FixedSegments<T> {
     pub(crate) clock: SegmentClock<T>,
     /// The number of steps made in each lane's segment.
     pub(crate) step_index: N<T>,
-    lanes: [FixedProgress; MAX_LANES],
+    progress_by_lane: [FixedProgress; MAX_LANES],
     segment_ends: [Option<SegmentEnd>; MAX_LANES],
 }
 
@@ -57,9 +57,9 @@ impl<T: Lane> FixedSegments<T> {
     #[inline(always)]
     pub(crate) fn new(zero: N<T>) -> Self {
         Self {
-            clock: SegmentClock { start: zero, end: zero, h: zero, step_total: zero },
+            clock: SegmentClock { start_s: zero, end_s: zero, h: zero, step_total: zero },
             step_index: zero,
-            lanes: [FixedProgress::default(); MAX_LANES],
+            progress_by_lane: [FixedProgress::default(); MAX_LANES],
             segment_ends: [Some(SegmentEnd::Idle); MAX_LANES],
         }
     }
@@ -76,24 +76,24 @@ impl<T: Lane> FixedSegments<T> {
         for lane in 0..T::LANES {
             let Some(end) = self.segment_ends[lane].take() else { continue };
             let segment = task.next_segment(lane, end, x);
-            let steps = segment.as_ref().map_or(0, fixed_steps);
-            self.lanes[lane] = FixedProgress {
+            let step_count = segment.as_ref().map_or(0, fixed_steps);
+            self.progress_by_lane[lane] = FixedProgress {
                 is_active: segment.is_some(),
-                total_steps: steps,
-                remaining_steps: steps,
+                total_steps: step_count,
+                remaining_steps: step_count,
             };
             let (start_s, end_s) =
                 segment.map_or((0.0, 0.0), |segment| (segment.start_s, segment.end_s));
-            self.clock.start.0.set(lane, start_s);
-            self.clock.end.0.set(lane, end_s);
-            self.clock.h.0.set(lane, (end_s - start_s) / steps.max(1) as f64);
-            self.clock.step_total.0.set(lane, steps as f64);
+            self.clock.start_s.0.set(lane, start_s);
+            self.clock.end_s.0.set(lane, end_s);
+            self.clock.h.0.set(lane, (end_s - start_s) / step_count.max(1) as f64);
+            self.clock.step_total.0.set(lane, step_count as f64);
             self.step_index.0.set(lane, 0.0);
         }
         if task.cancel().is_requested() {
             return None;
         }
-        let active_lanes = self.lanes[..T::LANES].iter().filter(|lane| lane.is_active);
+        let active_lanes = self.progress_by_lane[..T::LANES].iter().filter(|lane| lane.is_active);
         active_lanes.map(|lane| lane.remaining_steps.min(CANCEL_POLL_STEPS)).min()
     }
 
@@ -108,10 +108,11 @@ impl<T: Lane> FixedSegments<T> {
     ) -> bool {
         let out_of_range = !T::bits(in_range);
         for lane in (0..T::LANES)
-            .filter(|lane| self.lanes[*lane].is_active && out_of_range >> lane & 1 == 1)
+            .filter(|lane| self.progress_by_lane[*lane].is_active && out_of_range >> lane & 1 == 1)
         {
-            let accepted_steps =
-                self.lanes[lane].total_steps - self.lanes[lane].remaining_steps + new_steps;
+            let accepted_steps = self.progress_by_lane[lane].total_steps
+                - self.progress_by_lane[lane].remaining_steps
+                + new_steps;
             self.segment_ends[lane] = Some(SegmentEnd::Failed {
                 reason: Failure::Diverged,
                 time_s: time.0.get(lane),
@@ -125,7 +126,7 @@ impl<T: Lane> FixedSegments<T> {
     #[inline(always)]
     pub(crate) fn count_steps(&mut self, new_steps: u64) {
         for lane in 0..T::LANES {
-            let progress = &mut self.lanes[lane];
+            let progress = &mut self.progress_by_lane[lane];
             if progress.is_active {
                 progress.remaining_steps -= new_steps;
                 if progress.remaining_steps == 0 && self.segment_ends[lane].is_none() {

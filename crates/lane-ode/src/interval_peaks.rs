@@ -49,7 +49,7 @@ impl<T: Lane, const M: usize> IntervalPeaks<T, M> {
     pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
         self.interval_end_s.0.set(lane, f64::INFINITY);
         let mut lane_peaks = core::mem::take(&mut self.completed_peaks[lane]);
-        lane_peaks.push(self.peaks.lane(lane));
+        lane_peaks.push(self.peaks.lane_peaks(lane));
         lane_peaks
     }
 
@@ -113,7 +113,7 @@ impl<T: Lane, const M: usize> IntervalPeaks<T, M> {
             }
             remaining_s -= part_length_s;
             for lane in (0..T::LANES).filter(|lane| divided_lanes >> lane & 1 == 1) {
-                self.completed_peaks[lane].push(self.peaks.lane(lane));
+                self.completed_peaks[lane].push(self.peaks.lane_peaks(lane));
                 self.peaks.reset(lane);
                 let next_division_s = self.division_times_s[lane].pop().unwrap_or(f64::INFINITY);
                 self.interval_end_s.0.set(lane, next_division_s);

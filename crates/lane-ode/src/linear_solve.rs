@@ -7,9 +7,9 @@ use crate::N;
 pub struct Lu<const C: usize> {
     /// The factor L below the diagonal (without its unit diagonal), the factor U above it, and the
     /// reciprocals of U's diagonal on it.
-    packed: [[N<f64>; C]; C],
+    packed_factors: [[N<f64>; C]; C],
     /// The row of the matrix for each row of the factors.
-    order: [usize; C],
+    row_order: [usize; C],
 }
 
 impl<const C: usize> Lu<C> {
@@ -17,23 +17,23 @@ impl<const C: usize> Lu<C> {
     /// Matrix Computations, Algorithm 3.4.1). Returns `None` if a pivot is zero or not finite.
     #[inline(always)]
     pub fn new(mut a: [[N<f64>; C]; C]) -> Option<Self> {
-        let mut order = [0; C];
+        let mut row_order = [0; C];
         for i in 0..C {
-            order[i] = i;
+            row_order[i] = i;
         }
         for j in 0..C {
-            let mut pivot = j;
+            let mut pivot_index = j;
             for i in j + 1..C {
-                if a[i][j].0.abs() > a[pivot][j].0.abs() {
-                    pivot = i;
+                if a[i][j].0.abs() > a[pivot_index][j].0.abs() {
+                    pivot_index = i;
                 }
             }
-            let pivot_size = a[pivot][j].0.abs();
+            let pivot_size = a[pivot_index][j].0.abs();
             if !(pivot_size > 0.0 && pivot_size.is_finite()) {
                 return None;
             }
-            a.swap(j, pivot);
-            order.swap(j, pivot);
+            a.swap(j, pivot_index);
+            row_order.swap(j, pivot_index);
             let reciprocal = a[j][j].recip();
             let pivot_row = a[j];
             for i in j + 1..C {
@@ -45,7 +45,7 @@ impl<const C: usize> Lu<C> {
             }
             a[j][j] = reciprocal;
         }
-        Some(Self { packed: a, order })
+        Some(Self { packed_factors: a, row_order })
     }
 
     /// Solves for one right-hand side.
@@ -53,18 +53,18 @@ impl<const C: usize> Lu<C> {
     pub fn solve(&self, b: &[N<f64>; C]) -> [N<f64>; C] {
         let mut x = *b;
         for i in 0..C {
-            x[i] = b[self.order[i]];
+            x[i] = b[self.row_order[i]];
         }
         // The substitution goes column by column, so that each pass is independent over the rows.
         for j in 0..C {
             for i in j + 1..C {
-                x[i] -= self.packed[i][j] * x[j];
+                x[i] -= self.packed_factors[i][j] * x[j];
             }
         }
         for j in (0..C).rev() {
-            x[j] = (x[j] * self.packed[j][j]).v();
+            x[j] = (x[j] * self.packed_factors[j][j]).v();
             for i in 0..j {
-                x[i] -= self.packed[i][j] * x[j];
+                x[i] -= self.packed_factors[i][j] * x[j];
             }
         }
         x

@@ -40,16 +40,16 @@ impl<const C: usize> Partials<C> {
         }
         // The directions are a loop, so that the right-hand side is compiled once for all of them.
         for group in 0..D.div_ceil(T::LANES) {
-            let first = group * T::LANES;
+            let first_direction = group * T::LANES;
             let mut seeded_state = constant_state;
-            for lane in 0..T::LANES.min(D - first) {
-                seeded_state[first + lane].0.slope.set(lane, 1.0);
+            for lane in 0..T::LANES.min(D - first_direction) {
+                seeded_state[first_direction + lane].0.slope.set(lane, 1.0);
             }
             let slopes = system.derivative_out_of_line(&forcing, &seeded_state);
             for i in 0..C {
                 let slope = slopes[C + i].0.slope;
-                for lane in 0..T::LANES.min(D - first) {
-                    let direction = first + lane;
+                for lane in 0..T::LANES.min(D - first_direction) {
+                    let direction = first_direction + lane;
                     if direction < C {
                         self.by_coordinate[i][direction] = N(slope.get(lane));
                     } else {
@@ -81,13 +81,13 @@ mod tests {
 
         fn derivative(&self, forcing: &N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
             let [angle, position, angular_speed, speed] = *x;
-            let pull = (position - angle) * self.stiffness;
+            let spring_pull = (position - angle) * self.stiffness;
             let (sin, _) = angle.sin_cos();
             [
                 angular_speed,
                 speed,
-                pull - 9.0 * sin - 0.1 * angular_speed + *forcing,
-                4.0 * *forcing - 2.0 * pull.v(),
+                spring_pull - 9.0 * sin - 0.1 * angular_speed + *forcing,
+                4.0 * *forcing - 2.0 * spring_pull.v(),
             ]
         }
 

@@ -30,7 +30,7 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
 
     /// Returns the peaks of one lane.
     #[inline(always)]
-    pub fn lane(&self, lane: usize) -> [f64; M] {
+    pub fn lane_peaks(&self, lane: usize) -> [f64; M] {
         self.peaks.map(|peak| peak.0.get(lane))
     }
 
@@ -49,7 +49,7 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counted_lanes: T::Mask) {
         let zero = length_s.lit(0.0);
-        let third = (length_s * (1.0 / 3.0)).v();
+        let third_length_s = (length_s * (1.0 / 3.0)).v();
         let mut max_rise = zero;
         let mut polygon_rises = [zero; M];
         for i in 0..M {
@@ -57,10 +57,10 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
             let end = &samples[i];
             self.raise_peak(i, end.value.abs(), counted_lanes);
             // The height of the control polygon above the peak.
-            let polygon_height = (start.value + third * start.slope)
+            let polygon_height = (start.value + third_length_s * start.slope)
                 .abs()
                 .0
-                .larger((end.value - third * end.slope).abs().0);
+                .larger((end.value - third_length_s * end.slope).abs().0);
             polygon_rises[i] = N(polygon_height) - self.peaks[i];
             max_rise = N(polygon_rises[i].0.larger(max_rise.0));
         }

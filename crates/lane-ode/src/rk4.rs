@@ -26,11 +26,11 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let h = clock.h;
         let one_third = zero.lit(1.0 / 3.0);
         let h_sixth = h / zero.lit(6.0);
-        let mut time = clock.time_after(index);
+        let mut time_s = clock.time_after(index);
         // The forcing at the step's start, then at its middle, then at its end, which is the start
         // of the next step. `black_box` prevents the compiler from keeping the forcing in
         // variables, all of which it would copy in every step.
-        let mut forcing = task.system().forcing_out_of_line(time);
+        let mut forcing = task.system().forcing_out_of_line(time_s);
         let forcing = black_box(&mut forcing);
         // The states and slopes at the start of this step and of the last one, which swap places,
         // and the states of two stages. One array holds them, so that their addresses need no
@@ -45,7 +45,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             // The iteration after the last step only evaluates the slope, because observers need it
             // at both ends of a step.
             let is_last = step_count == step_limit;
-            let next_time = clock.time_after(index + 1.0);
+            let next_time_s = clock.time_after(index + 1.0);
             // The state at the last step's start is overwritten only after that step has been
             // observed.
             let second_index = 2;
@@ -57,7 +57,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             for stage in 0..4 {
                 if stage % 2 == 1 {
                     task.system().update_forcing(
-                        if stage == 1 { clock.time_after(index + 0.5) } else { next_time },
+                        if stage == 1 { clock.time_after(index + 0.5) } else { next_time_s },
                         forcing,
                     );
                 }
@@ -90,7 +90,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                         task.observe(
                             forcing,
                             &ObservedStep {
-                                end_s: time,
+                                end_s: time_s,
                                 length_s: h,
                                 start_state: &states[previous_index],
                                 start_slope: &slopes[previous_index],
@@ -110,10 +110,10 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             }
             (current_index, previous_index) = (previous_index, current_index);
             index = index + 1.0;
-            time = next_time;
+            time_s = next_time_s;
             step_count += 1;
             let in_range = task.system().in_range(&states[current_index]);
-            if !T::all(in_range) && segments.end_failed_segments(in_range, time, step_count) {
+            if !T::all(in_range) && segments.end_failed_segments(in_range, time_s, step_count) {
                 step_limit = step_count;
             }
         }

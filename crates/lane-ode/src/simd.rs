@@ -62,7 +62,7 @@ impl Simd {
     ///
     /// # Errors
     /// [`UnsupportedProcessor`] if it has none.
-    pub fn check() -> Result<(), UnsupportedProcessor> {
+    pub fn check_processor() -> Result<(), UnsupportedProcessor> {
         if Self::Scalar.is_available() { Ok(()) } else { Err(UnsupportedProcessor) }
     }
 
@@ -74,14 +74,15 @@ impl Simd {
     /// Returns the instruction set with the fewest lanes that still holds `trajectories` at once,
     /// with at most as many lanes as this one; this one if none does. Half the lanes take little
     /// more than half the time on a processor that splits its widest instructions.
-    pub fn narrowed(self, trajectories: usize) -> Self {
-        let fits = |simd: &Self| (trajectories..=self.lanes()).contains(&simd.lanes());
+    pub fn narrowest_for(self, trajectories: usize) -> Self {
+        let holds_trajectories =
+            |simd: &Self| (trajectories..=self.lanes()).contains(&simd.lanes());
         let mut narrowest_first = Self::ALL.into_iter().rev().filter(|simd| simd.is_available());
-        narrowest_first.find(fits).unwrap_or(self)
+        narrowest_first.find(holds_trajectories).unwrap_or(self)
     }
 
     /// Returns the instruction set that [`Self::dispatch_narrow`] uses.
-    pub fn narrow() -> Self {
+    pub fn narrow_set() -> Self {
         [Self::Avx2, Self::Neon, Self::Simd128]
             .into_iter()
             .find(|simd| simd.is_available())

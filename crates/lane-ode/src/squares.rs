@@ -27,7 +27,7 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
     }
 
     /// Returns the integrals of one lane, in the square of the output's unit times seconds.
-    pub fn lane(&self, lane: usize) -> [f64; M] {
+    pub fn lane_integrals(&self, lane: usize) -> [f64; M] {
         self.integrals.map(|integral| integral.0.get(lane))
     }
 
@@ -51,8 +51,9 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
             let end_terms = (0.5 * (start.value + end.value)).v();
             let slope_terms = (0.1 * (start.slope - end.slope)).v();
             let curvature_terms = ((1.0 / 120.0) * (start.curvature + end.curvature)).v();
-            let mean = end_terms + length_s * (slope_terms + length_s * curvature_terms);
-            self.integrals[i] += N(T::select(counted_lanes, (length_s * mean).v().0, zero.0));
+            let mean_square = end_terms + length_s * (slope_terms + length_s * curvature_terms);
+            self.integrals[i] +=
+                N(T::select(counted_lanes, (length_s * mean_square).v().0, zero.0));
             self.last_squares[i] = end;
         }
     }

@@ -33,7 +33,7 @@ trait Equation<const D: usize, const P: usize> {
         Self::derivative(p, t_s, x)
     }
     /// Computes the solution; NaN if it is not known.
-    fn exact(_p: &[f64; P], _t_s: f64) -> [f64; D] {
+    fn exact_state(_p: &[f64; P], _t_s: f64) -> [f64; D] {
         [f64::NAN; D]
     }
 }
@@ -42,7 +42,7 @@ trait Equation<const D: usize, const P: usize> {
 #[derive(Clone, Debug)]
 struct TestTrajectory<const D: usize, const P: usize> {
     parameters: [f64; P],
-    start: [f64; D],
+    start_state: [f64; D],
     segments: Vec<Segment>,
 }
 
@@ -71,7 +71,7 @@ struct TestOutcome<const D: usize> {
 }
 
 impl<const D: usize> TestOutcome<D> {
-    const NONE: Self = Self {
+    const EMPTY_OUTCOME: Self = Self {
         end: SegmentEnd::Idle,
         count: StepCount { accepted: 0, rejected: 0 },
         x: [f64::NAN; D],
@@ -116,13 +116,13 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for SolveKernel<'
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut batch = Batch::<'_, T, E, D, P> {
-            member: Member { p: [N(zero); P], equation: PhantomData },
+            test_system: TestSystem { p: [N(zero); P], equation: PhantomData },
             trajectories: self.trajectories,
             started: 0,
-            current: [(0, 0); MAX_LANES],
-            outcomes: vec![TestOutcome::NONE; self.trajectories.len()],
+            current_segments: [(0, 0); MAX_LANES],
+            outcomes: vec![TestOutcome::EMPTY_OUTCOME; self.trajectories.len()],
         };
-        let heap = allocation_counter::measure(|| match self.method {
+        let heap_use = allocation_counter::measure(|| match self.method {
             TestMethod::Rk4 => rk4::integrate(zero, &mut batch),
             TestMethod::Dop853 => dop853::integrate(zero, &mut batch),
             TestMethod::Dop853Adaptive(tolerance) => {
@@ -131,27 +131,29 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for SolveKernel<'
             TestMethod::Dopri5(tolerance) => dopri5::integrate(zero, &mut batch, &tolerance),
             TestMethod::Additive(tolerance) => additive::integrate(zero, &mut batch, &tolerance),
         });
-        (batch.outcomes, heap.count_total)
+        (batch.outcomes, heap_use.count_total)
     }
 }
 
 /// A task that passes trajectories through the lanes, one after another.
 struct Batch<'a, T, E, const D: usize, const P: usize> {
-    member: Member<T, E, P>,
+    test_system: TestSystem<T, E, P>,
     trajectories: &'a [TestTrajectory<D, P>],
     started: usize,
     /// The indices of the trajectory and of the segment in each lane.
-    current: [(usize, usize); MAX_LANES],
+    current_segments: [(usize, usize); MAX_LANES],
     outcomes: Vec<TestOutcome<D>>,
 }
 
 /// The member of the family in each lane.
-struct Member<T, E, const P: usize> {
+struct TestSystem<T, E, const P: usize> {
     p: [N<T>; P],
     equation: PhantomData<E>,
 }
 
-impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> for Member<T, E, P> {
+impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D>
+    for TestSystem<T, E, P>
+{
     type Forcing = N<T>;
 
     #[inline(always)]
@@ -176,7 +178,7 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> fo
 }
 
 impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> SemiImplicit<T, D>
-    for Member<T, E, P>
+    for TestSystem<T, E, P>
 {
     #[inline(always)]
     fn solve_implicit_stage(
@@ -193,16 +195,16 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> SemiImplicit<T,
 impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
     for Batch<'_, T, E, D, P>
 {
-    type System = Member<T, E, P>;
+    type System = TestSystem<T, E, P>;
 
     #[inline(always)]
-    fn system(&self) -> &Member<T, E, P> {
-        &self.member
+    fn system(&self) -> &TestSystem<T, E, P> {
+        &self.test_system
     }
 
     fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment> {
         if end != SegmentEnd::Idle {
-            let (trajectory, segment) = &mut self.current[lane];
+            let (trajectory, segment) = &mut self.current_segments[lane];
             let segments = &self.trajectories[*trajectory].segments;
             let outcome = &mut self.outcomes[*trajectory];
             outcome.end = end;
@@ -219,12 +221,12 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
             outcome.x = x.map(|x| x.0.get(lane));
         }
         let trajectory = self.trajectories.get(self.started)?;
-        self.current[lane] = (self.started, 0);
+        self.current_segments[lane] = (self.started, 0);
         self.started += 1;
-        for (p, value) in self.member.p.iter_mut().zip(trajectory.parameters) {
+        for (p, value) in self.test_system.p.iter_mut().zip(trajectory.parameters) {
             p.0.set(lane, value);
         }
-        for (x, start) in x.iter_mut().zip(trajectory.start) {
+        for (x, start) in x.iter_mut().zip(trajectory.start_state) {
             x.0.set(lane, start);
         }
         Some(trajectory.segments[0])
@@ -236,11 +238,11 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
         for fraction in [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] {
             let interpolated = step.interpolate(step.length_s.lit(fraction));
             for lane in (0..T::LANES).filter(|&lane| step.length_s.0.get(lane) > 0.0) {
-                let (trajectory, _) = self.current[lane];
+                let (trajectory, _) = self.current_segments[lane];
                 let outcome = &mut self.outcomes[trajectory];
                 outcome.observed_to_s = step.end_s.0.get(lane);
                 let t_s = outcome.observed_to_s - (1.0 - fraction) * step.length_s.0.get(lane);
-                let exact = E::exact(&self.trajectories[trajectory].parameters, t_s);
+                let exact = E::exact_state(&self.trajectories[trajectory].parameters, t_s);
                 for i in 0..D {
                     // `max` ignores NaN, so that a trajectory without a known solution has no
                     // error.
@@ -281,7 +283,7 @@ impl Equation<3, 1> for SwingEquation {
         [x_rate, y_slope, residual[1] - angle * y_slope]
     }
 
-    fn exact(&[w]: &[f64; 1], t_s: f64) -> [f64; 3] {
+    fn exact_state(&[w]: &[f64; 1], t_s: f64) -> [f64; 3] {
         let (sin, cos) = (w * t_s).sin_cos();
         [sin.exp(), cos, -sin]
     }
@@ -325,6 +327,6 @@ impl TestTrajectory<3, 1> {
         let segments = (0..count)
             .map(|i| Segment { start_s: boundary_s(i), end_s: boundary_s(i + 1), step_s })
             .collect();
-        Self { parameters: [w], start: [1.0, 1.0, 0.0], segments }
+        Self { parameters: [w], start_state: [1.0, 1.0, 0.0], segments }
     }
 }

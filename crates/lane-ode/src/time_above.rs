@@ -30,7 +30,7 @@ impl<T: Lane> TimeAbove<T> {
     }
 
     /// Returns the time of one lane (s).
-    pub fn lane(&self, lane: usize) -> f64 {
+    pub fn lane_time_s(&self, lane: usize) -> f64 {
         self.time_s.0.get(lane)
     }
 
@@ -46,12 +46,12 @@ impl<T: Lane> TimeAbove<T> {
     pub fn advance(&mut self, length_s: N<T>, sample: &Sample<T>, counted_lanes: T::Mask) {
         let zero = length_s.lit(0.0);
         let one = length_s.lit(1.0);
-        let third = (length_s * (1.0 / 3.0)).v();
+        let third_length_s = (length_s * (1.0 / 3.0)).v();
         // The control points a, b, c, d of the cubic.
         let a = self.last_sample.value;
         let d = sample.value;
-        let b = a + third * self.last_sample.slope;
-        let c = d - third * sample.slope;
+        let b = a + third_length_s * self.last_sample.slope;
+        let c = d - third_length_s * sample.slope;
         // The greatest height of the control polygon above zero and its greatest depth below zero,
         // which bound the cubic.
         let max_height = N(a.0.larger(b.0).larger(c.0.larger(d.0)));
@@ -100,25 +100,25 @@ fn positive_length_between<T: Lane>(quintic: &Quintic<T>, start: N<T>, end: N<T>
     let zero = start.lit(0.0);
     let start_value = quintic.value(start);
     let end_value = quintic.value(end);
-    let mut low = start;
-    let mut high = end;
+    let mut low_position = start;
+    let mut high_position = end;
     // Bisects to the point where the sign changes from that at `start`. If it does not change,
-    // `low` converges to `end`.
+    // `low_position` converges to `end`.
     for _ in 0..MAX_BISECTIONS {
-        let middle = (0.5 * (low + high)).v();
-        let value = quintic.value(middle);
-        let is_positive = zero.where_less(value, middle.lit(1.0), zero);
-        let starts_positive = zero.where_less(start_value, middle.lit(1.0), zero);
+        let middle_position = (0.5 * (low_position + high_position)).v();
+        let value = quintic.value(middle_position);
+        let is_positive = zero.where_less(value, middle_position.lit(1.0), zero);
+        let starts_positive = zero.where_less(start_value, middle_position.lit(1.0), zero);
         let has_start_sign = (is_positive - starts_positive).abs().where_less(
-            middle.lit(0.5),
-            middle.lit(1.0),
+            middle_position.lit(0.5),
+            middle_position.lit(1.0),
             zero,
         );
-        low = zero.where_less(has_start_sign, middle, low);
-        high = zero.where_less(has_start_sign, high, middle);
+        low_position = zero.where_less(has_start_sign, middle_position, low_position);
+        high_position = zero.where_less(has_start_sign, high_position, middle_position);
     }
-    let start_length = (low - start).abs();
-    let end_length = (end - low).abs();
+    let start_length = (low_position - start).abs();
+    let end_length = (end - low_position).abs();
     let positive_start_length = zero.where_less(start_value, start_length, zero);
     let positive_end_length = zero.where_less(end_value, end_length, zero);
     positive_start_length + positive_end_length

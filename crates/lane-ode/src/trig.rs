@@ -10,7 +10,7 @@ use crate::{Lane, N, Real};
 use core::f64::consts::FRAC_PI_4;
 
 /// Coefficients S1 to S6 of fdlibm's `k_sin.c`.
-const SIN: [f64; 6] = [
+const SIN_COEFFICIENTS: [f64; 6] = [
     -1.666_666_666_666_663_243_48e-1,
     8.333_333_333_322_489_461_24e-3,
     -1.984_126_982_985_794_931_34e-4,
@@ -19,7 +19,7 @@ const SIN: [f64; 6] = [
     1.589_690_995_211_550_102_21e-10,
 ];
 /// Coefficients C1 to C6 of fdlibm's `k_cos.c`.
-const COS: [f64; 6] = [
+const COS_COEFFICIENTS: [f64; 6] = [
     4.166_666_666_666_660_190_37e-2,
     -1.388_888_888_887_410_957_49e-3,
     2.480_158_728_947_672_941_78e-5,
@@ -29,15 +29,15 @@ const COS: [f64; 6] = [
 ];
 
 /// pi/2 as a sum of three doubles.
-const HALF_PI: [f64; 3] =
+const HALF_PI_PARTS: [f64; 3] =
     [core::f64::consts::FRAC_PI_2, 6.123_233_995_736_766e-17, -1.497_384_904_859_169_8e-33];
 
 /// Computes sine and cosine for |x| up to pi/4.
 #[inline(always)]
 fn sin_cos_within_quarter<T: Real>(x: N<T>) -> (N<T>, N<T>) {
     let z = x.squared().v();
-    let sin = (x * z) * polynomial(&SIN, z) + x;
-    let cos = z.squared() * polynomial(&COS, z) + (1.0 - z * 0.5);
+    let sin = (x * z) * polynomial(&SIN_COEFFICIENTS, z) + x;
+    let cos = z.squared() * polynomial(&COS_COEFFICIENTS, z) + (1.0 - z * 0.5);
     (sin, cos)
 }
 
@@ -56,8 +56,8 @@ fn polynomial<T: Real>(c: &[f64; 6], z: N<T>) -> N<T> {
 fn rotate_by_quarter_turns<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<T>, N<T>) {
     // The quadrant as a fraction of a turn: 0, 0.25, 0.5 or 0.75. A multiple of 1/4 minus 3/8
     // rounds to the floor of the multiple.
-    let quarter = (quadrant * 0.25).v();
-    let fraction = quarter - N((quarter - 0.375).0.round());
+    let quarter_turns = (quadrant * 0.25).v();
+    let fraction = quarter_turns - N((quarter_turns - 0.375).0.round());
     (
         select_by_quadrant(fraction, [sin, cos, -sin, -cos]),
         select_by_quadrant(fraction, [cos, -sin, -cos, sin]),
@@ -94,8 +94,9 @@ fn sin_cos_by_lanes<T: Lane>(x: T) -> (T, T) {
         let x = N(x.get(i));
         let quadrant = N((x * core::f64::consts::FRAC_2_PI).v().0.round());
         // The first difference is exact: both terms are multiples of 2^-53 and it is below 1.
-        let reduced = ((x - quadrant * HALF_PI[0]) - quadrant * HALF_PI[1]) - quadrant * HALF_PI[2];
-        let (s, c) = sin_cos_within_quarter(reduced);
+        let reduced_angle = ((x - quadrant * HALF_PI_PARTS[0]) - quadrant * HALF_PI_PARTS[1])
+            - quadrant * HALF_PI_PARTS[2];
+        let (s, c) = sin_cos_within_quarter(reduced_angle);
         let (s, c) = rotate_by_quarter_turns(quadrant, s, c);
         sin.set(i, s.0);
         cos.set(i, c.0);

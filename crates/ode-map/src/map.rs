@@ -138,7 +138,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     }
 
     fn engine<'a>(plan: &'a Plan<Self>, _: Option<&str>) -> Result<Engine<'a>, Error> {
-        Simd::check().map_err(Error::model)?;
+        Simd::check_processor().map_err(Error::model)?;
         Ok(Engine::new(RowEvaluator { plan }, Simd::best().name()))
     }
 }

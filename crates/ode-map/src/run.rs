@@ -152,7 +152,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             let run = &mut self.runs[trajectory];
             run.steps += count.accepted;
             run.rejected += count.rejected;
-            run.peaks = self.peaks.lane(lane);
+            run.peaks = self.peaks.lane_peaks(lane);
         }
         match end {
             SegmentEnd::Completed(_) => segment += 1,

@@ -226,7 +226,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     fn simd_for(&self, trajectories: usize) -> Simd {
-        self.forced.unwrap_or_else(|| Simd::best().narrowed(trajectories))
+        self.forced.unwrap_or_else(|| Simd::best().narrowest_for(trajectories))
     }
 
     /// Prepares points for integration, those with the same window together. A point that cannot be

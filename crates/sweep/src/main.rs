@@ -15,7 +15,7 @@ fn main() -> ExitCode {
 
 fn run() -> Result<Exit, Error> {
     let cli = WasherCli::read();
-    Simd::check().map_err(Error::model)?;
+    Simd::check_processor().map_err(Error::model)?;
     survive_file_size_limits().map_err(Error::signal_handlers)?;
     check_random_numbers()?;
     cli.command.run()

@@ -286,7 +286,7 @@ pub fn prepare(
             let method = Method::capped(MethodKind::Capped0, step_s, caps);
             let batch_points: Vec<&Point> =
                 batch.iter().map(|point_search| &point_search.point).collect();
-            let simd = simd.narrowed(batch_points.len());
+            let simd = simd.narrowest_for(batch_points.len());
             let (_, gauge_readings) =
                 simulate_with(simd, ModelKind::Linear, &method, &batch_points, recorders);
             for (point_search, reading) in batch.iter_mut().zip(gauge_readings) {

@@ -212,8 +212,8 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
         let record = &mut self.records[state.point];
         *record = Record { failure, steps, rejected, ..EMPTY_RECORD };
         if failure.is_none() {
-            record.amplitudes = self.channel_peaks.lane(lane);
-            let [radial_squared] = self.radial_peaks.lane(lane);
+            record.amplitudes = self.channel_peaks.lane_peaks(lane);
+            let [radial_squared] = self.radial_peaks.lane_peaks(lane);
             record.min_gap_m = point.machine.bodies.clearance.0 - radial_squared.sqrt();
         }
         if let Some(active_recorders) = &mut self.active_recorders {

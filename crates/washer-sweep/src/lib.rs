@@ -39,6 +39,6 @@ mod _native {
 
     #[pymodule_init]
     fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
-        Simd::check().map_err(|error| PyImportError::new_err(error.to_string()))
+        Simd::check_processor().map_err(|error| PyImportError::new_err(error.to_string()))
     }
 }

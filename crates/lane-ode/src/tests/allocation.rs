@@ -5,8 +5,8 @@ use crate::{SegmentEnd, Tolerance};
 
 #[test]
 fn the_allocation_counter_counts() {
-    let heap = allocation_counter::measure(|| drop(core::hint::black_box(vec![1.0_f64; 8])));
-    assert_eq!(heap.count_total, 1);
+    let heap_use = allocation_counter::measure(|| drop(core::hint::black_box(vec![1.0_f64; 8])));
+    assert_eq!(heap_use.count_total, 1);
 }
 
 #[test]
@@ -17,9 +17,10 @@ fn an_integration_allocates_nothing() {
     let tolerance =
         Tolerance { relative: 1e-8, absolute: 1e-8, max_steps: 100_000, longest_step_s: None };
     for simd in instruction_sets() {
-        let adaptive = [TestMethod::Dop853Adaptive, TestMethod::Dopri5, TestMethod::Additive]
-            .map(|method| method(tolerance));
-        for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(adaptive) {
+        let adaptive_methods =
+            [TestMethod::Dop853Adaptive, TestMethod::Dopri5, TestMethod::Additive]
+                .map(|method| method(tolerance));
+        for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(adaptive_methods) {
             let (outcomes, allocations) = solve::<SwingEquation, 3, 1>(simd, method, &trajectories);
             assert!(
                 outcomes

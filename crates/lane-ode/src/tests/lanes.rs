@@ -10,11 +10,11 @@ use core::hint::black_box;
 type Operands = [f64; 3];
 
 /// The number of results for the operands.
-const RESULTS: usize = 21;
+const RESULT_COUNT: usize = 21;
 
 /// Returns the results by IEEE 754 and the standard library. `black_box` prevents the compiler from
 /// fusing a negation with its sum (`aarch64::negated`).
-fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
+fn expected_results([a, b, c]: Operands) -> [f64; RESULT_COUNT] {
     let (sin, cos) = trig::sin_cos(a);
     let (sin_turns, cos_turns) = trig::sin_cos_turns(N(a));
     [
@@ -45,11 +45,11 @@ fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
 struct LaneOperations<'a>(&'a [Operands]);
 
 impl Kernel for LaneOperations<'_> {
-    type Output = Vec<[f64; RESULTS]>;
+    type Output = Vec<[f64; RESULT_COUNT]>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut rows = Vec::new();
+        let mut result_rows = Vec::new();
         for group in self.0.chunks(T::LANES) {
             let mut operands = [zero; 3];
             for (lane, values) in group.iter().enumerate() {
@@ -83,26 +83,26 @@ impl Kernel for LaneOperations<'_> {
                 T::select(a.less(b), a, c),
                 a.larger(b),
             ];
-            let less = T::bits(a.less(b));
+            let less_bits = T::bits(a.less(b));
             let mut are_all_less = true;
             for (lane, [a, b, _]) in group.iter().enumerate() {
-                assert_eq!(less >> lane & 1 == 1, a < b, "{a} < {b}");
+                assert_eq!(less_bits >> lane & 1 == 1, a < b, "{a} < {b}");
                 are_all_less &= a < b;
-                rows.push(results.map(|r| r.get(lane)));
+                result_rows.push(results.map(|r| r.get(lane)));
             }
             if group.len() == T::LANES {
                 assert_eq!(T::all(a.less(b)), are_all_less);
-                assert_eq!(less >> T::LANES, 0, "bits beyond the last lane");
+                assert_eq!(less_bits >> T::LANES, 0, "bits beyond the last lane");
             }
             assert!((0..T::LANES).all(|lane| zero.lit(-1.5).get(lane) == -1.5));
         }
-        rows
+        result_rows
     }
 }
 
 /// Returns all pairs of special values, then random numbers of all magnitudes.
 fn operands() -> Vec<Operands> {
-    let special = [
+    let special_numbers = [
         0.0,
         -0.0,
         1.0,
@@ -124,23 +124,27 @@ fn operands() -> Vec<Operands> {
         -core::f64::consts::FRAC_PI_2,
         4_503_599_627_370_497.5,
     ];
-    let mut rows = Vec::new();
-    for a in special {
-        for b in special {
-            rows.push([a, b, special[(rows.len() * 7) % special.len()]]);
+    let mut operand_rows = Vec::new();
+    for a in special_numbers {
+        for b in special_numbers {
+            operand_rows.push([
+                a,
+                b,
+                special_numbers[(operand_rows.len() * 7) % special_numbers.len()],
+            ]);
         }
     }
     let mut rng = fastrand::Rng::with_seed(1);
     for _ in 0..20_000 {
-        let mut number = || (rng.f64() * 2.0 - 1.0) * 2.0_f64.powi(rng.i32(-40..40));
-        rows.push([number(), number(), number()]);
+        let mut random_number = || (rng.f64() * 2.0 - 1.0) * 2.0_f64.powi(rng.i32(-40..40));
+        operand_rows.push([random_number(), random_number(), random_number()]);
     }
     // Fused operations differ from two rounded ones for products and sums of similar magnitude.
     for _ in 0..20_000 {
         let [a, b] = [rng.f64() + 0.5, rng.f64() + 0.5];
-        rows.push([a, b, -a * b]);
+        operand_rows.push([a, b, -a * b]);
     }
-    rows
+    operand_rows
 }
 
 /// Returns whether both numbers have the same bits. Two NaN are the same, because their sign and
@@ -149,11 +153,11 @@ fn is_same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }
 
-fn check(name: &str, operands: &[Operands], results: &[[f64; RESULTS]]) {
+fn check_results(name: &str, operands: &[Operands], results: &[[f64; RESULT_COUNT]]) {
     assert_eq!(operands.len(), results.len());
     for (operands, results) in operands.iter().zip(results) {
-        let expected = expected(*operands);
-        for i in 0..RESULTS {
+        let expected = expected_results(*operands);
+        for i in 0..RESULT_COUNT {
             assert!(
                 is_same(results[i], expected[i]),
                 "{name}, result {i} of {operands:?}: {} against {}",
@@ -168,15 +172,15 @@ fn check(name: &str, operands: &[Operands], results: &[[f64; RESULTS]]) {
 fn every_operation_of_every_instruction_set_gives_the_bits_of_plain_numbers() {
     let operands = operands();
     for simd in instruction_sets() {
-        check(simd.name(), &operands, &simd.dispatch(LaneOperations(&operands)));
+        check_results(simd.name(), &operands, &simd.dispatch(LaneOperations(&operands)));
     }
 }
 
 #[test]
 fn every_operation_of_plain_arrays_gives_the_bits_of_plain_numbers() {
     let operands = operands();
-    check("Array<2>", &operands, &LaneOperations(&operands).run(Array([0.0; 2])));
-    check("Array<3>", &operands, &LaneOperations(&operands).run(Array([0.0; 3])));
+    check_results("Array<2>", &operands, &LaneOperations(&operands).run(Array([0.0; 2])));
+    check_results("Array<3>", &operands, &LaneOperations(&operands).run(Array([0.0; 3])));
 }
 
 struct CountLanes;
@@ -195,15 +199,15 @@ fn every_instruction_set_has_its_number_of_lanes() {
     for simd in instruction_sets() {
         assert_eq!(simd.dispatch(CountLanes), simd.lanes(), "{}", simd.name());
     }
-    let baseline = if cfg!(target_arch = "aarch64") { Simd::Neon } else { Simd::Scalar };
+    let baseline_set = if cfg!(target_arch = "aarch64") { Simd::Neon } else { Simd::Scalar };
     assert!(
-        instruction_sets().contains(&baseline),
-        "every processor of this architecture has {baseline:?}"
+        instruction_sets().contains(&baseline_set),
+        "every processor of this architecture has {baseline_set:?}"
     );
-    let absent = Simd::ALL.into_iter().filter(|simd| !simd.is_available());
+    let absent_sets = Simd::ALL.into_iter().filter(|simd| !simd.is_available());
     assert!(
-        absent.into_iter().all(|simd| simd.dispatch(CountLanes) == 1),
+        absent_sets.into_iter().all(|simd| simd.dispatch(CountLanes) == 1),
         "what is absent runs on one lane"
     );
-    assert_eq!(Simd::check(), Ok(()));
+    assert_eq!(Simd::check_processor(), Ok(()));
 }

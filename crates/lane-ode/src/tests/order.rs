@@ -17,7 +17,7 @@ const fn tolerance(relative: f64, max_steps: u64) -> Tolerance {
 }
 
 /// Returns the error at the end and the largest error inside a step, for each number of steps.
-fn errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
+fn end_and_inside_errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
     let trajectories: Vec<_> = steps
         .iter()
         .map(|&n| match method {
@@ -30,43 +30,44 @@ fn errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
         })
         .collect();
     let (outcomes, _) = solve::<SwingEquation, 3, 1>(Simd::best(), method, &trajectories);
-    let exact = SwingEquation::exact(&[1.0], END_S);
-    let trajectory_errors = |(n, outcome): (&u32, TestOutcome<3>)| {
+    let exact_state = SwingEquation::exact_state(&[1.0], END_S);
+    let errors_of_outcome = |(n, outcome): (&u32, TestOutcome<3>)| {
         assert!(matches!(outcome.end, SegmentEnd::Completed(_)), "{outcome:?}");
         assert_eq!((outcome.count.accepted, outcome.count.rejected), (u64::from(*n), 0));
-        let end_error = (0..3).map(|i| (outcome.x[i] - exact[i]).abs()).fold(0.0, f64::max);
+        let end_error = (0..3).map(|i| (outcome.x[i] - exact_state[i]).abs()).fold(0.0, f64::max);
         [end_error, outcome.error_inside]
     };
-    steps.iter().zip(outcomes).map(trajectory_errors).collect()
+    steps.iter().zip(outcomes).map(errors_of_outcome).collect()
 }
 
 /// Computes the slope of the logarithm of the error over that of the step, by least squares.
-fn slope(steps: &[u32], errors: impl Iterator<Item = f64>) -> f64 {
-    let points: Vec<_> =
+fn convergence_order(steps: &[u32], errors: impl Iterator<Item = f64>) -> f64 {
+    let log_points: Vec<_> =
         steps.iter().zip(errors).map(|(&n, e)| (-f64::from(n).ln(), e.ln())).collect();
-    let count = points.len() as f64;
-    let (mx, my) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / count, y + p.1 / count));
-    let (xy, xx) = points
+    let count = log_points.len() as f64;
+    let (mx, my) =
+        log_points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / count, y + p.1 / count));
+    let (xy, xx) = log_points
         .iter()
         .fold((0.0, 0.0), |(xy, xx), p| (xy + (p.0 - mx) * (p.1 - my), xx + (p.0 - mx).powi(2)));
     xy / xx
 }
 
 /// Measures the slopes at the end and inside steps.
-fn slopes(name: &str, method: TestMethod, steps: &[u32]) -> [f64; 2] {
-    let errors = errors(method, steps);
-    let slopes = [0, 1].map(|kind| slope(steps, errors.iter().map(|e| e[kind])));
+fn convergence_orders(name: &str, method: TestMethod, steps: &[u32]) -> [f64; 2] {
+    let errors = end_and_inside_errors(method, steps);
+    let orders = [0, 1].map(|column| convergence_order(steps, errors.iter().map(|e| e[column])));
     let [coarse, fine] = [0, steps.len() - 1].map(|i| errors[i][0]);
     eprintln!(
         "{name}: order {:.3}, between steps {:.3}; errors {coarse:.1e} to {fine:.1e}",
-        slopes[0], slopes[1]
+        orders[0], orders[1]
     );
-    slopes
+    orders
 }
 
 #[test]
 fn rk4_and_the_cubic_inside_its_steps_have_order_4() {
-    let [order, inside] = slopes("rk4", TestMethod::Rk4, &[200, 283, 400, 566, 800]);
+    let [order, inside] = convergence_orders("rk4", TestMethod::Rk4, &[200, 283, 400, 566, 800]);
     assert!((order - 4.0).abs() < 0.1, "order {order}");
     assert!((inside - 4.0).abs() < 0.1, "between steps {inside}");
 }
@@ -74,7 +75,7 @@ fn rk4_and_the_cubic_inside_its_steps_have_order_4() {
 #[test]
 fn dop853_has_order_8_and_its_coefficients_are_consistent() {
     for method in [TestMethod::Dop853, TestMethod::Dop853Adaptive(ACCEPT_ALL)] {
-        let [order, _] = slopes(&format!("{method:?}"), method, &[10, 14, 20, 28]);
+        let [order, _] = convergence_orders(&format!("{method:?}"), method, &[10, 14, 20, 28]);
         assert!((7.7..9.3).contains(&order), "order {order}");
     }
 }
@@ -94,7 +95,7 @@ fn dopri5_and_its_dense_output_have_order_5() {
     // Dense output of order 4 has a local error of order h^5, which does not accumulate, so that it
     // is as accurate as the method.
     let [order, inside] =
-        slopes("dopri5", TestMethod::Dopri5(ACCEPT_ALL), &[64, 91, 128, 181, 256]);
+        convergence_orders("dopri5", TestMethod::Dopri5(ACCEPT_ALL), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
     assert!((inside - 5.0).abs() < 0.1, "between steps {inside}");
 }
@@ -102,7 +103,7 @@ fn dopri5_and_its_dense_output_have_order_5() {
 #[test]
 fn the_additive_method_has_order_5() {
     let [order, inside] =
-        slopes("additive", TestMethod::Additive(ACCEPT_ALL), &[64, 91, 128, 181, 256]);
+        convergence_orders("additive", TestMethod::Additive(ACCEPT_ALL), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
     // The cubic inside steps has order 4.
     assert!((inside - 4.0).abs() < 0.1, "between steps {inside}");
@@ -113,12 +114,13 @@ fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
     // With a rigid spring in place of the stiff one, the masses would oscillate at an angular
     // frequency of sqrt(1/2).
     let segments = vec![Segment { start_s: 0.0, end_s: 10.0, step_s: 1e-4 }];
-    let trajectory = TestTrajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], segments };
+    let trajectory =
+        TestTrajectory { parameters: [1e8], start_state: [1.0, 1.0, 0.0, 0.0], segments };
     for relative in [1e-4, 1e-6] {
-        let tolerances = tolerance(relative, 5_000);
+        let run_tolerance = tolerance(relative, 5_000);
         let (outcomes, _) = solve::<CoupledEquation, 4, 1>(
             Simd::best(),
-            TestMethod::Additive(tolerances),
+            TestMethod::Additive(run_tolerance),
             core::slice::from_ref(&trajectory),
         );
         let TestOutcome { end, x, count, .. } = outcomes[0];
@@ -133,10 +135,10 @@ fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
 
 /// Integrates a swing at four tolerances, each a hundredth of the one before, and checks that
 /// errors are below 30 times the tolerance. Returns the ratios of the numbers of steps.
-fn ratios_of_steps(method: fn(Tolerance) -> TestMethod) -> Vec<f64> {
+fn step_count_ratios(method: fn(Tolerance) -> TestMethod) -> Vec<f64> {
     let trajectory = TestTrajectory::swing(1.0, 20.0, 1, 1e-3);
-    let exact = SwingEquation::exact(&[1.0], 20.0);
-    let mut steps = Vec::new();
+    let exact_state = SwingEquation::exact_state(&[1.0], 20.0);
+    let mut step_counts = Vec::new();
     for relative in [1e-5, 1e-7, 1e-9, 1e-11] {
         let tolerance = tolerance(relative, 100_000);
         let (outcomes, _) = solve::<SwingEquation, 3, 1>(
@@ -146,22 +148,22 @@ fn ratios_of_steps(method: fn(Tolerance) -> TestMethod) -> Vec<f64> {
         );
         let TestOutcome { end, x, count, .. } = outcomes[0];
         assert!(matches!(end, SegmentEnd::Completed(_)));
-        let error = (0..3).map(|i| (x[i] - exact[i]).abs()).fold(0.0, f64::max);
+        let error = (0..3).map(|i| (x[i] - exact_state[i]).abs()).fold(0.0, f64::max);
         eprintln!("{:?}: error {error:.2e}, {count:?}", method(tolerance));
         assert!(error < 30.0 * relative, "{relative:e} gave {error:e}");
-        steps.push(count.accepted as f64);
+        step_counts.push(count.accepted as f64);
     }
-    steps.windows(2).map(|pair| pair[1] / pair[0]).collect()
+    step_counts.windows(2).map(|pair| pair[1] / pair[0]).collect()
 }
 
 #[test]
 fn steps_follow_the_tolerance_by_the_order_of_the_error_estimate() {
     // The local error of dopri5 is proportional to h^5: a hundredth of the tolerance takes
     // 100^(1/5) = 2.51 times as many steps.
-    let ratios = ratios_of_steps(TestMethod::Dopri5);
+    let ratios = step_count_ratios(TestMethod::Dopri5);
     assert!(ratios.iter().all(|ratio| (2.1..2.9).contains(ratio)), "{ratios:?}");
     // That of dop853 is proportional to h^8 if steps are short: 100^(1/8) = 1.78.
-    let ratios = ratios_of_steps(TestMethod::Dop853Adaptive);
+    let ratios = step_count_ratios(TestMethod::Dop853Adaptive);
     assert!(ratios.iter().all(|ratio| (1.4..2.1).contains(ratio)), "{ratios:?}");
 }
 
@@ -177,9 +179,12 @@ fn no_step_is_longer_than_the_longest() {
                 core::slice::from_ref(&trajectory),
             );
             // Steps grow from the first one at most by a factor of 5, and the last one is shorter.
-            let accepted = outcomes[0].count.accepted as f64;
-            let least = 20.0 / longest_step_s;
-            assert!((least..least + 4.0).contains(&accepted), "{method:?}: {accepted}");
+            let accepted_steps = outcomes[0].count.accepted as f64;
+            let min_steps = 20.0 / longest_step_s;
+            assert!(
+                (min_steps..min_steps + 4.0).contains(&accepted_steps),
+                "{method:?}: {accepted_steps}"
+            );
         }
     }
 }
@@ -223,15 +228,15 @@ fn every_segment_ends_exactly_at_its_end() {
 
 #[test]
 fn fixed_steps_divide_a_segment_into_the_fewest_equal_steps() {
-    let steps = |end_s: f64, step_s: f64| {
+    let step_count = |end_s: f64, step_s: f64| {
         crate::fixed::fixed_steps(&Segment { start_s: 0.0, end_s, step_s })
     };
-    assert_eq!(steps(50.0, 2e-4), 250_000);
-    assert_eq!(steps(1.0, 0.3), 4);
+    assert_eq!(step_count(50.0, 2e-4), 250_000);
+    assert_eq!(step_count(1.0, 0.3), 4);
     // The quotients 0.7 / 0.1, 0.3 / 0.1 and 4.35 / 0.01 are slightly below 7, 3 and 435 by
     // rounding.
-    assert_eq!([steps(0.7, 0.1), steps(0.3, 0.1), steps(4.35, 0.01)], [7, 3, 435]);
+    assert_eq!([step_count(0.7, 0.1), step_count(0.3, 0.1), step_count(4.35, 0.01)], [7, 3, 435]);
     // The quotient 1.1 / 0.1 is slightly above 11 by rounding.
-    assert_eq!(steps(1.1, 0.1), 11);
-    assert_eq!(steps(0.01, 1.0), 1);
+    assert_eq!(step_count(1.1, 0.1), 11);
+    assert_eq!(step_count(0.01, 1.0), 1);
 }

@@ -27,23 +27,23 @@ impl Waves {
 
     /// Computes the largest magnitude from 0 to `end`: the largest on a fine grid, refined by
     /// Newton's method.
-    fn peak(&self, end: f64) -> f64 {
-        let cells = 4000;
-        let step = end / f64::from(cells);
+    fn exact_peak(&self, end: f64) -> f64 {
+        let cell_count = 4000;
+        let step = end / f64::from(cell_count);
         let magnitude = |i: i32| self.derivatives(step * f64::from(i))[0].abs();
-        let largest_sample =
-            (0..=cells).max_by(|&i, &j| magnitude(i).total_cmp(&magnitude(j))).unwrap();
-        let mut t = step * f64::from(largest_sample);
+        let largest_index =
+            (0..=cell_count).max_by(|&i, &j| magnitude(i).total_cmp(&magnitude(j))).unwrap();
+        let mut t = step * f64::from(largest_index);
         for _ in 0..20 {
             let [_, slope, curvature] = self.derivatives(t);
             t -= slope / curvature;
         }
         let is_inside =
-            (0.0..=end).contains(&t) && (t - step * f64::from(largest_sample)).abs() <= step;
+            (0.0..=end).contains(&t) && (t - step * f64::from(largest_index)).abs() <= step;
         if is_inside {
-            self.derivatives(t)[0].abs().max(magnitude(largest_sample))
+            self.derivatives(t)[0].abs().max(magnitude(largest_index))
         } else {
-            magnitude(largest_sample)
+            magnitude(largest_index)
         }
     }
 
@@ -65,7 +65,7 @@ impl Waves {
         for i in 1..=steps {
             advance(&mut peaks, N(h), &[self.sample(h * f64::from(i))], true);
         }
-        peaks.lane(0)[0]
+        peaks.lane_peaks(0)[0]
     }
 }
 
@@ -88,10 +88,10 @@ fn largest_error_by(advance: Advance, steps_per_period: u32) -> f64 {
             phase: [TAU * rng.f64(), TAU * rng.f64()],
         };
         let periods = 3;
-        let peak = waves.peak(f64::from(periods));
+        let exact_peak = waves.exact_peak(f64::from(periods));
         let sampled_peak =
             waves.sampled_peak_by(advance, f64::from(periods), periods * steps_per_period);
-        max_error = max_error.max((sampled_peak - peak).abs() / peak);
+        max_error = max_error.max((sampled_peak - exact_peak).abs() / exact_peak);
     }
     max_error
 }
@@ -109,20 +109,21 @@ fn the_sampling_error_stays_below_1e_5_down_to_ten_steps_a_period() {
 
 #[test]
 fn the_sampling_error_is_of_sixth_order() {
-    let [coarse, fine] = [12, 24].map(largest_error);
-    let order = (coarse / fine).log2();
+    let [coarse_error, fine_error] = [12, 24].map(largest_error);
+    let order = (coarse_error / fine_error).log2();
     eprintln!("order of a peak's sampling error: {order:.2}");
     assert!(order > 5.5, "{order}");
 }
 
 #[test]
 fn without_curvatures_the_sampling_error_is_of_fourth_order() {
-    let [coarse, fine] = [24, 48].map(|steps| largest_error_by(Peaks::advance_by_slopes, steps));
-    let order = (coarse / fine).log2();
+    let [coarse_error, fine_error] =
+        [24, 48].map(|steps| largest_error_by(Peaks::advance_by_slopes, steps));
+    let order = (coarse_error / fine_error).log2();
     eprintln!(
-        "without curvatures, 48 steps a period: {fine:.2e} of the amplitude, order {order:.2}"
+        "without curvatures, 48 steps a period: {fine_error:.2e} of the amplitude, order {order:.2}"
     );
-    assert!(order > 3.5 && fine < 1e-5, "{order} {fine:e}");
+    assert!(order > 3.5 && fine_error < 1e-5, "{order} {fine_error:e}");
 }
 
 #[test]
@@ -141,11 +142,11 @@ fn a_peak_outside_the_window_does_not_count() {
     let mut peaks = Peaks::<f64, 1>::new(N(0.0));
     peaks.begin(&[waves.sample(0.0)], false);
     // The step over the crest at 1/4 is outside the window, the step down from it is inside.
-    let descending = waves.sample(0.35);
-    peaks.advance(N(0.35), &[descending], false);
-    peaks.begin(&[descending], true);
+    let descending_sample = waves.sample(0.35);
+    peaks.advance(N(0.35), &[descending_sample], false);
+    peaks.begin(&[descending_sample], true);
     peaks.advance(N(0.1), &[waves.sample(0.45)], true);
-    assert_eq!(peaks.lane(0)[0], descending.value.0);
+    assert_eq!(peaks.lane_peaks(0)[0], descending_sample.value.0);
     peaks.reset(0);
-    assert_eq!(peaks.lane(0)[0], 0.0);
+    assert_eq!(peaks.lane_peaks(0)[0], 0.0);
 }

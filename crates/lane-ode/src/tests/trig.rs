@@ -6,8 +6,8 @@ use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// The precision of the reference in bits. Basis: arguments close to a multiple of pi/2 lose 60 to
 /// 80 bits. Doubling it doubles the time.
-const BITS: usize = 320;
-const NEAREST: RoundingMode = RoundingMode::ToEven;
+const PRECISION_BITS: usize = 320;
+const TO_NEAREST: RoundingMode = RoundingMode::ToEven;
 
 struct Reference {
     constants: Consts,
@@ -20,38 +20,43 @@ impl Reference {
 
     /// Returns the greater error of `computed` sine and cosine of `angle`, in units in the last
     /// place of the true values.
-    fn errors(&mut self, angle: &BigFloat, (sin, cos): (f64, f64)) -> f64 {
-        let true_sin = angle.sin(BITS, NEAREST, &mut self.constants);
-        let true_cos = angle.cos(BITS, NEAREST, &mut self.constants);
+    fn greater_error(&mut self, angle: &BigFloat, (sin, cos): (f64, f64)) -> f64 {
+        let true_sin = angle.sin(PRECISION_BITS, TO_NEAREST, &mut self.constants);
+        let true_cos = angle.cos(PRECISION_BITS, TO_NEAREST, &mut self.constants);
         ulps(sin, &true_sin).max(ulps(cos, &true_cos))
     }
 
     /// Returns the errors of an angle in radians.
-    fn radians(&mut self, x: f64) -> f64 {
-        self.errors(&BigFloat::from_f64(x, BITS), trig::sin_cos(x))
+    fn error_in_radians(&mut self, x: f64) -> f64 {
+        self.greater_error(&BigFloat::from_f64(x, PRECISION_BITS), trig::sin_cos(x))
     }
 
     /// Returns the errors of an angle in turns.
-    fn turns(&mut self, turns: f64) -> f64 {
-        let two_pi =
-            self.constants.pi(BITS, NEAREST).mul(&BigFloat::from_f64(2.0, BITS), BITS, NEAREST);
-        let angle = BigFloat::from_f64(turns, BITS).mul(&two_pi, BITS, NEAREST);
+    fn error_in_turns(&mut self, turns: f64) -> f64 {
+        let two_pi = self.constants.pi(PRECISION_BITS, TO_NEAREST).mul(
+            &BigFloat::from_f64(2.0, PRECISION_BITS),
+            PRECISION_BITS,
+            TO_NEAREST,
+        );
+        let angle =
+            BigFloat::from_f64(turns, PRECISION_BITS).mul(&two_pi, PRECISION_BITS, TO_NEAREST);
         let (sin, cos) = trig::sin_cos_turns(N(turns));
-        self.errors(&angle, (sin.0, cos.0))
+        self.greater_error(&angle, (sin.0, cos.0))
     }
 }
 
 /// Returns the distance between `computed` and `exact` in units in the last place of `exact`.
 fn ulps(computed: f64, exact: &BigFloat) -> f64 {
-    let difference = BigFloat::from_f64(computed, BITS).sub(exact, BITS, NEAREST);
+    let difference =
+        BigFloat::from_f64(computed, PRECISION_BITS).sub(exact, PRECISION_BITS, TO_NEAREST);
     if difference.is_zero() {
         return 0.0;
     }
     // A double m 2^e with m from 1/2 to 1 has 53 bits, the last of which has the value 2^(e - 53).
     let unit_exponent = exact.exponent().unwrap() - 53;
-    let (words, _, _, exponent, _) = difference.as_raw_parts().unwrap();
-    let leading = *words.last().unwrap() as f64 / 2.0_f64.powi(64);
-    leading * 2.0_f64.powi(exponent - unit_exponent)
+    let (digit_words, _, _, exponent, _) = difference.as_raw_parts().unwrap();
+    let leading_fraction = *digit_words.last().unwrap() as f64 / 2.0_f64.powi(64);
+    leading_fraction * 2.0_f64.powi(exponent - unit_exponent)
 }
 
 /// Returns the largest error over the angles.
@@ -74,7 +79,11 @@ fn largest_error(
 }
 
 /// Generates `count` random numbers of either sign from a seed.
-fn random(seed: u64, count: usize, number: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
+fn random_numbers(
+    seed: u64,
+    count: usize,
+    number: impl Fn(f64) -> f64,
+) -> impl Iterator<Item = f64> {
     let mut rng = fastrand::Rng::with_seed(seed);
     (0..count).map(move |_| number(rng.f64()).copysign(rng.f64() - 0.5))
 }
@@ -84,23 +93,26 @@ fn sines_of_coordinates_are_within_1_5_ulp() {
     let mut reference = Reference::new();
     // Within a quarter turn on one path, up to where a trajectory has diverged on the other.
     let small_angles =
-        random(1, 3000, |u| u * FRAC_PI_4).chain(random(2, 1000, |u| 10.0_f64.powf(-12.0 * u)));
-    assert!(largest_error("below pi/4", small_angles, |x| reference.radians(x)) < 1.2);
-    let wide_angles = random(3, 3000, |u| FRAC_PI_4 + u * FRAC_PI_4);
-    assert!(largest_error("pi/4 to pi/2", wide_angles, |x| reference.radians(x)) < 1.5);
+        random_numbers(1, 3000, |u| u * FRAC_PI_4)
+            .chain(random_numbers(2, 1000, |u| 10.0_f64.powf(-12.0 * u)));
+    assert!(largest_error("below pi/4", small_angles, |x| reference.error_in_radians(x)) < 1.2);
+    let wide_angles = random_numbers(3, 3000, |u| FRAC_PI_4 + u * FRAC_PI_4);
+    assert!(largest_error("pi/4 to pi/2", wide_angles, |x| reference.error_in_radians(x)) < 1.5);
 }
 
 #[test]
 fn sines_of_any_angle_are_within_1_5_ulp() {
     let mut reference = Reference::new();
-    let large = random(4, 3000, |u| 10.0_f64.powf(6.0 * u));
-    assert!(largest_error("up to 1e6", large, |x| reference.radians(x)) < 1.5);
+    let large = random_numbers(4, 3000, |u| 10.0_f64.powf(6.0 * u));
+    assert!(largest_error("up to 1e6", large, |x| reference.error_in_radians(x)) < 1.5);
     // Almost all digits cancel at these angles.
     let angles_near_zeros = (1..500_u32)
         .map(|k| f64::from(k * k) * FRAC_PI_2)
         .chain((1..500).map(|k| f64::from(k) * PI));
     assert!(
-        largest_error("near multiples of pi/2", angles_near_zeros, |x| reference.radians(x)) < 1.5
+        largest_error("near multiples of pi/2", angles_near_zeros, |x| reference
+            .error_in_radians(x))
+            < 1.5
     );
 }
 
@@ -108,15 +120,19 @@ fn sines_of_any_angle_are_within_1_5_ulp() {
 fn sines_of_any_number_of_turns_are_within_1_6_ulp() {
     let mut reference = Reference::new();
     assert!(
-        largest_error("turns below 1/2", random(5, 3000, |u| 0.5 * u), |t| reference.turns(t))
+        largest_error("turns below 1/2", random_numbers(5, 3000, |u| 0.5 * u), |t| reference
+            .error_in_turns(t))
             < 1.6
     );
-    let large_angles = random(6, 3000, |u| 10.0_f64.powf(9.0 * u));
-    assert!(largest_error("up to 1e9 turns", large_angles, |t| reference.turns(t)) < 1.6);
+    let large_angles = random_numbers(6, 3000, |u| 10.0_f64.powf(9.0 * u));
+    assert!(largest_error("up to 1e9 turns", large_angles, |t| reference.error_in_turns(t)) < 1.6);
     // Angles near multiples of a quarter turn, but not the multiples themselves, at which sine or
     // cosine is zero and has no unit in the last place.
-    let close = (0..2000_i32).map(|k| f64::from(k) * 0.125 + 1e-9 * (0.5 + f64::from(k % 7 - 3)));
-    assert!(largest_error("near eighths of a turn", close, |t| reference.turns(t)) < 1.6);
+    let close_turns =
+        (0..2000_i32).map(|k| f64::from(k) * 0.125 + 1e-9 * (0.5 + f64::from(k % 7 - 3)));
+    assert!(
+        largest_error("near eighths of a turn", close_turns, |t| reference.error_in_turns(t)) < 1.6
+    );
 }
 
 #[test]

@@ -52,7 +52,7 @@ pub(super) fn record_turns(
     let integrate_batch = |held_states: &[HeldState<'_>]| {
         let lane_groups = held_states.chunks(simd.lanes());
         let integrate_group = |held_states: &[HeldState<'_>]| {
-            simd.narrowed(held_states.len()).dispatch(HeldTurnsKernel {
+            simd.narrowest_for(held_states.len()).dispatch(HeldTurnsKernel {
                 held_states,
                 turns,
                 requested_recorders,
@@ -135,7 +135,7 @@ fn integrate_lanes<T: Lane>(
                 let radial_m = recorder.max_radial_squared.0.get(lane).sqrt();
                 records.push(TurnRecord {
                     end: core::array::from_fn(|i| states[0][i].0.get(lane)),
-                    peaks: recorder.peaks.lane(lane),
+                    peaks: recorder.peaks.lane_peaks(lane),
                     min_gap_m: held_state.setup.point.clearance_m() - radial_m,
                 });
             }

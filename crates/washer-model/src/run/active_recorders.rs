@@ -127,12 +127,12 @@ impl<T: Lane> ActiveRecorders<T> {
         let to_root_mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let gauges = Gauge::ALL.map(|gauge| match &self.loads {
             _ if !recorders.has_gauge(gauge) => Vec::new(),
-            _ if gauge == Gauge::ClashTime => vec![self.clash_time.lane(lane)],
+            _ if gauge == Gauge::ClashTime => vec![self.clash_time.lane_time_s(lane)],
             Some(loads) => loads.gauge(gauge, lane, point),
             None => Vec::new(),
         });
         let root_mean_squares = match recorders.root_mean_squares {
-            true => Some(self.square_integrals.lane(lane).map(to_root_mean)),
+            true => Some(self.square_integrals.lane_integrals(lane).map(to_root_mean)),
             false => None,
         };
         let checkpoints = Vec::new();

@@ -125,7 +125,7 @@ pub fn histories<'a>(
 
 /// Returns the number of points that [`histories`] integrates at once.
 pub fn histories_per_batch() -> usize {
-    Simd::narrow().lanes()
+    Simd::narrow_set().lanes()
 }
 
 /// Integrates one model, with at most as many requests as there are lanes.

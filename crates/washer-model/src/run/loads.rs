@@ -166,10 +166,10 @@ impl<T: Lane> Loads<T> {
     /// Returns the values of a gauge for the point in one lane: one for each element of the
     /// machine, or a single one.
     pub(crate) fn gauge(&self, gauge: Gauge, lane: usize, point: &Point) -> Vec<f64> {
-        let max_value = |peaks: &Peaks<T, 1>| peaks.lane(lane)[0];
+        let max_value = |peaks: &Peaks<T, 1>| peaks.lane_peaks(lane)[0];
         let min_loads = |indices: core::ops::Range<usize>| {
             let indices = if self.distribution.is_some() { indices } else { 0..0 };
-            self.distances_below_reference_n.lane(lane)[indices]
+            self.distances_below_reference_n.lane_peaks(lane)[indices]
                 .iter()
                 .map(|below_n| REFERENCE_N - below_n)
                 .collect()
@@ -181,7 +181,7 @@ impl<T: Lane> Loads<T> {
                 self.stops.iter().map(|stop| max_value(&stop.force_peaks)).collect()
             }
             Gauge::StopContact => {
-                self.stops.iter().map(|stop| stop.contact_time.lane(lane)).collect()
+                self.stops.iter().map(|stop| stop.contact_time.lane_time_s(lane)).collect()
             }
             Gauge::FootLoad => min_loads(0..point.feet.as_ref().map_or(0, |feet| feet.count)),
             Gauge::SlipMargin => min_loads(SLIP_INDEX..WALK_INDEX),

@@ -132,7 +132,7 @@ pub(crate) fn compute_turns(requests: &[TurnRequest<'_>], cancel: Cancel<'_>) ->
     map_in_batches(requests, key, |requests| {
         let kernel = TurnKernel { requests, cancel };
         // Mostly empty wide lanes take longer than narrow lanes.
-        let is_narrow_enough = requests.len() <= Simd::narrow().lanes();
+        let is_narrow_enough = requests.len() <= Simd::narrow_set().lanes();
         // The differentiation of steps fills all lanes with disturbances, even for one turn.
         let fills_lanes = requests
             .iter()
@@ -296,7 +296,7 @@ fn integrate_batch<T: Lane>(
             let clearance_m = request.setup.point.clearance_m();
             Box::new(OrbitRecord {
                 monodromy: monodromies[lane],
-                peaks: recorder.peaks.lane(lane),
+                peaks: recorder.peaks.lane_peaks(lane),
                 min_gap_m: clearance_m - recorder.max_radial_squared.0.get(lane).sqrt(),
                 states: recorder.states.iter().map(|state| extract_lane(state, lane)).collect(),
             })
@@ -436,7 +436,7 @@ fn solve_linear_batch<T: Lane>(
             if is_from_fixed_point {
                 responses.push(LinearResponse {
                     state: from_fn(|i| start[i].0.get(lane)),
-                    peaks: recorder.peaks.lane(lane),
+                    peaks: recorder.peaks.lane_peaks(lane),
                     states: recorder.states.iter().map(|x| from_fn(|i| x[i].0.get(lane))).collect(),
                 });
                 continue;
