@@ -52,7 +52,7 @@ pub use store::{Job, StoreError};
 pub use table::Table;
 pub use threads::{Environment, ThreadsError};
 
-pub use sweep_results::nearest;
+pub use sweep_results::nearest_name;
 
 use std::fmt;
 

@@ -188,7 +188,7 @@ impl Folder {
     /// Returns the path of the sidecar: the JSON file beside the result that describes how the run
     /// went.
     fn sidecar(&self) -> PathBuf {
-        files::beside(&self.output, "run.json")
+        files::path_beside(&self.output, "run.json")
     }
 
     /// Returns the kind of the sidecar.

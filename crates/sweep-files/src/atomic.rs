@@ -12,42 +12,43 @@ use tempfile::NamedTempFile;
 use crate::{FileError, regular};
 
 /// Beginning of the name of a temporary file.
-const PREFIX: &str = ".sweep-";
+const TEMPORARY_PREFIX: &str = ".sweep-";
 /// Ending of the name of a temporary file.
-const SUFFIX: &str = ".tmp";
+const TEMPORARY_SUFFIX: &str = ".tmp";
 
 /// Greatest number of attempts to make a temporary file. An attempt fails if another process has a
 /// file of this name, or removes the new file before it is locked. Basis: both are rare. Doubling
 /// it makes no difference.
-const ATTEMPTS: u32 = 5;
+const MAX_ATTEMPTS: u32 = 5;
 
 /// Number of hexadecimal digits of each of the two parts of a temporary file's name. Basis: with 48
 /// bits, two processes of a cluster do not choose the same name, and no name that a user chooses
 /// passes the check of its second part. Doubling it makes longer names.
-const DIGITS: usize = 12;
+const HASH_DIGITS: usize = 12;
 
 /// Whether a name is that of a temporary file. The second part of such a name is a hash of the
 /// first, so that no user's file is taken for a temporary one.
 pub fn is_temporary(name: &str) -> bool {
-    let parts = name.strip_prefix(PREFIX).and_then(|rest| rest.strip_suffix(SUFFIX));
+    let parts =
+        name.strip_prefix(TEMPORARY_PREFIX).and_then(|rest| rest.strip_suffix(TEMPORARY_SUFFIX));
     let parts = parts.and_then(|parts| parts.split_once('-'));
-    parts.is_some_and(|(token, check)| token.len() == DIGITS && check == hash_digits(token))
+    parts.is_some_and(|(token, check)| token.len() == HASH_DIGITS && check == hash_digits(token))
 }
 
 /// Makes a name of a temporary file that this process has not made before.
 pub fn temporary_name() -> String {
     /// The number of names that this process has made.
-    static COUNT: AtomicU64 = AtomicU64::new(0);
-    let sequence = COUNT.fetch_add(1, Ordering::Relaxed);
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
-    let token = hash_digits(&format!("{} {now} {sequence}", std::process::id()));
-    format!("{PREFIX}{token}-{}{SUFFIX}", hash_digits(&token))
+    static NAME_COUNT: AtomicU64 = AtomicU64::new(0);
+    let sequence = NAME_COUNT.fetch_add(1, Ordering::Relaxed);
+    let now_ns = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+    let token = hash_digits(&format!("{} {now_ns} {sequence}", std::process::id()));
+    format!("{TEMPORARY_PREFIX}{token}-{}{TEMPORARY_SUFFIX}", hash_digits(&token))
 }
 
 /// Computes the first digits of a text's hash.
 fn hash_digits(text: &str) -> String {
     let hash = blake3::hash(text.as_bytes()).to_hex();
-    hash.chars().take(DIGITS).collect()
+    hash.chars().take(HASH_DIGITS).collect()
 }
 
 /// Makes a temporary file in `folder`, which is deleted unless it is [`publish`]ed. The file is
@@ -67,19 +68,21 @@ pub fn create_temporary(folder: &Path) -> Result<NamedTempFile, FileError> {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let file = match builder.tempfile_in(folder) {
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempt < ATTEMPTS => {
+            Err(error)
+                if error.kind() == io::ErrorKind::AlreadyExists && attempt < MAX_ATTEMPTS =>
+            {
                 attempt += 1;
                 continue;
             }
             created => created.map_err(FileError::io("create a file in", folder))?,
         };
         let is_lost = match file.as_file().try_lock() {
-            Ok(()) => !is_named(file.as_file(), file.path()),
+            Ok(()) => !is_at_path(file.as_file(), file.path()),
             Err(TryLockError::WouldBlock) => true,
             // On a file system without locks, [`clear_leftovers`] deletes no file.
             Err(TryLockError::Error(_)) => false,
         };
-        if !is_lost || attempt == ATTEMPTS {
+        if !is_lost || attempt == MAX_ATTEMPTS {
             return Ok(file);
         }
         attempt += 1;
@@ -88,7 +91,7 @@ pub fn create_temporary(folder: &Path) -> Result<NamedTempFile, FileError> {
 
 /// Whether an open file is the file at a path.
 #[cfg(unix)]
-pub fn is_named(file: &File, path: &Path) -> bool {
+pub fn is_at_path(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     match (file.metadata(), fs::symlink_metadata(path)) {
         (Ok(open), Ok(named)) => (open.dev(), open.ino()) == (named.dev(), named.ino()),
@@ -99,7 +102,7 @@ pub fn is_named(file: &File, path: &Path) -> bool {
 /// Whether the path exists. On systems other than Unix an open file cannot be deleted, so that a
 /// file at the path is the open one.
 #[cfg(not(unix))]
-pub fn is_named(_file: &File, path: &Path) -> bool {
+pub fn is_at_path(_file: &File, path: &Path) -> bool {
     path.exists()
 }
 
@@ -163,8 +166,8 @@ pub fn sync_folder(folder: &Path) -> Result<(), FileError> {
 /// Deletes the temporary files in a folder that killed processes have left: those on which no
 /// process has a lock. A file that cannot be deleted does no harm, so that no failure is an error.
 pub fn clear_leftovers(folder: &Path) {
-    let names = regular::names(folder).unwrap_or_default();
-    for name in names.iter().filter(|name| name.to_str().is_some_and(is_temporary)) {
+    let folder_entries = regular::file_names(folder).unwrap_or_default();
+    for name in folder_entries.iter().filter(|name| name.to_str().is_some_and(is_temporary)) {
         let path = folder.join(name);
         if let Ok(file) = regular::open_to_write(&path)
             && file.try_lock().is_ok()
@@ -179,7 +182,7 @@ pub fn clear_leftovers(folder: &Path) {
 /// # Errors
 /// [`FileError::Io`].
 pub fn remove(path: &Path) -> Result<(), FileError> {
-    regular::if_there(fs::remove_file(path)).map_err(FileError::io("delete", path))?;
+    regular::none_if_missing(fs::remove_file(path)).map_err(FileError::io("delete", path))?;
     Ok(())
 }
 
@@ -213,7 +216,7 @@ mod tests {
         assert_ne!(names[0], names[1]);
         for name in names {
             assert!(is_temporary(&name), "{name}");
-            for at in PREFIX.len()..name.len() - SUFFIX.len() {
+            for at in TEMPORARY_PREFIX.len()..name.len() - TEMPORARY_SUFFIX.len() {
                 let mut other_name = name.clone().into_bytes();
                 other_name[at] ^= 1;
                 let other_name = String::from_utf8(other_name).unwrap();
@@ -254,8 +257,8 @@ mod tests {
         let plain_file = folder.path().join("plain");
         write(folder.path(), &own_file, b"").unwrap();
         File::create(&plain_file).unwrap();
-        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
-        assert_eq!(mode(&own_file), mode(&plain_file));
+        let permission_mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(permission_mode(&own_file), permission_mode(&plain_file));
     }
 
     #[test]

@@ -16,13 +16,13 @@ use arrow_array::{
     RecordBatchOptions, StringArray,
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef, TimeUnit};
-use parquet::basic::{ConvertedType, LogicalType, Repetition, TimeUnit as DeclaredUnit, Type};
+use parquet::basic::{ConvertedType, LogicalType, Repetition, TimeUnit as ParquetTimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArrayType, DataType as Physical};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::ChunkReader;
-use parquet::schema::types::Type as Declared;
+use parquet::schema::types::Type as ParquetType;
 use serde_json::Value;
 
 use crate::{key, pages};
@@ -40,56 +40,59 @@ const MAX_WORD_BYTES: usize = 1 << 30;
 
 /// Returns the columns of a file. A column of a type that is not supported, such as a group or a
 /// time, has the type [`DataType::Null`].
-pub fn schema(file: &ParquetMetaData) -> SchemaRef {
-    described_schema(file, |_| None)
+pub fn schema(metadata: &ParquetMetaData) -> SchemaRef {
+    described_schema(metadata, |_| None)
 }
 
 /// Returns the columns of a file like [`schema`], and supports instants and times of day.
-pub fn schema_with_clocks(file: &ParquetMetaData) -> SchemaRef {
-    described_schema(file, clock_type)
+pub fn schema_with_clocks(metadata: &ParquetMetaData) -> SchemaRef {
+    described_schema(metadata, clock_type)
 }
 
 fn described_schema(
-    file: &ParquetMetaData,
-    clock_type: impl Fn(&Declared) -> Option<DataType>,
+    metadata: &ParquetMetaData,
+    clock_type: impl Fn(&ParquetType) -> Option<DataType>,
 ) -> SchemaRef {
-    let file_metadata = file.file_metadata();
-    let pairs = file_metadata.key_value_metadata().into_iter().flatten();
-    let descriptions =
-        pairs.filter(|pair| pair.key == key::COLUMNS).find_map(|pair| pair.value.as_deref());
+    let file_metadata = metadata.file_metadata();
+    let metadata_pairs = file_metadata.key_value_metadata().into_iter().flatten();
+    let descriptions = metadata_pairs
+        .filter(|pair| pair.key == key::COLUMNS)
+        .find_map(|pair| pair.value.as_deref());
     let descriptions: Value = descriptions
         .and_then(|descriptions| serde_json::from_str(descriptions).ok())
         .unwrap_or_default();
-    let fields = file_metadata.schema_descr().root_schema().get_fields().iter().map(|declared| {
-        let descriptions = descriptions[declared.name()].as_object().into_iter().flatten();
-        let descriptions = descriptions.filter(|(key, _)| *key != "type").map(|(key, value)| {
-            (key.clone(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+    let fields =
+        file_metadata.schema_descr().root_schema().get_fields().iter().map(|parquet_type| {
+            let descriptions = descriptions[parquet_type.name()].as_object().into_iter().flatten();
+            let descriptions =
+                descriptions.filter(|(key, _)| *key != "type").map(|(key, value)| {
+                    (key.clone(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+                });
+            let descriptions: HashMap<String, String> = descriptions.collect();
+            let is_nullable = parquet_type.get_basic_info().repetition() != Repetition::REQUIRED;
+            let data_type = clock_type(parquet_type).unwrap_or_else(|| data_type(parquet_type));
+            Field::new(parquet_type.name(), data_type, is_nullable).with_metadata(descriptions)
         });
-        let descriptions: HashMap<String, String> = descriptions.collect();
-        let is_nullable = declared.get_basic_info().repetition() != Repetition::REQUIRED;
-        let data_type = clock_type(declared).unwrap_or_else(|| data_type(declared));
-        Field::new(declared.name(), data_type, is_nullable).with_metadata(descriptions)
-    });
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
 
 /// Whether values of a column of decimals have a length that is read. The library allocates a
 /// batch of values of any length that a file declares.
-fn has_decimal_length(declared: &Declared) -> bool {
-    let Declared::PrimitiveType { type_length, .. } = declared else { return false };
+fn has_decimal_length(parquet_type: &ParquetType) -> bool {
+    let ParquetType::PrimitiveType { type_length, .. } = parquet_type else { return false };
     usize::try_from(*type_length).is_ok_and(|length| (1..=MAX_DECIMAL_BYTES).contains(&length))
 }
 
 /// Returns the type as which a column is read. Integers and floats are read as the widest type of
 /// their kind.
-fn data_type(declared: &Declared) -> DataType {
+fn data_type(parquet_type: &ParquetType) -> DataType {
     use ConvertedType as As;
-    let basic_info = declared.get_basic_info();
-    if declared.is_group() || basic_info.repetition() == Repetition::REPEATED {
+    let basic_info = parquet_type.get_basic_info();
+    if parquet_type.is_group() || basic_info.repetition() == Repetition::REPEATED {
         return DataType::Null;
     }
-    match (declared.get_physical_type(), basic_info.converted_type()) {
-        (Type::FIXED_LEN_BYTE_ARRAY, As::DECIMAL) if !has_decimal_length(declared) => {
+    match (parquet_type.get_physical_type(), basic_info.converted_type()) {
+        (Type::FIXED_LEN_BYTE_ARRAY, As::DECIMAL) if !has_decimal_length(parquet_type) => {
             DataType::Null
         }
         (Type::BOOLEAN, _) => DataType::Boolean,
@@ -111,17 +114,18 @@ fn data_type(declared: &Declared) -> DataType {
 
 /// Returns the type of a column of instants or of times of day in units of 64 bits. Instants are
 /// read without their time zone.
-fn clock_type(declared: &Declared) -> Option<DataType> {
-    let basic_info = declared.get_basic_info();
-    let is_plain = !declared.is_group() && basic_info.repetition() != Repetition::REPEATED;
-    if !is_plain || declared.get_physical_type() != Type::INT64 {
+fn clock_type(parquet_type: &ParquetType) -> Option<DataType> {
+    let basic_info = parquet_type.get_basic_info();
+    let is_single_value =
+        !parquet_type.is_group() && basic_info.repetition() != Repetition::REPEATED;
+    if !is_single_value || parquet_type.get_physical_type() != Type::INT64 {
         return None;
     }
     let unit = match (basic_info.logical_type_ref(), basic_info.converted_type()) {
         (Some(LogicalType::Timestamp(time) | LogicalType::Time(time)), _) => match time.unit {
-            DeclaredUnit::MILLIS => TimeUnit::Millisecond,
-            DeclaredUnit::MICROS => TimeUnit::Microsecond,
-            DeclaredUnit::NANOS => TimeUnit::Nanosecond,
+            ParquetTimeUnit::MILLIS => TimeUnit::Millisecond,
+            ParquetTimeUnit::MICROS => TimeUnit::Microsecond,
+            ParquetTimeUnit::NANOS => TimeUnit::Nanosecond,
         },
         (None, ConvertedType::TIMESTAMP_MILLIS) => TimeUnit::Millisecond,
         (None, ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS) => {
@@ -129,9 +133,9 @@ fn clock_type(declared: &Declared) -> Option<DataType> {
         }
         _ => return None,
     };
-    let is_of_day = matches!(basic_info.logical_type_ref(), Some(LogicalType::Time(_)))
+    let is_time_of_day = matches!(basic_info.logical_type_ref(), Some(LogicalType::Time(_)))
         || basic_info.converted_type() == ConvertedType::TIME_MICROS;
-    match (is_of_day, unit) {
+    match (is_time_of_day, unit) {
         (false, unit) => Some(DataType::Timestamp(unit, None)),
         // Times of day in milliseconds have 32 bits.
         (true, TimeUnit::Millisecond) => None,
@@ -141,8 +145,8 @@ fn clock_type(declared: &Declared) -> Option<DataType> {
 
 /// A reader of some columns of a file, batch by batch.
 pub struct Batches<R> {
-    source: Arc<R>,
-    file: Arc<ParquetMetaData>,
+    reader_source: Arc<R>,
+    metadata: Arc<ParquetMetaData>,
     schema: SchemaRef,
     /// The index of each column among those of a row group.
     leaf_indices: Vec<usize>,
@@ -152,7 +156,7 @@ pub struct Batches<R> {
     next_group: usize,
     /// The number of rows that are still to be read of the current row group.
     remaining_rows: usize,
-    columns: Vec<ColumnReader>,
+    column_readers: Vec<ColumnReader>,
 }
 
 impl<R: ChunkReader + 'static> Batches<R> {
@@ -161,39 +165,39 @@ impl<R: ChunkReader + 'static> Batches<R> {
     /// # Errors
     /// Fails if the type of a column is not supported.
     pub fn new(
-        source: R,
-        file: Arc<ParquetMetaData>,
+        reader_source: R,
+        metadata: Arc<ParquetMetaData>,
         schema: &Schema,
-        fields: Vec<usize>,
+        field_indices: Vec<usize>,
     ) -> Result<Self, ParquetError> {
-        let schema = Arc::new(schema.project(&fields).map_err(from_arrow)?);
-        if let Some(unreadable_field) =
+        let schema = Arc::new(schema.project(&field_indices).map_err(from_arrow)?);
+        if let Some(unsupported_field) =
             schema.fields().iter().find(|field| *field.data_type() == DataType::Null)
         {
             let reason =
-                format!("its column `{}` is of a type that is not read", unreadable_field.name());
+                format!("its column `{}` is of a type that is not read", unsupported_field.name());
             return Err(ParquetError::General(reason));
         }
-        let schema_descriptor = file.file_metadata().schema_descr();
+        let schema_descriptor = metadata.file_metadata().schema_descr();
         let mut leaf_indices = vec![0; schema_descriptor.root_schema().get_fields().len()];
         (0..schema_descriptor.num_columns())
             .for_each(|leaf| leaf_indices[schema_descriptor.get_column_root_idx(leaf)] = leaf);
         let leaf_indices: Vec<usize> =
-            fields.into_iter().map(|field| leaf_indices[field]).collect();
-        let scale = |leaf: &usize| {
+            field_indices.into_iter().map(|field_index| leaf_indices[field_index]).collect();
+        let decimal_scale = |leaf: &usize| {
             let column = schema_descriptor.column(*leaf);
             (column.converted_type() == ConvertedType::DECIMAL).then(|| column.type_scale())
         };
-        let decimal_places = leaf_indices.iter().map(scale).collect();
+        let decimal_places = leaf_indices.iter().map(decimal_scale).collect();
         Ok(Self {
-            source: Arc::new(source),
-            file,
+            reader_source: Arc::new(reader_source),
+            metadata,
             schema,
             leaf_indices,
             decimal_places,
             next_group: 0,
             remaining_rows: 0,
-            columns: Vec::new(),
+            column_readers: Vec::new(),
         })
     }
 
@@ -201,37 +205,40 @@ impl<R: ChunkReader + 'static> Batches<R> {
     ///
     /// # Errors
     /// Fails if the file is damaged.
-    pub fn batch(&mut self) -> Result<Option<RecordBatch>, ParquetError> {
+    pub fn read_batch(&mut self) -> Result<Option<RecordBatch>, ParquetError> {
         while self.remaining_rows == 0 {
-            let Some(group) = self.file.row_groups().get(self.next_group) else { return Ok(None) };
+            let Some(row_group) = self.metadata.row_groups().get(self.next_group) else {
+                return Ok(None);
+            };
             self.next_group += 1;
-            self.remaining_rows = usize::try_from(group.num_rows())?;
+            self.remaining_rows = usize::try_from(row_group.num_rows())?;
             // The pages of the last row group are freed before others are read.
-            self.columns.clear();
+            self.column_readers.clear();
             let byte_budget = pages::new_budget();
             let open_column = |leaf: &usize| {
                 pages::open_pages(
-                    &self.source,
-                    group.column(*leaf),
+                    &self.reader_source,
+                    row_group.column(*leaf),
                     self.remaining_rows,
                     &byte_budget,
                 )
             };
-            self.columns =
+            self.column_readers =
                 self.leaf_indices.iter().map(open_column).collect::<Result<_, ParquetError>>()?;
         }
-        let rows = self.remaining_rows.min(BATCH_ROWS);
-        self.remaining_rows -= rows;
-        let columns = self.columns.iter_mut().zip(self.schema.fields());
+        let batch_rows = self.remaining_rows.min(BATCH_ROWS);
+        self.remaining_rows -= batch_rows;
+        let column_readers = self.column_readers.iter_mut().zip(self.schema.fields());
         let arrays =
-            columns.zip(&self.decimal_places).map(|((column, field), scale)| match scale {
-                Some(scale) => read_decimals(column, *scale, rows),
-                None => read_array(column, field.data_type(), rows),
+            column_readers.zip(&self.decimal_places).map(|((column, field), scale)| match scale {
+                Some(scale) => read_decimals(column, *scale, batch_rows),
+                None => read_array(column, field.data_type(), batch_rows),
             });
         let arrays = arrays.collect::<Result<Vec<_>, _>>()?;
         // The number of rows is given because there may be no column.
-        let count = RecordBatchOptions::new().with_row_count(Some(rows));
-        let batch = RecordBatch::try_new_with_options(Arc::clone(&self.schema), arrays, &count);
+        let batch_options = RecordBatchOptions::new().with_row_count(Some(batch_rows));
+        let batch =
+            RecordBatch::try_new_with_options(Arc::clone(&self.schema), arrays, &batch_options);
         batch.map(Some).map_err(from_arrow)
     }
 }
@@ -317,10 +324,10 @@ fn read_integers(
 fn read_numbers<T: Physical, A: ArrowPrimitiveType>(
     column: &mut ColumnReaderImpl<T>,
     rows: usize,
-    typed: impl Fn(T::T) -> A::Native,
+    convert: impl Fn(T::T) -> A::Native,
 ) -> Result<ArrayRef, ParquetError> {
     let (levels, values) = read_values(column, rows)?;
-    let values: Vec<A::Native> = values.into_iter().map(typed).collect();
+    let values: Vec<A::Native> = values.into_iter().map(convert).collect();
     Ok(Arc::new(if values.len() == rows {
         PrimitiveArray::<A>::new(values.into(), None)
     } else {
@@ -339,17 +346,17 @@ fn read_decimals(
     scale: i32,
     rows: usize,
 ) -> Result<ArrayRef, ParquetError> {
-    let size = 10_f64.powi(scale);
+    let scale_factor = 10_f64.powi(scale);
     match column {
         ColumnReader::Int32ColumnReader(column) => {
-            read_numbers::<_, Float64Type>(column, rows, |cell| f64::from(cell) / size)
+            read_numbers::<_, Float64Type>(column, rows, |cell| f64::from(cell) / scale_factor)
         }
         ColumnReader::Int64ColumnReader(column) => {
-            read_numbers::<_, Float64Type>(column, rows, |cell| cell as f64 / size)
+            read_numbers::<_, Float64Type>(column, rows, |cell| cell as f64 / scale_factor)
         }
         ColumnReader::FixedLenByteArrayColumnReader(column) => {
             read_numbers::<_, Float64Type>(column, rows, |cell| {
-                big_endian_integer(cell.data()) as f64 / size
+                big_endian_integer(cell.data()) as f64 / scale_factor
             })
         }
         _ => Err(ParquetError::General("a column of decimals holds something else".to_owned())),
@@ -367,8 +374,8 @@ fn read_words(
     column: &mut ColumnReaderImpl<ByteArrayType>,
     rows: usize,
 ) -> Result<ArrayRef, ParquetError> {
-    let mut read_words = Vec::<String>::new();
-    let mut bytes = 0;
+    let mut distinct_words = Vec::<String>::new();
+    let mut word_bytes = 0;
     // A word's code by its address in a page's dictionary, which has each word once. Another page
     // may have another word at the same address, so that the words are compared too.
     let mut codes = HashMap::new();
@@ -384,23 +391,23 @@ fn read_words(
             let address = (word.data().as_ptr(), word.len());
             if address != last_word.0 {
                 let known_code = codes.get(&address).copied();
-                let known_code =
-                    known_code.filter(|code| read_words[*code as usize].as_bytes() == word.data());
-                let code = known_code.unwrap_or(read_words.len() as i32);
+                let known_code = known_code
+                    .filter(|code| distinct_words[*code as usize].as_bytes() == word.data());
+                let code = known_code.unwrap_or(distinct_words.len() as i32);
                 if known_code.is_none() {
-                    bytes += word.len();
-                    read_words.push(word.as_utf8()?.to_owned());
+                    word_bytes += word.len();
+                    distinct_words.push(word.as_utf8()?.to_owned());
                     codes.insert(address, code);
                 }
                 last_word = (address, code);
             }
             keys.push(Some(last_word.1));
         }
-        if bytes > MAX_WORD_BYTES {
+        if word_bytes > MAX_WORD_BYTES {
             return Err(ParquetError::General("its words are too long".to_owned()));
         }
     }
-    let read_words = Arc::new(StringArray::from(read_words));
-    let dictionary = DictionaryArray::<Int32Type>::try_new(Int32Array::from(keys), read_words);
+    let distinct_words = Arc::new(StringArray::from(distinct_words));
+    let dictionary = DictionaryArray::<Int32Type>::try_new(Int32Array::from(keys), distinct_words);
     Ok(Arc::new(dictionary.map_err(from_arrow)?))
 }

@@ -10,8 +10,11 @@ use arrow_array::types::{
 use arrow_array::{Array, BooleanArray, StringArray, TypedDictionaryArray};
 use arrow_schema::{ArrowError, DataType, TimeUnit};
 
-fn unreadable(array: &dyn Array, wanted: &str) -> ArrowError {
-    ArrowError::SchemaError(format!("expected a column of {wanted}, found {}", array.data_type()))
+fn unreadable_column_error(array: &dyn Array, expected_type: &str) -> ArrowError {
+    ArrowError::SchemaError(format!(
+        "expected a column of {expected_type}, found {}",
+        array.data_type()
+    ))
 }
 
 /// Reads numbers of any width, one per row.
@@ -36,7 +39,7 @@ pub fn numbers(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> {
         DataType::Int32 => widened!(Int32Type),
         DataType::Int16 => widened!(Int16Type),
         DataType::Int8 => widened!(Int8Type),
-        _ => return Err(unreadable(array, "numbers")),
+        _ => return Err(unreadable_column_error(array, "numbers")),
     })
 }
 
@@ -56,10 +59,10 @@ pub fn clock_seconds(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> 
             array
                 .as_primitive::<$type>()
                 .iter()
-                .map(|cell| {
-                    let cell = cell?;
-                    let fraction = cell.rem_euclid($units) as f64 / $units as f64;
-                    Some(cell.div_euclid($units) as f64 + fraction)
+                .map(|instant| {
+                    let instant = instant?;
+                    let fraction = instant.rem_euclid($units) as f64 / $units as f64;
+                    Some(instant.div_euclid($units) as f64 + fraction)
                 })
                 .collect()
         };
@@ -76,7 +79,7 @@ pub fn clock_seconds(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> 
         }
         DataType::Time64(TimeUnit::Microsecond) => in_seconds!(Time64MicrosecondType, 1_000_000),
         DataType::Time64(TimeUnit::Nanosecond) => in_seconds!(Time64NanosecondType, 1_000_000_000),
-        _ => return Err(unreadable(array, "instants or times of day")),
+        _ => return Err(unreadable_column_error(array, "instants or times of day")),
     })
 }
 
@@ -91,7 +94,7 @@ pub fn is_clock(data_type: &DataType) -> bool {
 /// # Errors
 /// [`ArrowError::SchemaError`] if the column has another type.
 pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
-    array.as_boolean_opt().ok_or_else(|| unreadable(array, "true and false"))
+    array.as_boolean_opt().ok_or_else(|| unreadable_column_error(array, "true and false"))
 }
 
 /// Reads words, one per row. The dictionary has each distinct word once.
@@ -102,8 +105,8 @@ pub fn words(
     array: &dyn Array,
 ) -> Result<TypedDictionaryArray<'_, Int32Type, StringArray>, ArrowError> {
     let dictionary = array.as_dictionary_opt::<Int32Type>();
-    let dictionary_of_text = dictionary.and_then(|dictionary| dictionary.downcast_dict());
-    dictionary_of_text.ok_or_else(|| unreadable(array, "words"))
+    let text_dictionary = dictionary.and_then(|dictionary| dictionary.downcast_dict());
+    text_dictionary.ok_or_else(|| unreadable_column_error(array, "words"))
 }
 
 /// Whether [`words`] can read a column of this type.

@@ -74,9 +74,9 @@ pub struct ColumnMetadata {
 }
 
 /// The key of a field's unit.
-const UNIT: &str = "unit";
+const UNIT_KEY: &str = "unit";
 /// The key of a field's description.
-const DESCRIPTION: &str = "description";
+const DESCRIPTION_KEY: &str = "description";
 
 impl ColumnMetadata {
     /// Returns the unit to show: empty for pure numbers and words.
@@ -89,7 +89,8 @@ impl ColumnMetadata {
         let worse = self.worse.map(|worse| (key::WORSE, worse.name().to_owned()));
         let limit = self.limit.map(|limit| (key::LIMIT, Value::from(limit).to_string()));
         let summary = self.is_in_summary.then(|| (key::SUMMARY, true.to_string()));
-        let mut pairs = vec![(UNIT, self.unit.clone()), (DESCRIPTION, self.description.clone())];
+        let mut pairs =
+            vec![(UNIT_KEY, self.unit.clone()), (DESCRIPTION_KEY, self.description.clone())];
         pairs.extend([worse, limit, summary].into_iter().flatten());
         pairs.into_iter().map(|(key, text)| (key.to_owned(), text)).collect()
     }
@@ -99,8 +100,8 @@ impl ColumnMetadata {
     pub fn from_field(field: &Field) -> Self {
         let text = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
         Self {
-            unit: text(UNIT),
-            description: text(DESCRIPTION),
+            unit: text(UNIT_KEY),
+            description: text(DESCRIPTION_KEY),
             worse: Worse::named(&text(key::WORSE)),
             limit: text(key::LIMIT).parse().ok(),
             is_in_summary: text(key::SUMMARY) == true.to_string(),

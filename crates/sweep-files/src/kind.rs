@@ -92,7 +92,7 @@ impl FileKind<'_> {
 
     /// Returns the reason why the regular file at `path` is not of this kind; `None` if it is.
     pub(crate) fn objection(self, path: &Path) -> Result<Option<String>, FileError> {
-        let begins_with = |prefix: &[u8]| {
+        let starts_with_bytes = |prefix: &[u8]| {
             let mut start = Vec::new();
             let result =
                 regular::open(path).and_then(|file| file.take(256).read_to_end(&mut start));
@@ -101,17 +101,17 @@ impl FileKind<'_> {
         };
         let objection = format!("the file there is no {}", self.name());
         let is_ours = match self {
-            Self::ModelFile => begins_with(MODEL_FILE_START.as_bytes())?,
-            Self::Exported { ending: "csv" } => begins_with(EXPORTED_CSV.as_bytes())?,
-            Self::Exported { .. } => begins_with(b"PK\x03\x04")?,
+            Self::ModelFile => starts_with_bytes(MODEL_FILE_START.as_bytes())?,
+            Self::Exported { ending: "csv" } => starts_with_bytes(EXPORTED_CSV.as_bytes())?,
+            Self::Exported { .. } => starts_with_bytes(b"PK\x03\x04")?,
             Self::Sidecar { result_name } => {
                 is_sidecar(path, result_name).map_err(FileError::io("read", path))?
             }
-            Self::Svg => begins_with(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
-            Self::Pdf => begins_with(PDF_START)?,
-            Self::Png => begins_with(b"\x89PNG\r\n\x1a\n")?,
-            Self::Html => begins_with(b"<!doctype html>\n")?,
-            Self::ManPage => begins_with(b".ie \\n(.g ")?,
+            Self::Svg => starts_with_bytes(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
+            Self::Pdf => starts_with_bytes(PDF_START)?,
+            Self::Png => starts_with_bytes(b"\x89PNG\r\n\x1a\n")?,
+            Self::Html => starts_with_bytes(b"<!doctype html>\n")?,
+            Self::ManPage => starts_with_bytes(b".ie \\n(.g ")?,
             _ => match ParquetFile::open_unchecked(path) {
                 Ok(file) if file.kind() == Some(self) => true,
                 Ok(_) => {
@@ -129,7 +129,7 @@ impl FileKind<'_> {
     }
 
     /// Names a kind of result in one word.
-    pub fn word(self) -> &'static str {
+    pub fn short_name(self) -> &'static str {
         self.result_kind().map_or("map", |(_, word, ..)| word)
     }
 
@@ -161,7 +161,7 @@ impl ParquetFile {
 
 /// Returns the path of a result's sidecar: `x.run.json` beside `x.parquet`, `v1.5.run.json` beside
 /// `v1.5`.
-pub fn beside(output: &Path, ending: &str) -> PathBuf {
+pub fn path_beside(output: &Path, ending: &str) -> PathBuf {
     let stem = if output.extension().is_some_and(|extension| extension == "parquet") {
         output.file_stem()
     } else {
@@ -177,11 +177,11 @@ pub fn beside(output: &Path, ending: &str) -> PathBuf {
 /// the result `result_name`, or one that was renamed together with its result and still contains
 /// the result's old name. The sidecar of another result that has the same path is kept.
 fn is_sidecar(path: &Path, result_name: &OsStr) -> std::io::Result<bool> {
-    let text = regular::read_json(path)?;
-    let sidecar: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
+    let sidecar_text = regular::read_json(path)?;
+    let sidecar: serde_json::Value = serde_json::from_slice(&sidecar_text).unwrap_or_default();
     let can_be_replaced = |stored_name: &str| {
         stored_name == result_name.to_string_lossy()
-            || beside(&path.with_file_name(stored_name), "run.json") != path
+            || path_beside(&path.with_file_name(stored_name), "run.json") != path
     };
     Ok(sidecar["plan_hash"].is_string() && sidecar["file"].as_str().is_some_and(can_be_replaced))
 }

@@ -24,35 +24,38 @@ impl fmt::Display for Step<'_> {
 }
 
 /// Returns a path as text with dots: `machine.dampers.1.damping_n_s_per_m`.
-pub fn dotted(path: &[Step<'_>]) -> String {
+pub fn dotted_path(path: &[Step<'_>]) -> String {
     path.iter().map(Step::to_string).collect::<Vec<_>>().join(".")
 }
 
 /// Calls `visit_leaf` with each pair of leaves of two values and the path to them; `None` stands
-/// for a value that one side lacks. Two lists are leaves unless `opens` returns true for them.
+/// for a value that one side lacks. Two lists are leaves unless `is_nested_list` returns true for
+/// them.
 pub fn visit_leaves<'a>(
-    sides: [Option<&'a Value>; 2],
-    opens: fn(&[Value], &[Value]) -> bool,
+    values: [Option<&'a Value>; 2],
+    is_nested_list: fn(&[Value], &[Value]) -> bool,
     path: &mut Vec<Step<'a>>,
     visit_leaf: &mut dyn FnMut(&[Step<'a>], [Option<&'a Value>; 2]),
 ) {
-    let mut visit = |step: Step<'a>, sides| {
+    let mut visit_step = |step: Step<'a>, values| {
         path.push(step);
-        visit_leaves(sides, opens, path, visit_leaf);
+        visit_leaves(values, is_nested_list, path, visit_leaf);
         path.pop();
     };
-    match sides {
+    match values {
         [Some(Value::Object(first)), Some(Value::Object(second))] => {
             let added_names = second.keys().filter(|name| !first.contains_key(*name));
             for name in first.keys().chain(added_names) {
-                visit(Step::Name(name), [first.get(name), second.get(name)]);
+                visit_step(Step::Name(name), [first.get(name), second.get(name)]);
             }
         }
-        [Some(Value::Array(first)), Some(Value::Array(second))] if opens(first, second) => {
+        [Some(Value::Array(first)), Some(Value::Array(second))]
+            if is_nested_list(first, second) =>
+        {
             for index in 0..first.len().max(second.len()) {
-                visit(Step::Index(index), [first.get(index), second.get(index)]);
+                visit_step(Step::Index(index), [first.get(index), second.get(index)]);
             }
         }
-        sides => visit_leaf(path, sides),
+        values => visit_leaf(path, values),
     }
 }

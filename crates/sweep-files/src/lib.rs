@@ -38,8 +38,8 @@ mod writer;
 
 pub use columns::{CellKind, Column, ColumnMetadata, columns};
 pub use error::FileError;
-pub use kind::{EXPORTED_CSV, FileKind, MODEL_FILE_START, PDF_START, beside};
-pub use leaves::{Step, dotted, visit_leaves};
+pub use kind::{EXPORTED_CSV, FileKind, MODEL_FILE_START, PDF_START, path_beside};
+pub use leaves::{Step, dotted_path, visit_leaves};
 pub use output::{Output, check_replaceable, create_folder_without_leftovers, write};
 pub use parquet::{CREATED_BY, ParquetFile};
 pub use rows::{Cell, ResultTable, Row, Rows, ratio_limits};

@@ -15,7 +15,7 @@ use crate::{FileError, FileKind, atomic, regular};
 pub struct Output<'a> {
     path: &'a Path,
     kind: FileKind<'a>,
-    temporary: NamedTempFile,
+    temporary_file: NamedTempFile,
 }
 
 impl<'a> Output<'a> {
@@ -27,7 +27,7 @@ impl<'a> Output<'a> {
         check_replaceable(path, kind)?;
         let folder = atomic::parent(path);
         create_folder_without_leftovers(folder)?;
-        Ok(Self { path, kind, temporary: atomic::create_temporary(folder)? })
+        Ok(Self { path, kind, temporary_file: atomic::create_temporary(folder)? })
     }
 
     /// Writes the next bytes.
@@ -35,7 +35,7 @@ impl<'a> Output<'a> {
     /// # Errors
     /// [`FileError::Io`].
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), FileError> {
-        self.temporary.write_all(bytes).map_err(FileError::io("write", self.path))
+        self.temporary_file.write_all(bytes).map_err(FileError::io("write", self.path))
     }
 
     /// Writes the last bytes and publishes the file at its path.
@@ -45,7 +45,7 @@ impl<'a> Output<'a> {
     pub fn finish(mut self, bytes: &[u8]) -> Result<(), FileError> {
         self.write(bytes)?;
         check_replaceable(self.path, self.kind)?;
-        atomic::publish(self.temporary, self.path)
+        atomic::publish(self.temporary_file, self.path)
     }
 }
 
@@ -55,7 +55,8 @@ impl<'a> Output<'a> {
 /// Those of [`Output::begin`].
 pub fn write(path: &Path, kind: FileKind<'_>, bytes: &[u8]) -> Result<(), FileError> {
     check_replaceable(path, kind)?;
-    let output = Output { path, kind, temporary: atomic::create_temporary(atomic::parent(path))? };
+    let output =
+        Output { path, kind, temporary_file: atomic::create_temporary(atomic::parent(path))? };
     output.finish(bytes)
 }
 
@@ -75,43 +76,43 @@ pub fn create_folder_without_leftovers(folder: &Path) -> Result<(), FileError> {
 /// [`FileError::Refused`] for what must not be overwritten, [`FileError::Io`],
 /// [`FileError::Damaged`].
 pub fn check_replaceable(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
-    let refuse = |reason: &str, help| {
+    let refusal = |reason: &str, help| {
         Err(FileError::Refused { path: path.to_path_buf(), reason: reason.to_owned(), help })
     };
     // Advice about a path that cannot be a file's.
-    const NAME_A_FILE: &str = "give the name of a file, such as results/x.parquet";
+    const NAME_ADVICE: &str = "give the name of a file, such as results/x.parquet";
     if path.file_name().is_none() {
-        return refuse("it has no file name", NAME_A_FILE);
+        return refusal("it has no file name", NAME_ADVICE);
     }
     let text = path.to_string_lossy();
     let ends_in_separator = |text: &str| text.ends_with(std::path::is_separator);
     if ends_in_separator(&text) || text.strip_suffix('.').is_some_and(ends_in_separator) {
-        return refuse("it is the name of a folder", NAME_A_FILE);
+        return refusal("it is the name of a folder", NAME_ADVICE);
     }
     if let Some(ending) = kind.other_format(path) {
-        return refuse(
+        return refusal(
             &format!("it ends in .{ending}, and the file would be Parquet"),
             "give a name that ends in .parquet; `sweep export` makes CSV or Excel of the file, and \
              `sweep plot` pictures",
         );
     }
-    let metadata = regular::if_there(fs::symlink_metadata(path));
+    let metadata = regular::none_if_missing(fs::symlink_metadata(path));
     let Some(metadata) = metadata.map_err(FileError::io("look at", path))? else { return Ok(()) };
     if metadata.is_symlink() {
-        return refuse(
+        return refusal(
             "it is a symbolic link",
             "give the name of the file that the link leads to, or remove the link",
         );
     }
     if let Some(description) = regular::describe_file_type(metadata.file_type()) {
-        return refuse(&format!("it is {description}, not a regular file"), NAME_A_FILE);
+        return refusal(&format!("it is {description}, not a regular file"), NAME_ADVICE);
     }
     if metadata.len() == 0 {
         return Ok(());
     }
     match kind.objection(path)? {
         None => Ok(()),
-        Some(reason) => refuse(&reason, "give another name, or move that file away first"),
+        Some(reason) => refusal(&reason, "give another name, or move that file away first"),
     }
 }
 
@@ -129,7 +130,7 @@ mod tests {
     use super::*;
     use crate::{Writer, key, seal};
 
-    const PARQUET: [FileKind<'_>; 9] = [
+    const PARQUET_KINDS: [FileKind<'_>; 9] = [
         FileKind::Map,
         FileKind::Trace,
         FileKind::Modes,
@@ -142,7 +143,7 @@ mod tests {
     ];
 
     /// Returns the bytes of a file of this kind, as the commands write it.
-    fn example(kind: FileKind<'_>) -> Vec<u8> {
+    fn example_file(kind: FileKind<'_>) -> Vec<u8> {
         let columns = match kind {
             FileKind::Map => key::PLAN,
             FileKind::Trace => key::TRACE,
@@ -171,11 +172,11 @@ mod tests {
             FileKind::Html => return b"<!doctype html>\n<title>x</title>".to_vec(),
             FileKind::ManPage => return b".ie \\n(.g .ds Aq \\(aq\n".to_vec(),
         };
-        sealed(&[key::PLAN, columns])
+        sealed_file(&[key::PLAN, columns])
     }
 
     /// Makes a Parquet file of one number, with a digest and with these keys in its metadata.
-    fn sealed(keys: &[&str]) -> Vec<u8> {
+    fn sealed_file(keys: &[&str]) -> Vec<u8> {
         let numbers: ArrayRef = Arc::new(Float64Array::from(vec![1.0]));
         let batch = RecordBatch::try_from_iter([("x", numbers)]).unwrap();
         let mut writer = Writer::new(Vec::new(), &batch.schema(), Default::default()).unwrap();
@@ -191,9 +192,9 @@ mod tests {
         file.into_inner()
     }
 
-    fn kinds() -> impl Iterator<Item = FileKind<'static>> {
+    fn all_kinds() -> impl Iterator<Item = FileKind<'static>> {
         let sidecar = FileKind::Sidecar { result_name: OsStr::new("x.parquet") };
-        PARQUET.into_iter().chain([
+        PARQUET_KINDS.into_iter().chain([
             sidecar,
             FileKind::ModelFile,
             FileKind::Svg,
@@ -206,7 +207,7 @@ mod tests {
         ])
     }
 
-    fn refusal(path: &Path, kind: FileKind<'_>) -> String {
+    fn refusal_message(path: &Path, kind: FileKind<'_>) -> String {
         let error = Output::begin(path, kind).unwrap_err();
         assert!(error.is_refusal(), "{error}");
         let text = error.to_string();
@@ -214,93 +215,95 @@ mod tests {
         text
     }
 
-    fn names(folder: &Path) -> Vec<String> {
-        let names = regular::names(folder).unwrap();
+    fn file_names(folder: &Path) -> Vec<String> {
+        let names = regular::file_names(folder).unwrap();
         names.into_iter().map(|name| name.into_string().unwrap()).collect()
     }
 
     #[test]
     fn a_file_is_written_over_its_own_kind_and_no_other() {
-        let home = tempfile::tempdir().unwrap();
-        let path = home.path().join("file");
-        for kind in kinds() {
-            for other in kinds() {
-                let original_bytes = example(other);
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("file");
+        for kind in all_kinds() {
+            for other in all_kinds() {
+                let original_bytes = example_file(other);
                 fs::write(&path, &original_bytes).unwrap();
                 if kind == other {
                     Output::begin(&path, kind).unwrap().finish(b"new").unwrap();
                     assert_eq!(fs::read(&path).unwrap(), b"new");
                 } else {
-                    let message = refusal(&path, kind);
+                    let message = refusal_message(&path, kind);
                     assert!(message.contains(kind.name()), "{message}");
                     assert!(fs::read(&path).unwrap() == original_bytes);
                 }
             }
             for mine in ["my thesis", "PAR1", "{}"] {
                 fs::write(&path, mine).unwrap();
-                refusal(&path, kind);
+                refusal_message(&path, kind);
                 assert_eq!(fs::read_to_string(&path).unwrap(), mine);
             }
             fs::write(&path, "").unwrap();
             Output::begin(&path, kind).unwrap().finish(b"over an empty file").unwrap();
         }
-        assert_eq!(names(home.path()), ["file"]);
+        assert_eq!(file_names(directory.path()), ["file"]);
     }
 
     #[test]
     fn results_with_different_names_have_sidecars_with_different_names() {
-        let path_beside = |output| crate::beside(Path::new(output), "svg");
-        assert_eq!(path_beside("maps/x.parquet"), Path::new("maps/x.svg"));
-        assert_eq!(path_beside("v1.0"), Path::new("v1.0.svg"));
-        assert_eq!(path_beside("v1.5.parquet"), Path::new("v1.5.svg"));
+        let svg_path = |output| crate::path_beside(Path::new(output), "svg");
+        assert_eq!(svg_path("maps/x.parquet"), Path::new("maps/x.svg"));
+        assert_eq!(svg_path("v1.0"), Path::new("v1.0.svg"));
+        assert_eq!(svg_path("v1.5.parquet"), Path::new("v1.5.svg"));
     }
 
     #[test]
     fn an_output_changes_nothing_before_it_is_finished() {
-        let home = tempfile::tempdir().unwrap();
-        let path = home.path().join("made/for/it/x.svg");
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("made/for/it/x.svg");
         let output = Output::begin(&path, FileKind::Svg).unwrap();
         assert!(!path.exists());
         drop(output);
-        assert!(names(path.parent().unwrap()).is_empty());
+        assert!(file_names(path.parent().unwrap()).is_empty());
 
         let output = Output::begin(&path, FileKind::Svg).unwrap();
         fs::write(&path, "came meanwhile").unwrap();
         assert!(output.finish(b"new").unwrap_err().is_refusal());
         assert_eq!(fs::read_to_string(&path).unwrap(), "came meanwhile");
-        assert_eq!(names(path.parent().unwrap()), ["x.svg"]);
+        assert_eq!(file_names(path.parent().unwrap()), ["x.svg"]);
     }
 
     #[test]
     fn names_of_folders_are_refused() {
-        let home = tempfile::tempdir().unwrap();
-        let message = refusal(home.path(), FileKind::Map);
+        let directory = tempfile::tempdir().unwrap();
+        let message = refusal_message(directory.path(), FileKind::Map);
         assert!(message.contains("it is a folder"), "{message}");
         for (name, expected) in [
             ("new/", "it is the name of a folder"),
             ("new/.", "it is the name of a folder"),
             ("new/..", "it has no file name"),
         ] {
-            let message =
-                refusal(&PathBuf::from(format!("{}/{name}", home.path().display())), FileKind::Map);
+            let message = refusal_message(
+                &PathBuf::from(format!("{}/{name}", directory.path().display())),
+                FileKind::Map,
+            );
             assert!(message.contains(expected), "{name}: {message}");
         }
-        refusal(Path::new("/"), FileKind::Map);
-        refusal(Path::new(""), FileKind::Map);
-        assert!(names(home.path()).is_empty());
+        refusal_message(Path::new("/"), FileKind::Map);
+        refusal_message(Path::new(""), FileKind::Map);
+        assert!(file_names(directory.path()).is_empty());
     }
 
     #[cfg(unix)]
     #[test]
     fn links_and_devices_are_refused_and_the_targets_of_links_stay() {
-        let home = tempfile::tempdir().unwrap();
+        let directory = tempfile::tempdir().unwrap();
         let [fifo, target, link, dangling] =
-            ["fifo", "target", "link", "dangling"].map(|name| home.path().join(name));
+            ["fifo", "target", "link", "dangling"].map(|name| directory.path().join(name));
         rustix::fs::mkfifoat(rustix::fs::CWD, &fifo, rustix::fs::Mode::RUSR).unwrap();
-        for kind in kinds() {
+        for kind in all_kinds() {
             let _ = fs::remove_file(&link);
             let _ = fs::remove_file(&dangling);
-            fs::write(&target, example(kind)).unwrap();
+            fs::write(&target, example_file(kind)).unwrap();
             std::os::unix::fs::symlink(&target, &link).unwrap();
             std::os::unix::fs::symlink("nowhere", &dangling).unwrap();
             for (path, expected) in [
@@ -309,10 +312,10 @@ mod tests {
                 (&dangling, "it is a symbolic link"),
                 (&PathBuf::from("/dev/null"), "it is a device"),
             ] {
-                let message = refusal(path, kind);
+                let message = refusal_message(path, kind);
                 assert!(message.contains(expected), "{message}");
             }
-            assert!(fs::read(&target).unwrap() == example(kind));
+            assert!(fs::read(&target).unwrap() == example_file(kind));
         }
     }
 }

@@ -19,8 +19,8 @@ thread_local! {
 /// The message of a panic.
 pub fn catch_panic<T>(function: impl FnOnce() -> T) -> Result<T, String> {
     // The panic hook is set once per process.
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
+    static INSTALL_HOOK: Once = Once::new();
+    INSTALL_HOOK.call_once(|| {
         let previous_hook = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
             if !CATCHES_PANICS.get() {

@@ -50,7 +50,7 @@ impl ParquetFile {
             return Err(FileError::not_parquet(path, reason));
         }
         let mut file = regular::open(path).map_err(FileError::io("open", path))?;
-        let seal = seal::check(&mut file).map_err(FileError::io("read", path))?;
+        let seal = seal::check_seal(&mut file).map_err(FileError::io("read", path))?;
         let file = match Self::parse(path, file, seal) {
             Err(_) if seal == Seal::Broken => return Err(FileError::damaged(path)),
             parsed => parsed?,
@@ -63,7 +63,8 @@ impl ParquetFile {
         }
         // This program writes a digest where `seal` finds it. So a file that has one elsewhere, or
         // none but our name, was changed.
-        let is_ours = file.created_by().is_some_and(|by| by.starts_with(CREATED_BY));
+        let is_ours =
+            file.created_by().is_some_and(|writer_name| writer_name.starts_with(CREATED_BY));
         let has_digest = file.pairs().any(|pair| pair.key == key::DIGEST);
         if seal == Seal::Absent && (is_ours || has_digest) {
             return Err(FileError::damaged(path));
@@ -77,18 +78,19 @@ impl ParquetFile {
     /// Returns the errors of [`ParquetFile::open`].
     pub fn open_unchecked(path: &Path) -> Result<Self, FileError> {
         let open = || regular::open(path).map_err(FileError::io("open", path));
-        let parsed = Self::parse(path, open()?, Seal::Absent);
-        let is_damaged = matches!(parsed, Err(FileError::NotParquet { .. }))
-            && seal::check(&mut open()?).map_err(FileError::io("read", path))? == Seal::Broken;
-        if is_damaged { Err(FileError::damaged(path)) } else { parsed }
+        let parse_result = Self::parse(path, open()?, Seal::Absent);
+        let is_damaged = matches!(parse_result, Err(FileError::NotParquet { .. }))
+            && seal::check_seal(&mut open()?).map_err(FileError::io("read", path))? == Seal::Broken;
+        if is_damaged { Err(FileError::damaged(path)) } else { parse_result }
     }
 
     fn parse(path: &Path, file: File, seal: Seal) -> Result<Self, FileError> {
-        let load = || {
-            let metadata = footer::metadata(&file)?;
+        let load_metadata = || {
+            let metadata = footer::read_metadata(&file)?;
             Ok((batches::schema(&metadata), Arc::new(metadata)))
         };
-        let (schema, metadata) = guarded(load).map_err(not_parquet(path))?;
+        let (schema, metadata) =
+            catch_library_panic(load_metadata).map_err(not_parquet_error(path))?;
         Ok(Self { path: path.to_path_buf(), file, metadata, schema, seal })
     }
 
@@ -99,7 +101,9 @@ impl ParquetFile {
 
     /// Whether another program has written a result of this program again, with its digest.
     pub fn is_copy(&self) -> bool {
-        let is_other_writer = |by: &str| OTHER_WRITERS.iter().any(|writer| by.starts_with(writer));
+        let is_other_writer = |writer_name: &str| {
+            OTHER_WRITERS.iter().any(|known_writer| writer_name.starts_with(known_writer))
+        };
         self.created_by().is_some_and(is_other_writer)
             && self.pairs().any(|pair| pair.key == key::DIGEST)
     }
@@ -118,7 +122,7 @@ impl ParquetFile {
         let mut file = &self.file;
         let result = file.seek(SeekFrom::Start(0)).and_then(|_| file.read_to_end(&mut bytes));
         result.map_err(FileError::io("read", &self.path))?;
-        let seal = seal::check(&mut io::Cursor::new(&bytes));
+        let seal = seal::check_seal(&mut io::Cursor::new(&bytes));
         if seal.map_err(FileError::io("read", &self.path))? != self.seal {
             return Err(FileError::damaged(&self.path));
         }
@@ -166,31 +170,33 @@ impl ParquetFile {
     /// [`FileError::Io`], [`FileError::NotParquet`].
     pub fn batches(
         &self,
-        fields: Vec<usize>,
+        field_indices: Vec<usize>,
     ) -> Result<impl Iterator<Item = Result<RecordBatch, FileError>> + use<'_>, FileError> {
         let file = self.file.try_clone().map_err(FileError::io("open", &self.path))?;
-        let batches = Batches::new(file, Arc::clone(&self.metadata), &self.schema, fields);
-        let mut batches = Some(batches.map_err(not_parquet(&self.path))?);
+        let batches = Batches::new(file, Arc::clone(&self.metadata), &self.schema, field_indices);
+        let mut batches = Some(batches.map_err(not_parquet_error(&self.path))?);
         Ok(std::iter::from_fn(move || {
             let reader = batches.as_mut()?;
-            let batch = guarded(|| reader.batch()).transpose();
+            let batch = catch_library_panic(|| reader.read_batch()).transpose();
             if !matches!(batch, Some(Ok(_))) {
                 // After an error or a panic the reader is not used again.
                 batches = None;
             }
-            batch.map(|batch| batch.map_err(not_parquet(&self.path)))
+            batch.map(|batch| batch.map_err(not_parquet_error(&self.path)))
         }))
     }
 }
 
 /// Calls the library, and turns a panic into an error.
-fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
-    panics::catch_in_parquet("it makes no sense inside", work)
+fn catch_library_panic<T>(
+    read: impl FnOnce() -> Result<T, ParquetError>,
+) -> Result<T, ParquetError> {
+    panics::catch_in_parquet("it makes no sense inside", read)
 }
 
 /// Returns a function that makes a file's error from one of the library: [`FileError::Io`] if the
 /// system reported it.
-fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
+fn not_parquet_error(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
             // Decompressors report their own failures as `io::Error` too, but without the system's
@@ -225,14 +231,14 @@ mod tests {
     use crate::{Writer, cells};
 
     /// The bytes of a file that this program has written, with its digest.
-    fn own_file() -> Vec<u8> {
-        let mut bytes = io::Cursor::new(with_blank_digest(&format!("{CREATED_BY}0.0.0")));
+    fn own_file_bytes() -> Vec<u8> {
+        let mut bytes = io::Cursor::new(bytes_with_blank_digest(&format!("{CREATED_BY}0.0.0")));
         seal::seal(&mut bytes).unwrap();
         bytes.into_inner()
     }
 
     /// The bytes of a file that bears this name, with a digest that does not fit.
-    fn with_blank_digest(created_by: &str) -> Vec<u8> {
+    fn bytes_with_blank_digest(created_by: &str) -> Vec<u8> {
         let values: Float64Array = (0..300).map(f64::from).collect();
         let batch = RecordBatch::try_from_iter([("x", Arc::new(values) as _)]).unwrap();
         let properties = WriterProperties::builder().set_created_by(created_by.to_owned()).build();
@@ -253,14 +259,14 @@ mod tests {
             ("sweep version 0.0.0", false),
             ("sweeq version 0.0.0", false),
         ] {
-            std::fs::write(&path, with_blank_digest(writer)).unwrap();
-            let opened = ParquetFile::open(&path);
-            assert_eq!(opened.is_ok(), is_copy, "{writer}");
-            if let Ok(file) = opened {
+            std::fs::write(&path, bytes_with_blank_digest(writer)).unwrap();
+            let open_result = ParquetFile::open(&path);
+            assert_eq!(open_result.is_ok(), is_copy, "{writer}");
+            if let Ok(file) = open_result {
                 assert!(file.is_copy() && !file.is_sealed(), "{writer}");
                 assert!(file.bytes().is_ok(), "{writer}");
             } else {
-                assert!(matches!(opened, Err(FileError::Damaged { .. })), "{writer}");
+                assert!(matches!(open_result, Err(FileError::Damaged { .. })), "{writer}");
             }
         }
     }
@@ -269,11 +275,11 @@ mod tests {
     fn a_result_with_any_bit_flipped_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
-        let undamaged = own_file();
-        std::fs::write(&path, &undamaged).unwrap();
+        let undamaged_bytes = own_file_bytes();
+        std::fs::write(&path, &undamaged_bytes).unwrap();
         assert!(ParquetFile::open(&path).unwrap().is_sealed());
-        for bit in 0..8 * undamaged.len() {
-            let mut bytes = undamaged.clone();
+        for bit in 0..8 * undamaged_bytes.len() {
+            let mut bytes = undamaged_bytes.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
             std::fs::write(&path, &bytes).unwrap();
             assert!(ParquetFile::open(&path).is_err(), "bit {bit}");
@@ -284,17 +290,21 @@ mod tests {
     fn bytes_of_an_open_file_that_has_changed_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
-        let undamaged = own_file();
-        std::fs::write(&path, &undamaged).unwrap();
+        let undamaged_bytes = own_file_bytes();
+        std::fs::write(&path, &undamaged_bytes).unwrap();
         let file = ParquetFile::open(&path).unwrap();
-        assert_eq!(file.bytes().unwrap(), undamaged);
+        assert_eq!(file.bytes().unwrap(), undamaged_bytes);
         let other_path = folder.path().join("y.parquet");
         std::fs::write(&other_path, b"another file").unwrap();
         std::fs::rename(&other_path, &path).unwrap();
-        assert_eq!(file.bytes().unwrap(), undamaged, "a file that took its place is another one");
-        std::fs::write(&path, &undamaged).unwrap();
+        assert_eq!(
+            file.bytes().unwrap(),
+            undamaged_bytes,
+            "a file that took its place is another one"
+        );
+        std::fs::write(&path, &undamaged_bytes).unwrap();
         let file = ParquetFile::open(&path).unwrap();
-        let mut changed_bytes = undamaged;
+        let mut changed_bytes = undamaged_bytes;
         changed_bytes[20] ^= 1;
         std::fs::write(&path, &changed_bytes).unwrap();
         assert!(matches!(file.bytes(), Err(FileError::Damaged { .. })));
@@ -317,10 +327,10 @@ mod tests {
         }
         writer.end().unwrap().close().unwrap();
         let file = ParquetFile::open(&path).unwrap();
-        let rows = file.batches(vec![0]).unwrap();
-        let rows: Vec<RecordBatch> = rows.collect::<Result<_, _>>().unwrap();
-        assert_eq!(rows.iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
-        assert!(rows.iter().all(|rows| rows.get_array_memory_size() < 8 << 20));
+        let batches = file.batches(vec![0]).unwrap();
+        let batches: Vec<RecordBatch> = batches.collect::<Result<_, _>>().unwrap();
+        assert_eq!(batches.iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
+        assert!(batches.iter().all(|batch| batch.get_array_memory_size() < 8 << 20));
     }
 
     #[test]
@@ -332,7 +342,7 @@ mod tests {
             .set_data_page_size_limit(1 << 30)
             .set_write_batch_size(1 << 20)
             .set_compression(parquet::basic::Compression::ZSTD(Default::default()));
-        let write = |mebibytes: usize| {
+        let write_words = |mebibytes: usize| {
             let long_word = "a".repeat(1 << 20);
             let words: DictionaryArray<Int32Type> =
                 vec![long_word.as_str(); mebibytes].into_iter().collect();
@@ -342,10 +352,10 @@ mod tests {
             let mut writer = Writer::new(file, &batch.schema(), properties).unwrap();
             writer.write(&batch).unwrap();
             writer.end().unwrap().close().unwrap();
-            ParquetFile::open(&path).and_then(|file| Ok(rows(&file)?[0].num_rows()))
+            ParquetFile::open(&path).and_then(|file| Ok(read_batches(&file)?[0].num_rows()))
         };
-        assert_eq!(write(10).unwrap(), 10);
-        let message = write(130).unwrap_err().to_string();
+        assert_eq!(write_words(10).unwrap(), 10);
+        let message = write_words(130).unwrap_err().to_string();
         assert!(message.contains("into 128 MiB of words"), "{message}");
     }
 
@@ -354,7 +364,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let result = folder.path().join("results/tol60.parquet");
         std::fs::create_dir(folder.path().join("results")).unwrap();
-        std::fs::write(&result, own_file()).unwrap();
+        std::fs::write(&result, own_file_bytes()).unwrap();
         std::fs::write(folder.path().join("g.toml"), "name = \"tol60\"\n").unwrap();
         let message =
             |name: &str| ParquetFile::open(&folder.path().join(name)).unwrap_err().to_string();
@@ -374,16 +384,17 @@ mod tests {
         let properties = WriterProperties::builder().build();
         let mut writer = Writer::new(Vec::new(), &batch.schema(), properties).unwrap();
         writer.write(&batch).unwrap();
-        let undamaged = writer.end().unwrap().into_inner().unwrap();
-        std::fs::write(&path, &undamaged).unwrap();
-        let read_rows = || ParquetFile::open(&path).and_then(|file| rows(&file));
+        let undamaged_bytes = writer.end().unwrap().into_inner().unwrap();
+        std::fs::write(&path, &undamaged_bytes).unwrap();
+        let read_rows = || ParquetFile::open(&path).and_then(|file| read_batches(&file));
         assert_eq!(read_rows().unwrap().iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
         // The header's number of entries, 1500, becomes 8191; the library believes any.
         let declared_count = [0x4c, 0x15, 0xb8, 0x17];
-        let count_offset = undamaged.windows(4).position(|bytes| bytes == declared_count).unwrap();
-        let mut damaged = undamaged;
-        damaged[count_offset + 2..count_offset + 4].copy_from_slice(&[0xfe, 0x7f]);
-        std::fs::write(&path, &damaged).unwrap();
+        let count_offset =
+            undamaged_bytes.windows(4).position(|bytes| bytes == declared_count).unwrap();
+        let mut damaged_bytes = undamaged_bytes;
+        damaged_bytes[count_offset + 2..count_offset + 4].copy_from_slice(&[0xfe, 0x7f]);
+        std::fs::write(&path, &damaged_bytes).unwrap();
         let message = read_rows().unwrap_err().to_string();
         assert!(message.contains("the header of a page makes no sense"), "{message}");
     }
@@ -395,23 +406,23 @@ mod tests {
         let bytes = include_bytes!("../../../fuzz/corpus-result/words_counted.parquet");
         assert_eq!(bytes.len(), 97);
         std::fs::write(&path, bytes).unwrap();
-        let message = rows(&ParquetFile::open(&path).unwrap()).unwrap_err().to_string();
+        let message = read_batches(&ParquetFile::open(&path).unwrap()).unwrap_err().to_string();
         assert!(message.contains("encoded by DELTA_LENGTH_BYTE_ARRAY"), "{message}");
     }
 
     /// Opens a file of two rows with columns of these types. The second row is null in columns that
     /// may be.
-    fn foreign(schema: &str) -> ParquetFile {
+    fn foreign_file(schema: &str) -> ParquetFile {
         let schema = parse_message_type(schema).unwrap();
         let mut writer =
             SerializedFileWriter::new(Vec::new(), schema.into(), Default::default()).unwrap();
-        let mut group = writer.next_row_group().unwrap();
-        while let Some(mut column) = group.next_column().unwrap() {
+        let mut row_group = writer.next_row_group().unwrap();
+        while let Some(mut column) = row_group.next_column().unwrap() {
             macro_rules! write {
                 ($column:expr, $value:expr) => {{
-                    let level = $column.get_descriptor().max_def_level();
-                    let values = vec![$value; if level > 0 { 1 } else { 2 }];
-                    $column.write_batch(&values, Some(&[level, 0]), Some(&[0, 0])).unwrap()
+                    let max_level = $column.get_descriptor().max_def_level();
+                    let values = vec![$value; if max_level > 0 { 1 } else { 2 }];
+                    $column.write_batch(&values, Some(&[max_level, 0]), Some(&[0, 0])).unwrap()
                 }};
             }
             match column.untyped() {
@@ -429,7 +440,7 @@ mod tests {
             };
             column.close().unwrap();
         }
-        group.close().unwrap();
+        row_group.close().unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         std::fs::write(&path, writer.into_inner().unwrap()).unwrap();
@@ -437,13 +448,13 @@ mod tests {
         ParquetFile::open(&path).unwrap()
     }
 
-    fn rows(file: &ParquetFile) -> Result<Vec<RecordBatch>, FileError> {
+    fn read_batches(file: &ParquetFile) -> Result<Vec<RecordBatch>, FileError> {
         file.batches((0..file.schema().fields().len()).collect())?.collect()
     }
 
     #[test]
     fn numbers_flags_and_words_of_other_programs_are_read() {
-        let file = foreign(
+        let file = foreign_file(
             "message x {
                 optional int32 a (INTEGER(8, true));
                 required int32 b (INT_16);
@@ -460,12 +471,12 @@ mod tests {
                 required fixed_len_byte_array(2) m (DECIMAL(4, 1));
             }",
         );
-        let batches = rows(&file).unwrap();
+        let batches = read_batches(&file).unwrap();
         let [batch] = batches.as_slice() else { panic!("{batches:?}") };
         let numbers = [-2.0, -2.0, -2.0, -2.0, -2.0, 0.5, 0.5, 4294967294.0, u64::MAX as f64];
         for (column, number) in batch.columns().iter().zip(numbers) {
-            let second = (!column.is_nullable()).then_some(number);
-            assert_eq!(cells::numbers(column).unwrap(), [Some(number), second]);
+            let second_number = (!column.is_nullable()).then_some(number);
+            assert_eq!(cells::numbers(column).unwrap(), [Some(number), second_number]);
         }
         assert_eq!(batch.column(9).as_boolean().iter().collect::<Vec<_>>(), [Some(true), None]);
         let words = |k: usize| {
@@ -488,8 +499,8 @@ mod tests {
             "repeated int64 x;",
             "optional group x (LIST) { repeated group list { optional int64 element; } }",
         ] {
-            let file = foreign(&format!("message m {{ required double y; {column} }}"));
-            let message = rows(&file).unwrap_err().to_string();
+            let file = foreign_file(&format!("message m {{ required double y; {column} }}"));
+            let message = read_batches(&file).unwrap_err().to_string();
             assert!(message.contains("`x` is of a type that is not read"), "{column}: {message}");
         }
     }

@@ -27,7 +27,7 @@ const WRITER_WAIT: Duration = Duration::from_secs(2);
 
 /// Time between two attempts to read a pipe without data.
 #[cfg(unix)]
-const LOOK_AGAIN: Duration = Duration::from_millis(5);
+const READ_RETRY_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Reads at most `most` bytes of a text file that a user names, or of a pipe, as a shell's `<(...)`
 /// and `/dev/stdin` are. A named pipe without a writer is an error after two seconds.
@@ -39,11 +39,11 @@ pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     use std::os::unix::fs::FileTypeExt as _;
     // The parent process passed these descriptors, and has opened the other end of such a pipe
     // before.
-    let is_passed = path.starts_with("/dev/fd")
+    let is_passed_descriptor = path.starts_with("/dev/fd")
         || path.starts_with("/proc/self/fd")
         || path == Path::new("/dev/stdin");
     let file_type = fs::metadata(path)?.file_type();
-    if !file_type.is_fifo() && !is_passed {
+    if !file_type.is_fifo() && !is_passed_descriptor {
         let mut bytes = Vec::new();
         open(path)?.take(max_bytes).read_to_end(&mut bytes)?;
         return Ok(bytes);
@@ -58,15 +58,15 @@ pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
         let remaining_bytes = usize::try_from(max_bytes - bytes.len() as u64).unwrap_or(usize::MAX);
         let remaining_bytes = remaining_bytes.min(buffer.len());
         match (&file).read(&mut buffer[..remaining_bytes]) {
-            Ok(0) if is_passed || !bytes.is_empty() => break,
+            Ok(0) if is_passed_descriptor || !bytes.is_empty() => break,
             Ok(0) if start_time.elapsed() >= WRITER_WAIT => {
                 let reason = "it is a FIFO that nobody writes to";
                 return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
             }
-            Ok(0) => std::thread::sleep(LOOK_AGAIN),
+            Ok(0) => std::thread::sleep(READ_RETRY_INTERVAL),
             Ok(count) => bytes.extend_from_slice(&buffer[..count]),
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
-                std::thread::sleep(LOOK_AGAIN);
+                std::thread::sleep(READ_RETRY_INTERVAL);
             }
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
@@ -80,9 +80,9 @@ pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 /// # Errors
 /// An error of the system, or an error with the type of a file that is neither regular nor a pipe.
 #[cfg(not(unix))]
-pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    open(path)?.take(most).read_to_end(&mut bytes)?;
+    open(path)?.take(max_bytes).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -90,7 +90,7 @@ pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// Any other error of the system.
-pub fn if_there<T>(result: io::Result<T>) -> io::Result<Option<T>> {
+pub fn none_if_missing<T>(result: io::Result<T>) -> io::Result<Option<T>> {
     match result {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         result => result.map(Some),
@@ -128,16 +128,16 @@ pub fn open_or_create(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     match without_waiting(options.read(true).write(true).create_new(true), false).open(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => open_to_write(path),
-        made => made,
+        created => created,
     }
 }
 
 fn expect_regular(file_type: FileType) -> io::Result<()> {
     match describe_file_type(file_type) {
         None => Ok(()),
-        Some(what) => Err(io::Error::new(
+        Some(description) => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
-            format!("it is {what}, not a regular file"),
+            format!("it is {description}, not a regular file"),
         )),
     }
 }
@@ -174,9 +174,9 @@ fn without_waiting(options: &mut OpenOptions, follows_links: bool) -> &mut OpenO
     {
         use rustix::fs::OFlags;
         use std::os::unix::fs::OpenOptionsExt as _;
-        let links = if follows_links { OFlags::empty() } else { OFlags::NOFOLLOW };
+        let link_flag = if follows_links { OFlags::empty() } else { OFlags::NOFOLLOW };
         // The bits of flags that fit the system's own type; the sign means nothing.
-        options.custom_flags((OFlags::NONBLOCK | links).bits().cast_signed());
+        options.custom_flags((OFlags::NONBLOCK | link_flag).bits().cast_signed());
     }
     options
 }
@@ -185,7 +185,7 @@ fn without_waiting(options: &mut OpenOptions, follows_links: bool) -> &mut OpenO
 ///
 /// # Errors
 /// An error of the system.
-pub fn names(folder: &Path) -> io::Result<Vec<OsString>> {
+pub fn file_names(folder: &Path) -> io::Result<Vec<OsString>> {
     let mut names = unsorted_names(folder)?;
     names.sort_unstable();
     Ok(names)
@@ -227,8 +227,11 @@ mod tests {
             fs::write(folder.path().join(name), "").unwrap();
         }
         fs::create_dir(folder.path().join("c")).unwrap();
-        assert_eq!(names(folder.path()).unwrap(), [".hidden", "a", "b", "c"]);
-        assert_eq!(names(&folder.path().join("d")).unwrap_err().kind(), io::ErrorKind::NotFound);
+        assert_eq!(file_names(folder.path()).unwrap(), [".hidden", "a", "b", "c"]);
+        assert_eq!(
+            file_names(&folder.path().join("d")).unwrap_err().kind(),
+            io::ErrorKind::NotFound
+        );
     }
 
     #[cfg(unix)]
@@ -285,9 +288,9 @@ mod tests {
         let (reader, mut writer) = io::pipe().unwrap();
         writer.write_all(b"name").unwrap();
         drop(writer);
-        let passed_path = format!("/dev/fd/{}", reader.as_raw_fd());
-        assert_eq!(read_text(Path::new(&passed_path), 1000).unwrap(), b"name");
-        assert_eq!(read_text(Path::new(&passed_path), 1000).unwrap(), b"");
+        let descriptor_path = format!("/dev/fd/{}", reader.as_raw_fd());
+        assert_eq!(read_text(Path::new(&descriptor_path), 1000).unwrap(), b"name");
+        assert_eq!(read_text(Path::new(&descriptor_path), 1000).unwrap(), b"");
         assert!(read_text(folder.path(), 1000).is_err());
         let device = read_text(Path::new("/dev/zero"), 1000).unwrap_err();
         assert_eq!(device.to_string(), "it is a device, not a regular file");

@@ -20,7 +20,7 @@ pub enum Cell {
     /// No value, or a number that is NaN.
     Null,
     /// A number; in JSON, whole numbers have no decimal point.
-    Number(#[serde(serialize_with = "without_point")] f64),
+    Number(#[serde(serialize_with = "serialize_without_point")] f64),
     /// Words.
     Text(String),
     /// True or false.
@@ -41,11 +41,14 @@ impl Cell {
     }
 }
 
-fn without_point<S: serde::Serializer>(number: &f64, to: S) -> Result<S::Ok, S::Error> {
+fn serialize_without_point<S: serde::Serializer>(
+    number: &f64,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     let integer = *number as i64;
     // An f64 holds every whole number up to 2^53.
     let is_integer = integer as f64 == *number && number.abs() < 2_f64.powi(53);
-    if is_integer { to.serialize_i64(integer) } else { to.serialize_f64(*number) }
+    if is_integer { serializer.serialize_i64(integer) } else { serializer.serialize_f64(*number) }
 }
 
 /// Returns the limits of ratios in a plan.
@@ -126,10 +129,13 @@ impl ResultTable {
     /// Returns the names of the columns that identify a row: the point's index, the axes, and in
     /// results other than maps the further columns that number their rows.
     pub fn key_columns(&self) -> Vec<&str> {
-        let further_keys = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
+        let further_key_columns = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
         let mut names: Vec<&str> = ["point"].into_iter().chain(self.axes()).collect();
         names.extend(
-            further_keys.into_iter().filter(|name| !names.contains(name)).collect::<Vec<_>>(),
+            further_key_columns
+                .into_iter()
+                .filter(|name| !names.contains(name))
+                .collect::<Vec<_>>(),
         );
         names.retain(|name| self.column(name).is_some());
         names
@@ -160,15 +166,15 @@ impl ParquetFile {
         let mut first_row = 0;
         Ok(batches.map(move |batch| {
             let batch = batch?;
-            let columns = batch.columns().iter().zip(fields.values());
-            let columns =
-                columns.map(|(cells, kind)| decode(cells, *kind)).collect::<Result<_, _>>();
-            let columns = columns.map_err(FileError::cells(self.path()))?;
+            let cell_columns = batch.columns().iter().zip(fields.values());
+            let cell_columns =
+                cell_columns.map(|(cells, kind)| decode(cells, *kind)).collect::<Result<_, _>>();
+            let cell_columns = cell_columns.map_err(FileError::cells(self.path()))?;
             let rows = Rows {
-                first: first_row,
+                first_row,
                 count: batch.num_rows(),
-                positions: positions_in_batch.clone(),
-                columns,
+                column_positions: positions_in_batch.clone(),
+                columns: cell_columns,
             };
             first_row += rows.count as u64;
             Ok(rows)
@@ -197,11 +203,11 @@ impl ParquetFile {
 #[derive(Debug)]
 pub struct Rows {
     /// The number of the first row in the file, from 0.
-    pub first: u64,
+    pub first_row: u64,
     /// The number of rows.
     pub count: usize,
     /// The index in `columns` of each requested column, if the file has it.
-    positions: Vec<Option<usize>>,
+    column_positions: Vec<Option<usize>>,
     columns: Vec<Cells>,
 }
 
@@ -211,10 +217,10 @@ impl Rows {
     /// # Errors
     /// Fails if the batch's columns have other types.
     pub fn from_batch(batch: &RecordBatch, columns: &[Column]) -> Result<Self, ArrowError> {
-        let decoded = |column: &Column| decode(batch.column(column.field), column.kind);
-        let columns = columns.iter().map(decoded).collect::<Result<Vec<_>, _>>()?;
-        let positions = (0..columns.len()).map(Some).collect();
-        Ok(Self { first: 0, count: batch.num_rows(), positions, columns })
+        let decode_column = |column: &Column| decode(batch.column(column.field), column.kind);
+        let columns = columns.iter().map(decode_column).collect::<Result<Vec<_>, _>>()?;
+        let column_positions = (0..columns.len()).map(Some).collect();
+        Ok(Self { first_row: 0, count: batch.num_rows(), column_positions, columns })
     }
 
     /// Returns a row.
@@ -233,17 +239,17 @@ pub struct Row<'a> {
 impl<'a> Row<'a> {
     /// Returns the row's index in the file, from 0.
     pub const fn index(self) -> u64 {
-        self.rows.first + self.row_index as u64
+        self.rows.first_row + self.row_index as u64
     }
 
     #[inline]
-    fn cells(self, column: usize) -> Option<&'a Cells> {
-        self.rows.positions[column].map(|position| &self.rows.columns[position])
+    fn column_cells(self, column: usize) -> Option<&'a Cells> {
+        self.rows.column_positions[column].map(|position| &self.rows.columns[position])
     }
 
     /// Returns the cell of a column.
     pub fn cell(self, column: usize) -> Cell {
-        match self.cells(column) {
+        match self.column_cells(column) {
             Some(Cells::Numbers(cells)) if cells[self.row_index].is_nan() => Cell::Null,
             Some(Cells::Numbers(cells)) => Cell::Number(cells[self.row_index]),
             Some(Cells::Flags(cells)) => cells[self.row_index].map_or(Cell::Null, Cell::Flag),
@@ -254,14 +260,14 @@ impl<'a> Row<'a> {
     /// Returns the number in a column, NaN if there is none.
     #[inline]
     pub fn value(self, column: usize) -> f64 {
-        let Some(Cells::Numbers(cells)) = self.cells(column) else { return f64::NAN };
+        let Some(Cells::Numbers(cells)) = self.column_cells(column) else { return f64::NAN };
         cells[self.row_index]
     }
 
     /// Returns the word in a column; a truth value is a word too.
     #[inline]
     pub fn word(self, column: usize) -> Option<&'a str> {
-        match self.cells(column)? {
+        match self.column_cells(column)? {
             Cells::Words(word_indices, words) => {
                 let word_index = word_indices
                     .is_valid(self.row_index)

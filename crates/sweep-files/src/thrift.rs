@@ -27,29 +27,29 @@ const MAX_NESTING: usize = 16;
 
 /// The code of a true boolean, as a file declares the type of a field. This code and those below
 /// are Thrift's; Parquet has no other types.
-const TRUE: u8 = 1;
+const TYPE_TRUE: u8 = 1;
 /// The code of a false boolean.
-const FALSE: u8 = 2;
+const TYPE_FALSE: u8 = 2;
 /// The code of an integer of one byte.
-const BYTE: u8 = 3;
+const TYPE_BYTE: u8 = 3;
 /// The code of an integer of 16 bits.
-const I16: u8 = 4;
+const TYPE_I16: u8 = 4;
 /// The code of an integer of 32 bits.
-const I32: u8 = 5;
+const TYPE_I32: u8 = 5;
 /// The code of an integer of 64 bits.
-const I64: u8 = 6;
+const TYPE_I64: u8 = 6;
 /// The code of a float of 64 bits.
-const DOUBLE: u8 = 7;
+const TYPE_DOUBLE: u8 = 7;
 /// The code of bytes or a text.
-const BINARY: u8 = 8;
+const TYPE_BINARY: u8 = 8;
 /// The code of a list.
-const LIST: u8 = 9;
+const TYPE_LIST: u8 = 9;
 /// The code of a struct.
-const STRUCT: u8 = 12;
+const TYPE_STRUCT: u8 = 12;
 
 /// The type as which the library reads a field.
 #[derive(Clone, Copy)]
-pub(crate) enum Wire {
+pub(crate) enum ThriftType {
     Bool,
     Byte,
     /// An integer of any width; all widths are encoded alike.
@@ -57,128 +57,141 @@ pub(crate) enum Wire {
     Double,
     Binary,
     List(&'static Self),
-    Struct(Shape),
+    Struct(FieldTypes),
 }
 
 /// The types of a struct's fields that the library knows, by field numbers. It skips other fields.
-pub(crate) type Shape = &'static [(RangeInclusive<i16>, Wire)];
+pub(crate) type FieldTypes = &'static [(RangeInclusive<i16>, ThriftType)];
 
 /// An item that a walk reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Found {
+pub(crate) enum ThriftItem {
     /// An integer, 1 or 0 for a boolean, or the length of bytes.
     Number(i64),
     /// The end of a struct.
     End,
 }
 
-/// Walks the struct at the beginning of some bytes, and returns the bytes behind it. Calls `found`
-/// with each number and the path of field numbers that leads to it; elements of a list have the
-/// path of the list.
+/// Walks the struct at the beginning of some bytes, and returns the bytes behind it. Calls
+/// `visit_item` with each number and the path of field numbers that leads to it; elements of a list
+/// have the path of the list.
 ///
 /// Returns `None` if the bytes end too early, the fields of a struct are not in order, a declared
-/// type is not that in `shape`, a list holds booleans, or a field is a set, a map or a UUID, which
-/// Parquet has not.
-pub(crate) fn walk<'a>(
+/// type is not that in `field_types`, a list holds booleans, or a field is a set, a map or a UUID,
+/// which Parquet has not.
+pub(crate) fn walk_struct<'a>(
     bytes: &'a [u8],
-    shape: Shape,
-    found: &mut dyn FnMut(&[i16], Found),
+    field_types: FieldTypes,
+    visit_item: &mut dyn FnMut(&[i16], ThriftItem),
 ) -> Option<&'a [u8]> {
-    let mut walk = Walk { rest: bytes, path: Vec::new(), depth: 0, found };
-    walk.fields(Some(shape))?;
+    let mut walk = StructWalk { rest: bytes, path: Vec::new(), depth: 0, visit_item };
+    walk.walk_fields(Some(field_types))?;
     Some(walk.rest)
 }
 
-impl Wire {
-    const fn is(self, declared: u8) -> bool {
+impl ThriftType {
+    const fn accepts(self, declared_type: u8) -> bool {
         match self {
-            Self::Bool => matches!(declared, TRUE | FALSE),
-            Self::Byte => declared == BYTE,
-            Self::Number => matches!(declared, I16 | I32 | I64),
-            Self::Double => declared == DOUBLE,
-            Self::Binary => declared == BINARY,
-            Self::List(_) => declared == LIST,
-            Self::Struct(_) => declared == STRUCT,
+            Self::Bool => matches!(declared_type, TYPE_TRUE | TYPE_FALSE),
+            Self::Byte => declared_type == TYPE_BYTE,
+            Self::Number => matches!(declared_type, TYPE_I16 | TYPE_I32 | TYPE_I64),
+            Self::Double => declared_type == TYPE_DOUBLE,
+            Self::Binary => declared_type == TYPE_BINARY,
+            Self::List(_) => declared_type == TYPE_LIST,
+            Self::Struct(_) => declared_type == TYPE_STRUCT,
         }
     }
 }
 
-struct Walk<'a, 'f> {
+struct StructWalk<'a, 'f> {
     rest: &'a [u8],
     path: Vec<i16>,
     depth: usize,
-    found: &'f mut dyn FnMut(&[i16], Found),
+    visit_item: &'f mut dyn FnMut(&[i16], ThriftItem),
 }
 
-impl Walk<'_, '_> {
-    fn fields(&mut self, shape: Option<Shape>) -> Option<()> {
+impl StructWalk<'_, '_> {
+    fn walk_fields(&mut self, field_types: Option<FieldTypes>) -> Option<()> {
         let mut field = 0_i16;
         loop {
-            let header_byte = self.byte()?;
-            let step = header_byte >> 4;
-            let declared = header_byte & 0xf;
-            if declared == 0 {
-                (self.found)(&self.path, Found::End);
+            let header_byte = self.read_byte()?;
+            let field_step = header_byte >> 4;
+            let declared_type = header_byte & 0xf;
+            if declared_type == 0 {
+                (self.visit_item)(&self.path, ThriftItem::End);
                 return Some(());
             }
             let last_field = field;
-            field = match step {
+            field = match field_step {
                 // The library truncates field numbers to this type too.
-                0 => self.number()? as i16,
-                step => field.checked_add(i16::from(step))?,
+                0 => self.read_number()? as i16,
+                field_step => field.checked_add(i16::from(field_step))?,
             };
             if field <= last_field {
                 return None;
             }
-            let known_type =
-                shape.and_then(|shape| shape.iter().find(|(at, _)| at.contains(&field)));
-            let known_type = known_type.map(|(_, kind)| *kind);
+            let expected_type = field_types
+                .and_then(|field_types| field_types.iter().find(|(at, _)| at.contains(&field)));
+            let expected_type = expected_type.map(|(_, thrift_type)| *thrift_type);
             self.path.push(field);
-            if matches!(declared, TRUE | FALSE) {
+            if matches!(declared_type, TYPE_TRUE | TYPE_FALSE) {
                 // Only a boolean has its value in the byte of its type.
-                if !known_type.is_none_or(|kind| kind.is(declared)) {
+                if !expected_type.is_none_or(|thrift_type| thrift_type.accepts(declared_type)) {
                     return None;
                 }
-                (self.found)(&self.path, Found::Number(i64::from(declared == TRUE)));
+                (self.visit_item)(
+                    &self.path,
+                    ThriftItem::Number(i64::from(declared_type == TYPE_TRUE)),
+                );
             } else {
-                self.value(declared, known_type)?;
+                self.walk_value(declared_type, expected_type)?;
             }
             self.path.pop();
         }
     }
 
-    fn value(&mut self, declared: u8, known: Option<Wire>) -> Option<()> {
-        if !known.is_none_or(|kind| kind.is(declared)) || self.depth == MAX_NESTING {
+    fn walk_value(&mut self, declared_type: u8, expected_type: Option<ThriftType>) -> Option<()> {
+        if !expected_type.is_none_or(|kind| kind.accepts(declared_type))
+            || self.depth == MAX_NESTING
+        {
             return None;
         }
         self.depth += 1;
-        match declared {
-            BYTE => self.skip(1)?,
-            I16 | I32 | I64 => {
-                let number = self.number()?;
-                (self.found)(&self.path, Found::Number(number));
+        match declared_type {
+            TYPE_BYTE => self.skip(1)?,
+            TYPE_I16 | TYPE_I32 | TYPE_I64 => {
+                let number = self.read_number()?;
+                (self.visit_item)(&self.path, ThriftItem::Number(number));
             }
-            DOUBLE => self.skip(8)?,
-            BINARY => {
-                let length = self.varint()?;
-                (self.found)(&self.path, Found::Number(i64::try_from(length).ok()?));
+            TYPE_DOUBLE => self.skip(8)?,
+            TYPE_BINARY => {
+                let length = self.read_varint()?;
+                (self.visit_item)(&self.path, ThriftItem::Number(i64::try_from(length).ok()?));
                 self.skip(length)?;
             }
-            LIST => {
-                let header_byte = self.byte()?;
+            TYPE_LIST => {
+                let header_byte = self.read_byte()?;
                 let length = if header_byte >> 4 == 0xf {
-                    self.varint()?
+                    self.read_varint()?
                 } else {
                     u64::from(header_byte >> 4)
                 };
-                let element = if let Some(Wire::List(kind)) = known { Some(*kind) } else { None };
+                let element_type = if let Some(ThriftType::List(kind)) = expected_type {
+                    Some(*kind)
+                } else {
+                    None
+                };
                 for _ in 0..length {
-                    self.value(header_byte & 0xf, element)?;
+                    self.walk_value(header_byte & 0xf, element_type)?;
                 }
             }
-            STRUCT => {
-                let shape = if let Some(Wire::Struct(shape)) = known { Some(shape) } else { None };
-                self.fields(shape)?;
+            TYPE_STRUCT => {
+                let field_types = if let Some(ThriftType::Struct(field_types)) = expected_type {
+                    Some(field_types)
+                } else {
+                    None
+                };
+                self.walk_fields(field_types)?;
             }
             // Among these are booleans in a list, which take no bytes by the library's reading.
             _ => return None,
@@ -187,7 +200,7 @@ impl Walk<'_, '_> {
         Some(())
     }
 
-    fn byte(&mut self) -> Option<u8> {
+    fn read_byte(&mut self) -> Option<u8> {
         let (first, rest) = self.rest.split_first()?;
         self.rest = rest;
         Some(*first)
@@ -199,10 +212,10 @@ impl Walk<'_, '_> {
     }
 
     /// Reads an unsigned number in groups of seven bits, the lowest group first.
-    fn varint(&mut self) -> Option<u64> {
+    fn read_varint(&mut self) -> Option<u64> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
-            let byte = self.byte()?;
+            let byte = self.read_byte()?;
             number |= u64::from(byte & 0x7f) << shift;
             if byte & 0x80 == 0 {
                 return Some(number);
@@ -212,8 +225,8 @@ impl Walk<'_, '_> {
     }
 
     /// Reads a signed number, whose lowest bit is the sign.
-    fn number(&mut self) -> Option<i64> {
-        let number = self.varint()?;
+    fn read_number(&mut self) -> Option<i64> {
+        let number = self.read_varint()?;
         Some((number >> 1) as i64 ^ -((number & 1) as i64))
     }
 }
@@ -222,7 +235,7 @@ impl Walk<'_, '_> {
 #[cfg(test)]
 pub(crate) mod encode {
     /// Encodes an unsigned number in groups of seven bits, the lowest group first.
-    pub(crate) fn varint(mut rest: u64) -> Vec<u8> {
+    pub(crate) fn encode_varint(mut rest: u64) -> Vec<u8> {
         let mut bytes = Vec::new();
         while rest >= 0x80 {
             bytes.push(rest as u8 | 0x80);
@@ -233,8 +246,8 @@ pub(crate) mod encode {
     }
 
     /// Encodes a signed number, whose lowest bit is the sign.
-    pub(crate) fn number(value: i32) -> Vec<u8> {
-        varint(((i64::from(value) << 1) ^ (i64::from(value) >> 63)) as u64)
+    pub(crate) fn encode_number(value: i32) -> Vec<u8> {
+        encode_varint(((i64::from(value) << 1) ^ (i64::from(value) >> 63)) as u64)
     }
 }
 
@@ -242,23 +255,30 @@ pub(crate) mod encode {
 mod tests {
     use super::*;
 
-    const SHAPE: Shape = &[
-        (1..=2, Wire::Number),
-        (3..=3, Wire::List(&Wire::Struct(&[(1..=1, Wire::Bool), (2..=2, Wire::Binary)]))),
-        (4..=4, Wire::List(&Wire::Number)),
+    const TEST_FIELD_TYPES: FieldTypes = &[
+        (1..=2, ThriftType::Number),
+        (
+            3..=3,
+            ThriftType::List(&ThriftType::Struct(&[
+                (1..=1, ThriftType::Bool),
+                (2..=2, ThriftType::Binary),
+            ])),
+        ),
+        (4..=4, ThriftType::List(&ThriftType::Number)),
     ];
 
     /// Returns the items that a walk reports, and the number of bytes behind the struct.
-    fn walked(bytes: &[u8]) -> Option<(Vec<(Vec<i16>, Found)>, usize)> {
+    fn walk_items(bytes: &[u8]) -> Option<(Vec<(Vec<i16>, ThriftItem)>, usize)> {
         let mut found_fields = Vec::new();
-        let rest =
-            walk(bytes, SHAPE, &mut |path, found| found_fields.push((path.to_vec(), found)))?;
+        let rest = walk_struct(bytes, TEST_FIELD_TYPES, &mut |path, item| {
+            found_fields.push((path.to_vec(), item))
+        })?;
         Some((found_fields, rest.len()))
     }
 
     #[test]
     fn numbers_are_reported_with_their_paths() {
-        use Found::{End, Number};
+        use ThriftItem::{End, Number};
         let bytes = [
             // Field 1 is -3, in groups of seven bits; field 2, its number in full, 300.
             &[0x15, 0x05, 0x06, 0x04, 0xd8, 0x04][..],
@@ -285,51 +305,51 @@ mod tests {
             (vec![7], End),
             (vec![], End),
         ];
-        assert_eq!(walked(&bytes), Some((expected, 1)));
+        assert_eq!(walk_items(&bytes), Some((expected, 1)));
         for length in 0..bytes.len() - 1 {
-            assert_eq!(walked(&bytes[..length]), None, "{length}");
+            assert_eq!(walk_items(&bytes[..length]), None, "{length}");
         }
     }
 
     #[test]
     fn a_field_of_another_type_than_the_library_assumes_ends_the_walk() {
-        assert!(walked(&[0x15, 2, 0]).is_some());
+        assert!(walk_items(&[0x15, 2, 0]).is_some());
         for other in [0x11, 0x13, 0x17, 0x18, 0x19, 0x1c] {
-            assert_eq!(walked(&[other, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]), None, "{other:#x}");
+            assert_eq!(walk_items(&[other, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]), None, "{other:#x}");
         }
-        assert!(walked(&[0x39, 0x1c, 0, 0]).is_some());
-        assert_eq!(walked(&[0x39, 0x15, 0, 0]), None, "elements too");
-        assert_eq!(walked(&[0x39, 0x1c, 0x15, 0, 0, 0]), None, "fields of elements too");
+        assert!(walk_items(&[0x39, 0x1c, 0, 0]).is_some());
+        assert_eq!(walk_items(&[0x39, 0x15, 0, 0]), None, "elements too");
+        assert_eq!(walk_items(&[0x39, 0x1c, 0x15, 0, 0, 0]), None, "fields of elements too");
     }
 
     #[test]
     fn fields_that_are_repeated_or_out_of_order_end_the_walk() {
         // The library takes the last of them.
-        assert!(walked(&[0x15, 2, 0x15, 2, 0]).is_some());
+        assert!(walk_items(&[0x15, 2, 0x15, 2, 0]).is_some());
         for (field, is_after) in [(3, true), (2, false), (1, false)] {
             let bytes = [0x25, 2, 0x09, 2 * field, 0x0c, 0];
-            assert_eq!(walked(&bytes).is_some(), is_after, "{field}");
+            assert_eq!(walk_items(&bytes).is_some(), is_after, "{field}");
         }
     }
 
     #[test]
     fn lists_of_booleans_end_the_walk_whatever_length_they_declare() {
-        assert!(walked(&[0x59, 0x02, 0]).is_some(), "there is none in it");
+        assert!(walk_items(&[0x59, 0x02, 0]).is_some(), "there is none in it");
         for other in [0x5a, 0x5b, 0x5d, 0x5e, 0x5f] {
-            assert_eq!(walked(&[&[other], [0; 20].as_slice()].concat()), None, "{other:#x}");
+            assert_eq!(walk_items(&[&[other], [0; 20].as_slice()].concat()), None, "{other:#x}");
         }
         for kind in [1, 2] {
-            assert_eq!(walked(&[0x59, 0x10 | kind, 1, 0]), None);
-            assert_eq!(walked(&[0x59, 0xf0 | kind, 0xff, 0xff, 0xff, 0xff, 7, 0]), None);
-            assert_eq!(walked(&[0x59, 0x19, 0x10 | kind, 1, 0]), None, "in a list");
+            assert_eq!(walk_items(&[0x59, 0x10 | kind, 1, 0]), None);
+            assert_eq!(walk_items(&[0x59, 0xf0 | kind, 0xff, 0xff, 0xff, 0xff, 7, 0]), None);
+            assert_eq!(walk_items(&[0x59, 0x19, 0x10 | kind, 1, 0]), None, "in a list");
         }
     }
 
     #[test]
     fn structs_and_lists_that_are_nested_too_deeply_end_the_walk() {
-        let nested = |depth: usize| [vec![0x5c; depth], vec![0; depth + 1]].concat();
-        assert!(walked(&nested(MAX_NESTING)).is_some());
-        assert_eq!(walked(&nested(MAX_NESTING + 1)), None);
-        assert_eq!(walked(&[vec![0x59], vec![0x19; 100_000]].concat()), None);
+        let nested_structs = |depth: usize| [vec![0x5c; depth], vec![0; depth + 1]].concat();
+        assert!(walk_items(&nested_structs(MAX_NESTING)).is_some());
+        assert_eq!(walk_items(&nested_structs(MAX_NESTING + 1)), None);
+        assert_eq!(walk_items(&[vec![0x59], vec![0x19; 100_000]].concat()), None);
     }
 }

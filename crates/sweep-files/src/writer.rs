@@ -13,7 +13,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::types::Type as Declared;
+use parquet::schema::types::Type as ParquetType;
 use serde_json::Value;
 
 use crate::key;
@@ -40,9 +40,10 @@ impl<W: Write + Send> Writer<W> {
     ) -> Result<Self, ParquetError> {
         let fields = schema.fields().iter().map(|field| Ok(declare_type(field)?.into()));
         let fields = fields.collect::<Result<_, ParquetError>>()?;
-        let root = Declared::group_type_builder("arrow_schema").with_fields(fields).build()?;
+        let root_type =
+            ParquetType::group_type_builder("arrow_schema").with_fields(fields).build()?;
         let group_rows = properties.max_row_group_row_count().unwrap_or(usize::MAX);
-        let mut file = SerializedFileWriter::new(sink, root.into(), properties.into())?;
+        let mut file = SerializedFileWriter::new(sink, root_type.into(), properties.into())?;
         file.append_key_value_metadata(column_metadata(schema));
         Ok(Self { file, group_rows, count: 0, rows: Vec::new() })
     }
@@ -80,16 +81,16 @@ impl<W: Write + Send> Writer<W> {
     /// Writes a row group. The library gets each column in one call: it ends pages by the rows of a
     /// call, and the file must not depend on the batches in which the rows came.
     fn flush(&mut self) -> Result<(), ParquetError> {
-        let mut group = self.file.next_row_group()?;
+        let mut row_group = self.file.next_row_group()?;
         let mut column_index = 0;
-        while let Some(mut column) = group.next_column()? {
+        while let Some(mut column) = row_group.next_column()? {
             let arrays: Vec<&dyn Array> =
                 self.rows.iter().map(|rows| rows.column(column_index).as_ref()).collect();
-            write(column.untyped(), &arrays)?;
+            write_column(column.untyped(), &arrays)?;
             column.close()?;
             column_index += 1;
         }
-        group.close()?;
+        row_group.close()?;
         self.rows.clear();
         self.count = 0;
         Ok(())
@@ -100,24 +101,25 @@ impl<W: Write + Send> Writer<W> {
 /// none for a column.
 fn column_metadata(schema: &Schema) -> KeyValue {
     let column_description = |field: &FieldRef| {
-        let kind = match field.data_type() {
+        let cell_type = match field.data_type() {
             DataType::Boolean => "bool",
             DataType::UInt64 => "uint64",
             DataType::Float64 => "float64",
             _ => "string",
         };
-        let pairs = field.metadata().iter().map(|(key, text)| {
+        let metadata_pairs = field.metadata().iter().map(|(key, text)| {
             let number = (key == key::LIMIT).then(|| serde_json::from_str(text).ok()).flatten();
             (key.clone(), number.unwrap_or_else(|| Value::from(text.as_str())))
         });
-        let column_description = pairs.chain([("type".to_owned(), kind.into())]).collect::<Value>();
+        let column_description =
+            metadata_pairs.chain([("type".to_owned(), cell_type.into())]).collect::<Value>();
         (field.name().clone(), column_description)
     };
     let columns: Value = schema.fields().iter().map(column_description).collect();
     KeyValue::new(key::COLUMNS.to_owned(), columns.to_string())
 }
 
-fn declare_type(field: &Field) -> Result<Declared, ParquetError> {
+fn declare_type(field: &Field) -> Result<ParquetType, ParquetError> {
     let (physical, logical) = match field.data_type() {
         DataType::Boolean => (Type::BOOLEAN, None),
         DataType::UInt64 => (Type::INT64, Some(LogicalType::integer(64, false))),
@@ -125,14 +127,17 @@ fn declare_type(field: &Field) -> Result<Declared, ParquetError> {
         _ => (Type::BYTE_ARRAY, Some(LogicalType::String)),
     };
     let is_nullable = field.is_nullable();
-    Declared::primitive_type_builder(field.name(), physical)
+    ParquetType::primitive_type_builder(field.name(), physical)
         .with_logical_type(logical)
         .with_repetition(if is_nullable { Repetition::OPTIONAL } else { Repetition::REQUIRED })
         .build()
 }
 
 /// Writes the arrays of a column one after the other.
-fn write(column: &mut ColumnWriter<'_>, arrays: &[&dyn Array]) -> Result<usize, ParquetError> {
+fn write_column(
+    column: &mut ColumnWriter<'_>,
+    arrays: &[&dyn Array],
+) -> Result<usize, ParquetError> {
     let mut levels: Vec<i16> = Vec::new();
     for array in arrays {
         match array.nulls() {
@@ -186,22 +191,23 @@ mod tests {
 
     #[test]
     fn bytes_do_not_depend_on_batches() {
-        const ROWS: usize = 100_000;
-        let counts: ArrayRef = Arc::new((0..ROWS as u64).map(Some).collect::<UInt64Array>());
-        let number = |row: usize| (!row.is_multiple_of(7)).then_some(row as f64 / 3.0);
-        let numbers: ArrayRef = Arc::new((0..ROWS).map(number).collect::<Float64Array>());
+        const ROW_COUNT: usize = 100_000;
+        let counts: ArrayRef = Arc::new((0..ROW_COUNT as u64).map(Some).collect::<UInt64Array>());
+        let number_in_row = |row: usize| (!row.is_multiple_of(7)).then_some(row as f64 / 3.0);
+        let numbers: ArrayRef =
+            Arc::new((0..ROW_COUNT).map(number_in_row).collect::<Float64Array>());
         let batch = RecordBatch::try_from_iter([("count", counts), ("number", numbers)]).unwrap();
         let written_bytes = |batch_rows: usize| {
             let properties = WriterProperties::builder().set_max_row_group_row_count(Some(60_000));
             let mut writer = Writer::new(Vec::new(), &batch.schema(), properties.build()).unwrap();
-            for from in (0..ROWS).step_by(batch_rows) {
-                writer.write(&batch.slice(from, batch_rows.min(ROWS - from))).unwrap();
+            for from in (0..ROW_COUNT).step_by(batch_rows) {
+                writer.write(&batch.slice(from, batch_rows.min(ROW_COUNT - from))).unwrap();
             }
             writer.end().unwrap().into_inner().unwrap()
         };
-        let in_one_batch = written_bytes(ROWS);
+        let one_batch_bytes = written_bytes(ROW_COUNT);
         for batch_rows in [1000, 4096, 33_333] {
-            assert!(written_bytes(batch_rows) == in_one_batch, "batches of {batch_rows} rows");
+            assert!(written_bytes(batch_rows) == one_batch_bytes, "batches of {batch_rows} rows");
         }
     }
 }

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use serde_json::Value;
-use sweep_files::{Step, dotted, key, visit_leaves};
+use sweep_files::{Step, dotted_path, key, visit_leaves};
 
 use crate::error::{PlotError, Result};
 use crate::read::{FigureFile, ModelKinds};
@@ -96,7 +96,8 @@ fn collect_differences<'a>(
             });
             // The elements of a list, such as springs, give one difference together.
             let names = path.iter().copied().filter(|step| matches!(step, Step::Name(_)));
-            let phrase = format!("{} {first} and {second}", dotted(&names.collect::<Vec<_>>()));
+            let phrase =
+                format!("{} {first} and {second}", dotted_path(&names.collect::<Vec<_>>()));
             if !differences.contains(&phrase) {
                 differences.push(phrase);
             }
@@ -131,7 +132,7 @@ fn is_set_by(parameter: &str, path: &[Step<'_>]) -> bool {
 fn is_parameter_of_point(values: [&Value; 2], points: [&NamedPoint; 2], path: &[Step<'_>]) -> bool {
     points.into_iter().flatten().any(|(name, value)| {
         let mut words_of_name = name.split('_').filter(|token| token.len() > 1);
-        let path_text = dotted(path);
+        let path_text = dotted_path(path);
         !is_set_by(name, path)
             && values.iter().any(|plan_value| plan_value.as_f64() == Some(*value))
             && words_of_name.next().is_some_and(|first| path_text.contains(first))

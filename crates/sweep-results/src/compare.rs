@@ -43,17 +43,21 @@ pub struct SharedRow {
     /// nine digits.
     pub second_key: Vec<f64>,
     /// The greatest ratio in either file.
-    pub ratio: [Option<f64>; 2],
+    #[serde(rename = "ratio")]
+    pub ratios: [Option<f64>; 2],
     /// The least ratio in either file.
-    pub least_ratio: [Option<f64>; 2],
+    #[serde(rename = "least_ratio")]
+    pub least_ratios: [Option<f64>; 2],
     /// The least gap of the nonlinear model in either file, m.
-    pub gap_m: [Option<f64>; 2],
+    #[serde(rename = "gap_m")]
+    pub gaps_m: [Option<f64>; 2],
     /// The change of the verdict.
     pub flip: Flip,
     /// Whether the row was reliable and is now unreliable or without a verdict.
     pub is_lost: bool,
     /// Whether either file calls the row sensitive, so that its verdict may differ between builds.
-    pub sensitive: bool,
+    #[serde(rename = "sensitive")]
+    pub is_sensitive: bool,
     /// Whether any cell differs.
     pub differs: bool,
 }
@@ -61,24 +65,24 @@ pub struct SharedRow {
 impl SharedRow {
     /// Returns the second ratio over the first.
     pub fn ratio_quotient(&self) -> Option<f64> {
-        let first = self.ratio[0]?;
-        let second = self.ratio[1]?;
-        Some(second / first).filter(|quotient| quotient.is_finite())
+        let first_row = self.ratios[0]?;
+        let second = self.ratios[1]?;
+        Some(second / first_row).filter(|quotient| quotient.is_finite())
     }
 
     /// Returns the second gap less the first, m.
     pub fn gap_difference_m(&self) -> Option<f64> {
-        Some(self.gap_m[1]? - self.gap_m[0]?)
+        Some(self.gaps_m[1]? - self.gaps_m[0]?)
     }
 
     /// Returns the larger ratio over the smaller, less 1; infinite if only one file has a ratio.
     pub fn ratio_deviation(&self) -> f64 {
-        deviation(self.ratio, |first, second| (second / first).max(first / second) - 1.0)
+        deviation(self.ratios, |first, second| (second / first).max(first / second) - 1.0)
     }
 
     /// Returns the distance of the two gaps (m); infinite if only one file has a gap.
     pub fn gap_deviation_m(&self) -> f64 {
-        deviation(self.gap_m, |first, second| (second - first).abs())
+        deviation(self.gaps_m, |first, second| (second - first).abs())
     }
 }
 
@@ -95,27 +99,28 @@ fn deviation(values: [Option<f64>; 2], distance: fn(f64, f64) -> f64) -> f64 {
 /// The differences in a column that both files have.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColumnChange {
-    /// The name.
+    /// The name of the column.
     pub name: String,
-    /// The unit.
+    /// The unit of the column.
     pub unit: String,
     /// The number of shared rows in which the column differs.
     pub rows: u64,
     /// The greatest difference of numbers.
     pub greatest_difference: f64,
     /// The rows in which numbers differ most, the farthest apart first, without sensitive ones; at
-    /// most [`MAX_WORST`].
-    pub worst: Vec<ColumnRow>,
+    /// most [`MAX_WORST_ROWS`].
+    #[serde(rename = "worst")]
+    pub worst_rows: Vec<ColumnRow>,
 }
 
-/// Greatest number of rows that are kept for each column that differs. Basis: what a table shows.
+/// Maximum number of rows that are kept for each column that differs. Basis: what a table shows.
 /// Doubling it doubles the rows that a table of a column can show.
-pub const MAX_WORST: usize = 20;
+pub const MAX_WORST_ROWS: usize = 20;
 
 /// A row in which a column's numbers differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColumnRow {
-    /// The index of the row in [`Comparison::shared`].
+    /// The index of the row in [`Comparison::shared_rows`].
     pub row: usize,
     /// The number in either file.
     pub values: [Option<f64>; 2],
@@ -148,14 +153,17 @@ pub struct Comparison {
     /// The names of the columns that only the first file has, and that only the second has.
     pub unmatched_columns: [Vec<String>; 2],
     /// The rows that both files have, in the order of the first.
-    pub shared: Vec<SharedRow>,
+    #[serde(rename = "shared")]
+    pub shared_rows: Vec<SharedRow>,
     /// The columns that differ, in the order of the first file.
-    pub columns: Vec<ColumnChange>,
+    #[serde(rename = "columns")]
+    pub changed_columns: Vec<ColumnChange>,
     /// Whether both files have verdicts.
     pub has_verdicts: bool,
     /// The number of shared rows in either file in which the linear model over-estimates beyond the
     /// limit of reliable rows; `None` for files without limits.
-    pub over_estimated: Option<[usize; 2]>,
+    #[serde(rename = "over_estimated")]
+    pub over_estimated_rows: Option<[usize; 2]>,
     /// Whether both files have ratios.
     pub has_ratios: bool,
     /// Whether both files have least gaps of the nonlinear model.
@@ -171,12 +179,14 @@ impl Comparison {
             && self.unmatched_rows == [0, 0]
             && self.single_valued_axes.is_empty()
             && self.unmatched_columns.iter().all(Vec::is_empty)
-            && self.columns.is_empty()
+            && self.changed_columns.is_empty()
     }
 
     /// Iterates over the rows whose verdict differs, either the sensitive or the other ones.
     pub fn flips(&self, sensitive: bool) -> impl Iterator<Item = &SharedRow> {
-        self.shared.iter().filter(move |row| row.flip != Flip::None && row.sensitive == sensitive)
+        self.shared_rows
+            .iter()
+            .filter(move |row| row.flip != Flip::None && row.is_sensitive == sensitive)
     }
 
     /// Returns the `count` rows with the greatest deviations above 0, the greatest first, either of
@@ -188,9 +198,9 @@ impl Comparison {
         deviation: fn(&SharedRow) -> f64,
     ) -> Vec<&SharedRow> {
         let mut rows: Vec<&SharedRow> = self
-            .shared
+            .shared_rows
             .iter()
-            .filter(|row| row.sensitive == sensitive && deviation(row) > 0.0)
+            .filter(|row| row.is_sensitive == sensitive && deviation(row) > 0.0)
             .collect();
         rows.sort_by(|a, b| deviation(b).total_cmp(&deviation(a)));
         rows.truncate(count);
@@ -199,10 +209,10 @@ impl Comparison {
 }
 
 /// Returns the kind of a file; only files of the same kind are compared.
-fn kind(table: &ResultTable) -> &'static str {
+fn result_kind(table: &ResultTable) -> &'static str {
     let is_map = table.column("ratio_max").is_some() && table.column("status").is_some();
     let default_kind = if is_map { "map" } else { "other" };
-    table.file().kind().map_or(default_kind, FileKind::word)
+    table.file().kind().map_or(default_kind, FileKind::short_name)
 }
 
 /// Compares the second file with the first.
@@ -215,13 +225,13 @@ fn kind(table: &ResultTable) -> &'static str {
 /// # Errors
 /// [`ResultsError::Refused`] with the reason, [`ResultsError::File`].
 pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, ResultsError> {
-    let refuse = |reason: String| {
+    let refusal = |reason: String| {
         let [first, second] = [first, second].map(|table| table.path().display());
         ResultsError::Refused(format!("{first} and {second} cannot be compared: {reason}"))
     };
-    let kinds = [kind(first), kind(second)];
+    let kinds = [result_kind(first), result_kind(second)];
     if kinds[0] != kinds[1] {
-        return Err(refuse(format!("the kinds of file are {} and {}", kinds[0], kinds[1])));
+        return Err(refusal(format!("the kinds of file are {} and {}", kinds[0], kinds[1])));
     }
     let is_boundary = kinds[0] == "boundary";
     let tables = [first, second];
@@ -231,9 +241,9 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     let mut single_valued_axes = Vec::new();
     for (file, names) in keys_by_file.iter().enumerate() {
         for name in names.iter().filter(|name| !keys.contains(name)) {
-            let Some(value) = side::single_value(tables[file], name)? else {
+            let Some(value) = side::find_single_value(tables[file], name)? else {
                 let ordinal = ["first", "second"][file];
-                return Err(refuse(format!(
+                return Err(refusal(format!(
                     "only the {ordinal} has the axis `{name}`, with several values"
                 )));
             };
@@ -250,57 +260,60 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     let is_matched_by_point = !is_boundary
         && tables.iter().all(|table| table.column("point").is_some())
         && plans::differs_in_nominal_values(first.plan.as_ref(), second.plan.as_ref());
-    let mut matched_by = keys.clone();
+    let mut matching_columns = keys.clone();
     if is_matched_by_point {
-        matched_by.retain(|name| !first.axes().contains(&name.as_str()));
-        matched_by.push("point".to_owned());
+        matching_columns.retain(|name| !first.axes().contains(&name.as_str()));
+        matching_columns.push("point".to_owned());
     }
     let files = [
-        ComparedFile::read(first, second, &keys, &matched_by)?,
-        ComparedFile::read(second, first, &keys, &matched_by)?,
+        ComparedFile::read(first, second, &keys, &matching_columns)?,
+        ComparedFile::read(second, first, &keys, &matching_columns)?,
     ];
-    let pairs = match_rows(&files);
-    if pairs.is_empty() && files.iter().any(|file| file.rows > 0) {
+    let row_pairs = match_rows(&files);
+    if row_pairs.is_empty() && files.iter().any(|file| file.rows > 0) {
         let keys = if keys.is_empty() { "rows".to_owned() } else { keys.join(", ") };
-        return Err(refuse(format!("they share no row: no values of {keys} are in both")));
+        return Err(refusal(format!("they share no row: no values of {keys} are in both")));
     }
-    let mut shared: Vec<SharedRow> =
-        pairs.iter().map(|&pair| files[0].shared_row(&files[1], pair)).collect();
-    let columns = compare_columns(&files, &pairs, &mut shared);
-    let unit_of_key = |name: &String| first.column(name).map(|column| column.unit().to_owned());
-    let key_units = keys.iter().map(|name| unit_of_key(name).unwrap_or_default()).collect();
+    let mut shared_rows: Vec<SharedRow> =
+        row_pairs.iter().map(|&pair| files[0].shared_row(&files[1], pair)).collect();
+    let changed_columns = compare_columns(&files, &row_pairs, &mut shared_rows);
+    let key_unit = |name: &String| first.column(name).map(|column| column.unit().to_owned());
+    let key_units = keys.iter().map(|name| key_unit(name).unwrap_or_default()).collect();
     let boundary = if is_boundary {
         boundary::compare_boundaries(first, second)?
     } else {
-        boundary::compare_maps(first, &keys, &shared)
+        boundary::compare_maps(first, &keys, &shared_rows)
     };
-    let both_have = |name: &str| tables.iter().all(|table| table.column(name).is_some());
+    let is_column_in_both = |name: &str| tables.iter().all(|table| table.column(name).is_some());
     Ok(Comparison {
         plan: plans::compare_plans(first.file(), second.file()),
-        unmatched_rows: [0, 1].map(|file| (files[file].rows - pairs.len()) as u64),
-        has_verdicts: both_have("reliable"),
-        over_estimated: count_over_estimated(tables, &shared),
-        has_ratios: both_have("ratio_max"),
-        has_gaps: both_have("min_gap_nonlinear_m"),
+        unmatched_rows: [0, 1].map(|file| (files[file].rows - row_pairs.len()) as u64),
+        has_verdicts: is_column_in_both("reliable"),
+        over_estimated_rows: count_over_estimated(tables, &shared_rows),
+        has_ratios: is_column_in_both("ratio_max"),
+        has_gaps: is_column_in_both("min_gap_nonlinear_m"),
         keys,
         key_units,
         is_matched_by_point,
         single_valued_axes,
         unmatched_columns,
-        shared,
-        columns,
+        shared_rows,
+        changed_columns,
         boundary,
     })
 }
 
 /// Counts the rows of either file whose least ratio is below the limit of that file's plan.
-fn count_over_estimated(tables: [&ResultTable; 2], shared: &[SharedRow]) -> Option<[usize; 2]> {
-    let count = |file: usize| {
+fn count_over_estimated(
+    tables: [&ResultTable; 2],
+    shared_rows: &[SharedRow],
+) -> Option<[usize; 2]> {
+    let count_in_file = |file: usize| {
         let limit = ratio_limits(tables[file].plan.as_ref()?)?.over_estimate();
-        let is_below = |row: &&SharedRow| row.least_ratio[file].is_some_and(|least| least < limit);
-        Some(shared.iter().filter(is_below).count())
+        let is_below = |row: &&SharedRow| row.least_ratios[file].is_some_and(|least| least < limit);
+        Some(shared_rows.iter().filter(is_below).count())
     };
-    Some([count(0)?, count(1)?])
+    Some([count_in_file(0)?, count_in_file(1)?])
 }
 
 /// Returns the row numbers of matching rows, in the order of the first file. Rows with equal keys
@@ -334,47 +347,49 @@ fn numbered_key(
 /// Returns the columns that differ in the shared rows, and marks the rows that differ.
 fn compare_columns(
     files: &[ComparedFile; 2],
-    pairs: &[[usize; 2]],
-    shared: &mut [SharedRow],
+    row_pairs: &[[usize; 2]],
+    shared_rows: &mut [SharedRow],
 ) -> Vec<ColumnChange> {
-    let mut changes = Vec::new();
+    let mut column_changes = Vec::new();
     for (first, column) in files[0].columns() {
-        let Some(second) = files[1].position(&column.name) else { continue };
-        let mut change = ColumnChange {
+        let Some(second) = files[1].column_position(&column.name) else { continue };
+        let mut column_change = ColumnChange {
             name: column.name.clone(),
             unit: column.unit().to_owned(),
             rows: 0,
             greatest_difference: 0.0,
-            worst: Vec::new(),
+            worst_rows: Vec::new(),
         };
-        for (index, (pair, row)) in pairs.iter().zip(shared.iter_mut()).enumerate() {
-            let first_cell = files[0].cell(first, pair[0]);
-            let second_cell = files[1].cell(second, pair[1]);
+        for (index, (row_pair, row)) in row_pairs.iter().zip(shared_rows.iter_mut()).enumerate() {
+            let first_cell = files[0].cell(first, row_pair[0]);
+            let second_cell = files[1].cell(second, row_pair[1]);
             if first_cell == second_cell {
                 continue;
             }
-            change.rows += 1;
+            column_change.rows += 1;
             row.differs = true;
             // Other writers store NaN where a value is missing.
             let number = |cell: Cell| cell.number().filter(|number| !number.is_nan());
             let column_row =
                 ColumnRow { row: index, values: [number(first_cell), number(second_cell)] };
             if let [Some(first), Some(second)] = column_row.values {
-                change.greatest_difference = change.greatest_difference.max((second - first).abs());
+                column_change.greatest_difference =
+                    column_change.greatest_difference.max((second - first).abs());
             }
             let deviation = column_row.deviation();
-            if deviation > 0.0 && !row.sensitive {
-                let index_in_worst =
-                    change.worst.partition_point(|worst_row| worst_row.deviation() >= deviation);
-                change.worst.insert(index_in_worst, column_row);
-                change.worst.truncate(MAX_WORST);
+            if deviation > 0.0 && !row.is_sensitive {
+                let index_in_worst = column_change
+                    .worst_rows
+                    .partition_point(|worst_row| worst_row.deviation() >= deviation);
+                column_change.worst_rows.insert(index_in_worst, column_row);
+                column_change.worst_rows.truncate(MAX_WORST_ROWS);
             }
         }
-        if change.rows > 0 {
-            changes.push(change);
+        if column_change.rows > 0 {
+            column_changes.push(column_change);
         }
     }
-    changes
+    column_changes
 }
 
 #[cfg(test)]

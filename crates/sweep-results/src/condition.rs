@@ -65,7 +65,7 @@ pub struct Condition {
     pub(crate) root: ExpressionNode,
     pub(crate) aggregates: Vec<(Aggregate, ExpressionNode)>,
     /// Whether the expression reads columns outside of aggregates.
-    pub(crate) by_row: bool,
+    pub(crate) is_by_row: bool,
 }
 
 impl Condition {
@@ -214,8 +214,8 @@ pub(crate) struct Accumulator {
     rows_with_value: u64,
     /// The sum of the numbers; a condition counts as 1 where it is true.
     sum: f64,
-    least: Option<f64>,
-    greatest: Option<f64>,
+    minimum: Option<f64>,
+    maximum: Option<f64>,
     /// All numbers, kept for quantiles only.
     numbers: Vec<f64>,
 }
@@ -225,7 +225,7 @@ impl Condition {
     ///
     /// # Errors
     /// [`crate::ResultsError::File`].
-    pub(crate) fn aggregate(
+    pub(crate) fn compute_aggregates(
         &self,
         table: &ResultTable,
         filter: Option<&Condition>,
@@ -266,8 +266,8 @@ impl Accumulator {
         let Some(number) = number else { return };
         self.rows_with_value += 1;
         self.sum += number;
-        self.least = Some(self.least.map_or(number, |least| least.min(number)));
-        self.greatest = Some(self.greatest.map_or(number, |greatest| greatest.max(number)));
+        self.minimum = Some(self.minimum.map_or(number, |minimum| minimum.min(number)));
+        self.maximum = Some(self.maximum.map_or(number, |maximum| maximum.max(number)));
         if let Aggregate::Quantile(_) = function {
             self.numbers.push(number);
         }
@@ -278,8 +278,8 @@ impl Accumulator {
         let value = match function {
             Aggregate::Count => Some(self.sum),
             Aggregate::Share | Aggregate::Mean => Some(self.sum / self.rows_with_value as f64),
-            Aggregate::Least => self.least,
-            Aggregate::Greatest => self.greatest,
+            Aggregate::Least => self.minimum,
+            Aggregate::Greatest => self.maximum,
             Aggregate::Quantile(probability) => quantile(self.numbers, probability),
         };
         AggregateValue {
@@ -294,10 +294,10 @@ impl Accumulator {
 /// Returns a quantile with linear interpolation, as `numpy.quantile` does by default.
 fn quantile(mut numbers: Vec<f64>, probability: f64) -> Option<f64> {
     numbers.sort_by(f64::total_cmp);
-    let position = probability * numbers.len().checked_sub(1)? as f64;
-    let lower = numbers[position.floor() as usize];
-    let upper = numbers[position.ceil() as usize];
-    Some(lower + (upper - lower) * position.fract())
+    let rank = probability * numbers.len().checked_sub(1)? as f64;
+    let lower_number = numbers[rank.floor() as usize];
+    let upper_number = numbers[rank.ceil() as usize];
+    Some(lower_number + (upper_number - lower_number) * rank.fract())
 }
 
 /// Calls `visit` for each row that a filter accepts, with the columns of these names.

@@ -27,7 +27,7 @@ impl ExportFormat {
     }
 
     /// Returns the kind of file that an export may overwrite.
-    pub const fn kind(self) -> FileKind<'static> {
+    pub const fn file_kind(self) -> FileKind<'static> {
         FileKind::Exported { ending: self.name() }
     }
 }

@@ -67,7 +67,7 @@ impl Goal {
 
     /// Returns whether the expression reads columns outside of aggregates.
     pub const fn is_by_row(&self) -> bool {
-        self.expression.by_row
+        self.expression.is_by_row
     }
 
     /// Returns the unit, if the expression is a single column or an aggregate of one, else an empty
@@ -121,23 +121,24 @@ impl Goal {
         reduce: impl Fn(T, T) -> T,
     ) -> Result<Option<T>, ArrowError> {
         let rows = Rows::from_batch(batch, &self.columns)?;
-        let context =
+        let row_context =
             |row| EvaluationContext { row: rows.row(row), first_column: 0, aggregates: &[] };
-        let aggregate = |(function, node): &(Aggregate, ExpressionNode)| {
+        let evaluate_aggregate = |(function, node): &(Aggregate, ExpressionNode)| {
             let mut accumulator = Accumulator::default();
             for row in 0..rows.count {
-                accumulator.add(*function, node, &context(row));
+                accumulator.add(*function, node, &row_context(row));
             }
             let result = accumulator.finish(*function);
             if result.is_complete { result.value } else { Cell::Null }
         };
-        let aggregates: Vec<Cell> = self.expression.aggregates.iter().map(aggregate).collect();
-        let value_of_row = |row| {
-            let context = EvaluationContext { aggregates: &aggregates, ..context(row) };
+        let aggregates: Vec<Cell> =
+            self.expression.aggregates.iter().map(evaluate_aggregate).collect();
+        let row_result = |row| {
+            let context = EvaluationContext { aggregates: &aggregates, ..row_context(row) };
             evaluate_row(&self.expression.root, &context)
         };
-        let row_count = if self.expression.by_row { rows.count } else { rows.count.min(1) };
-        let values = (0..row_count).map(value_of_row).collect::<Option<Vec<T>>>();
+        let row_count = if self.expression.is_by_row { rows.count } else { rows.count.min(1) };
+        let values = (0..row_count).map(row_result).collect::<Option<Vec<T>>>();
         Ok(values.and_then(|values| values.into_iter().reduce(reduce)))
     }
 }
@@ -156,20 +157,15 @@ impl ExpressionNode {
     /// compares no numbers.
     fn slack(&self, context: &EvaluationContext<'_>) -> Option<Slack> {
         match self {
-            Self::And(left_value, right_value) | Self::Or(left_value, right_value) => {
+            Self::And(left, right) | Self::Or(left, right) => {
                 let is_conjunction = matches!(self, Self::And(..));
-                let [left_value, right_value] =
-                    [left_value.slack(context)?, right_value.slack(context)?];
+                let [left, right] = [left.slack(context)?, right.slack(context)?];
                 // For `and` the nearer limit decides, for `or` the farther one.
-                Some(if (left_value.relative < right_value.relative) == is_conjunction {
-                    left_value
-                } else {
-                    right_value
-                })
+                Some(if (left.relative < right.relative) == is_conjunction { left } else { right })
             }
-            Self::Compare(operator, left_value, right_value) => {
-                let left_value = left_value.value(context).number()?;
-                let right_value = right_value.value(context).number()?;
+            Self::Compare(operator, left, right) => {
+                let left_value = left.value(context).number()?;
+                let right_value = right.value(context).number()?;
                 let distance = operator.slack(left_value, right_value)?;
                 let magnitude = left_value.abs().max(right_value.abs()).max(f64::MIN_POSITIVE);
                 Some(Slack { distance, relative: distance / magnitude })
@@ -213,29 +209,31 @@ mod tests {
     use arrow_schema::{Field, Schema};
 
     use super::*;
-    use crate::sample::{flags, numbers};
+    use crate::sample::{flag_array, number_array};
     use sweep_files::columns;
 
-    fn batch() -> RecordBatch {
-        let arrays = [
-            ("x_m", numbers(&[Some(1.0), Some(2.0), Some(4.0), Some(8.0), Some(10.0)])),
-            ("y", numbers(&[Some(1.0), None, Some(3.0), Some(0.0), Some(-1.0)])),
-            ("sound", flags(&[Some(true), Some(true), Some(false), Some(true), Some(true)])),
+    fn sample_batch() -> RecordBatch {
+        let named_arrays = [
+            ("x_m", number_array(&[Some(1.0), Some(2.0), Some(4.0), Some(8.0), Some(10.0)])),
+            ("y", number_array(&[Some(1.0), None, Some(3.0), Some(0.0), Some(-1.0)])),
+            ("sound", flag_array(&[Some(true), Some(true), Some(false), Some(true), Some(true)])),
         ];
-        let field = |(name, array): &(&str, arrow_array::ArrayRef)| {
+        let to_field = |(name, array): &(&str, arrow_array::ArrayRef)| {
             let unit = if *name == "x_m" { "m" } else { "1" };
-            let unit = [("unit".to_owned(), unit.to_owned())];
-            Field::new(*name, array.data_type().clone(), true).with_metadata(unit)
+            let unit_metadata = [("unit".to_owned(), unit.to_owned())];
+
+            Field::new(*name, array.data_type().clone(), true).with_metadata(unit_metadata)
         };
-        let schema = Schema::new(arrays.iter().map(field).collect::<Vec<_>>());
-        let arrays = arrays.into_iter().map(|(_, array)| array).collect();
+        let schema = Schema::new(named_arrays.iter().map(to_field).collect::<Vec<_>>());
+        let arrays = named_arrays.into_iter().map(|(_, array)| array).collect();
         RecordBatch::try_new(Arc::new(schema), arrays).unwrap()
     }
 
     #[test]
     fn objectives_cover_all_rows_and_are_missing_if_a_value_is() {
-        let batch = batch();
-        let parse = |text: &str| Goal::objective(text, &columns(&batch.schema())).unwrap();
+        let batch = sample_batch();
+        let parse_objective =
+            |text: &str| Goal::objective(text, &columns(&batch.schema())).unwrap();
         for (text, value, unit) in [
             ("max(x_m)", Some(10.0), "m"),
             // numpy.quantile([1, 2, 4, 8, 10], [0, 0.5, 0.6, 0.95, 1])
@@ -248,7 +246,7 @@ mod tests {
             ("max(y)", None, ""),
             ("share(sound)", Some(0.8), ""),
         ] {
-            let goal = parse(text);
+            let goal = parse_objective(text);
             let result = goal.evaluate(&batch).unwrap();
             match (result, value) {
                 (Some(result), Some(value)) => assert!((result - value).abs() < 1e-12, "{text}"),
@@ -256,12 +254,12 @@ mod tests {
             }
             assert_eq!((goal.unit(), goal.is_by_row()), (unit, false), "{text}");
         }
-        assert!(parse("x_m").is_by_row());
+        assert!(parse_objective("x_m").is_by_row());
     }
 
     #[test]
     fn slack_is_the_distance_of_the_worst_row_from_the_limit() {
-        let batch = batch();
+        let batch = sample_batch();
         for (text, distance, relative) in [
             ("x_m <= 12.5", 2.5, 0.2),
             ("x_m <= 8", -2.0, -0.2),
@@ -282,7 +280,7 @@ mod tests {
 
     #[test]
     fn a_violation_is_that_of_the_worst_row() {
-        let batch = batch();
+        let batch = sample_batch();
         for (text, violation) in [
             ("x_m <= 10", Some(0.0)),
             ("x_m <= 7.5", Some(2.5)),
@@ -301,7 +299,7 @@ mod tests {
 
     #[test]
     fn errors_have_positions() {
-        let columns = columns(&batch().schema());
+        let columns = columns(&sample_batch().schema());
         for (text, text_at_error) in [
             ("quantile(x_m)", ")"),
             ("quantile(x_m, 95)", "95"),

@@ -1,7 +1,7 @@
 //! Queries of finished results, from the files alone.
 //!
-//! * [`Condition`] is an expression over a file's columns. [`check`] returns the rows that violate
-//!   it, [`top`] the rows that come first in an order.
+//! * [`Condition`] is an expression over a file's columns. [`check_condition`] returns the rows
+//!   that violate it, [`top_rows`] the rows that come first in an order.
 //! * [`Goal`] is an objective or a constraint of a search, over rows in memory.
 //! * [`compare`] returns the differences between two files.
 //! * [`export`] writes a file's rows in another format.
@@ -21,14 +21,14 @@ mod sample;
 mod top;
 
 pub use compare::{
-    BoundaryCrossing, BoundaryShift, ColumnChange, ColumnRow, Comparison, Flip, MAX_WORST,
+    BoundaryCrossing, BoundaryShift, ColumnChange, ColumnRow, Comparison, Flip, MAX_WORST_ROWS,
     PlanChange, SharedRow, compare, plan_changes,
 };
 pub use condition::{Condition, ExpressionError};
 pub use error::ResultsError;
 pub use export::{ExportFormat, export};
 pub use goal::{Goal, Slack};
-pub use nearest::nearest;
-pub use require::{ConditionCheck, ViolatingRow, check};
+pub use nearest::nearest_name;
+pub use require::{ConditionCheck, ViolatingRow, check_condition};
 pub use sweep_files::{Cell, CellKind, Column, ResultTable, columns, ratio_limits};
-pub use top::top;
+pub use top::top_rows;

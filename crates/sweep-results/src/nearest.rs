@@ -9,41 +9,42 @@ const MIN_SIMILARITY: f64 = 0.8;
 const MAX_COMPARED_CHARACTERS: usize = 80;
 
 /// Returns the valid name most similar to the typed one, if any is similar enough.
-pub fn nearest<'a, I>(typed: &str, valid: I) -> Option<&'a str>
+pub fn nearest_name<'a, I>(typed_name: &str, valid_names: I) -> Option<&'a str>
 where
     I: IntoIterator<Item = &'a str>,
 {
-    let typed: String =
-        typed.chars().take(MAX_COMPARED_CHARACTERS).flat_map(char::to_lowercase).collect();
-    let mut nearest_name = None;
+    let typed_name: String =
+        typed_name.chars().take(MAX_COMPARED_CHARACTERS).flat_map(char::to_lowercase).collect();
+    let mut best_name = None;
     let mut greatest_similarity = MIN_SIMILARITY;
-    for name in valid {
-        let similarity = similarity(&typed, name);
+    for name in valid_names {
+        let similarity = similarity(&typed_name, name);
         if similarity > greatest_similarity {
             greatest_similarity = similarity;
-            nearest_name = Some(name);
+            best_name = Some(name);
         }
     }
-    nearest_name
+    best_name
 }
 
 /// Returns the similarity of a typed name to a valid one, from 0 to 1.
-fn similarity(typed: &str, name: &str) -> f64 {
+fn similarity(typed_name: &str, name: &str) -> f64 {
     // Users leave out the unit or the first words as often as they mistype a letter.
-    if typed.len() >= 4 {
-        if name.starts_with(typed) {
+    if typed_name.len() >= 4 {
+        if name.starts_with(typed_name) {
             return 1.0;
         }
-        if name.split('_').any(|word| word == typed) {
+        if name.split('_').any(|word| word == typed_name) {
             return 0.95;
         }
     }
-    let similarity = strsim::jaro_winkler(typed, name)
-        .min(strsim::normalized_damerau_levenshtein(typed, name) + 0.45);
+    let similarity = strsim::jaro_winkler(typed_name, name)
+        .min(strsim::normalized_damerau_levenshtein(typed_name, name) + 0.45);
     // Both measures are low for a short word with one wrong letter, so that it is counted as
     // similar.
-    let has_one_typo = typed.len() >= 3 && strsim::damerau_levenshtein(typed, name) == 1;
-    if has_one_typo { similarity.max(0.9) } else { similarity }
+    let has_one_mistake =
+        typed_name.len() >= 3 && strsim::damerau_levenshtein(typed_name, name) == 1;
+    if has_one_mistake { similarity.max(0.9) } else { similarity }
 }
 
 #[cfg(test)]
@@ -52,7 +53,7 @@ mod tests {
 
     #[test]
     fn the_nearest_name_is_found_for_common_typos() {
-        let valid = [
+        let valid_names = [
             "unbalance_mass_kg",
             "frame_mass_kg",
             "damping_n_s_per_m",
@@ -62,7 +63,7 @@ mod tests {
             "damper_2_friction_n",
             "damper_1_friction_n",
         ];
-        let find_nearest = |typed: &str| nearest(typed, valid);
+        let find_nearest = |typed_name: &str| nearest_name(typed_name, valid_names);
         assert_eq!(find_nearest("unbalance_mas_kg"), Some("unbalance_mass_kg"));
         assert_eq!(find_nearest("Unbalance_Mass_kg"), Some("unbalance_mass_kg"));
         assert_eq!(find_nearest("frame_mass"), Some("frame_mass_kg"));

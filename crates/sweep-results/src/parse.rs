@@ -139,16 +139,16 @@ fn tokenize(text: &str) -> Result<Vec<SpannedToken>, ExpressionError> {
                 );
             };
             (Token::Text(remaining[1..=quote_length].to_owned()), quote_length + 2)
-        } else if let Some((foreign, replacement)) =
-            FOREIGN_OPERATORS.iter().find(|(foreign, _)| {
-                remaining.starts_with(foreign)
+        } else if let Some((foreign_operator, replacement)) =
+            FOREIGN_OPERATORS.iter().find(|(foreign_operator, _)| {
+                remaining.starts_with(foreign_operator)
                     && !(remaining.starts_with("==") || remaining.starts_with("!="))
             })
         {
-            let title = format!("`{foreign}` is not part of an expression");
+            let title = format!("`{foreign_operator}` is not part of an expression");
             return error_at(
                 title,
-                offset..offset + foreign.len(),
+                offset..offset + foreign_operator.len(),
                 format!("expected `{replacement}`"),
             );
         } else if let Some(symbol) = SYMBOLS.iter().find(|symbol| remaining.starts_with(*symbol)) {
@@ -221,8 +221,8 @@ struct Parser<'a> {
     /// The names of the columns read so far.
     used_columns: Vec<String>,
     aggregates: Vec<(Aggregate, ExpressionNode)>,
-    by_row: bool,
-    in_aggregate: bool,
+    is_by_row: bool,
+    is_in_aggregate: bool,
     depth: usize,
 }
 
@@ -249,14 +249,14 @@ pub(crate) fn parse_expression(
         let title = format!("the expression is {}, which {objection}", root.kind.name());
         return error_at(title, root.span, expected);
     }
-    let Parser { used_columns, aggregates, by_row, .. } = parser;
-    let by_row = by_row || aggregates.is_empty();
+    let Parser { used_columns, aggregates, is_by_row, .. } = parser;
+    let is_by_row = is_by_row || aggregates.is_empty();
     Ok(Condition {
         text: text.trim().to_owned(),
         columns: used_columns,
         root: root.node,
         aggregates,
-        by_row,
+        is_by_row,
     })
 }
 
@@ -331,11 +331,11 @@ impl Parser<'_> {
         if !self.accept_word("not") {
             return self.parse_comparison();
         }
-        let inner = self.parse_nested(Self::parse_negation)?;
-        expect_kind(&inner, CellKind::Flag, "`not` turns true into false")?;
-        let span = start..inner.span.end;
+        let inner_node = self.parse_nested(Self::parse_negation)?;
+        expect_kind(&inner_node, CellKind::Flag, "`not` turns true into false")?;
+        let span = start..inner_node.span.end;
         Ok(TypedNode {
-            node: ExpressionNode::Not(Box::new(inner.node)),
+            node: ExpressionNode::Not(Box::new(inner_node.node)),
             kind: CellKind::Flag,
             span,
         })
@@ -393,16 +393,16 @@ impl Parser<'_> {
                 typed_node(ExpressionNode::Literal(Cell::Text(text)), CellKind::Text)
             }
             Token::Symbol("-") => {
-                let inner = self.parse_nested(Self::parse_factor)?;
-                expect_kind(&inner, CellKind::Number, "only a number has a sign")?;
-                let span = span.start..inner.span.end;
-                let node = ExpressionNode::Unary(|number| -number, Box::new(inner.node));
+                let inner_node = self.parse_nested(Self::parse_factor)?;
+                expect_kind(&inner_node, CellKind::Number, "only a number has a sign")?;
+                let span = span.start..inner_node.span.end;
+                let node = ExpressionNode::Unary(|number| -number, Box::new(inner_node.node));
                 Ok(TypedNode { node, kind: CellKind::Number, span })
             }
             Token::Symbol("(") => {
-                let inner = self.parse_nested(Self::parse_disjunction)?;
+                let inner_node = self.parse_nested(Self::parse_disjunction)?;
                 let end = self.accept_closing_parenthesis()?;
-                Ok(TypedNode { span: span.start..end, ..inner })
+                Ok(TypedNode { span: span.start..end, ..inner_node })
             }
             Token::Word(word) if word == "true" || word == "false" => {
                 typed_node(ExpressionNode::Literal(Cell::Flag(word == "true")), CellKind::Flag)
@@ -435,9 +435,9 @@ impl Parser<'_> {
                 candidates: Some((word.to_owned(), names)),
             });
         };
-        self.by_row |= !self.in_aggregate;
-        let known_index = self.used_columns.iter().position(|used_column| used_column == word);
-        let index = known_index.unwrap_or_else(|| {
+        self.is_by_row |= !self.is_in_aggregate;
+        let index_if_used = self.used_columns.iter().position(|used_column| used_column == word);
+        let index = index_if_used.unwrap_or_else(|| {
             self.used_columns.push(word.to_owned());
             self.used_columns.len() - 1
         });
@@ -451,15 +451,15 @@ impl Parser<'_> {
         span: Range<usize>,
     ) -> ParseResult {
         self.next_index += 1;
-        if aggregate.is_some() && self.in_aggregate {
+        if aggregate.is_some() && self.is_in_aggregate {
             let title = format!("`{word}` within another function over all rows");
             return error_at(title, span, "expected a value of single rows");
         }
-        let was_in_aggregate = self.in_aggregate;
-        self.in_aggregate |= aggregate.is_some();
-        let inner = self.parse_nested(Self::parse_disjunction);
-        self.in_aggregate = was_in_aggregate;
-        let inner = inner?;
+        let was_in_aggregate = self.is_in_aggregate;
+        self.is_in_aggregate |= aggregate.is_some();
+        let inner_node = self.parse_nested(Self::parse_disjunction);
+        self.is_in_aggregate = was_in_aggregate;
+        let inner_node = inner_node?;
         if let Some(Aggregate::Quantile(probability)) = &mut aggregate {
             *probability = self.parse_probability()?;
         }
@@ -468,13 +468,17 @@ impl Parser<'_> {
             Some(Aggregate::Count | Aggregate::Share) => CellKind::Flag,
             _ => CellKind::Number,
         };
-        expect_kind(&inner, expected_kind, &format!("`{word}` takes {}", expected_kind.name()))?;
+        expect_kind(
+            &inner_node,
+            expected_kind,
+            &format!("`{word}` takes {}", expected_kind.name()),
+        )?;
         let node = match aggregate {
             Some(aggregate) => {
-                self.aggregates.push((aggregate, inner.node));
+                self.aggregates.push((aggregate, inner_node.node));
                 ExpressionNode::Aggregate(self.aggregates.len() - 1)
             }
-            None => ExpressionNode::Unary(f64::abs, Box::new(inner.node)),
+            None => ExpressionNode::Unary(f64::abs, Box::new(inner_node.node)),
         };
         Ok(TypedNode { node, kind: CellKind::Number, span: span.start..end })
     }
@@ -518,9 +522,9 @@ impl Parser<'_> {
             return error_at("the expression is nested too deeply", span, expected);
         }
         self.depth += 1;
-        let parsed = parse(self);
+        let result = parse(self);
         self.depth -= 1;
-        parsed
+        result
     }
 }
 
@@ -601,9 +605,9 @@ mod tests {
     #[test]
     fn expressions_by_row_differ_from_aggregates() {
         let table = sample::table();
-        let by_row = |text: &str| Condition::parse(text, &table).unwrap().by_row;
-        assert!(by_row("ratio_max < 1.5 and reliable"));
-        assert!(by_row("ratio_max < 2 * mean(ratio_max)"));
-        assert!(!by_row("count(not reliable) == 0 and max(abs(ratio_max - 1)) < 3"));
+        let is_by_row = |text: &str| Condition::parse(text, &table).unwrap().is_by_row;
+        assert!(is_by_row("ratio_max < 1.5 and reliable"));
+        assert!(is_by_row("ratio_max < 2 * mean(ratio_max)"));
+        assert!(!is_by_row("count(not reliable) == 0 and max(abs(ratio_max - 1)) < 3"));
     }
 }

@@ -13,7 +13,8 @@ pub struct ViolatingRow {
     /// The row's number in the file, from 0.
     pub row: u64,
     /// Whether the condition is neither true nor false, because a value is missing.
-    pub undefined: bool,
+    #[serde(rename = "undefined")]
+    pub is_undefined: bool,
     /// The cells of the columns that identify the row, then of those that the condition reads.
     pub cells: Vec<(String, Cell)>,
 }
@@ -27,13 +28,16 @@ pub struct ConditionCheck {
     /// the file.
     pub holds: bool,
     /// Whether the condition reads columns outside of aggregates.
-    pub by_row: bool,
+    #[serde(rename = "by_row")]
+    pub is_by_row: bool,
     /// The number of rows that were checked.
     pub rows: u64,
     /// The number of rows for which the condition is false.
-    pub failing: u64,
+    #[serde(rename = "failing")]
+    pub failing_rows: u64,
     /// The number of rows for which the condition is neither true nor false.
-    pub undefined: u64,
+    #[serde(rename = "undefined")]
+    pub undefined_rows: u64,
     /// The values of the aggregates over the rows that have a value, in the order of their closing
     /// parentheses.
     #[serde(rename = "folded")]
@@ -45,7 +49,8 @@ pub struct ConditionCheck {
     pub share_counts: Vec<Option<u64>>,
     /// The rows that violate the condition. They are sorted by the first column of the condition
     /// that has a direction in which it is bad, the worst first.
-    pub offenders: Vec<ViolatingRow>,
+    #[serde(rename = "offenders")]
+    pub violating_rows: Vec<ViolatingRow>,
 }
 
 /// Checks a condition on the rows that a filter accepts.
@@ -56,51 +61,52 @@ pub struct ConditionCheck {
 ///
 /// # Errors
 /// [`ResultsError::File`].
-pub fn check(
+pub fn check_condition(
     table: &ResultTable,
     condition: &Condition,
     filter: Option<&Condition>,
     allow_null: bool,
-    max_offenders: usize,
+    max_violating_rows: usize,
 ) -> Result<ConditionCheck, ResultsError> {
-    let results = condition.aggregate(table, filter)?;
+    let results = condition.compute_aggregates(table, filter)?;
     let value_or_null = |result: &AggregateValue| {
         if result.is_complete || allow_null { result.value.clone() } else { Cell::Null }
     };
     let aggregates: Vec<Cell> = results.iter().map(value_or_null).collect();
     let mut condition_check = ConditionCheck {
         expression: condition.text.clone(),
-        by_row: condition.by_row,
+        is_by_row: condition.is_by_row,
         aggregate_rows: results.iter().map(|result| result.rows).collect(),
         share_counts: results.iter().map(AggregateValue::share_count).collect(),
         aggregate_values: results.into_iter().map(|result| result.value).collect(),
         ..ConditionCheck::default()
     };
-    let ordered_column =
+    let column_with_direction =
         |(k, name): (usize, &String)| Some((k, table.column(name)?.metadata.worse?));
-    let order_column = condition.columns.iter().enumerate().find_map(ordered_column);
-    let mut offenders = WorstRows::new(order_column.map(|(_, direction)| direction), max_offenders);
-    let mut truth_of_file = None;
+    let order_column = condition.columns.iter().enumerate().find_map(column_with_direction);
+    let mut violating_rows =
+        WorstRows::new(order_column.map(|(_, direction)| direction), max_violating_rows);
+    let mut file_truth = None;
     let key_columns = table.key_columns();
     let names = [&condition.column_names()[..], &key_columns].concat();
     for_each_row(table, &names, filter, |context| {
         condition_check.rows += 1;
         let context = EvaluationContext { aggregates: &aggregates, ..*context };
         let truth = condition.root.truth(&context);
-        if !condition.by_row {
-            truth_of_file = truth;
+        if !condition.is_by_row {
+            file_truth = truth;
             return Ok(());
         }
         match truth {
             Some(true) => return Ok(()),
-            Some(false) => condition_check.failing += 1,
-            None => condition_check.undefined += 1,
+            Some(false) => condition_check.failing_rows += 1,
+            None => condition_check.undefined_rows += 1,
         }
         if allow_null && truth.is_none() {
             return Ok(());
         }
         let value = order_column.and_then(|(column, _)| context.row.cell(column).number());
-        offenders.insert(value, || {
+        violating_rows.insert(value, || {
             let first_key_column = condition.columns.len();
             let other_columns =
                 (0..first_key_column).filter(|&column| !key_columns.contains(&names[column]));
@@ -108,16 +114,16 @@ pub fn check(
             let cells = columns
                 .map(|column| (names[column].to_owned(), context.row.cell(column)))
                 .collect();
-            ViolatingRow { row: context.row.index(), undefined: truth.is_none(), cells }
+            ViolatingRow { row: context.row.index(), is_undefined: truth.is_none(), cells }
         });
         Ok(())
     })?;
-    condition_check.offenders = offenders.finish();
+    condition_check.violating_rows = violating_rows.finish();
     condition_check.holds = condition_check.rows > 0
-        && if condition.by_row {
-            condition_check.failing == 0 && (allow_null || condition_check.undefined == 0)
+        && if condition.is_by_row {
+            condition_check.failing_rows == 0 && (allow_null || condition_check.undefined_rows == 0)
         } else {
-            truth_of_file.unwrap_or(false)
+            file_truth.unwrap_or(false)
         };
     Ok(condition_check)
 }
@@ -131,7 +137,7 @@ mod tests {
         let table = sample::table();
         let condition = Condition::parse(text, &table).unwrap();
         let filter = filter.map(|filter| Condition::parse(filter, &table).unwrap());
-        check(&table, &condition, filter.as_ref(), allow_null, 3).unwrap()
+        check_condition(&table, &condition, filter.as_ref(), allow_null, 3).unwrap()
     }
 
     // The sample's ratios are 1, 1.5, 2.5, null, 4, 1.2; rows below 2 are reliable; row 3 has
@@ -139,27 +145,28 @@ mod tests {
     #[test]
     fn violating_rows_are_listed_with_their_keys() {
         let result = check_text("ratio_max < 2", None, false);
-        assert!(!result.holds && result.by_row);
-        assert_eq!((result.rows, result.failing, result.undefined), (6, 2, 1));
+        assert!(!result.holds && result.is_by_row);
+        assert_eq!((result.rows, result.failing_rows, result.undefined_rows), (6, 2, 1));
         assert_eq!(
-            result.offenders.iter().map(|offender| offender.row).collect::<Vec<_>>(),
+            result.violating_rows.iter().map(|violating_row| violating_row.row).collect::<Vec<_>>(),
             [2, 3, 4]
         );
-        let first = &result.offenders[0];
-        let names: Vec<&str> = first.cells.iter().map(|(name, _)| name.as_str()).collect();
+        let first_violation = &result.violating_rows[0];
+        let names: Vec<&str> =
+            first_violation.cells.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["point", "unbalance_mass_kg", "damping_n_s_per_m", "ratio_max"]);
-        assert_eq!(first.cells[1].1, Cell::Number(0.1));
-        assert_eq!(first.cells[3].1, Cell::Number(2.5));
-        assert!(result.offenders[1].undefined);
+        assert_eq!(first_violation.cells[1].1, Cell::Number(0.1));
+        assert_eq!(first_violation.cells[3].1, Cell::Number(2.5));
+        assert!(result.violating_rows[1].is_undefined);
     }
 
     #[test]
-    fn the_worst_offenders_come_first() {
+    fn the_worst_violating_rows_come_first() {
         // The gaps are 0.009, 0.0085, 0.0075, null, 0.006, 0.0088 m.
         let result = check_text("min_gap_nonlinear_m > 0.0089", None, false);
-        assert_eq!((result.failing, result.undefined), (4, 1));
+        assert_eq!((result.failing_rows, result.undefined_rows), (4, 1));
         assert_eq!(
-            result.offenders.iter().map(|offender| offender.row).collect::<Vec<_>>(),
+            result.violating_rows.iter().map(|violating_row| violating_row.row).collect::<Vec<_>>(),
             [4, 2, 1]
         );
     }
@@ -172,7 +179,7 @@ mod tests {
         assert!(check_text("ratio_max < 9 or status == 'diverged'", None, false).holds);
         assert!(!check_text("ratio_max is not null", None, false).holds);
         assert!(!check_text("not (ratio_max < 9)", None, true).holds);
-        assert_eq!(check_text("not (ratio_max < 9)", None, true).undefined, 1);
+        assert_eq!(check_text("not (ratio_max < 9)", None, true).undefined_rows, 1);
     }
 
     #[test]
@@ -200,11 +207,11 @@ mod tests {
             ("count(status != \"ok\") < 1", false),
         ] {
             let result = check_text(text, None, true);
-            assert!(!result.by_row);
+            assert!(!result.is_by_row);
             assert_eq!(result.holds, holds, "{text}: {result:?}");
         }
         let by_row_with_aggregate = check_text("ratio_max <= max(ratio_max)", None, true);
-        assert!(by_row_with_aggregate.holds && by_row_with_aggregate.by_row);
+        assert!(by_row_with_aggregate.holds && by_row_with_aggregate.is_by_row);
         assert_eq!(by_row_with_aggregate.aggregate_values, [Cell::Number(4.0)]);
         let filtered = check_text("max(ratio_max) == 2.5", Some("not sensitive"), true);
         assert!(filtered.holds, "{filtered:?}");
@@ -242,19 +249,19 @@ mod tests {
     // Other writers store a missing value as NaN.
     #[test]
     fn nan_is_null() {
-        let home = tempfile::tempdir().unwrap();
-        let path = home.path().join("nan.parquet");
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("nan.parquet");
         let ratios = [Some(1.0), Some(f64::NAN), Some(3.0), None];
-        sample::write(&path, vec![("x", "1", sample::numbers(&ratios))], &[]);
+        sample::write(&path, vec![("x", "1", sample::number_array(&ratios))], &[]);
         let table = ResultTable::open(&path).unwrap();
         let check_column = |text: &str, filter: Option<&str>| {
             let condition = Condition::parse(text, &table).unwrap();
             let filter = filter.map(|filter| Condition::parse(filter, &table).unwrap());
-            check(&table, &condition, filter.as_ref(), true, 3).unwrap()
+            check_condition(&table, &condition, filter.as_ref(), true, 3).unwrap()
         };
         assert!(check_column("count(x is null) == 2 and mean(x) == 2 and max(x) == 3", None).holds);
         assert_eq!(check_column("x > 0", Some("x is not null")).rows, 2);
-        assert_eq!(check_column("x > 0", None).undefined, 2);
+        assert_eq!(check_column("x > 0", None).undefined_rows, 2);
         assert!(check_column("share(x > 2) == 0.5", None).holds);
     }
 

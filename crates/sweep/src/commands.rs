@@ -27,7 +27,7 @@ use sweep_engine::commands::{
     Arguments, GeneralCommand, boundary, compare, examples, export, merge, optimise, parameters,
     report, require, show as show_engine, status,
 };
-use sweep_engine::{Error, Exit, nearest};
+use sweep_engine::{Error, Exit, nearest_name};
 use washer_plot::WasherFigures;
 
 /// The headings of help, each with its subcommands.
@@ -187,7 +187,7 @@ fn add_suggestion(mut error: clap::Error) -> clap::Error {
     let shown = visible_command();
     let names = shown.get_subcommands().map(clap::Command::get_name);
     if let (None, Some(name)) =
-        (error.get(ContextKind::SuggestedSubcommand), nearest(&typed, names))
+        (error.get(ContextKind::SuggestedSubcommand), nearest_name(&typed, names))
     {
         error
             .insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![name.to_owned()]));

@@ -87,7 +87,7 @@ impl<'a> HeldPlan<'a> {
 
     /// Returns the name of the command.
     pub(crate) fn command_name(&self) -> &'static str {
-        self.kind().word()
+        self.kind().short_name()
     }
 
     /// Returns the path of the result, by default one in `results`.

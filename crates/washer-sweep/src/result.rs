@@ -144,7 +144,7 @@ impl PyResultTable {
     /// Returns the kind of the result, such as `"map"`, `"boundary"`, `"trace"` or `"modes"`.
     #[getter]
     fn kind(&self) -> &'static str {
-        self.0.kind().word()
+        self.0.kind().short_name()
     }
 
     /// Returns the plan of the result, with the keys of a grid file.
@@ -209,7 +209,7 @@ impl PyResultTable {
 
     fn __repr__(&self) -> String {
         let name = self.0.plan()["name"].as_str().unwrap_or("unnamed");
-        let kind = self.0.kind().word();
+        let kind = self.0.kind().short_name();
         let rows = format_count(self.0.rows(), "row");
         let columns = format_count(self.0.schema().fields().len(), "column");
         format!("<washer_sweep.Result: {kind} of {name}, {rows}, {columns}>")

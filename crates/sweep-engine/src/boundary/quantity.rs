@@ -9,7 +9,7 @@ use sweep_results::{Column as KnownColumn, Goal, columns};
 
 use crate::config::{Diagnostic, Location, Report};
 use crate::store::{CellType, DeclaredColumn};
-use crate::{Error, Model, Plan, nearest};
+use crate::{Error, Model, Plan, nearest_name};
 
 /// The prefix of the columns of ratios.
 const RATIO_PREFIX: &str = "ratio_";
@@ -251,7 +251,7 @@ pub fn find_quantity<M: Model>(
         if let Some((_, required_setting)) = required_setting.filter(|_| !names().any(is_of_kind)) {
             return Err(Error::option("--quantity", name, required_setting));
         }
-        let suggestion = nearest(name, names());
+        let suggestion = nearest_name(name, names());
         let suggestion =
             suggestion.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
         let known_columns: Vec<String> =

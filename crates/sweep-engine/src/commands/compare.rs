@@ -173,15 +173,16 @@ fn difference_tables(args: &CompareArgs, comparison: &Comparison) -> Vec<TitledT
         tables.push(TitledTable { title, headings, rows });
     };
     // If results have a lower limit of ratios, the least ratio decides on the verdict too.
-    let has_lower_limit = comparison.columns.iter().any(|column| column.name == "ratio_min");
+    let has_lower_limit =
+        comparison.changed_columns.iter().any(|column| column.name == "ratio_min");
     let verdict_cell = |row: &SharedRow, side: usize| {
         let ratio = match has_lower_limit {
             true => format!(
                 "{} to {}",
-                format_optional(row.least_ratio[side]),
-                format_optional(row.ratio[side])
+                format_optional(row.least_ratios[side]),
+                format_optional(row.ratios[side])
             ),
-            false => format_optional(row.ratio[side]),
+            false => format_optional(row.ratios[side]),
         };
         match row.flip {
             Flip::Defined => ratio,
@@ -200,13 +201,13 @@ fn difference_tables(args: &CompareArgs, comparison: &Comparison) -> Vec<TitledT
             let change = row.ratio_quotient().map(|change| 100.0 * (change - 1.0));
             let change =
                 change.map_or_else(|| format_optional(None), |change| format!("{change:+.3} %"));
-            (row.ratio.map(format_optional), Some(change))
+            (row.ratios.map(format_optional), Some(change))
         });
         let rows = comparison.most_deviating(max_rows, sensitive, SharedRow::gap_deviation_m);
         add_table(format!("greatest changes of the least gap{row_kind}, m"), rows, &|row| {
             let sign = if row.gap_difference_m() > Some(0.0) { "+" } else { "" };
             let change = format!("{sign}{}", format_optional(row.gap_difference_m()));
-            (row.gap_m.map(format_optional), Some(change))
+            (row.gaps_m.map(format_optional), Some(change))
         });
     }
     tables.extend(
@@ -218,12 +219,12 @@ fn difference_tables(args: &CompareArgs, comparison: &Comparison) -> Vec<TitledT
 /// Returns the table of the greatest changes of a column that `--fail-on` names.
 fn column_table(fail_on: &FailOn, comparison: &Comparison, max_rows: usize) -> Option<TitledTable> {
     let FailOn::Column(name, _) = fail_on else { return None };
-    let column = comparison.columns.iter().find(|column| column.name == *name)?;
-    let rows = column.worst.iter().take(max_rows).map(|worst| {
+    let column = comparison.changed_columns.iter().find(|column| column.name == *name)?;
+    let rows = column.worst_rows.iter().take(max_rows).map(|worst| {
         let [first, second] = worst.values;
         let change = first.zip(second).map(|(first, second)| second - first);
         let sign = if change > Some(0.0) { "+" } else { "" };
-        let key = comparison.shared[worst.row].key.iter().map(|value| format_number(*value));
+        let key = comparison.shared_rows[worst.row].key.iter().map(|value| format_number(*value));
         let value_cells = [
             format_optional(first),
             format_optional(second),
@@ -262,7 +263,7 @@ fn summary_lines(
         (0, 0) => String::new(),
         _ => format!(", {first} only in A, {second} only in B"),
     };
-    lines.push(("rows", format!("{} in both{unmatched}", comparison.shared.len())));
+    lines.push(("rows", format!("{} in both{unmatched}", comparison.shared_rows.len())));
     if comparison.is_matched_by_point {
         let description = "rows are matched by point: the axes have tolerances about other \
                     numbers; \
@@ -288,7 +289,8 @@ fn summary_lines(
         let sensitive = comparison.flips(true).count();
         lines.push(("verdicts", format!("{flips}; of sensitive rows {sensitive}")));
     }
-    if let Some([first, second]) = comparison.over_estimated.filter(|counts| *counts != [0, 0]) {
+    if let Some([first, second]) = comparison.over_estimated_rows.filter(|counts| *counts != [0, 0])
+    {
         let description = format!(
             "in {first} rows of A, {second} of B the linear model over-estimates: a ratio is below \
              1 / ratio_limit, or ratio_min"
@@ -298,13 +300,13 @@ fn summary_lines(
     if let Some(shift) = &comparison.boundary {
         lines.push(("boundary", describe_shift(shift)));
     }
-    let differing = comparison.shared.iter().filter(|row| row.differs).count();
+    let differing = comparison.shared_rows.iter().filter(|row| row.differs).count();
     let description = match differing {
         0 => "every shared cell is the same, bit for bit".to_owned(),
         count => {
             let name = |column: &ColumnChange| format!("{} ({})", column.name, column.rows);
-            let names: Vec<String> = comparison.columns.iter().take(6).map(name).collect();
-            let ellipsis = if comparison.columns.len() > 6 { ", ..." } else { "" };
+            let names: Vec<String> = comparison.changed_columns.iter().take(6).map(name).collect();
+            let ellipsis = if comparison.changed_columns.len() > 6 { ", ..." } else { "" };
             format!("{count} rows, in {}{ellipsis}", names.join(", "))
         }
     };
@@ -321,7 +323,7 @@ fn describe_shift(shift: &BoundaryShift) -> String {
             format!("{count} along {axis}, none moved")
         }
         (Some(_), _)
-            if crossings.iter().all(|crossing| crossing.bracket[0] == crossing.bracket[1]) =>
+            if crossings.iter().all(|crossing| crossing.brackets[0] == crossing.brackets[1]) =>
         {
             format!("{count} along {axis}, none moved out of its bracket")
         }
@@ -330,7 +332,7 @@ fn describe_shift(shift: &BoundaryShift) -> String {
             let axis_values: Vec<String> = axis_values
                 .map(|(name, value)| format!("{name} {}", format_number(*value)))
                 .collect();
-            let [from, to] = most_shifted.bracket.map(|ends| format_range(ends, format_number));
+            let [from, to] = most_shifted.brackets.map(|ends| format_range(ends, format_number));
             let certain = shift.count_certain_shifts();
             let axis_values = axis_values.join(", ");
             format!(
@@ -455,8 +457,8 @@ fn to_json(
         let axis_values: serde_json::Map<String, Value> =
             comparison.keys.iter().cloned().zip(row.key.iter().map(|value| json!(value))).collect();
         json!({
-            "rows": row.rows, "place": axis_values, "ratio": row.ratio, "gap_m": row.gap_m,
-            "flip": row.flip, "sensitive": row.sensitive,
+            "rows": row.rows, "place": axis_values, "ratio": row.ratios, "gap_m": row.gaps_m,
+            "flip": row.flip, "sensitive": row.is_sensitive,
         })
     };
     let max_rows = usize::from(args.rows);
@@ -477,16 +479,16 @@ fn to_json(
         })).collect::<Value>(),
         "matched_by": if comparison.is_matched_by_point { "point" } else { "axes" },
         "rows": {
-            "in_both": comparison.shared.len(),
-            "over_estimated": comparison.over_estimated,
+            "in_both": comparison.shared_rows.len(),
+            "over_estimated": comparison.over_estimated_rows,
             "only_in_first": comparison.unmatched_rows[0],
             "only_in_second": comparison.unmatched_rows[1],
-            "differing": comparison.shared.iter().filter(|row| row.differs).count(),
+            "differing": comparison.shared_rows.iter().filter(|row| row.differs).count(),
         },
         "axes_left_out": comparison.single_valued_axes.iter().map(|(file, name, value)| json!({
             "file": (["first", "second"][*file]), "parameter": name, "value": value,
         })).collect::<Value>(),
-        "columns": comparison.columns,
+        "columns": comparison.changed_columns,
         "columns_only_in": {
             "first": comparison.unmatched_columns[0],
             "second": comparison.unmatched_columns[1],
@@ -504,7 +506,7 @@ fn to_json(
             "certain": shift.count_certain_shifts(),
             "crossings": shift.crossings.iter().map(|crossing| json!({
                 "place": crossing.key_values, "number": crossing.number, "at": crossing.positions,
-                "bracket": crossing.bracket,
+                "bracket": crossing.brackets,
                 "by": crossing.shift_range(),
                 "at_least": crossing.certain_shift(),
             })).collect::<Value>(),

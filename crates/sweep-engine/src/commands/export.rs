@@ -43,7 +43,7 @@ pub fn run(args: &ExportArgs) -> Result<Exit, Error> {
     };
     refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
-    let output = Output::begin(output_path, format.kind())?;
+    let output = Output::begin(output_path, format.file_kind())?;
     export(&file, format, output)?;
     tell(&format!("wrote {}: {} rows", output_path.display(), file.rows()));
     Ok(Exit::Done)

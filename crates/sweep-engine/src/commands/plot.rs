@@ -7,9 +7,9 @@ use clap::ValueEnum;
 use crate::config::arguments::parse_finite;
 use crate::exit::{Error, Exit, tell};
 use crate::store::refuse_unfinished;
-use sweep_files::beside;
+use sweep_files::path_beside;
 use sweep_plot::{CommonFigures, DesignView, Figures, PlotError, PlotOptions, render};
-use sweep_results::nearest;
+use sweep_results::nearest_name;
 
 /// The arguments of `plot` for a model with these views.
 #[derive(Debug, clap::Args)]
@@ -59,7 +59,7 @@ pub fn draw<V: ValueEnum + Send + Sync>(
     model_options: PlotOptions,
     model: &dyn Figures,
 ) -> Result<Exit, Error> {
-    let output = args.output.clone().unwrap_or_else(|| beside(&args.file, "svg"));
+    let output = args.output.clone().unwrap_or_else(|| path_beside(&args.file, "svg"));
     let options = PlotOptions {
         quantity: args.quantity.clone(),
         fixed_values: args.at.clone(),
@@ -75,7 +75,7 @@ pub fn draw<V: ValueEnum + Send + Sync>(
 /// Adds the nearest valid name to the error about an unknown one.
 fn suggest_name(error: PlotError) -> PlotError {
     let PlotError::NotThere { message, requested_name, valid_names } = &error else { return error };
-    match nearest(requested_name, valid_names.iter().map(String::as_str)) {
+    match nearest_name(requested_name, valid_names.iter().map(String::as_str)) {
         Some(nearest_name) => {
             PlotError::Unfit(format!("{message}\n  = help: is `{nearest_name}` meant?"))
         }

@@ -14,7 +14,7 @@ use sweep_plot::{
     Figures, describe_as_html, escape, format_significant, html_table, name_in_words,
     printable_page, quantity_in_words,
 };
-use sweep_results::{Cell, Column, ResultTable, check, ratio_limits, top};
+use sweep_results::{Cell, Column, ResultTable, check_condition, ratio_limits, top_rows};
 
 /// Arguments of `sweep report`.
 #[derive(Debug, clap::Args)]
@@ -95,12 +95,12 @@ pub fn run<M: Model>(
     let mut all_hold = true;
     let mut requirement_rows = Vec::new();
     for condition in &requirements {
-        let condition_check = check(&file, condition, None, false, 1)?;
+        let condition_check = check_condition(&file, condition, None, false, 1)?;
         all_hold &= condition_check.holds;
         let aggregate_values: Vec<String> =
             condition_check.aggregate_values.iter().map(format_cell).collect();
-        let violating_rows = condition_check.failing + condition_check.undefined;
-        let outcome = match condition_check.by_row {
+        let violating_rows = condition_check.failing_rows + condition_check.undefined_rows;
+        let outcome = match condition_check.is_by_row {
             true => format!("{violating_rows} of {} rows break it", condition_check.rows),
             false => aggregate_values.join(", "),
         };
@@ -177,7 +177,7 @@ fn worst_values(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
         let is_shown = !is_numbered && name.split('_').all(|word| word != MODELS[1]);
         let Some(worse) = column.metadata.worse.filter(|_| is_shown) else { continue };
         let columns: Vec<&str> = [name].into_iter().chain(axes.iter().copied()).collect();
-        let rows = top(file, &columns, None, Some((name, worse)), 1)?;
+        let rows = top_rows(file, &columns, None, Some((name, worse)), 1)?;
         let Some([value, axis_cells @ ..]) = rows.first().map(Vec::as_slice) else { continue };
         let Cell::Number(number) = value else { continue };
         let format_value = |value: f64| join_unit(format_significant(value, 4), column.unit());

@@ -10,7 +10,7 @@ use super::{conditions, format_cell, format_table};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, show};
 use sweep_plot::Share;
-use sweep_results::{Cell, Condition, ConditionCheck, ResultTable, check};
+use sweep_results::{Cell, Condition, ConditionCheck, ResultTable, check_condition};
 
 /// Arguments of `sweep require`.
 #[derive(Debug, clap::Args)]
@@ -71,7 +71,8 @@ pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
     let expression_checks = conditions
         .iter()
         .map(|condition| {
-            let whole = check(&file, condition, filter.as_ref(), args.allow_null, max_rows)?;
+            let whole =
+                check_condition(&file, condition, filter.as_ref(), args.allow_null, max_rows)?;
             let parts =
                 check_parts(&file, condition, filter.as_ref(), args.allow_null, whole.holds)?;
             Ok(ExpressionCheck { intervals: share_intervals(&whole, is_random), whole, parts })
@@ -140,7 +141,7 @@ fn check_parts(
     }
     let texts: Vec<String> = texts.into_iter().map(str::to_owned).collect();
     let parts = conditions::parse_conditions("EXPRESSION", &texts, file)?;
-    let checks = parts.iter().map(|part| check(file, part, filter, allow_null, 0));
+    let checks = parts.iter().map(|part| check_condition(file, part, filter, allow_null, 0));
     Ok(checks.collect::<Result<Vec<_>, _>>()?)
 }
 
@@ -179,18 +180,18 @@ fn format_condition_check(
     let verdict = if condition_check.holds { "holds" } else { "FAILS" };
     let mut text = format!("{verdict}  {}", condition_check.expression);
     // Writing to a String cannot fail.
-    let _ = match (condition_check.rows, condition_check.by_row) {
+    let _ = match (condition_check.rows, condition_check.is_by_row) {
         (0, _) => writeln!(text, ": there is no row to check"),
-        (rows, true) if condition_check.failing + condition_check.undefined == 0 => {
+        (rows, true) if condition_check.failing_rows + condition_check.undefined_rows == 0 => {
             writeln!(text, ": {rows} rows")
         }
         (rows, true) => {
-            let undefined = match (condition_check.undefined, args.allow_null) {
+            let undefined = match (condition_check.undefined_rows, args.allow_null) {
                 (0, _) => String::new(),
                 (count, true) => format!(", {count} undefined (null) and let pass"),
                 (count, false) => format!(", {count} undefined (null)"),
             };
-            writeln!(text, ": {} of {rows} rows false{undefined}", condition_check.failing)
+            writeln!(text, ": {} of {rows} rows false{undefined}", condition_check.failing_rows)
         }
         (rows, false) => {
             let values = condition_check.aggregate_values.iter().enumerate();
@@ -213,16 +214,16 @@ fn format_condition_check(
             }
         }
     };
-    let Some(first) = condition_check.offenders.first() else { return text };
+    let Some(first) = condition_check.violating_rows.first() else { return text };
     let headings: Vec<String> = first.cells.iter().map(|(name, _)| name.clone()).collect();
     let cells = |violating_row: &sweep_results::ViolatingRow| {
         violating_row.cells.iter().map(|(_, cell)| format_cell(cell)).collect()
     };
-    let rows: Vec<Vec<String>> = condition_check.offenders.iter().map(cells).collect();
+    let rows: Vec<Vec<String>> = condition_check.violating_rows.iter().map(cells).collect();
     text.push_str(&format_table(&headings, &rows, "       "));
-    let violation_count =
-        condition_check.failing + if args.allow_null { 0 } else { condition_check.undefined };
-    let hidden_rows = violation_count - condition_check.offenders.len() as u64;
+    let violation_count = condition_check.failing_rows
+        + if args.allow_null { 0 } else { condition_check.undefined_rows };
+    let hidden_rows = violation_count - condition_check.violating_rows.len() as u64;
     if hidden_rows > 0 {
         let _ = writeln!(text, "       and {hidden_rows} more (--rows)");
     }

@@ -15,7 +15,7 @@ use crate::store::{Holder, UnfinishedWork, find_unfinished, refuse_unfinished};
 use crate::{Error, Exit, show};
 use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
-use sweep_results::{Cell, Condition, ResultTable, ratio_limits, top};
+use sweep_results::{Cell, Condition, ResultTable, ratio_limits, top_rows};
 
 /// The number of rows that are shown without `--top`. Basis: they fit a terminal. Doubling it shows
 /// twice as many.
@@ -193,7 +193,7 @@ fn show_rows(args: &ShowArgs) -> Result<Exit, Error> {
     let by = args.by.as_deref().map(|by| (by, order(by)));
     let count = usize::from(args.top.unwrap_or(ROWS_SHOWN));
     let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let rows = top(&file, &names, filter.as_ref(), by, count)?;
+    let rows = top_rows(&file, &names, filter.as_ref(), by, count)?;
     if args.json {
         let object = |row: &Vec<Cell>| -> Value {
             columns.iter().zip(row).map(|(name, cell)| (name.as_str(), json!(cell))).collect()

@@ -1,7 +1,7 @@
 //! Axes: parameters with the values that a grid, a design or a list gives them.
 
 use sweep_parameter::{Range, decimal};
-use sweep_results::nearest;
+use sweep_results::nearest_name;
 
 use super::draft::WrittenNumbers;
 use super::list::{self, PointList};
@@ -181,7 +181,7 @@ fn is_unlike_parameters<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) ->
     let model = &draft.plan.model;
     let Err(error) = model.find(name.value) else { return false };
     let parameters = model.parameters();
-    let nearest_name = nearest(
+    let nearest_name = nearest_name(
         name.value,
         parameters.iter().take(MAX_COMPARED_NAMES).map(|parameter| &*parameter.name),
     );

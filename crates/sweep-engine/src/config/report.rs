@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::source::{Location, SourceId, Sources};
 use crate::plan::ASSUMED_PREFIX;
-use sweep_results::nearest;
+use sweep_results::nearest_name;
 
 /// Maximum number of mistakes that are kept; later ones are only counted. Basis: a wrong file must
 /// not fill a terminal or the memory. Doubling it shows twice as many.
@@ -56,7 +56,7 @@ impl Diagnostic {
         typed: &str,
         valid: impl IntoIterator<Item = &'a str>,
     ) -> Self {
-        match nearest(typed, valid) {
+        match nearest_name(typed, valid) {
             Some(name) => self.with_help(format!("did you mean `{name}`?")),
             None => self,
         }

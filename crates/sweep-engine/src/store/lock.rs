@@ -65,7 +65,7 @@ impl Lock {
             let lock_result =
                 if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
             match lock_result {
-                Ok(()) if !atomic::is_named(&file, &path) => continue,
+                Ok(()) if !atomic::is_at_path(&file, &path) => continue,
                 Ok(()) => {
                     let shard = match shard {
                         Some(shard) => lock_shard(folder, shard)?,
@@ -111,7 +111,7 @@ impl Lock {
 
 /// Returns the processes that work in the folder now, as far as their names can be read.
 pub(super) fn find_holders(folder: &Folder) -> Vec<Holder> {
-    let names = regular::names(&folder.path).unwrap_or_default().into_iter();
+    let names = regular::file_names(&folder.path).unwrap_or_default().into_iter();
     let lock = |name: OsString| Some((shard_from_name(name.to_str()?)?, folder.file(name)));
     let mut locks: Vec<(u64, PathBuf)> = names.filter_map(lock).collect();
     locks.sort_unstable();
@@ -303,7 +303,7 @@ mod tests {
         let deleted_file = regular::open_or_create(&folder.file(LOCK_FILE)).unwrap();
         first.delete().unwrap();
         deleted_file.try_lock().unwrap();
-        assert!(!atomic::is_named(&deleted_file, &folder.file(LOCK_FILE)));
+        assert!(!atomic::is_at_path(&deleted_file, &folder.file(LOCK_FILE)));
         Lock::acquire(&folder, None).unwrap();
     }
 }

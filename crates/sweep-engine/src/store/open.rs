@@ -372,7 +372,7 @@ pub(super) fn rename_damaged_part(
 /// Returns the indices of the parts in a folder.
 pub(super) fn part_indices(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
     let mut parts = BTreeSet::new();
-    for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+    for name in regular::file_names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         parts.extend(name.to_str().and_then(part_index));
     }
     Ok(parts)
@@ -516,7 +516,7 @@ pub(super) fn remove_folder(folder: &Folder, lock: Lock) -> Option<String> {
     let removal = own_files::delete_own_files(folder).and_then(|remaining_files| {
         lock.delete()?;
         if remaining_files.is_empty() {
-            let removal = regular::if_there(fs::remove_dir(&folder.path));
+            let removal = regular::none_if_missing(fs::remove_dir(&folder.path));
             removal.map_err(StoreError::io("remove the folder", &folder.path))?;
         }
         Ok(remaining_files)

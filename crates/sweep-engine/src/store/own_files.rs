@@ -20,7 +20,7 @@ use sweep_files::{atomic, regular};
 /// # Errors
 /// [`StoreError::File`].
 pub(super) fn delete_own_files(folder: &Folder) -> Result<Vec<OsString>, StoreError> {
-    let names = regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))?;
+    let names = regular::file_names(&folder.path).map_err(StoreError::io("list", &folder.path))?;
     let (own_names, foreign_names): (Vec<OsString>, Vec<OsString>) = names
         .into_iter()
         .filter(|name| name != LOCK_FILE)

@@ -63,7 +63,7 @@ impl PlanFile {
     /// Reads the plan of a run folder.
     pub(super) fn read(folder: &Folder) -> Result<StoredPlan, StoreError> {
         let path = folder.file(PLAN_FILE);
-        let text = regular::if_there(regular::read_json(&path));
+        let text = regular::none_if_missing(regular::read_json(&path));
         let Some(text) = text.map_err(StoreError::io("read", &path))? else {
             return Ok(StoredPlan::Nothing);
         };
@@ -141,7 +141,7 @@ pub(super) fn rename_damaged(path: &Path) -> Result<PathBuf, StoreError> {
     let new_path =
         (1..=u64::MAX).map(numbered_path).find(is_unused).unwrap_or_else(|| numbered_path(1));
     // Another shard of the same run may have renamed the file already.
-    let result = regular::if_there(fs::rename(path, &new_path));
+    let result = regular::none_if_missing(fs::rename(path, &new_path));
     result.map_err(StoreError::io("set aside", path)).map(|_| new_path)
 }
 

@@ -77,7 +77,7 @@ pub fn sidecar(
 /// Reads the recorded sessions, without those that cannot be read.
 fn recorded_sessions(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     let mut sessions = Vec::new();
-    for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+    for name in regular::file_names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         if name.to_str().is_some_and(is_session_name) {
             let text = regular::read_json(&folder.path.join(name)).unwrap_or_default();
             sessions.extend(serde_json::from_slice::<Session>(&text).ok());

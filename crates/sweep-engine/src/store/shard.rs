@@ -90,7 +90,7 @@ impl ShardLayout {
     /// readable. It decides which process computes a chunk, but not its content.
     pub(super) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
         let path = folder.file(SHARDS_FILE);
-        let text = regular::if_there(regular::read_json(&path));
+        let text = regular::none_if_missing(regular::read_json(&path));
         let text = text.map_err(StoreError::io("read", &path))?;
         let layout = text.and_then(|text| serde_json::from_slice(&text).ok());
         Ok(layout.filter(|layout: &Self| (1..=MAX_SHARDS).contains(&layout.shards)))

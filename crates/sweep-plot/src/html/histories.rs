@@ -31,7 +31,7 @@ const TIME_BUCKETS: usize = 500;
 /// a folder without traces.
 pub(crate) fn read_histories(folder: &Path, map: &CellMap, model: &dyn Figures) -> Result<Value> {
     let model_kinds = map.table.source.model_kinds;
-    let names = regular::names(folder).map_err(FileError::io("list", folder))?;
+    let names = regular::file_names(folder).map_err(FileError::io("list", folder))?;
     let mut files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "parquet"));
     if files.is_empty() {

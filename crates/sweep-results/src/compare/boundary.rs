@@ -20,14 +20,15 @@ pub struct BoundaryCrossing {
     #[serde(rename = "at")]
     pub positions: [f64; 2],
     /// The bracket in either file.
-    pub bracket: [[f64; 2]; 2],
+    #[serde(rename = "bracket")]
+    pub brackets: [[f64; 2]; 2],
 }
 
 impl BoundaryCrossing {
     /// Returns the least and the greatest shift that the brackets allow.
     pub fn shift_range(&self) -> [f64; 2] {
-        let [[first_low, first_high], [second_low, second_high]] = self.bracket;
-        if self.positions[0] == self.positions[1] && self.bracket[0] == self.bracket[1] {
+        let [[first_low, first_high], [second_low, second_high]] = self.brackets;
+        if self.positions[0] == self.positions[1] && self.brackets[0] == self.brackets[1] {
             return [0.0; 2];
         }
         [second_low - first_high, second_high - first_low]
@@ -98,7 +99,8 @@ struct BracketedCrossing {
 #[derive(Default)]
 struct LineCrossings {
     key_values: Vec<f64>,
-    by_file: [Vec<BracketedCrossing>; 2],
+    /// The crossings of the first and of the second file.
+    crossings_by_file: [Vec<BracketedCrossing>; 2],
 }
 
 /// The crossings of each line, sorted by the values of the other axes.
@@ -109,11 +111,13 @@ fn pair_crossings(
     first: &ResultTable,
     axis: &str,
     keys: Vec<String>,
-    lines: CrossingsByLine,
+    crossings_by_line: CrossingsByLine,
 ) -> BoundaryShift {
     let mut crossings = Vec::new();
     let mut unmatched_lines = Vec::new();
-    for LineCrossings { key_values, by_file: [first, second] } in lines.into_values() {
+    for LineCrossings { key_values, crossings_by_file: [first, second] } in
+        crossings_by_line.into_values()
+    {
         if first.len() != second.len() {
             unmatched_lines.push((key_values, [first.len(), second.len()]));
             continue;
@@ -123,7 +127,7 @@ fn pair_crossings(
                 key_values: key_values.clone(),
                 number: index + 1,
                 positions: [first.position, second.position],
-                bracket: [first.bracket, second.bracket],
+                brackets: [first.bracket, second.bracket],
             });
         }
     }
@@ -146,15 +150,15 @@ pub(super) fn compare_boundaries(
     first: &ResultTable,
     second: &ResultTable,
 ) -> Result<Option<BoundaryShift>, ResultsError> {
-    let names = first.axes();
-    let names_in_second = second.axes();
-    let [_, axis, ..] = names[..] else { return Ok(None) };
-    let keys: Vec<&str> = names
+    let axis_names = first.axes();
+    let axis_names_in_second = second.axes();
+    let [_, axis, ..] = axis_names[..] else { return Ok(None) };
+    let keys: Vec<&str> = axis_names
         .iter()
         .copied()
-        .filter(|name| *name != axis && names_in_second.contains(name))
+        .filter(|name| *name != axis && axis_names_in_second.contains(name))
         .collect();
-    let mut lines = CrossingsByLine::new();
+    let mut crossings_by_line = CrossingsByLine::new();
     for (file, table) in [first, second].into_iter().enumerate() {
         let bracket_columns = ["_low", "_high"].map(|suffix| {
             let column = table.columns.iter().find(|column| {
@@ -165,22 +169,25 @@ pub(super) fn compare_boundaries(
         let mut column_names = keys.clone();
         column_names.extend([axis, bracket_columns[0], bracket_columns[1]]);
         table.file().each_row(&column_names, |row| {
-            let number = |column: usize| row.cell(column).number();
-            let key_values: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
+            let read_number = |column: usize| row.cell(column).number();
+            let key_values: Option<Vec<f64>> = (0..keys.len()).map(read_number).collect();
             let Some(key_values) = key_values else { return Ok(()) };
-            let line = lines
+            let line = crossings_by_line
                 .entry(sort_key(&key_values))
                 .or_insert_with(|| LineCrossings { key_values, ..LineCrossings::default() });
             let axis_column = keys.len();
-            if let (Some(low), Some(high)) = (number(axis_column + 1), number(axis_column + 2)) {
-                let position = number(axis_column).unwrap_or(f64::midpoint(low, high));
-                line.by_file[file].push(BracketedCrossing { position, bracket: [low, high] });
+            if let (Some(low), Some(high)) =
+                (read_number(axis_column + 1), read_number(axis_column + 2))
+            {
+                let position = read_number(axis_column).unwrap_or(f64::midpoint(low, high));
+                line.crossings_by_file[file]
+                    .push(BracketedCrossing { position, bracket: [low, high] });
             }
             Ok::<(), ResultsError>(())
         })?;
     }
     let keys = keys.into_iter().map(str::to_owned).collect();
-    Ok(Some(pair_crossings(first, axis, keys, lines)))
+    Ok(Some(pair_crossings(first, axis, keys, crossings_by_line)))
 }
 
 /// Compares the boundaries of two maps: a crossing lies between neighbours along the second axis
@@ -188,7 +195,7 @@ pub(super) fn compare_boundaries(
 pub(super) fn compare_maps(
     first: &ResultTable,
     keys: &[String],
-    shared: &[SharedRow],
+    shared_rows: &[SharedRow],
 ) -> Option<BoundaryShift> {
     let limit = first.plan.as_ref()?["reliability"]["ratio_limit"].as_f64()?;
     // The points of a design have no neighbours along an axis.
@@ -198,24 +205,24 @@ pub(super) fn compare_maps(
     let mut other_keys = keys.to_vec();
     let axis = other_keys.remove(1);
     let mut rows_by_line: BTreeMap<Vec<u64>, (Vec<f64>, Vec<&SharedRow>)> = BTreeMap::new();
-    for row in shared {
+    for row in shared_rows {
         let mut key_values = row.key.clone();
         key_values.remove(1);
         let line =
             rows_by_line.entry(sort_key(&key_values)).or_insert_with(|| (key_values, Vec::new()));
         line.1.push(row);
     }
-    let mut lines = CrossingsByLine::new();
+    let mut crossings_by_line = CrossingsByLine::new();
     for (key, (key_values, mut rows)) in rows_by_line {
         rows.sort_by(|a, b| a.key[1].total_cmp(&b.key[1]));
-        let by_file = [0, 1].map(|file| {
+        let crossings_by_file = [0, 1].map(|file| {
             rows.windows(2)
                 .filter_map(|pair| find_crossing(pair[0], pair[1], file, limit))
                 .collect()
         });
-        lines.insert(key, LineCrossings { key_values, by_file });
+        crossings_by_line.insert(key, LineCrossings { key_values, crossings_by_file });
     }
-    Some(pair_crossings(first, &axis, other_keys, lines))
+    Some(pair_crossings(first, &axis, other_keys, crossings_by_line))
 }
 
 /// Finds the crossing between two neighbours in one file, by a straight line through the logarithms
@@ -226,12 +233,12 @@ fn find_crossing(
     file: usize,
     limit: f64,
 ) -> Option<BracketedCrossing> {
-    let low = below.ratio[file]?;
-    let high = above.ratio[file]?;
-    if (low < limit) == (high < limit) {
+    let ratio_below = below.ratios[file]?;
+    let ratio_above = above.ratios[file]?;
+    if (ratio_below < limit) == (ratio_above < limit) {
         return None;
     }
     let bracket = [below, above].map(|row| [&row.key, &row.second_key][file][1]);
-    let share = (limit / low).ln() / (high / low).ln();
-    Some(BracketedCrossing { position: bracket[0] + share * (bracket[1] - bracket[0]), bracket })
+    let fraction = (limit / ratio_below).ln() / (ratio_above / ratio_below).ln();
+    Some(BracketedCrossing { position: bracket[0] + fraction * (bracket[1] - bracket[0]), bracket })
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use serde_json::{Map, Value};
-use sweep_files::{ParquetFile, dotted, key, visit_leaves};
+use sweep_files::{ParquetFile, dotted_path, key, visit_leaves};
 
 /// A value that differs between the plans of two files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -45,16 +45,21 @@ pub(super) fn compare_plans(first: &ParquetFile, second: &ParquetFile) -> Vec<Pl
 /// Returns every value that differs between two plans. Lists of different lengths, and lists of
 /// numbers, are one value each.
 pub fn plan_changes(first: &Value, second: &Value) -> Vec<PlanChange> {
-    let descends = |first: &[Value], second: &[Value]| {
+    let is_nested_list = |first: &[Value], second: &[Value]| {
         first.len() == second.len() && first.iter().any(Value::is_object)
     };
     let mut changes = Vec::new();
-    visit_leaves([Some(first), Some(second)], descends, &mut Vec::new(), &mut |path, values| {
-        let [first, second] = values.map(|value| value.cloned().unwrap_or_default());
-        if first != second {
-            changes.push(PlanChange { path: dotted(path), first, second });
-        }
-    });
+    visit_leaves(
+        [Some(first), Some(second)],
+        is_nested_list,
+        &mut Vec::new(),
+        &mut |path, values| {
+            let [first, second] = values.map(|value| value.cloned().unwrap_or_default());
+            if first != second {
+                changes.push(PlanChange { path: dotted_path(path), first, second });
+            }
+        },
+    );
     changes
 }
 
@@ -76,8 +81,8 @@ fn without_toleranced_numbers(axes: &Value) -> Value {
         }
         for key in ["range", "distribution"] {
             if let Some(values) = axis.get_mut(key).and_then(Value::as_object_mut) {
-                let determined_keys = ["from", "to", "mean", "sd", "median", "sigma"];
-                values.retain(|key, _| !determined_keys.contains(&key.as_str()));
+                let dependent_keys = ["from", "to", "mean", "sd", "median", "sigma"];
+                values.retain(|key, _| !dependent_keys.contains(&key.as_str()));
             }
         }
     }

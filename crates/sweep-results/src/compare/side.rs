@@ -19,7 +19,7 @@ pub(super) struct ComparedFile {
     /// The number of key columns.
     key_count: usize,
     /// The positions of the columns by which rows are matched.
-    matched_by: Vec<usize>,
+    matching_columns: Vec<usize>,
     /// The position of the first compared column.
     first_column: usize,
     /// The compared columns.
@@ -36,14 +36,17 @@ pub(super) fn key_columns(table: &ResultTable, is_boundary: bool) -> Vec<String>
     }
     if is_boundary {
         // Values along the second axis are results of the search, not keys.
-        let second = table.axes().get(1).map(|name| (*name).to_owned());
-        names.retain(|name| Some(*name) != second.as_deref());
+        let second_axis = table.axes().get(1).map(|name| (*name).to_owned());
+        names.retain(|name| Some(*name) != second_axis.as_deref());
     }
     names.into_iter().map(str::to_owned).collect()
 }
 
 /// Returns the value of a column that has the same value in all rows.
-pub(super) fn single_value(table: &ResultTable, name: &str) -> Result<Option<f64>, ResultsError> {
+pub(super) fn find_single_value(
+    table: &ResultTable,
+    name: &str,
+) -> Result<Option<f64>, ResultsError> {
     let mut value = None;
     for rows in table.file().read(&[name])? {
         let rows = rows?;
@@ -67,7 +70,7 @@ impl ComparedFile {
         table: &ResultTable,
         other_table: &ResultTable,
         keys: &[String],
-        matched_by: &[String],
+        matching_columns: &[String],
     ) -> Result<Self, ResultsError> {
         let is_in_both = |column: &Column| {
             let counterpart = other_table.column(&column.name);
@@ -78,11 +81,11 @@ impl ComparedFile {
         let mut columns = table.columns.clone();
         columns.retain(is_in_both);
         let mut names: Vec<&str> = keys.iter().map(String::as_str).collect();
-        let further_names = matched_by.iter().filter(|name| !keys.contains(name));
-        names.extend(further_names.map(String::as_str));
+        let matching_names = matching_columns.iter().filter(|name| !keys.contains(name));
+        names.extend(matching_names.map(String::as_str));
         let first_column = names.len();
-        let position = |name: &String| names.iter().position(|read_name| read_name == name);
-        let matched_by = matched_by.iter().filter_map(position).collect();
+        let column_position = |name: &String| names.iter().position(|read_name| read_name == name);
+        let matching_columns = matching_columns.iter().filter_map(column_position).collect();
         names.extend(columns.iter().map(|column| column.name.as_str()));
         let cell_count = table.rows().saturating_mul(names.len() as u64);
         if cell_count > MAX_CELLS {
@@ -93,7 +96,14 @@ impl ComparedFile {
         }
         let row_groups = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
         let rows = row_groups.iter().map(|group| group.count).sum();
-        Ok(Self { row_groups, rows, key_count: keys.len(), matched_by, first_column, columns })
+        Ok(Self {
+            row_groups,
+            rows,
+            key_count: keys.len(),
+            matching_columns,
+            first_column,
+            columns,
+        })
     }
 
     /// Iterates over the columns, each with its position in [`ComparedFile::cell`].
@@ -102,15 +112,16 @@ impl ComparedFile {
     }
 
     /// Returns the position of the column of a name.
-    pub(super) fn position(&self, name: &str) -> Option<usize> {
+    pub(super) fn column_position(&self, name: &str) -> Option<usize> {
         self.columns().find(|(_, column)| column.name == name).map(|(position, _)| position)
     }
 
     /// Returns the cell of a row in the column at a position.
     pub(super) fn cell(&self, position: usize, row: usize) -> Cell {
-        let group = self.row_groups.partition_point(|group| group.first <= row as u64) - 1;
-        let group = &self.row_groups[group];
-        group.row(row - group.first as usize).cell(position)
+        let group_index =
+            self.row_groups.partition_point(|group| group.first_row <= row as u64) - 1;
+        let group = &self.row_groups[group_index];
+        group.row(row - group.first_row as usize).cell(position)
     }
 
     /// Returns the values of a row's key columns.
@@ -126,9 +137,13 @@ impl ComparedFile {
     /// Returns the values by which a row is matched, rounded to nine digits, because grids with
     /// different numbers of values have common points whose values differ by rounding.
     pub(super) fn key(&self, row: usize) -> Vec<u64> {
-        self.matched_by.iter().map(|&position| rounded_bits(self.number(position, row))).collect()
+        self.matching_columns
+            .iter()
+            .map(|&position| rounded_bits(self.number(position, row)))
+            .collect()
     }
 
+    /// Returns the least of the ratios of a row's channels.
     fn least_ratio(&self, row: usize) -> Option<f64> {
         let ratios = self.columns().filter(|(_, column)| column.name.starts_with("ratio_"));
         ratios.filter_map(|(position, _)| self.cell(position, row).number()).reduce(f64::min)
@@ -136,14 +151,14 @@ impl ComparedFile {
 
     /// Combines two matching rows: one of this file and one of the other.
     pub(super) fn shared_row(&self, other: &Self, pair: [usize; 2]) -> SharedRow {
-        let cells = |name: &str| {
+        let pair_cells = |name: &str| {
             [(self, pair[0]), (other, pair[1])].map(|(file, row)| {
-                file.position(name).map_or(Cell::Null, |position| file.cell(position, row))
+                file.column_position(name).map_or(Cell::Null, |position| file.cell(position, row))
             })
         };
-        let numbers = |name: &str| cells(name).map(|cell| cell.number());
-        let flags = |name: &str| cells(name).map(|cell| cell.flag());
-        let verdicts = flags("reliable");
+        let pair_numbers = |name: &str| pair_cells(name).map(|cell| cell.number());
+        let pair_flags = |name: &str| pair_cells(name).map(|cell| cell.flag());
+        let verdicts = pair_flags("reliable");
         let flip = match verdicts {
             [first, second] if first == second => Flip::None,
             [Some(true), Some(false)] => Flip::Lost,
@@ -159,12 +174,12 @@ impl ComparedFile {
             rows: pair.map(|row| row as u64),
             second_key: second_key.collect(),
             key,
-            ratio: numbers("ratio_max"),
-            least_ratio: [self.least_ratio(pair[0]), other.least_ratio(pair[1])],
-            gap_m: numbers("min_gap_nonlinear_m"),
+            ratios: pair_numbers("ratio_max"),
+            least_ratios: [self.least_ratio(pair[0]), other.least_ratio(pair[1])],
+            gaps_m: pair_numbers("min_gap_nonlinear_m"),
             flip,
             is_lost: verdicts[0] == Some(true) && verdicts[1] != Some(true),
-            sensitive: flags("sensitive").contains(&Some(true)),
+            is_sensitive: pair_flags("sensitive").contains(&Some(true)),
             differs: false,
         }
     }
@@ -172,8 +187,8 @@ impl ComparedFile {
 
 /// Returns the bits of a number rounded to nine digits.
 fn rounded_bits(value: f64) -> u64 {
-    let text = format!("{value:.8e}");
-    let rounded: f64 = text.parse().unwrap_or(value);
+    let rounded_text = format!("{value:.8e}");
+    let rounded: f64 = rounded_text.parse().unwrap_or(value);
     // Adding zero makes -0 and 0 one value.
     (rounded + 0.0).to_bits()
 }

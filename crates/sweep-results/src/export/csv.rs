@@ -33,14 +33,14 @@ pub(super) fn write(
         let _ = writeln!(text, "# plan: {}", escape_comment(plan));
     }
     let names = column_names(table);
-    let headings: Vec<String> = names.iter().map(|name| quote(name)).collect();
+    let headings: Vec<String> = names.iter().map(|name| quote_cell(name)).collect();
     let _ = writeln!(text, "{}", headings.join(","));
     table.file().each_row(&names, |row| {
         for column in 0..names.len() {
             let _ = match row.cell(column) {
                 Cell::Null => Ok(()),
                 Cell::Number(number) => text.write_str(&format_number(number)),
-                Cell::Text(word) => text.write_str(&quote(&word)),
+                Cell::Text(word) => text.write_str(&quote_cell(&word)),
                 Cell::Flag(flag) => write!(text, "{flag}"),
             };
             text.push(if column + 1 < names.len() { ',' } else { '\n' });
@@ -85,7 +85,7 @@ fn escape_comment(text: &str) -> String {
 
 /// Formats a text as one cell, in quotes where it contains separators. A text that a spreadsheet
 /// would take for a formula gets an apostrophe.
-fn quote(text: &str) -> String {
+fn quote_cell(text: &str) -> String {
     let is_formula = text.trim_start().starts_with(['=', '+', '-', '@']);
     if is_formula || text.contains(['"', ',', ';', '\t', '\n', '\r', '#']) {
         let apostrophe = if is_formula { "'" } else { "" };
@@ -120,10 +120,14 @@ mod tests {
 
     #[test]
     fn a_long_word_in_many_rows_is_written_in_parts() {
-        let home = tempfile::tempdir().unwrap();
-        let path = home.path().join("x.parquet");
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x.parquet");
         let word = "a".repeat(1 << 18);
-        sample::write(&path, vec![("status", "", sample::texts(&vec![word.as_str(); 100]))], &[]);
+        sample::write(
+            &path,
+            vec![("status", "", sample::text_array(&vec![word.as_str(); 100]))],
+            &[],
+        );
         let mut longest_part_bytes = 0;
         let mut total_bytes = 0;
         let mut count_bytes = |text: &str| {
@@ -158,9 +162,9 @@ mod tests {
 
     #[test]
     fn texts_with_separators_or_formulas_are_quoted() {
-        assert_eq!(quote("ok"), "ok");
-        assert_eq!(quote("a,\"b\""), "\"a,\"\"b\"\"\"");
-        assert_eq!(quote("=cmd()"), "\"'=cmd()\"");
+        assert_eq!(quote_cell("ok"), "ok");
+        assert_eq!(quote_cell("a,\"b\""), "\"a,\"\"b\"\"\"");
+        assert_eq!(quote_cell("=cmd()"), "\"'=cmd()\"");
         assert_eq!([1e-7, 0.25, 1e22].map(format_number), ["1e-7", "0.25", "1e22"]);
     }
 }

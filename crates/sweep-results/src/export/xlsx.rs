@@ -5,7 +5,7 @@ use rust_xlsxwriter::{
     DocProperties, ExcelDateTime, Format as Style, Workbook, Worksheet, XlsxError,
 };
 use serde_json::Value;
-use sweep_files::{Cell, Column, ResultTable, dotted, key, panics, visit_leaves};
+use sweep_files::{Cell, Column, ResultTable, dotted_path, key, panics, visit_leaves};
 
 use super::{ExportFormat, column_names, export_error};
 use crate::error::ResultsError;
@@ -49,20 +49,20 @@ fn write_workbook(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
         return Err(export_error(format!("more than {MAX_COLUMNS} columns")));
     }
     let mut workbook = Workbook::new();
-    let from_xlsx = |error: XlsxError| match error {
+    let from_xlsx_error = |error: XlsxError| match error {
         XlsxError::IoError(error) | XlsxError::TempFileError(_, error) => {
             temporary_file_error(table, error.to_string())
         }
         other => export_error(other.to_string()),
     };
-    let mut rows = SheetWriter::new(&mut workbook, "rows", 2).map_err(from_xlsx)?;
-    write_rows(&mut rows, table, from_xlsx)?;
-    write_columns(&mut workbook, table).map_err(from_xlsx)?;
-    write_plan(&mut workbook, table).map_err(from_xlsx)?;
+    let mut rows_sheet = SheetWriter::new(&mut workbook, "rows", 2).map_err(from_xlsx_error)?;
+    write_rows(&mut rows_sheet, table, from_xlsx_error)?;
+    write_columns(&mut workbook, table).map_err(from_xlsx_error)?;
+    write_plan(&mut workbook, table).map_err(from_xlsx_error)?;
     // A fixed date, so that the same rows always give the same bytes.
-    let creation_date = ExcelDateTime::from_ymd(2000, 1, 1).map_err(from_xlsx)?;
+    let creation_date = ExcelDateTime::from_ymd(2000, 1, 1).map_err(from_xlsx_error)?;
     workbook.set_properties(&DocProperties::new().set_creation_datetime(&creation_date));
-    workbook.save_to_buffer().map_err(from_xlsx)
+    workbook.save_to_buffer().map_err(from_xlsx_error)
 }
 
 /// A writer of a sheet's rows. The library keeps the rows in a temporary file.
@@ -73,9 +73,9 @@ struct SheetWriter<'a> {
 
 impl<'a> SheetWriter<'a> {
     /// Adds a sheet in which the first rows, its headings, do not scroll.
-    fn new(workbook: &'a mut Workbook, name: &str, headings: u32) -> Result<Self, XlsxError> {
+    fn new(workbook: &'a mut Workbook, name: &str, heading_rows: u32) -> Result<Self, XlsxError> {
         let sheet = workbook.add_worksheet_with_constant_memory()?;
-        sheet.set_name(name)?.set_freeze_panes(headings, 0)?;
+        sheet.set_name(name)?.set_freeze_panes(heading_rows, 0)?;
         sheet.set_row_format(0, &Style::new().set_bold())?;
         Ok(Self { sheet, next_row: 0 })
     }
@@ -121,21 +121,21 @@ fn text_cell(text: &str) -> Cell {
 fn write_rows(
     sheet: &mut SheetWriter<'_>,
     table: &ResultTable,
-    from_xlsx: impl Fn(XlsxError) -> ResultsError + Copy,
+    from_xlsx_error: impl Fn(XlsxError) -> ResultsError + Copy,
 ) -> Result<(), ResultsError> {
     let names = column_names(table);
     let units = table.columns.iter().map(|column| text_cell(column.unit()));
-    sheet.set_widths(names.iter().copied()).map_err(from_xlsx)?;
-    sheet.write_row(names.iter().map(|name| text_cell(name))).map_err(from_xlsx)?;
-    sheet.write_row(units).map_err(from_xlsx)?;
+    sheet.set_widths(names.iter().copied()).map_err(from_xlsx_error)?;
+    sheet.write_row(names.iter().map(|name| text_cell(name))).map_err(from_xlsx_error)?;
+    sheet.write_row(units).map_err(from_xlsx_error)?;
     let units_row = sheet.next_row - 1;
     table.file().each_row(&names, |row| {
-        sheet.write_row((0..names.len()).map(|column| row.cell(column))).map_err(from_xlsx)
+        sheet.write_row((0..names.len()).map(|column| row.cell(column))).map_err(from_xlsx_error)
     })?;
     let last_row = sheet.next_row - 1;
     let last_column = u16::try_from(names.len().saturating_sub(1)).unwrap_or(u16::MAX);
     // The filter begins at the units, so that sorting moves neither units nor names.
-    sheet.sheet.autofilter(units_row, 0, last_row, last_column).map_err(from_xlsx)?;
+    sheet.sheet.autofilter(units_row, 0, last_row, last_column).map_err(from_xlsx_error)?;
     Ok(())
 }
 
@@ -186,9 +186,9 @@ fn write_plan(workbook: &mut Workbook, table: &ResultTable) -> Result<(), XlsxEr
 
 /// Collects the values of a plan with their paths. A list of numbers is one value.
 fn collect_leaves(plan: &Value, settings: &mut Vec<(String, Value)>) {
-    let descends = |values: &[Value], _: &[Value]| values.iter().any(Value::is_object);
-    visit_leaves([Some(plan); 2], descends, &mut Vec::new(), &mut |path, [value, _]| {
-        settings.extend(value.map(|value| (dotted(path), value.clone())));
+    let has_objects = |values: &[Value], _: &[Value]| values.iter().any(Value::is_object);
+    visit_leaves([Some(plan); 2], has_objects, &mut Vec::new(), &mut |path, [value, _]| {
+        settings.extend(value.map(|value| (dotted_path(path), value.clone())));
     });
 }
 
@@ -213,8 +213,8 @@ mod tests {
             archive.windows(name.len()).position(|window| window == name.as_bytes()).unwrap();
         let extra_length = u16::from_le_bytes([archive[name_offset - 2], archive[name_offset - 1]]);
         let mut text = String::new();
-        let compressed = &archive[name_offset + name.len() + usize::from(extra_length)..];
-        flate2::read::DeflateDecoder::new(compressed).read_to_string(&mut text).unwrap();
+        let compressed_text = &archive[name_offset + name.len() + usize::from(extra_length)..];
+        flate2::read::DeflateDecoder::new(compressed_text).read_to_string(&mut text).unwrap();
         text
     }
 
@@ -225,19 +225,20 @@ mod tests {
         for element in ["<pane ySplit=\"2\"", "state=\"frozen\"", "<autoFilter ref=\"A2:K8\""] {
             assert!(sheet.contains(element), "{element}: {sheet}");
         }
-        let number = |text: &str, name: &str| -> f64 {
+        let read_number = |text: &str, name: &str| -> f64 {
             let (_, rest) = text.split_once(&format!("{name}=\"")).unwrap();
             rest.split('"').next().unwrap().parse().unwrap()
         };
         // Neighbouring columns of equal width share an element.
-        let width = |column: f64| {
+        let column_width = |column: f64| {
             let mut elements = sheet.split("<col ").skip(1);
-            let covers =
-                |text: &&str| (number(text, "min")..=number(text, "max")).contains(&column);
-            number(elements.find(covers).unwrap(), "width")
+            let is_covered = |text: &&str| {
+                (read_number(text, "min")..=read_number(text, "max")).contains(&column)
+            };
+            read_number(elements.find(is_covered).unwrap(), "width")
         };
         assert!(
-            width(2.0) > 17.0 && width(1.0) < width(2.0),
+            column_width(2.0) > 17.0 && column_width(1.0) < column_width(2.0),
             "unbalance_mass_kg needs more than point"
         );
     }

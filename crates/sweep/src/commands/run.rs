@@ -50,7 +50,7 @@ pub(crate) fn run(args: &WasherRunArgs) -> Result<Exit, Error> {
     if args.keep_traces && matches!(report.end, RunEnd::AlreadyFinished(..) | RunEnd::Finished(_)) {
         let threads =
             threads::choose_count(args.run.control.execution.threads, &threads::read_variable)?;
-        let folder = files::beside(&output, "traces");
+        let folder = files::path_beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
         let progress = Progress::new(args.run.control.execution.progress, plan.points(), 0);
         let traced_points = AtomicU64::new(0);

@@ -16,7 +16,7 @@ use sweep_engine::commands::grid::quote_for_shell;
 use sweep_engine::{Error, Exit, Interrupt, Job, tell};
 use sweep_files::{FileKind, Output, key};
 use sweep_parameter::Worse;
-use sweep_results::{Cell, ResultTable, top};
+use sweep_results::{Cell, ResultTable, top_rows};
 use washer_model::Channel;
 use washer_row::MethodKind;
 
@@ -150,7 +150,7 @@ fn find_worst(args: &TraceArgs, plan: &Plan, column: &str) -> Result<(u64, Worse
              row"
         ))
     })?;
-    let rows = top(&file, &["point", column], None, Some((column, worse)), 1)?;
+    let rows = top_rows(&file, &["point", column], None, Some((column, worse)), 1)?;
     match rows.first().map(Vec::as_slice) {
         Some([Cell::Number(point), Cell::Number(_)]) => Ok((*point as u64, worse)),
         _ => Err(refuse(format!("a column that has values in {}", path.display()))),

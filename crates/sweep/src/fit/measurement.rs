@@ -9,7 +9,7 @@ use sweep_engine::Diagnostics;
 use sweep_engine::config::list::{ANY_UNIT, ColumnNames, ListColumn, NumberTable};
 use sweep_engine::config::report::{Diagnostic, Report};
 use sweep_engine::config::section::format_count;
-use sweep_results::nearest;
+use sweep_results::nearest_name;
 use washer_model::Channel;
 
 /// The least number of samples of a column. Basis: fewer do not determine their noise. Doubling it
@@ -251,7 +251,7 @@ fn find_misspelling(column: &ListColumn) -> Option<Diagnostic> {
     // Other words, such as drum, are near many names; names of channels have underscores.
     let names = all_names();
     let is_written_so = column.header.contains('_');
-    nearest(&column.header, names.iter().map(String::as_str)).filter(|_| is_written_so)?;
+    nearest_name(&column.header, names.iter().map(String::as_str)).filter(|_| is_written_so)?;
     let title = format!("the column `{}` does not name a channel", column.header);
     let expected = "expected a channel of `sweep trace` with its unit, as in \
                     tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";

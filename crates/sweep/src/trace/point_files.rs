@@ -76,7 +76,7 @@ pub(crate) fn write_point_traces(
 
 /// Removes the files of an earlier run from the folder: their points may be points of another grid.
 fn remove_point_traces(folder: &Path) -> Result<(), StoreError> {
-    for name in regular::names(folder).map_err(StoreError::io("list", folder))? {
+    for name in regular::file_names(folder).map_err(StoreError::io("list", folder))? {
         let is_point_trace = name.to_str().is_some_and(|name| {
             let number = name.strip_prefix("point-").and_then(|rest| rest.strip_suffix(".parquet"));
             number.is_some_and(|number| number.parse::<u64>().is_ok())

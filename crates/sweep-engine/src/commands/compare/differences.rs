@@ -18,7 +18,7 @@ pub(super) fn differences_table(
     build: Build,
 ) -> Table {
     let mut table = Table::new(build);
-    let rows = || comparison.shared.iter();
+    let rows = || comparison.shared_rows.iter();
     table.add_counts("point", "row of A, from 0", rows().map(|row| row.rows[0]));
     for (k, (name, unit)) in comparison.keys.iter().zip(&comparison.key_units).enumerate() {
         let description = tables[0]
@@ -38,13 +38,13 @@ pub(super) fn differences_table(
     for (side, [suffix, file]) in [["a", "A"], ["b", "B"]].into_iter().enumerate() {
         let name = format!("ratio_max_{suffix}");
         let description = format!("greatest ratio of {file}");
-        table.add_numbers(&name, "1", &description, rows().map(|row| row.ratio[side]));
+        table.add_numbers(&name, "1", &description, rows().map(|row| row.ratios[side]));
     }
     let description = "none, lost (reliable in A alone), gained (reliable in B alone), defined \
                 (a verdict \
                 in one file alone)";
     table.add_words("flip", description, rows().map(|row| row.flip.name()));
-    let sensitive = rows().map(|row| if row.sensitive { "true" } else { "false" });
+    let sensitive = rows().map(|row| if row.is_sensitive { "true" } else { "false" });
     table.add_words("sensitive", "true where either file calls the row chaotic", sensitive);
     let status = rows().map(|row| if row.ratio_quotient().is_some() { "ok" } else { "no_ratio" });
     table.add_words("status", "ok, or no_ratio where either file has none", status);

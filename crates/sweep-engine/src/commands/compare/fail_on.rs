@@ -89,7 +89,7 @@ impl FailOn {
 
     /// Describes the forbidden differences between the files; `None` if there are none.
     pub(super) fn violation(&self, comparison: &Comparison) -> Option<String> {
-        let insensitive_rows = || comparison.shared.iter().filter(|row| !row.sensitive);
+        let insensitive_rows = || comparison.shared_rows.iter().filter(|row| !row.is_sensitive);
         let format_count =
             |noun: &str, count: usize| (count > 0).then(|| format!("{noun}: {count}"));
         match self {
@@ -108,8 +108,10 @@ impl FailOn {
                 format_count("sensitive verdicts that flipped", comparison.flips(true).count())
             }
             Self::Column(name, max_change) => {
-                let column = comparison.columns.iter().find(|column| column.name == *name)?;
-                let worst = column.worst.first().filter(|worst| worst.deviation() > *max_change)?;
+                let column =
+                    comparison.changed_columns.iter().find(|column| column.name == *name)?;
+                let worst =
+                    column.worst_rows.first().filter(|worst| worst.deviation() > *max_change)?;
                 let unit = column.unit.as_str();
                 let change = match worst.deviation() {
                     deviation if deviation.is_finite() => {

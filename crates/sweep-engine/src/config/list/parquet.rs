@@ -47,7 +47,7 @@ fn read(
     allows_missing: bool,
     names: &ColumnNames<'_>,
 ) -> Result<Vec<ParquetColumn>, ListError> {
-    let metadata = footer::metadata(&bytes).map_err(damage_error)?;
+    let metadata = footer::read_metadata(&bytes).map_err(damage_error)?;
     let schema = batches::schema_with_clocks(&metadata);
     let fields = schema.fields();
     check_size(0, fields.len())?;
@@ -78,7 +78,7 @@ fn read(
     let fields = known_columns.iter().map(|(_, column_index, _)| *column_index).collect();
     let reader = Batches::new(bytes, Arc::new(metadata), &schema, fields);
     let mut reader = reader.map_err(damage_error)?;
-    while let Some(batch) = reader.batch().map_err(damage_error)? {
+    while let Some(batch) = reader.read_batch().map_err(damage_error)? {
         check_size((rows + batch.num_rows()) as u64, known_columns.len())?;
         for ((column, _, scale), array) in known_columns.iter().zip(batch.columns()) {
             let ParquetColumn { header, values: Some(values), is_clock, .. } =
