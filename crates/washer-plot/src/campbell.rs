@@ -16,7 +16,7 @@ pub(crate) struct FrequencyCurve {
     pub(crate) speeds_rpm: Vec<f64>,
     pub(crate) frequencies_rpm: Vec<f64>,
     /// The speeds (rpm) that equal the frequency.
-    pub(crate) resonances: Vec<f64>,
+    pub(crate) resonances_rpm: Vec<f64>,
     /// The least and the greatest frequency over a turn, if the file has them.
     pub(crate) band: Option<(Vec<f64>, Vec<f64>)>,
 }
@@ -28,11 +28,14 @@ pub(crate) struct FrequencyCurve {
 /// # Errors
 /// [`PlotError::Undrawable`] without a column or with fewer than two speeds; the errors of
 /// [`stability::read_unstable`].
-pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Chart, PlotError> {
+pub(crate) fn campbell_chart(
+    table: &FigureTable,
+    options: &WasherFigures,
+) -> Result<Chart, PlotError> {
     let stability_file = options.stability.as_ref();
     let unstable_speeds =
         stability_file.map(|path| stability::read_unstable(table, path)).transpose()?;
-    let modes = modes(table)?;
+    let modes = read_modes(table)?;
     let max_speed_rpm = modes
         .iter()
         .flat_map(|mode| &mode.speeds_rpm)
@@ -52,8 +55,8 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         .iter()
         .chain(&frequency_sum_curves)
         .flat_map(|mode| mode.frequencies_rpm.iter().copied());
-    let (_, highest_frequency) = extremes(frequencies).unwrap_or((0.0, max_speed_rpm));
-    let range = (0.0, (1.06 * max_speed_rpm).min(1.25 * highest_frequency));
+    let (_, highest_frequency_rpm) = extremes(frequencies).unwrap_or((0.0, max_speed_rpm));
+    let frequency_range_rpm = (0.0, (1.06 * max_speed_rpm).min(1.25 * highest_frequency_rpm));
 
     let mut series = Vec::new();
     let mut stars = Vec::new();
@@ -64,8 +67,9 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     });
     let sum_curves = frequency_sum_curves.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
     for (mode, colour, style) in mode_curves.chain(sum_curves) {
-        stars
-            .extend(mode.resonances.iter().map(|&speed| (speed, speed, format!("{speed:.1} rpm"))));
+        stars.extend(
+            mode.resonances_rpm.iter().map(|&speed| (speed, speed, format!("{speed:.1} rpm"))),
+        );
         series.push(Series::new(mode.name, colour, mode.speeds_rpm, mode.frequencies_rpm, style));
     }
     let diagonal = vec![0.0, max_speed_rpm];
@@ -90,9 +94,15 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         title: "Natural frequencies over spin speed".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Spin speed", "rpm"),
-        panels: vec![ChartPanel { range: Some(range), height: 500.0, stars, ..panel }],
-        shades: unstable_speeds.map_or_else(Vec::new, |unstable_speeds| unstable_speeds.speeds),
-        shade_meaning: stability::UNSTABLE.to_owned(),
+        panels: vec![ChartPanel {
+            range: Some(frequency_range_rpm),
+            height: 500.0,
+            stars,
+            ..panel
+        }],
+        shades: unstable_speeds
+            .map_or_else(Vec::new, |unstable_speeds| unstable_speeds.speed_ranges_rpm),
+        shade_meaning: stability::UNSTABLE_SPEEDS_MEANING.to_owned(),
         ..Chart::default()
     })
 }
@@ -103,9 +113,10 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
 /// # Errors
 /// [`PlotError::Unfit`] when the file is not a modes file,
 /// [`PlotError::Undrawable`] when it lacks a column.
-pub(crate) fn resonances(table: &FigureTable) -> Result<Vec<f64>, PlotError> {
+pub(crate) fn read_resonances_rpm(table: &FigureTable) -> Result<Vec<f64>, PlotError> {
     table.source.expect_kind(MODES, "--modes", "`sweep modes --out FILE` writes a modes file")?;
-    let mut speeds: Vec<f64> = modes(table)?.into_iter().flat_map(|mode| mode.resonances).collect();
+    let mut speeds: Vec<f64> =
+        read_modes(table)?.into_iter().flat_map(|mode| mode.resonances_rpm).collect();
     speeds.sort_by(f64::total_cmp);
     Ok(speeds)
 }
@@ -116,12 +127,15 @@ fn frequency_sums(
     modes: &[FrequencyCurve],
     unstable_speeds: &UnstableSpeeds,
 ) -> Vec<FrequencyCurve> {
-    let mut pairs: Vec<[usize; 2]> = Vec::new();
-    for (speed, frequencies) in &unstable_speeds.participants {
+    let mut mode_pairs: Vec<[usize; 2]> = Vec::new();
+    for (speed, frequencies) in &unstable_speeds.mode_frequencies_cpm {
         let nearest_mode = |frequency: f64| {
-            let distance = |mode: &FrequencyCurve| (at_speed(mode, *speed) - frequency).abs();
+            let distance_to_frequency =
+                |mode: &FrequencyCurve| (frequency_at_speed(mode, *speed) - frequency).abs();
             let indices = 0..modes.len();
-            indices.min_by(|&a, &b| distance(&modes[a]).total_cmp(&distance(&modes[b])))
+            indices.min_by(|&a, &b| {
+                distance_to_frequency(&modes[a]).total_cmp(&distance_to_frequency(&modes[b]))
+            })
         };
         // Among all pairs of participating modes, that with the sum nearest to the speed is taken.
         let participants: Vec<usize> = frequencies
@@ -132,18 +146,19 @@ fn frequency_sums(
         let candidates = participants
             .iter()
             .flat_map(|&a| participants.iter().map(move |&b| [a.min(b), a.max(b)]));
-        let distance_from_speed = |pair: &[usize; 2]| {
-            let sum_curve: f64 = pair.iter().map(|&mode| at_speed(&modes[mode], *speed)).sum();
+        let distance_to_speed = |mode_pair: &[usize; 2]| {
+            let sum_curve: f64 =
+                mode_pair.iter().map(|&mode| frequency_at_speed(&modes[mode], *speed)).sum();
             (sum_curve - speed).abs()
         };
-        if let Some(pair) =
-            candidates.min_by(|a, b| distance_from_speed(a).total_cmp(&distance_from_speed(b)))
-            && !pairs.contains(&pair)
+        if let Some(mode_pair) =
+            candidates.min_by(|a, b| distance_to_speed(a).total_cmp(&distance_to_speed(b)))
+            && !mode_pairs.contains(&mode_pair)
         {
-            pairs.push(pair);
+            mode_pairs.push(mode_pair);
         }
     }
-    pairs.sort_unstable();
+    mode_pairs.sort_unstable();
     let sum_curve = |[a, b]: [usize; 2]| {
         let mode_number = |mode: usize| {
             let name = modes[mode].name.trim_start_matches("mode ");
@@ -155,42 +170,44 @@ fn frequency_sums(
             format!("sum of the frequencies of modes {} and {}", mode_number(a), mode_number(b))
         };
         let speeds_rpm = modes[a].speeds_rpm.clone();
-        let sum_at = |speed: &f64| at_speed(&modes[a], *speed) + at_speed(&modes[b], *speed);
-        let frequencies_rpm: Vec<f64> = speeds_rpm.iter().map(sum_at).collect();
+        let sum_at_speed = |speed: &f64| {
+            frequency_at_speed(&modes[a], *speed) + frequency_at_speed(&modes[b], *speed)
+        };
+        let frequencies_rpm: Vec<f64> = speeds_rpm.iter().map(sum_at_speed).collect();
         FrequencyCurve {
             name,
-            resonances: crossings(&speeds_rpm, &frequencies_rpm),
+            resonances_rpm: resonance_speeds(&speeds_rpm, &frequencies_rpm),
             speeds_rpm,
             frequencies_rpm,
             band: None,
         }
     };
-    pairs.into_iter().map(sum_curve).collect()
+    mode_pairs.into_iter().map(sum_curve).collect()
 }
 
 /// Returns a mode's frequency at a speed.
-fn at_speed(mode: &FrequencyCurve, speed: f64) -> f64 {
+fn frequency_at_speed(mode: &FrequencyCurve, speed: f64) -> f64 {
     interpolate(&mode.speeds_rpm, &mode.frequencies_rpm, speed)
 }
 
 /// Interpolates linearly at `x`; beyond the given values the curve is constant.
 pub(crate) fn interpolate(xs: &[f64], ys: &[f64], x: f64) -> f64 {
-    let upper = xs.partition_point(|known_x| *known_x < x).min(xs.len() - 1);
-    let lower = upper.saturating_sub(1);
-    let step = xs[upper] - xs[lower];
+    let upper_index = xs.partition_point(|known_x| *known_x < x).min(xs.len() - 1);
+    let lower_index = upper_index.saturating_sub(1);
+    let step = xs[upper_index] - xs[lower_index];
     if step == 0.0 {
-        return ys[upper];
+        return ys[upper_index];
     }
-    let fraction = ((x - xs[lower]) / step).clamp(0.0, 1.0);
-    ys[lower] + fraction * (ys[upper] - ys[lower])
+    let fraction = ((x - xs[lower_index]) / step).clamp(0.0, 1.0);
+    ys[lower_index] + fraction * (ys[upper_index] - ys[lower_index])
 }
 
 /// Returns the modes of a file by number.
-pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotError> {
+pub(crate) fn read_modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotError> {
     let speeds_rpm = table.numbers("speed_rpm")?;
     let mode_numbers = table.numbers("mode")?;
     let frequencies_rpm = table.numbers("frequency_rpm")?;
-    let extreme_over_turn = |word: &str| {
+    let find_turn_extreme = |word: &str| {
         let mut columns = table.columns.iter().filter(|column| {
             column.facts.name.starts_with("frequency")
                 && column.facts.unit() == "rpm"
@@ -198,7 +215,7 @@ pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotErro
         });
         columns.next().and_then(|column| column.numbers())
     };
-    let band = extreme_over_turn("min").zip(extreme_over_turn("max"));
+    let band = find_turn_extreme("min").zip(find_turn_extreme("max"));
     let names =
         table.column("name").or_else(|| table.column("shape")).and_then(|column| column.words());
 
@@ -207,43 +224,44 @@ pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotErro
         mode_numbers.iter().copied().filter(|number| number.is_finite()).collect();
     distinct_numbers.sort_by(f64::total_cmp);
     distinct_numbers.dedup();
-    let mode_curve = |number: f64| {
+    let read_mode = |number: f64| {
         let mut rows: Vec<usize> =
             (0..table.rows).filter(|&row| mode_numbers[row] == number).collect();
         rows.sort_by(|&a, &b| speeds_rpm[a].total_cmp(&speeds_rpm[b]));
-        let values_of_rows =
+        let select_rows =
             |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-        let shape_name = names.and_then(|names| names.get(*rows.first()?));
+        let mode_name_in_file = names.and_then(|names| names.get(*rows.first()?));
         let resonances_in_file = || -> Option<Vec<f64>> {
             let mut modes_in_file = table.source.metadata_list(key::MODES);
-            let resonances =
+            let resonances_rpm =
                 modes_in_file.find(|mode| mode["mode"] == number)?["resonances"].as_array()?;
-            resonances.iter().map(|resonance| resonance["speed_rpm"].as_f64()).collect()
+            resonances_rpm.iter().map(|resonance| resonance["speed_rpm"].as_f64()).collect()
         };
-        let speeds_rpm = values_of_rows(speeds_rpm);
-        let frequencies_rpm = values_of_rows(frequencies_rpm);
+        let speeds_rpm = select_rows(speeds_rpm);
+        let frequencies_rpm = select_rows(frequencies_rpm);
         FrequencyCurve {
-            name: shape_name
-                .map_or(format!("mode {number}"), |shape_name| format!("{number} {shape_name}")),
-            resonances: resonances_in_file()
-                .unwrap_or_else(|| crossings(&speeds_rpm, &frequencies_rpm)),
+            name: mode_name_in_file.map_or(format!("mode {number}"), |mode_name_in_file| {
+                format!("{number} {mode_name_in_file}")
+            }),
+            resonances_rpm: resonances_in_file()
+                .unwrap_or_else(|| resonance_speeds(&speeds_rpm, &frequencies_rpm)),
             speeds_rpm,
             frequencies_rpm,
-            band: band.map(|(low, high)| (values_of_rows(low), values_of_rows(high))),
+            band: band.map(|(low, high)| (select_rows(low), select_rows(high))),
         }
     };
-    Ok(distinct_numbers.into_iter().map(mode_curve).collect())
+    Ok(distinct_numbers.into_iter().map(read_mode).collect())
 }
 
 /// Returns the speeds at which a mode's frequency, linear between the given speeds, is the speed.
-fn crossings(speeds: &[f64], frequencies: &[f64]) -> Vec<f64> {
-    let pairs = frequencies.iter().zip(speeds);
-    let excess: Vec<f64> = pairs.map(|(frequency, speed)| frequency - speed).collect();
-    (1..excess.len())
-        .filter(|&k| excess[k - 1] > 0.0 && excess[k] <= 0.0)
+fn resonance_speeds(speeds_rpm: &[f64], frequencies_rpm: &[f64]) -> Vec<f64> {
+    let pairs = frequencies_rpm.iter().zip(speeds_rpm);
+    let excesses_rpm: Vec<f64> = pairs.map(|(frequency, speed)| frequency - speed).collect();
+    (1..excesses_rpm.len())
+        .filter(|&k| excesses_rpm[k - 1] > 0.0 && excesses_rpm[k] <= 0.0)
         .map(|k| {
-            let fraction = excess[k - 1] / (excess[k - 1] - excess[k]);
-            speeds[k - 1] + fraction * (speeds[k] - speeds[k - 1])
+            let fraction = excesses_rpm[k - 1] / (excesses_rpm[k - 1] - excesses_rpm[k]);
+            speeds_rpm[k - 1] + fraction * (speeds_rpm[k] - speeds_rpm[k - 1])
         })
         .collect()
 }
@@ -254,9 +272,10 @@ mod tests {
 
     #[test]
     fn a_resonance_is_where_the_frequency_is_the_speed() {
-        let speed: Vec<f64> = (0..=10).map(|k| 30.0 * f64::from(k)).collect();
-        let frequency: Vec<f64> = speed.iter().map(|speed| 150.0 - 0.02 * speed).collect();
-        let resonances = crossings(&speed, &frequency);
+        let speeds_rpm: Vec<f64> = (0..=10).map(|k| 30.0 * f64::from(k)).collect();
+        let frequencies_rpm: Vec<f64> =
+            speeds_rpm.iter().map(|speed| 150.0 - 0.02 * speed).collect();
+        let resonances = resonance_speeds(&speeds_rpm, &frequencies_rpm);
         assert_eq!(resonances.len(), 1);
         assert!((resonances[0] - 150.0 / 1.02).abs() < 1e-9);
     }

@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use crate::WasherFigures;
-use crate::kinds::MACHINE;
+use crate::kinds::MACHINE_SECTIONS;
 use crate::stability::{
-    HeldPoints, channel_columns, channel_panel, channels_with_kind, over_speeds, response_series,
-    shown_channels,
+    HeldPoints, channel_columns, channel_panel, channels_with_kind, response_series,
+    shown_channels, speed_chart,
 };
 use crate::{passages, trace};
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
@@ -48,43 +48,48 @@ type DrawnAttractor = (f64, usize, Vec<f64>);
 ///
 /// # Errors
 /// The errors of [`HeldPoints::single`] and [`shown_channels`].
-pub(crate) fn chart(
+pub(crate) fn dwell_chart(
     source: &FigureFile,
     fixed_values: &NamedPoint,
     options: &WasherFigures,
 ) -> Result<Chart, PlotError> {
     let channels = channels_with_kind(source, "periodic");
-    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
-    let is_shown = shown_channels(source, &names, &options.channels)?;
+    let channel_names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
+    let is_shown = shown_channels(source, &channel_names, &options.channels)?;
     let held_points = HeldPoints::single(source, fixed_values, "--at")?;
-    let attractors = attractors(source, &held_points, &channels)?;
+    let attractors = read_attractors(source, &held_points, &channels)?;
     let curves = held_points.read(&channel_columns(&channels, ["linear", "periodic"]))?.remove(0);
-    let passing_chart =
-        options.against.as_ref().map(|path| passing_run(source, &held_points, path)).transpose()?;
-    let attractors_with_kind = |kind: usize| {
+    let passing_chart = options
+        .against
+        .as_ref()
+        .map(|path| draw_passing_run(source, &held_points, path))
+        .transpose()?;
+    let attractors_by_kind = |kind: usize| {
         attractors.iter().filter(move |(_, kind_of_attractor, _)| *kind_of_attractor == kind)
     };
-    let first_speed = curves.speeds_rpm.first().copied();
-    let last_speed = curves.speeds_rpm.last().copied();
-    let is_in_range = |speed: &f64| first_speed <= Some(*speed) && Some(*speed) <= last_speed;
+    let first_speed_rpm = curves.speeds_rpm.first().copied();
+    let last_speed_rpm = curves.speeds_rpm.last().copied();
+    let is_in_range =
+        |speed_rpm: &f64| first_speed_rpm <= Some(*speed_rpm) && Some(*speed_rpm) <= last_speed_rpm;
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
         let (_, factor) = label::display_unit(facts.unit());
         let mut series = response_series("periodic response", &curves, k, factor);
         for (kind, (_, words, colour)) in ATTRACTOR_KINDS.iter().enumerate() {
-            let points =
-                attractors_with_kind(kind).map(|(speed, _, values)| (speed, values[k] * factor));
-            let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
+            let attractor_points = attractors_by_kind(kind)
+                .map(|(speed_rpm, _, values)| (speed_rpm, values[k] * factor));
+            let (x, y): (Vec<f64>, Vec<f64>) = attractor_points.unzip();
             if !y.is_empty() {
                 let name = format!("motion at a held speed: {words}");
                 series.push(Series::new(name, *colour, x, y, Style::Dots));
             }
         }
-        let curves_of_run =
+        let run_curves =
             passing_chart.iter().flat_map(|run| &run.panels).filter(|panel| panel.name == *name);
-        let curves_of_run = curves_of_run.flat_map(|panel| &panel.series);
-        let rising = curves_of_run.filter(|run| run.name == RISING_SERIES);
-        series.extend(rising.map(|run| {
-            let turns_in_range = run.x.iter().zip(&run.y).filter(|(speed, _)| is_in_range(speed));
+        let run_curves = run_curves.flat_map(|panel| &panel.series);
+        let rising_curves = run_curves.filter(|run| run.name == RISING_SERIES);
+        series.extend(rising_curves.map(|run| {
+            let turns_in_range =
+                run.x.iter().zip(&run.y).filter(|(speed_rpm, _)| is_in_range(speed_rpm));
             let (x, y): (Vec<f64>, Vec<f64>) = turns_in_range.unzip();
             Series::new("a run that passes these speeds", INK, x, y, Style::Solid(1.4))
         }));
@@ -94,14 +99,14 @@ pub(crate) fn chart(
         ChartPanel { height: 190.0, is_log, ..channel_panel((name, facts), is_shown[k], series) }
     });
     let titles = ["What a held speed ends in", "largest deviation from equilibrium"];
-    Ok(over_speeds(titles, &held_points, &curves, panels.collect()))
+    Ok(speed_chart(titles, &held_points, &curves, panels.collect()))
 }
 
 /// Draws the largest deviation in each turn of a run that passes these speeds.
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a file that is no trace or of another machine.
-fn passing_run(
+fn draw_passing_run(
     source: &FigureFile,
     held_points: &HeldPoints<'_>,
     path: &Path,
@@ -111,12 +116,12 @@ fn passing_run(
         (&trace.source, &together::point_of_trace(&trace.source)),
         (source, &held_points.values()),
     ];
-    together::check_agreement("--against", path, files, MACHINE)?;
-    passages::chart(&trace, &WasherFigures::default())
+    together::check_agreement("--against", path, files, MACHINE_SECTIONS)?;
+    passages::passage_chart(&trace, &WasherFigures::default())
 }
 
 /// Reads the attractors at every speed.
-fn attractors(
+fn read_attractors(
     source: &FigureFile,
     held_points: &HeldPoints<'_>,
     channels: &[(&str, &ColumnFacts)],
@@ -128,7 +133,7 @@ fn attractors(
     held_points.each_row(&columns, |_, mut row| {
         // An attractor has a row for each turn; the first one stands for it.
         if row.values.pop().is_some_and(|turn| turn <= 0.0) || !has_turns {
-            attractors.push((row.speed, kind_index(row.kind), row.values));
+            attractors.push((row.speed_rpm, kind_index(row.kind), row.values));
         }
     })?;
     Ok(attractors)
@@ -148,7 +153,10 @@ fn kind_index(kind: Option<&str>) -> usize {
 ///
 /// # Errors
 /// The errors of [`HeldPoints::single`]; [`PlotError::Undrawable`] if the file has no states.
-pub(crate) fn sections(source: &FigureFile, fixed_values: &NamedPoint) -> Result<Chart, PlotError> {
+pub(crate) fn section_chart(
+    source: &FigureFile,
+    fixed_values: &NamedPoint,
+) -> Result<Chart, PlotError> {
     let held_points = HeldPoints::single(source, fixed_values, "--at")?;
     let columns = ["motion", YAW_COLUMN, PITCH_COLUMN];
     if columns.into_iter().any(|name| source.column(name).is_none()) {
@@ -159,27 +167,27 @@ pub(crate) fn sections(source: &FigureFile, fixed_values: &NamedPoint) -> Result
     held_points.each_row(&columns, |_, row| {
         let [motion, yaw, pitch] = [0, 1, 2].map(|k| row.values[k]);
         let state = [1e3 * yaw, 1e3 * pitch];
-        match attractors.last_mut().filter(|last| (last.0, last.1) == (row.speed, motion)) {
+        match attractors.last_mut().filter(|last| (last.0, last.1) == (row.speed_rpm, motion)) {
             Some((.., states)) => states.push(state),
-            None => attractors.push((row.speed, motion, kind_index(row.kind), vec![state])),
+            None => attractors.push((row.speed_rpm, motion, kind_index(row.kind), vec![state])),
         }
     })?;
     let mut panels: Vec<ChartPanel> = Vec::new();
-    for (speed, motion, kind, mut states) in attractors {
+    for (speed_rpm, motion, kind, mut states) in attractors {
         states.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let (_, words, colour) = ATTRACTOR_KINDS[kind];
-        let speed_text = format!("{} rpm", label::format_significant(speed, 6));
-        let further_colour = DISTINCT[motion as usize % DISTINCT.len()];
-        let colour = if motion == 0.0 { colour } else { further_colour };
+        let panel_name = format!("{} rpm", label::format_significant(speed_rpm, 6));
+        let colour_of_further_motion = DISTINCT[motion as usize % DISTINCT.len()];
+        let colour = if motion == 0.0 { colour } else { colour_of_further_motion };
         let name = format!("motion {motion}: {words}");
         let [yaw, pitch]: [Vec<f64>; 2] =
             [0, 1].map(|k| states.iter().map(|state| state[k]).collect());
         let series = Series::new(name, colour, yaw, pitch, Style::Dots);
-        match panels.last_mut().filter(|panel| panel.name == speed_text) {
+        match panels.last_mut().filter(|panel| panel.name == panel_name) {
             Some(panel) => panel.series.push(series),
             None => {
-                let label = Label::new(&format!("Pitch at {speed_text}"), "mrad");
-                panels.push(ChartPanel::new(&speed_text, label, vec![series]));
+                let label = Label::new(&format!("Pitch at {panel_name}"), "mrad");
+                panels.push(ChartPanel::new(&panel_name, label, vec![series]));
             }
         }
     }

@@ -15,17 +15,17 @@ pub(crate) const MODES: FigureKind =
     FigureKind::new("modes", &["mode", "frequency_rpm", "speed_rpm"]);
 
 /// The sections of a plan on which modes, and responses at constant speeds, depend.
-pub(crate) const MACHINE: &[&str] = &["machine"];
+pub(crate) const MACHINE_SECTIONS: &[&str] = &["machine"];
 
 /// The kinds and sections for `sweep-plot`.
 pub(crate) const MODEL_KINDS: ModelKinds = ModelKinds {
     kinds: &[DWELL, STABILITY, MODES],
     history_sections: &["machine", "spin"],
-    machine_sections: MACHINE,
+    machine_sections: MACHINE_SECTIONS,
 };
 
 /// Returns a mark that is labelled with a speed, rpm.
 pub(crate) fn speed_mark(x: f64, speed_rpm: f64) -> Mark {
-    let text = format!("{speed_rpm:.1}");
-    Mark { x, label: format!("{} rpm", label::trim_decimals(&text)) }
+    let speed_text = format!("{speed_rpm:.1}");
+    Mark { x, label: format!("{} rpm", label::trim_decimals(&speed_text)) }
 }

@@ -182,11 +182,13 @@ impl Figures for WasherFigures {
         let fixed_values = &options.fixed_values;
         let speed_chart = match (source.kind, self.view) {
             (STABILITY, Some(FigureView::Responses)) => {
-                Some(stability::responses(&source, fixed_values, self)?)
+                Some(stability::response_chart(&source, fixed_values, self)?)
             }
-            (STABILITY, _) => Some(stability::growth(&source, fixed_values)?),
-            (DWELL, Some(FigureView::Sections)) => Some(dwell::sections(&source, fixed_values)?),
-            (DWELL, _) => Some(dwell::chart(&source, fixed_values, self)?),
+            (STABILITY, _) => Some(stability::growth_chart(&source, fixed_values)?),
+            (DWELL, Some(FigureView::Sections)) => {
+                Some(dwell::section_chart(&source, fixed_values)?)
+            }
+            (DWELL, _) => Some(dwell::dwell_chart(&source, fixed_values, self)?),
             _ => None,
         };
         if let Some(chart) = speed_chart {
@@ -194,19 +196,19 @@ impl Figures for WasherFigures {
         }
         let table = FigureTable::read(source)?;
         let chart = match (table.source.kind, self.view) {
-            (MODES, Some(FigureView::Variation)) => turn::chart(&table)?,
-            (MODES, Some(FigureView::Shapes)) => shapes::chart(&table)?,
-            (MODES, _) => campbell::chart(&table, self)?,
-            (_, Some(FigureView::Passages)) => passages::chart(&table, self)?,
-            (_, Some(FigureView::Profiles)) => profiles::chart(&table)?,
-            (_, Some(FigureView::Spectrum)) => spectrum::chart(&table)?,
-            _ => trace::chart(&table, self)?,
+            (MODES, Some(FigureView::Variation)) => turn::variation_chart(&table)?,
+            (MODES, Some(FigureView::Shapes)) => shapes::shape_chart(&table)?,
+            (MODES, _) => campbell::campbell_chart(&table, self)?,
+            (_, Some(FigureView::Passages)) => passages::passage_chart(&table, self)?,
+            (_, Some(FigureView::Profiles)) => profiles::profile_chart(&table)?,
+            (_, Some(FigureView::Spectrum)) => spectrum::spectrum_chart(&table)?,
+            _ => trace::trace_chart(&table, self)?,
         };
         Ok((table.source, chart))
     }
 
     fn history(&self, trace: &FigureTable) -> Result<Chart, PlotError> {
-        trace::chart(trace, &Self::default())
+        trace::trace_chart(trace, &Self::default())
     }
 
     fn plan_summary(&self, plan: &Value) -> Vec<(&'static str, String)> {

@@ -12,39 +12,44 @@ use sweep_plot::{DISTINCT, PlotError};
 /// A part of a trace in which the speed only rises or only falls, by its first and last instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Ramp {
-    first: usize,
-    last: usize,
+    first_row: usize,
+    last_row: usize,
     is_rising: bool,
 }
 
 /// The whole turns of a ramp, each with its mean speed.
 struct RampTurns {
     is_rising: bool,
-    turns: Vec<[usize; 2]>,
+    turn_rows: Vec<[usize; 2]>,
     speeds_rpm: Vec<f64>,
 }
 
 /// Draws the passages of a trace file.
 ///
 /// # Errors
-/// The errors of [`trace::chart`]; [`PlotError::Undrawable`] without the speed, or if the drum
-/// makes no whole turn while its speed changes.
-pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Chart, PlotError> {
-    let mut chart = trace::chart(table, options)?;
+/// The errors of [`trace::trace_chart`]; [`PlotError::Undrawable`] without the speed, or if the
+/// drum makes no whole turn while its speed changes.
+pub(crate) fn passage_chart(
+    table: &FigureTable,
+    options: &WasherFigures,
+) -> Result<Chart, PlotError> {
+    let mut chart = trace::trace_chart(table, options)?;
     let times_s = table.numbers("time_s")?;
     let speeds_rpm: Vec<f64> =
         table.numbers("speed_rpm")?.iter().map(|speed| speed.abs()).collect();
-    let mean_speed = |&[first, last]: &[usize; 2]| 0.5 * (speeds_rpm[first] + speeds_rpm[last]);
-    let turns_of_ramp = |ramp: Ramp| {
-        let turns = turns(times_s, &speeds_rpm, ramp);
+    let mean_speed_rpm =
+        |&[first_row, last_row]: &[usize; 2]| 0.5 * (speeds_rpm[first_row] + speeds_rpm[last_row]);
+    let read_ramp_turns = |ramp: Ramp| {
+        let turn_rows = find_turns(times_s, &speeds_rpm, ramp);
         RampTurns {
             is_rising: ramp.is_rising,
-            speeds_rpm: turns.iter().map(mean_speed).collect::<Vec<_>>(),
-            turns,
+            speeds_rpm: turn_rows.iter().map(mean_speed_rpm).collect::<Vec<_>>(),
+            turn_rows,
         }
     };
-    let mut all_turns: Vec<RampTurns> = ramps(&speeds_rpm).into_iter().map(turns_of_ramp).collect();
-    all_turns.retain(|turns| !turns.turns.is_empty());
+    let mut all_turns: Vec<RampTurns> =
+        find_ramps(&speeds_rpm).into_iter().map(read_ramp_turns).collect();
+    all_turns.retain(|turns| !turns.turn_rows.is_empty());
     if all_turns.is_empty() {
         return Err(table
             .source
@@ -76,9 +81,9 @@ fn series_over_speed(series: &Series, all_turns: &[RampTurns]) -> Vec<Series> {
             if turns.is_rising { "rising" } else { "falling" }
         );
         let y = turns
-            .turns
+            .turn_rows
             .iter()
-            .map(|&[first, last]| greatest_magnitude(&series.y[first..=last]))
+            .map(|&[first_row, last_row]| greatest_magnitude(&series.y[first_row..=last_row]))
             .collect();
         let style = if is_dashed { Style::Dashed } else { Style::Solid(1.8) };
         Series::new(
@@ -101,7 +106,7 @@ fn greatest_magnitude(values: &[f64]) -> f64 {
 }
 
 /// Returns the ramps of a trace; instants of constant speed belong to none.
-fn ramps(speeds_rpm: &[f64]) -> Vec<Ramp> {
+fn find_ramps(speeds_rpm: &[f64]) -> Vec<Ramp> {
     let mut ramps: Vec<Ramp> = Vec::new();
     for k in 1..speeds_rpm.len() {
         let change = speeds_rpm[k] - speeds_rpm[k - 1];
@@ -110,19 +115,21 @@ fn ramps(speeds_rpm: &[f64]) -> Vec<Ramp> {
         }
         let is_rising = change > 0.0;
         match ramps.last_mut() {
-            Some(ramp) if ramp.last == k - 1 && ramp.is_rising == is_rising => ramp.last = k,
-            _ => ramps.push(Ramp { first: k - 1, last: k, is_rising }),
+            Some(ramp) if ramp.last_row == k - 1 && ramp.is_rising == is_rising => {
+                ramp.last_row = k
+            }
+            _ => ramps.push(Ramp { first_row: k - 1, last_row: k, is_rising }),
         }
     }
     ramps
 }
 
 /// Returns the whole turns of a ramp by first and last instant, in order of rising speed.
-fn turns(times_s: &[f64], speeds_rpm: &[f64], ramp: Ramp) -> Vec<[usize; 2]> {
+fn find_turns(times_s: &[f64], speeds_rpm: &[f64], ramp: Ramp) -> Vec<[usize; 2]> {
     let mut turns = Vec::new();
     let mut turn_count = 0.0;
-    let mut turn_start = ramp.first;
-    for k in ramp.first + 1..=ramp.last {
+    let mut turn_start = ramp.first_row;
+    for k in ramp.first_row + 1..=ramp.last_row {
         turn_count +=
             0.5 * (speeds_rpm[k] + speeds_rpm[k - 1]) / 60.0 * (times_s[k] - times_s[k - 1]);
         if turn_count >= 1.0 {
@@ -146,13 +153,13 @@ mod tests {
         let times_s: Vec<f64> = (0..=920).map(|k| 0.01 * f64::from(k)).collect();
         let speeds_rpm: Vec<f64> =
             times_s.iter().map(|t| (30.0 * t).min(126.0).min(30.0 * (9.2 - t))).collect();
-        let found_ramps = ramps(&speeds_rpm);
+        let found_ramps = find_ramps(&speeds_rpm);
         assert_eq!(
             found_ramps.iter().map(|ramp| ramp.is_rising).collect::<Vec<_>>(),
             [true, false]
         );
         let [rising_turns, falling_turns] =
-            [0, 1].map(|k| turns(&times_s, &speeds_rpm, found_ramps[k]));
+            [0, 1].map(|k| find_turns(&times_s, &speeds_rpm, found_ramps[k]));
         // On the rising ramp t^2/4 turns are made at t: the second ends at sqrt(8) s.
         assert_eq!((rising_turns.len(), falling_turns.len()), (4, 4));
         assert!((times_s[rising_turns[1][1]] - 8.0_f64.sqrt()).abs() < 0.02);

@@ -17,12 +17,12 @@ fn format_quantity(table: &Value, key: &str) -> Option<String> {
 }
 
 fn machine_summary(machine: &Value) -> Option<String> {
-    let mass_of = |body: &str| format_quantity(&machine[body], "mass_kg");
-    let tub = mass_of("tub")?;
-    let shaft = mass_of("shaft")?;
-    let drum = mass_of("drum")?;
+    let format_mass = |body: &str| format_quantity(&machine[body], "mass_kg");
+    let tub = format_mass("tub")?;
+    let shaft = format_mass("shaft")?;
+    let drum = format_mass("drum")?;
     let radius = format_quantity(&machine["unbalance"], "radius_m")?;
-    let unbalance = mass_of("unbalance")?;
+    let unbalance = format_mass("unbalance")?;
     let mut phrases = vec![format!(
         "tub {tub}, shaft {shaft}, drum {drum}, unbalance {unbalance} at radius {radius}"
     )];
@@ -32,13 +32,15 @@ fn machine_summary(machine: &Value) -> Option<String> {
         let elements_of_list = machine.get(list).and_then(Value::as_array)?;
         let values = numbers.iter().filter_map(|(word, key)| {
             // A number that an element lacks is 0; a number that all lack is left out.
-            let value_of = |element: &Value| element[*key].as_f64().unwrap_or_default();
-            let greatest_element =
-                elements_of_list.iter().max_by(|a, b| value_of(a).total_cmp(&value_of(b)))?;
-            let least = elements_of_list.iter().map(value_of).fold(f64::INFINITY, f64::min);
-            let least_text = match least == value_of(greatest_element) {
+            let number_of_element = |element: &Value| element[*key].as_f64().unwrap_or_default();
+            let greatest_element = elements_of_list
+                .iter()
+                .max_by(|a, b| number_of_element(a).total_cmp(&number_of_element(b)))?;
+            let least_number =
+                elements_of_list.iter().map(number_of_element).fold(f64::INFINITY, f64::min);
+            let least_text = match least_number == number_of_element(greatest_element) {
                 true => String::new(),
-                false => format!("{} to ", format_significant(least, 4)),
+                false => format!("{} to ", format_significant(least_number, 4)),
             };
             Some(format!(" {word} {least_text}{}", format_quantity(greatest_element, key)?))
         });
@@ -55,10 +57,10 @@ fn machine_summary(machine: &Value) -> Option<String> {
         ("feet", &[]),
     ];
     phrases.extend(lists.into_iter().filter_map(list_summary));
-    if let Some(mass_of) =
+    if let Some(cabinet_mass) =
         machine.get("cabinet").and_then(|cabinet| format_quantity(cabinet, "mass_kg"))
     {
-        phrases.push(format!("a cabinet of {mass_of}"));
+        phrases.push(format!("a cabinet of {cabinet_mass}"));
     }
     if let Some(gap) = format_quantity(machine, "radial_clearance_m") {
         phrases.push(format!("a gap of {gap} between drum and tub"));

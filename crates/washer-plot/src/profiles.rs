@@ -16,25 +16,33 @@ const CHI2_1_95: f64 = 3.84;
 ///
 /// # Errors
 /// [`PlotError::Undrawable`] for a file without profiles.
-pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
-    let no_profiles = || {
+pub(crate) fn profile_chart(table: &FigureTable) -> Result<Chart, PlotError> {
+    let no_profiles_error = || {
         table.source.nothing_to_draw(
             "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
         )
     };
-    let profiles =
-        table.source.find_metadata("profiles").and_then(Value::as_array).ok_or_else(no_profiles)?;
-    let deviations = profiles.first().map(|profile| numbers(&profile["deviations"]));
+    let profiles = table
+        .source
+        .find_metadata("profiles")
+        .and_then(Value::as_array)
+        .ok_or_else(no_profiles_error)?;
+    let deviations = profiles.first().map(|profile| read_numbers(&profile["deviations"]));
     let deviations =
-        deviations.filter(|deviations| deviations.len() > 1).ok_or_else(no_profiles)?;
+        deviations.filter(|deviations| deviations.len() > 1).ok_or_else(no_profiles_error)?;
     let series = profiles.iter().enumerate().map(|(k, profile)| {
         let name = label::name_in_words(profile["name"].as_str().unwrap_or_default());
-        let y = numbers(&profile["cost_above"]);
+        let y = read_numbers(&profile["cost_above"]);
         Series::new(name, DISTINCT[k % 6], deviations.clone(), y, Style::Solid(1.8))
     });
-    let parabola = deviations.iter().map(|deviation| deviation * deviation).collect();
-    let parabola =
-        Series::new("by the standard errors", MUTED, deviations.clone(), parabola, Style::Dashed);
+    let parabola_values = deviations.iter().map(|deviation| deviation * deviation).collect();
+    let parabola = Series::new(
+        "by the standard errors",
+        MUTED,
+        deviations.clone(),
+        parabola_values,
+        Style::Dashed,
+    );
     let series = series.chain([parabola]).collect();
     let panel = ChartPanel {
         levels: vec![(CHI2_1_95, "95 %".to_owned())],
@@ -50,6 +58,6 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
 }
 
 /// Returns the numbers of a list.
-pub(crate) fn numbers(list: &Value) -> Vec<f64> {
+pub(crate) fn read_numbers(list: &Value) -> Vec<f64> {
     list.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
 }

@@ -18,9 +18,9 @@ type Phasor = [f64; 2];
 /// Positions along the axis, from O towards the door (m).
 struct AxisPositions {
     /// The rear and the front of the tub.
-    tub: [f64; 2],
+    tub_x_m: [f64; 2],
     /// The rear, the hinge and the front of the drum.
-    drum: [f64; 3],
+    drum_x_m: [f64; 3],
 }
 
 /// The deflections of an axis along c2 and c3 at some positions.
@@ -31,7 +31,7 @@ type AxisShape = [Vec<Phasor>; 2];
 ///
 /// # Errors
 /// [`PlotError::Undrawable`] if the file has no machine or no resonances.
-pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
+pub(crate) fn shape_chart(table: &FigureTable) -> Result<Chart, PlotError> {
     let positions = axis_positions(table).ok_or_else(|| {
         table.source.nothing_to_draw("the file does not say where the machine's parts are")
     })?;
@@ -44,14 +44,14 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
             else {
                 continue;
             };
-            let number = panels.len() + 1;
+            let panel_number = panels.len() + 1;
             let words = format!("{}, {speed:.1} rpm", label::capitalise(name));
             let label = Label::new(&words, "");
             panels.push(ChartPanel {
                 range: Some((-1.15, 1.15)),
                 height: 200.0,
                 ..ChartPanel::new(
-                    &format!("shape {number}"),
+                    &format!("shape {panel_number}"),
                     label,
                     shape_series(&positions, &coordinates),
                 )
@@ -76,23 +76,23 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
 
 fn axis_positions(table: &FigureTable) -> Option<AxisPositions> {
     let machine = table.source.find_metadata("machine")?;
-    let number = |path: &str| machine.pointer(path).and_then(Value::as_f64);
-    let rear = number("/bearings/rear_x_m")?;
-    let tub = [rear, number("/tub/front_x_m")?];
-    let drum = [rear, number("/drum/hinge_x_m")?, number("/drum/front_x_m")?];
-    Some(AxisPositions { tub, drum })
+    let read_number = |path: &str| machine.pointer(path).and_then(Value::as_f64);
+    let rear_x_m = read_number("/bearings/rear_x_m")?;
+    let tub_x_m = [rear_x_m, read_number("/tub/front_x_m")?];
+    let drum_x_m = [rear_x_m, read_number("/drum/hinge_x_m")?, read_number("/drum/front_x_m")?];
+    Some(AxisPositions { tub_x_m, drum_x_m })
 }
 
 /// Number of coordinates of a shape: `q1` to `q10` of a modes file.
-const COORDINATES: usize = 10;
+const COORDINATE_COUNT: usize = 10;
 
 /// Returns the phasor of each coordinate.
 fn coordinate_phasors(coordinates: &Value) -> Option<Vec<Phasor>> {
-    let component = |number_pair: &Value, k: usize| number_pair.get(k).and_then(Value::as_f64);
-    (1..=COORDINATES)
+    let read_component = |number_pair: &Value, k: usize| number_pair.get(k).and_then(Value::as_f64);
+    (1..=COORDINATE_COUNT)
         .map(|i| {
             coordinates.get(format!("q{i}")).and_then(|number_pair| {
-                Some([component(number_pair, 0)?, component(number_pair, 1)?])
+                Some([read_component(number_pair, 0)?, read_component(number_pair, 1)?])
             })
         })
         .collect()
@@ -104,18 +104,18 @@ fn axis_shapes(positions: &AxisPositions, phasors: &[Phasor]) -> [AxisShape; 2] 
     let straight_axis = |start: Phasor, slope: Phasor, sign: f64, xs: &[f64]| -> Vec<Phasor> {
         xs.iter().map(|x| add_scaled(start, sign * x, slope)).collect()
     };
-    let AxisPositions { tub, drum } = positions;
+    let AxisPositions { tub_x_m, drum_x_m } = positions;
     let tub = [
-        straight_axis(phasors[0], phasors[5], 1.0, tub),
-        straight_axis(phasors[1], phasors[4], -1.0, tub),
+        straight_axis(phasors[0], phasors[5], 1.0, tub_x_m),
+        straight_axis(phasors[1], phasors[4], -1.0, tub_x_m),
     ];
     let mut drum = [
-        straight_axis(phasors[2], phasors[7], 1.0, drum),
-        straight_axis(phasors[3], phasors[6], -1.0, drum),
+        straight_axis(phasors[2], phasors[7], 1.0, drum_x_m),
+        straight_axis(phasors[3], phasors[6], -1.0, drum_x_m),
     ];
     // Beyond the hinge the drum's axis is bent against the shaft; at theta = 0 its angles are about
     // c2 and c3.
-    let length_beyond_hinge = positions.drum[2] - positions.drum[1];
+    let length_beyond_hinge = positions.drum_x_m[2] - positions.drum_x_m[1];
     drum[0][2] = add_scaled(drum[0][2], length_beyond_hinge, phasors[9]);
     drum[1][2] = add_scaled(drum[1][2], -length_beyond_hinge, phasors[8]);
     [tub, drum]
@@ -139,9 +139,9 @@ fn shape_series(positions: &AxisPositions, phasors: &[Phasor]) -> Vec<Series> {
     };
     let mut series = Vec::new();
     for (k, direction) in ["vertical", "horizontal"].into_iter().enumerate() {
-        let tub_line: Vec<Phasor> = tub[k].iter().copied().map(normalise).collect();
-        let drum_line: Vec<Phasor> = drum[k].iter().copied().map(normalise).collect();
-        let mut add_curves = |body: &str, x: &[f64], line: &[Phasor], colour: usize| {
+        let tub_curve: Vec<Phasor> = tub[k].iter().copied().map(normalise).collect();
+        let drum_curve: Vec<Phasor> = drum[k].iter().copied().map(normalise).collect();
+        let mut add_real_and_imaginary = |body: &str, x: &[f64], line: &[Phasor], colour: usize| {
             // The real part of exp(i w t) comes first; a quarter of a period later it is minus the
             // imaginary part.
             for (component, sign, style, suffix) in [
@@ -153,9 +153,9 @@ fn shape_series(positions: &AxisPositions, phasors: &[Phasor]) -> Vec<Series> {
                 series.push(Series::new(name, DISTINCT[colour], x.to_vec(), y, style));
             }
         };
-        add_curves("", &positions.tub, &tub_line, k);
-        if max_separation(positions, &tub_line, &drum_line) > MIN_SEPARATION {
-            add_curves("drum, ", &positions.drum, &drum_line, k + 2);
+        add_real_and_imaginary("", &positions.tub_x_m, &tub_curve, k);
+        if max_separation(positions, &tub_curve, &drum_curve) > MIN_SEPARATION {
+            add_real_and_imaginary("drum, ", &positions.drum_x_m, &drum_curve, k + 2);
         }
     }
     series
@@ -164,10 +164,10 @@ fn shape_series(positions: &AxisPositions, phasors: &[Phasor]) -> Vec<Series> {
 /// Returns the greatest distance between the axes of drum and tub.
 fn max_separation(positions: &AxisPositions, tub: &[Phasor], drum: &[Phasor]) -> f64 {
     let tub_deflection = |x: f64| {
-        let fraction = (x - positions.tub[0]) / (positions.tub[1] - positions.tub[0]);
+        let fraction = (x - positions.tub_x_m[0]) / (positions.tub_x_m[1] - positions.tub_x_m[0]);
         [0, 1].map(|k| tub[0][k] + fraction * (tub[1][k] - tub[0][k]))
     };
-    let points = positions.drum.into_iter().zip(drum);
+    let points = positions.drum_x_m.into_iter().zip(drum);
     let separations = points.map(|(x, deflection)| {
         (deflection[0] - tub_deflection(x)[0]).hypot(deflection[1] - tub_deflection(x)[1])
     });
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     const POSITIONS: AxisPositions =
-        AxisPositions { tub: [-0.05, 0.45], drum: [-0.05, 0.15, 0.45] };
+        AxisPositions { tub_x_m: [-0.05, 0.45], drum_x_m: [-0.05, 0.15, 0.45] };
 
     #[test]
     fn pitch_tilts_the_axis_up_and_yaw_tilts_it_against_c3() {
@@ -187,12 +187,12 @@ mod tests {
         (phasors[5], phasors[7]) = ([0.0, 2.0], [0.0, 2.0]);
         let series = shape_series(&POSITIONS, &phasors);
         assert_eq!(series.len(), 4, "tub and drum move alike");
-        let curve = |name: &str| &series.iter().find(|series| series.name == name).unwrap().y;
+        let find_curve = |name: &str| &series.iter().find(|series| series.name == name).unwrap().y;
         let assert_near = |values: &[f64], expected: [f64; 2]| {
             assert!(values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{values:?}");
         };
-        assert_near(curve("vertical"), [-0.05 / 0.45, 1.0]);
-        assert_near(curve("horizontal"), [0.0, 0.0]);
+        assert_near(find_curve("vertical"), [-0.05 / 0.45, 1.0]);
+        assert_near(find_curve("horizontal"), [0.0, 0.0]);
         let mut phasors = vec![[0.0, 0.0]; 10];
         (phasors[4], phasors[6]) = ([1.0, 0.0], [1.0, 0.0]);
         let series = shape_series(&POSITIONS, &phasors);
@@ -207,12 +207,12 @@ mod tests {
         (phasors[1], phasors[3]) = ([0.5, 0.0], [0.5, 0.0]);
         phasors[9] = [0.0, -0.5 / 0.3];
         let series = shape_series(&POSITIONS, &phasors);
-        let curve = |name: &str| &series.iter().find(|series| series.name == name).unwrap().y;
+        let find_curve = |name: &str| &series.iter().find(|series| series.name == name).unwrap().y;
         // The greatest deflection is that of the drum's front, 1.5 along c2.
-        let last_value = |name: &str| curve(name).last().copied().unwrap();
-        assert!((last_value("drum, vertical") - 1.0).abs() < 1e-12);
-        assert!((last_value("vertical") - 1.0 / 1.5).abs() < 1e-12);
-        assert!((last_value("horizontal, a quarter of a period later") + 0.5 / 1.5).abs() < 1e-12);
-        assert!(last_value("horizontal").abs() < 1e-12);
+        let last_point = |name: &str| find_curve(name).last().copied().unwrap();
+        assert!((last_point("drum, vertical") - 1.0).abs() < 1e-12);
+        assert!((last_point("vertical") - 1.0 / 1.5).abs() < 1e-12);
+        assert!((last_point("horizontal, a quarter of a period later") + 0.5 / 1.5).abs() < 1e-12);
+        assert!(last_point("horizontal").abs() < 1e-12);
     }
 }

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::WasherFigures;
-use crate::kinds::{MACHINE, MODEL_KINDS, STABILITY, speed_mark};
+use crate::kinds::{MACHINE_SECTIONS, MODEL_KINDS, STABILITY, speed_mark};
 use crate::machine::unbalance_and_damping;
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::{self, Label};
@@ -23,10 +23,11 @@ const DEFAULT_CHANNELS: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "t
 
 /// Maximum number of edges that are marked with their speeds. Basis: labels of more would cover
 /// each other.
-const MAX_EDGES: usize = 16;
+const MAX_EDGE_MARKS: usize = 16;
 
 /// The legend entry of unstable speeds.
-pub(crate) const UNSTABLE: &str = "speeds at which the periodic response is unstable";
+pub(crate) const UNSTABLE_SPEEDS_MEANING: &str =
+    "speeds at which the periodic response is unstable";
 
 /// The responses at one point over speed.
 #[derive(Clone, Default)]
@@ -35,25 +36,29 @@ pub(crate) struct SpeedCurves {
     /// The growth at each speed; NaN without a response.
     pub(crate) growths_per_s: Vec<f64>,
     /// The values of each requested column.
-    columns: Vec<Vec<f64>>,
+    column_values: Vec<Vec<f64>>,
 }
 
 /// Draws the growth of a stability file over speed.
 ///
 /// # Errors
 /// The errors of [`HeldPoints::matching`] and [`HeldPoints::read`].
-pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<Chart, PlotError> {
+pub(crate) fn growth_chart(
+    source: &FigureFile,
+    fixed_values: &NamedPoint,
+) -> Result<Chart, PlotError> {
     let mut held_points = HeldPoints::matching(source, fixed_values, "--at")?;
     let count = held_points.points.len();
     if count > MAX_CURVES {
-        let picks = (0..MAX_CURVES).map(|k| k * (count - 1) / (MAX_CURVES - 1));
-        held_points.points = picks.map(|index| held_points.points[index].clone()).collect();
+        let curve_indices = (0..MAX_CURVES).map(|k| k * (count - 1) / (MAX_CURVES - 1));
+        held_points.points = curve_indices.map(|index| held_points.points[index].clone()).collect();
     }
     let curves = held_points.read(&[])?;
     let HeldPoints { axes, points: shown_points, .. } = &held_points;
-    let is_varying = |k: usize| shown_points.iter().any(|curve| curve[k] != shown_points[0][k]);
+    let is_varying_axis =
+        |k: usize| shown_points.iter().any(|curve| curve[k] != shown_points[0][k]);
     let curve_name = |curve: &[f64]| {
-        let varying_axes = axes.iter().zip(curve).enumerate().filter(|(k, _)| is_varying(*k));
+        let varying_axes = axes.iter().zip(curve).enumerate().filter(|(k, _)| is_varying_axis(*k));
         let varying_axes: Vec<String> =
             varying_axes.map(|(_, (axis, value))| format_value(axis, *value)).collect();
         if varying_axes.is_empty() { "growth".to_owned() } else { varying_axes.join(", ") }
@@ -64,7 +69,7 @@ pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<C
         Series::new(curve_name(values), DISTINCT[k], x, y, Style::Solid(2.2))
     });
     let constant_axes =
-        axes.iter().zip(&shown_points[0]).enumerate().filter(|(k, _)| !is_varying(*k));
+        axes.iter().zip(&shown_points[0]).enumerate().filter(|(k, _)| !is_varying_axis(*k));
     let mut notes =
         source.notes(constant_axes.map(|(_, (axis, value))| format_in_lower_case(axis, *value)));
     if shown_points.len() < count {
@@ -80,7 +85,7 @@ pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<C
         ),
         _ => Default::default(),
     };
-    let edges = edges.into_iter().take(MAX_EDGES);
+    let edges = edges.into_iter().take(MAX_EDGE_MARKS);
     let marks = edges.map(|edge| speed_mark(edge, edge)).collect();
     Ok(Chart {
         title: "Where a dwell at constant speed is unstable".to_owned(),
@@ -90,7 +95,7 @@ pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<C
         marks,
         mark_meaning: "edge".to_owned(),
         shades,
-        shade_meaning: UNSTABLE.to_owned(),
+        shade_meaning: UNSTABLE_SPEEDS_MEANING.to_owned(),
         ..Chart::default()
     })
 }
@@ -100,14 +105,14 @@ pub(crate) fn growth(source: &FigureFile, fixed_values: &NamedPoint) -> Result<C
 ///
 /// # Errors
 /// Returns the errors of [`HeldPoints::single`]; [`PlotError::Unfit`] for an unknown channel.
-pub(crate) fn responses(
+pub(crate) fn response_chart(
     source: &FigureFile,
     fixed_values: &NamedPoint,
     options: &WasherFigures,
 ) -> Result<Chart, PlotError> {
     let channels = channels_with_kind(source, "linear");
-    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
-    let is_shown = shown_channels(source, &names, &options.channels)?;
+    let channel_names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
+    let is_shown = shown_channels(source, &channel_names, &options.channels)?;
     let columns = channel_columns(&channels, ["linear", "nonlinear"]);
     let held_points = HeldPoints::single(source, fixed_values, "--at")?;
     let curves = held_points.read(&columns)?.remove(0);
@@ -123,12 +128,12 @@ pub(crate) fn responses(
         });
     let titles =
         ["Periodic responses at constant speed", "largest deviation from equilibrium over a turn"];
-    Ok(over_speeds(titles, &held_points, &curves, panels.collect()))
+    Ok(speed_chart(titles, &held_points, &curves, panels.collect()))
 }
 
 /// Returns a chart of one point over speed with its unstable speeds shaded. `title` is that of the
 /// chart; `quantity` names that of its panels.
-pub(crate) fn over_speeds(
+pub(crate) fn speed_chart(
     [title, quantity]: [&str; 2],
     held_points: &HeldPoints<'_>,
     curves: &SpeedCurves,
@@ -141,7 +146,7 @@ pub(crate) fn over_speeds(
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
         shades: unstable_ranges(&curves.speeds_rpm, &curves.growths_per_s),
-        shade_meaning: UNSTABLE.to_owned(),
+        shade_meaning: UNSTABLE_SPEEDS_MEANING.to_owned(),
         panels,
         ..Chart::default()
     }
@@ -184,40 +189,44 @@ pub(crate) fn response_series(
     k: usize,
     factor: f64,
 ) -> Vec<Series> {
-    let [linear, periodic]: [Vec<f64>; 2] =
-        [2 * k, 2 * k + 1].map(|k| curves.columns[k].iter().map(|value| value * factor).collect());
+    let [linear, periodic]: [Vec<f64>; 2] = [2 * k, 2 * k + 1]
+        .map(|k| curves.column_values[k].iter().map(|value| value * factor).collect());
     let [stable, unstable] = stability_parts(&curves.speeds_rpm, &periodic, &curves.growths_per_s);
-    let series_of_part = |word: &str, colour, (speed, values): (Vec<f64>, Vec<f64>), style| {
+    let part_series = |word: &str, colour, (speed, values): (Vec<f64>, Vec<f64>), style| {
         Series::new(format!("{name}, {word}"), colour, speed, values, style)
     };
     vec![
         Series::new("linear model", LINEAR, curves.speeds_rpm.clone(), linear, Style::Solid(1.6)),
-        series_of_part("stable", NONLINEAR, stable, Style::Solid(2.2)),
-        series_of_part("unstable", NONLINEAR, unstable, Style::Dashed),
+        part_series("stable", NONLINEAR, stable, Style::Solid(2.2)),
+        part_series("unstable", NONLINEAR, unstable, Style::Dashed),
     ]
 }
 
 /// Returns the stable and the unstable part of a curve over speed, each with its speeds; gaps are
 /// NaN. The parts meet where growth passes 0, as the shaded ranges end there.
-fn stability_parts(speed: &[f64], curve: &[f64], growth: &[f64]) -> [(Vec<f64>, Vec<f64>); 2] {
+fn stability_parts(
+    speed_rpm: &[f64],
+    curve: &[f64],
+    growth_per_s: &[f64],
+) -> [(Vec<f64>, Vec<f64>); 2] {
     let mut parts = [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())];
-    let mut add_point = |part: usize, speed: f64, value: f64| {
-        parts[part].0.push(speed);
+    let mut add_point = |part: usize, speed_rpm: f64, value: f64| {
+        parts[part].0.push(speed_rpm);
         parts[part].1.push(value);
     };
-    for k in 0..speed.len() {
-        let part = usize::from(growth[k] > 0.0);
-        let value = if growth[k].is_nan() { f64::NAN } else { curve[k] };
-        add_point(part, speed[k], value);
-        let Some(&next_growth) = growth.get(k + 1) else { continue };
+    for k in 0..speed_rpm.len() {
+        let part = usize::from(growth_per_s[k] > 0.0);
+        let value = if growth_per_s[k].is_nan() { f64::NAN } else { curve[k] };
+        add_point(part, speed_rpm[k], value);
+        let Some(&next_growth) = growth_per_s.get(k + 1) else { continue };
         let next_part = usize::from(next_growth > 0.0);
-        if next_growth.is_nan() || growth[k].is_nan() {
-            add_point(part, speed[k], f64::NAN);
+        if next_growth.is_nan() || growth_per_s[k].is_nan() {
+            add_point(part, speed_rpm[k], f64::NAN);
         } else if next_part != part {
-            let share = growth[k] / (growth[k] - next_growth);
+            let edge_fraction = growth_per_s[k] / (growth_per_s[k] - next_growth);
             let interpolate_between =
-                |values: &[f64]| values[k] + share * (values[k + 1] - values[k]);
-            let edge_speed = interpolate_between(speed);
+                |values: &[f64]| values[k] + edge_fraction * (values[k + 1] - values[k]);
+            let edge_speed = interpolate_between(speed_rpm);
             add_point(part, edge_speed, interpolate_between(curve));
             add_point(part, edge_speed, f64::NAN);
             add_point(next_part, edge_speed, interpolate_between(curve));
@@ -253,10 +262,10 @@ pub(crate) fn shown_channels(
 /// The unstable speeds in a stability file for the machine of another file.
 pub(crate) struct UnstableSpeeds {
     /// The ranges of unstable speeds (rpm).
-    pub(crate) speeds: Vec<[f64; 2]>,
+    pub(crate) speed_ranges_rpm: Vec<[f64; 2]>,
     /// The damped frequencies (cycles per minute) of the modes in resonance at each unstable speed
     /// (rpm): two, or one and NaN.
-    pub(crate) participants: Vec<(f64, [f64; 2])>,
+    pub(crate) mode_frequencies_cpm: Vec<(f64, [f64; 2])>,
 }
 
 /// Reads the unstable speeds of the machine of a trace or modes file from a stability file.
@@ -278,13 +287,13 @@ pub(crate) fn read_unstable(table: &FigureTable, path: &Path) -> Result<Unstable
     point.retain(|(name, _)| axes.iter().any(|axis| axis.name == *name));
     let held_points = HeldPoints::single(&source, &point, "--stability")?;
     let files = [(&table.source, &point_of_file), (&source, &held_points.values())];
-    together::check_agreement("--stability", path, files, MACHINE)?;
+    together::check_agreement("--stability", path, files, MACHINE_SECTIONS)?;
     let curves = held_points.read(&["mode_1_cpm", "mode_2_cpm"].map(str::to_owned))?.remove(0);
     let frequency =
-        |column: usize, k: usize| curves.columns[column].get(k).copied().unwrap_or(f64::NAN);
+        |column: usize, k: usize| curves.column_values[column].get(k).copied().unwrap_or(f64::NAN);
     Ok(UnstableSpeeds {
-        speeds: unstable_ranges(&curves.speeds_rpm, &curves.growths_per_s),
-        participants: (0..curves.speeds_rpm.len())
+        speed_ranges_rpm: unstable_ranges(&curves.speeds_rpm, &curves.growths_per_s),
+        mode_frequencies_cpm: (0..curves.speeds_rpm.len())
             .filter(|&k| curves.growths_per_s[k] > 0.0)
             .map(|k| (curves.speeds_rpm[k], [frequency(0, k), frequency(1, k)]))
             .collect(),
@@ -304,8 +313,8 @@ fn format_in_lower_case(axis: &ColumnFacts, value: f64) -> String {
 pub(crate) struct SpeedRow<'a> {
     /// The values of the file's axes.
     point: Vec<f64>,
-    pub(crate) speed: f64,
-    growth: f64,
+    pub(crate) speed_rpm: f64,
+    growth_per_s: f64,
     pub(crate) kind: Option<&'a str>,
     /// The values of the requested columns.
     pub(crate) values: Vec<f64>,
@@ -337,14 +346,15 @@ impl<'a> HeldPoints<'a> {
             let axis_index = names().position(|axis| axis == name);
             axis_index.ok_or_else(|| source.unknown_name(option, name, "axis", list_names(names())))
         };
-        let requested =
+        let requested_values_by_axis =
             requested_values.iter().map(|(name, value)| Ok((axis_index(name)?, *value)));
-        let requested = requested.collect::<Result<Vec<_>, PlotError>>()?;
+        let requested_values_by_axis =
+            requested_values_by_axis.collect::<Result<Vec<_>, PlotError>>()?;
         let mut points: Vec<Vec<f64>> = Vec::new();
         let mut has_rows = false;
         held_points.each_row_of_file(&[""; 0], |row| {
             has_rows = true;
-            let is_requested = requested
+            let is_requested = requested_values_by_axis
                 .iter()
                 .all(|&(axis_index, value)| SweptAxis::is_same_value(row.point[axis_index], value));
             // Speed varies fastest, so that the rows of a point follow each other.
@@ -437,8 +447,8 @@ impl<'a> HeldPoints<'a> {
         self.source.each_row(&names, |row| {
             visit(SpeedRow {
                 point: row.numbers(0..axis_count),
-                speed: row.number(axis_count),
-                growth: row.number(axis_count + 1),
+                speed_rpm: row.number(axis_count),
+                growth_per_s: row.number(axis_count + 1),
                 kind: row.word(axis_count + 2),
                 values: row.numbers(axis_count + 3..names.len()),
             });
@@ -451,18 +461,20 @@ impl<'a> HeldPoints<'a> {
     /// # Errors
     /// Returns the errors of [`FigureFile::each_row`].
     pub(crate) fn read(&self, columns: &[String]) -> Result<Vec<SpeedCurves>, PlotError> {
-        let empty_curves =
-            SpeedCurves { columns: vec![Vec::new(); columns.len()], ..SpeedCurves::default() };
+        let empty_curves = SpeedCurves {
+            column_values: vec![Vec::new(); columns.len()],
+            ..SpeedCurves::default()
+        };
         let mut curves = vec![empty_curves; self.points.len()];
         self.each_row(columns, |point_index, row| {
             let curve = &mut curves[point_index];
             // A speed can have several responses. The first is that of a machine that runs up.
-            if curve.speeds_rpm.last() == Some(&row.speed) {
+            if curve.speeds_rpm.last() == Some(&row.speed_rpm) {
                 return;
             }
-            curve.speeds_rpm.push(row.speed);
-            curve.growths_per_s.push(row.growth);
-            for (values, value) in curve.columns.iter_mut().zip(row.values) {
+            curve.speeds_rpm.push(row.speed_rpm);
+            curve.growths_per_s.push(row.growth_per_s);
+            for (values, value) in curve.column_values.iter_mut().zip(row.values) {
                 values.push(value);
             }
         })?;
@@ -472,17 +484,21 @@ impl<'a> HeldPoints<'a> {
 
 /// Returns the ranges of speed in which growth exceeds 0; it is linear between the given speeds. A
 /// speed without a response (NaN) ends a range at its neighbour.
-pub(crate) fn unstable_ranges(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
-    intervals_within(speed, growth, &[[0.0, f64::INFINITY]])
+pub(crate) fn unstable_ranges(speeds_rpm: &[f64], growths_per_s: &[f64]) -> Vec<[f64; 2]> {
+    intervals_within(speeds_rpm, growths_per_s, &[[0.0, f64::INFINITY]])
 }
 
 /// Returns the speeds at which growth passes 0. The end of a range at a missing response is no
 /// edge.
-fn stability_edges(speed: &[f64], growth: &[f64]) -> Vec<f64> {
-    let pairs = speed.iter().zip(growth);
+fn stability_edges(speeds_rpm: &[f64], growths_per_s: &[f64]) -> Vec<f64> {
+    let pairs = speeds_rpm.iter().zip(growths_per_s);
     let is_growing =
         |edge: f64| pairs.clone().any(|(&speed, &growth)| speed == edge && growth > 0.0);
-    unstable_ranges(speed, growth).into_iter().flatten().filter(|&edge| !is_growing(edge)).collect()
+    unstable_ranges(speeds_rpm, growths_per_s)
+        .into_iter()
+        .flatten()
+        .filter(|&edge| !is_growing(edge))
+        .collect()
 }
 
 /// Returns the intervals of x in which a curve lies within one of these ranges; it is linear
@@ -490,11 +506,11 @@ fn stability_edges(speed: &[f64], growth: &[f64]) -> Vec<f64> {
 pub(crate) fn intervals_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut intervals: Vec<[f64; 2]> = Vec::new();
     for &[low, high] in ranges {
-        let first_of_range = intervals.len();
+        let first_interval = intervals.len();
         let is_within = |k: usize| low < y[k] && y[k] < high;
         for k in 0..x.len().min(y.len()) {
             let mut add_interval =
-                |[from, to]: [f64; 2]| match intervals[first_of_range..].last_mut() {
+                |[from, to]: [f64; 2]| match intervals[first_interval..].last_mut() {
                     Some(last) if from <= last[1] => last[1] = to,
                     _ => intervals.push([from, to]),
                 };
@@ -545,17 +561,17 @@ mod tests {
         let growth = [-1.0, 1.0, -3.0, f64::NAN, 1.0];
         let curve = [1.0, 3.0, 7.0, 9.0, 11.0];
         let [stable, unstable] = stability_parts(&speed, &curve, &growth);
-        let finite_points = |(speed, values): (Vec<f64>, Vec<f64>)| -> Vec<(f64, f64)> {
+        let finite_part = |(speed, values): (Vec<f64>, Vec<f64>)| -> Vec<(f64, f64)> {
             speed.into_iter().zip(values).filter(|(_, value)| !value.is_nan()).collect()
         };
-        assert_eq!(finite_points(stable), [(200.0, 1.0), (205.0, 2.0), (212.5, 4.0), (220.0, 7.0)]);
+        assert_eq!(finite_part(stable), [(200.0, 1.0), (205.0, 2.0), (212.5, 4.0), (220.0, 7.0)]);
         assert_eq!(
-            finite_points(unstable),
+            finite_part(unstable),
             [(205.0, 2.0), (210.0, 3.0), (212.5, 4.0), (240.0, 11.0)]
         );
         // A last speed alone in its part is the end of a line, no dot.
         let [_, unstable] = stability_parts(&speed[..2], &curve[..2], &growth[..2]);
-        assert_eq!(finite_points(unstable), [(205.0, 2.0), (210.0, 3.0)]);
+        assert_eq!(finite_part(unstable), [(205.0, 2.0), (210.0, 3.0)]);
     }
 
     #[test]

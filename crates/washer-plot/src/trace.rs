@@ -4,7 +4,7 @@ use std::path::Path;
 use std::rc::Rc;
 
 use crate::WasherFigures;
-use crate::kinds::{MACHINE, MODEL_KINDS, speed_mark};
+use crate::kinds::{MACHINE_SECTIONS, MODEL_KINDS, speed_mark};
 use crate::machine::unbalance_and_damping;
 use crate::{campbell, stability};
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
@@ -18,8 +18,11 @@ use sweep_plot::{INK, LINEAR, NONLINEAR, PlotError, extremes};
 ///
 /// # Errors
 /// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and the
-/// errors of [`campbell::resonances`] for the modes file.
-pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Chart, PlotError> {
+/// errors of [`campbell::read_resonances_rpm`] for the modes file.
+pub(crate) fn trace_chart(
+    table: &FigureTable,
+    options: &WasherFigures,
+) -> Result<Chart, PlotError> {
     let times_s = Rc::new(table.numbers("time_s")?.to_vec());
     if times_s.len() < 2 {
         return Err(table.source.nothing_to_draw("a trace needs at least two instants"));
@@ -31,7 +34,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         )));
     }
     let model_prefixes = model_prefixes(table);
-    let quantities = quantities(table, model_prefixes);
+    let quantities = trace_quantities(table, model_prefixes);
     let names: Vec<&str> = quantities.iter().map(|quantity| quantity.name).collect();
     let is_shown = stability::shown_channels(&table.source, &names, &options.channels)?;
     // States and forces are drawn on request only.
@@ -42,25 +45,25 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         .filter(|(quantity, is_shown)| *is_shown && (is_any_requested || quantity.is_channel));
     let shown_names: Vec<&str> = shown_names.map(|(quantity, _)| quantity.name).collect();
     let compared_trace = options.against.as_ref().map(|path| read_other_trace(path)).transpose()?;
-    let names = match &compared_trace {
+    let curve_names = match &compared_trace {
         Some(compared_trace) => distinct_names(table, compared_trace),
         None => model_prefixes.map(curve_name),
     };
     // The second curve is translucent, so that the first one shows through.
     let front_table = compared_trace.as_ref().unwrap_or(table);
-    let front_time = Rc::new(front_table.numbers("time_s")?.to_vec());
+    let front_times_s = Rc::new(front_table.numbers("time_s")?.to_vec());
     let curve_sources = [
         (table, Rc::clone(&times_s), NONLINEAR),
-        (front_table, front_time, LINEAR.with_alpha(165)),
+        (front_table, front_times_s, LINEAR.with_alpha(165)),
     ];
     let model_curves = |columns: &[String; 2], factor: f64| -> Vec<Series> {
-        let curve = |k: usize| {
-            let ((table, times_s, colour), name) = (&curve_sources[k], names[k].clone());
+        let model_curve = |k: usize| {
+            let ((table, times_s, colour), name) = (&curve_sources[k], curve_names[k].clone());
             let column = table.column(&columns[if compared_trace.is_some() { 0 } else { k }])?;
             let y = column.numbers()?.iter().map(|value| value * factor).collect();
             Some(Series::new(name, *colour, Rc::clone(times_s), y, Style::Solid(1.3)))
         };
-        (0..2).filter_map(curve).collect()
+        (0..2).filter_map(model_curve).collect()
     };
     let quantity_panel = |quantity: &TraceQuantity<'_>| {
         let (name, (unit, factor)) = (quantity.name, label::display_unit(quantity.unit));
@@ -68,7 +71,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         let words =
             if is_channel { label::channel_in_words(name) } else { label::name_in_words(name) };
         let series = model_curves(&quantity.columns, factor);
-        panel(name, Label::new(&words, unit), shown_names.contains(&name), series)
+        trace_panel(name, Label::new(&words, unit), shown_names.contains(&name), series)
     };
     let mut panels: Vec<ChartPanel> = quantities.iter().map(quantity_panel).collect();
     // Decimated rows of two files do not lie at the same instants.
@@ -83,7 +86,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         let words = format!("residual, {}", label::name_in_words(name));
         let is_shown = shown_names.contains(&name);
         let label = Label::new(&words, unit);
-        panels.push(panel(&format!("residual_{name}"), label, is_shown, vec![residual]));
+        panels.push(trace_panel(&format!("residual_{name}"), label, is_shown, vec![residual]));
     }
     let mut gap_series = model_curves(&["gap_nonlinear_m", "gap_linear_m"].map(str::to_owned), 1e3);
     if compared_trace.is_some() && gap_series.len() < 2 {
@@ -97,7 +100,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
             gap_series.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
         let is_gap_small = least_gaps.iter().any(|(_, gap)| *gap < 0.5 * greatest_gap);
         let levels = if is_gap_small { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
-        let gap_panel = panel("gap", Label::new("gap, drum to tub", "mm"), true, gap_series);
+        let gap_panel = trace_panel("gap", Label::new("gap, drum to tub", "mm"), true, gap_series);
         panels.push(ChartPanel { levels, ..gap_panel });
     }
     let mut marks = Vec::new();
@@ -105,12 +108,12 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     let unstable_ranges = unstable_speeds(table, options)?;
     let (resonances, other_machine_note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
-        let passages = passages(&times_s, speed, &resonances).into_iter();
+        let passages = passage_times(&times_s, speed, &resonances).into_iter();
         marks.extend(passages.map(|(x, resonance)| speed_mark(x, resonance)));
         shades = stability::intervals_within(&times_s, speed, &unstable_ranges);
         let x = Rc::clone(&times_s);
         let series = Series::new("", INK, x, speed.to_vec(), Style::Solid(2.0));
-        let speed_panel = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
+        let speed_panel = trace_panel("speed", Label::new("spin", "rpm"), true, vec![series]);
         panels.push(ChartPanel { height: 130.0, ..speed_panel });
     }
     Ok(Chart {
@@ -132,7 +135,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
         shades,
-        shade_meaning: stability::UNSTABLE.to_owned(),
+        shade_meaning: stability::UNSTABLE_SPEEDS_MEANING.to_owned(),
         ..Chart::default()
     })
 }
@@ -165,7 +168,10 @@ struct TraceQuantity<'a> {
 
 /// Returns the quantities of a trace: channels first, then states and forces. The gap has a
 /// separate panel.
-fn quantities<'a>(table: &'a FigureTable, model_prefixes: [&str; 2]) -> Vec<TraceQuantity<'a>> {
+fn trace_quantities<'a>(
+    table: &'a FigureTable,
+    model_prefixes: [&str; 2],
+) -> Vec<TraceQuantity<'a>> {
     let channels = table.with_prefix(&format!("{}_", model_prefixes[0])).into_iter();
     let channels = channels.map(|(name, column)| {
         let file_unit = Some(column.facts.unit()).filter(|unit| !unit.is_empty());
@@ -177,8 +183,8 @@ fn quantities<'a>(table: &'a FigureTable, model_prefixes: [&str; 2]) -> Vec<Trac
             columns: model_prefixes.map(|prefix| format!("{prefix}_{name}")),
         }
     });
-    let numbers = table.columns.iter().filter(|column| column.numbers().is_some());
-    let states_and_forces = numbers.filter_map(|column| {
+    let number_columns = table.columns.iter().filter(|column| column.numbers().is_some());
+    let states_and_forces = number_columns.filter_map(|column| {
         let name_and_suffix = column.facts.name.split_once("_nonlinear_");
         let (name, unit_suffix) = name_and_suffix.filter(|(name, _)| *name != "gap")?;
         let columns = model_prefixes.map(|prefix| format!("{name}_{prefix}_{unit_suffix}"));
@@ -223,8 +229,9 @@ fn distinct_names(first: &FigureTable, second: &FigureTable) -> [String; 2] {
     }
     let points = tables.map(|table| together::point_of_trace(&table.source));
     let differing_values = |index: usize| -> Vec<String> {
-        let differing = points[index].iter().filter(|value| !points[1 - index].contains(value));
-        differing.map(|(name, value)| format_parameter(name, *value)).collect()
+        let differing_values_of_point =
+            points[index].iter().filter(|value| !points[1 - index].contains(value));
+        differing_values_of_point.map(|(name, value)| format_parameter(name, *value)).collect()
     };
     let value_names = [differing_values(0), differing_values(1)].map(|words| words.join(", "));
     if value_names[0] != value_names[1] && value_names.iter().all(|name| !name.is_empty()) {
@@ -252,8 +259,8 @@ fn common_notes(least_gaps_mm: &[(String, f64)], difference: Option<f64>) -> Vec
 fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
     gaps.iter()
         .filter_map(|series| {
-            let (least, _) = extremes(series.y.iter().copied())?;
-            Some((series.name.trim_end_matches(" model").to_owned(), least))
+            let (least_gap_mm, _) = extremes(series.y.iter().copied())?;
+            Some((series.name.trim_end_matches(" model").to_owned(), least_gap_mm))
         })
         .collect()
 }
@@ -289,7 +296,7 @@ pub(crate) fn unstable_speeds(
     options: &WasherFigures,
 ) -> Result<Vec<[f64; 2]>, PlotError> {
     match &options.stability {
-        Some(path) => Ok(stability::read_unstable(table, path)?.speeds),
+        Some(path) => Ok(stability::read_unstable(table, path)?.speed_ranges_rpm),
         None => Ok(Vec::new()),
     }
 }
@@ -301,16 +308,16 @@ pub(crate) fn resonances(
     table: &FigureTable,
     options: &WasherFigures,
 ) -> Result<(Vec<f64>, String), PlotError> {
-    let mut speeds = options.resonances_rpm.clone();
+    let mut speeds_rpm = options.resonances_rpm.clone();
     let mut note = String::new();
     if let Some(path) = &options.modes {
         let modes = FigureTable::open(path, MODEL_KINDS)?;
-        speeds.extend(campbell::resonances(&modes)?);
+        speeds_rpm.extend(campbell::read_resonances_rpm(&modes)?);
         let files = [
             (&table.source, &together::point_of_trace(&table.source)),
             (&modes.source, &NamedPoint::new()),
         ];
-        let differences = together::plan_differences(files, MACHINE);
+        let differences = together::plan_differences(files, MACHINE_SECTIONS);
         if !differences.is_empty() {
             note = format!(
                 " · resonances of another machine: {}",
@@ -318,23 +325,25 @@ pub(crate) fn resonances(
             );
         }
     }
-    Ok((speeds, note))
+    Ok((speeds_rpm, note))
 }
 
 /// Returns the instants at which the speed passes each resonance, in order of time.
-fn passages(times_s: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> {
+fn passage_times(times_s: &[f64], speeds_rpm: &[f64], resonances_rpm: &[f64]) -> Vec<(f64, f64)> {
     let mut passages = Vec::new();
-    for k in 1..times_s.len().min(speed.len()) {
-        for &resonance in resonances {
-            let distance_before = speed[k - 1] - resonance;
-            let distance_after = speed[k] - resonance;
+    for k in 1..times_s.len().min(speeds_rpm.len()) {
+        for &resonance_rpm in resonances_rpm {
+            let distance_before = speeds_rpm[k - 1] - resonance_rpm;
+            let distance_after = speeds_rpm[k] - resonance_rpm;
             if (distance_before < 0.0) != (distance_after < 0.0)
                 && distance_before.is_finite()
                 && distance_after.is_finite()
             {
                 let fraction = distance_before / (distance_before - distance_after);
-                passages
-                    .push((times_s[k - 1] + fraction * (times_s[k] - times_s[k - 1]), resonance));
+                passages.push((
+                    times_s[k - 1] + fraction * (times_s[k] - times_s[k - 1]),
+                    resonance_rpm,
+                ));
             }
         }
     }
@@ -344,7 +353,7 @@ fn passages(times_s: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64
     passages
 }
 
-fn panel(name: &str, label: Label, is_shown: bool, series: Vec<Series>) -> ChartPanel {
+fn trace_panel(name: &str, label: Label, is_shown: bool, series: Vec<Series>) -> ChartPanel {
     let label = Label { words: label::capitalise(&label.words), ..label };
     ChartPanel { is_shown, height: 165.0, ..ChartPanel::new(name, label, series) }
 }

@@ -1,6 +1,6 @@
 //! The variation of natural frequencies over a turn of the drum (the paper's Fig. 7b).
 
-use crate::campbell::{interpolate, modes};
+use crate::campbell::{interpolate, read_modes};
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::Label;
 use sweep_plot::table::FigureTable;
@@ -11,27 +11,35 @@ use sweep_plot::{DISTINCT, PlotError};
 ///
 /// # Errors
 /// [`PlotError::Undrawable`] without a column, or if no mode has a resonance.
-pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
+pub(crate) fn variation_chart(table: &FigureTable) -> Result<Chart, PlotError> {
     table.numbers("frequency_min_rpm")?;
     table.numbers("frequency_max_rpm")?;
     let mut series = Vec::new();
     let mut stars = Vec::new();
-    for (k, mode) in modes(table)?.into_iter().enumerate() {
-        let resonances = &mode.resonances;
-        let Some((least, greatest)) = mode.band.filter(|_| !resonances.is_empty()) else {
+    for (k, mode) in read_modes(table)?.into_iter().enumerate() {
+        let resonances_rpm = &mode.resonances_rpm;
+        let Some((least, greatest)) = mode.band.filter(|_| !resonances_rpm.is_empty()) else {
             continue;
         };
-        let variation = |k: usize| 50.0 * (greatest[k] - least[k]) / mode.frequencies_rpm[k];
-        let variation: Vec<f64> = (0..mode.frequencies_rpm.len()).map(variation).collect();
-        for &speed in resonances {
+        let variation_percent =
+            |k: usize| 50.0 * (greatest[k] - least[k]) / mode.frequencies_rpm[k];
+        let variations_percent: Vec<f64> =
+            (0..mode.frequencies_rpm.len()).map(variation_percent).collect();
+        for &speed in resonances_rpm {
             stars.push((
                 speed,
-                interpolate(&mode.speeds_rpm, &variation, speed),
+                interpolate(&mode.speeds_rpm, &variations_percent, speed),
                 format!("{speed:.1} rpm"),
             ));
         }
         let colour = DISTINCT[k % DISTINCT.len()];
-        series.push(Series::new(mode.name, colour, mode.speeds_rpm, variation, Style::Solid(2.2)));
+        series.push(Series::new(
+            mode.name,
+            colour,
+            mode.speeds_rpm,
+            variations_percent,
+            Style::Solid(2.2),
+        ));
     }
     if series.is_empty() {
         return Err(table.source.nothing_to_draw("no mode's frequency meets the spin speed"));
