@@ -69,15 +69,20 @@ impl Oscillator<2, 4, 6> for TwoSprings {
         let k1 = (omega_1 * omega_1).v();
         let k2 = (omega_2 * omega_2).v();
         let c = (0.5 * (k1 + k2)).v();
-        let square_1 = (x1 * x1).v();
-        let square_2 = (x2 * x2).v();
-        let both = (c * (square_1 + square_2)).v();
-        let product = (x1 * x2).v();
-        let quadratic_1 = 0.5 * (k1 * (3.0 * square_1 + square_2)).v() + (k2 * product).v();
-        let quadratic_2 = 0.5 * (k2 * (3.0 * square_2 + square_1)).v() + (k1 * product).v();
+        let x1_squared = (x1 * x1).v();
+        let x2_squared = (x2 * x2).v();
+        let cubic_factor = (c * (x1_squared + x2_squared)).v();
+        let coordinate_product = (x1 * x2).v();
+        let quadratic_1 =
+            0.5 * (k1 * (3.0 * x1_squared + x2_squared)).v() + (k2 * coordinate_product).v();
+        let quadratic_2 =
+            0.5 * (k2 * (3.0 * x2_squared + x1_squared)).v() + (k1 * coordinate_product).v();
         let linear_1 = k1 * x1 + (2.0 * zeta_1).v() * (omega_1 * u1).v();
         let linear_2 = k2 * x2 + (2.0 * zeta_2).v() * (omega_2 * u2).v();
-        [-(both * x1 + (linear_1 + quadratic_1)), -(both * x2 + (linear_2 + quadratic_2))]
+        [
+            -(cubic_factor * x1 + (linear_1 + quadratic_1)),
+            -(cubic_factor * x2 + (linear_2 + quadratic_2)),
+        ]
     }
 
     #[inline(always)]

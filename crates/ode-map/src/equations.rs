@@ -39,27 +39,27 @@ impl<const C: usize, const P: usize> PreparedPoint<C, P> {
         p: [f64; P],
         window_s: [f64; 2],
     ) -> Option<Self> {
-        let zero = [0.0; C];
-        let mut equilibrium = zero;
-        let mut tangent = tangent::<O, C, D, P>(&p, &zero, &zero);
+        let rest = [0.0; C];
+        let mut equilibrium = rest;
+        let mut tangent = compute_tangent::<O, C, D, P>(&p, &rest, &rest);
         // Rounding may prevent convergence to the last bit, so that the number of steps is limited.
         for _ in 0..MAX_NEWTON_STEPS {
-            let residual = O::accelerations(&p.map(N), &equilibrium.map(N), &zero.map(N));
+            let residual = O::accelerations(&p.map(N), &equilibrium.map(N), &rest.map(N));
             if residual.iter().all(|a| a.0 == 0.0) {
                 break;
             }
-            let step = Lu::new(tangent.by_coordinate)?.solve(&residual);
-            let previous = equilibrium;
+            let newton_step = Lu::new(tangent.by_coordinate)?.solve(&residual);
+            let previous_equilibrium = equilibrium;
             for i in 0..C {
-                equilibrium[i] -= step[i].0;
+                equilibrium[i] -= newton_step[i].0;
             }
             if !equilibrium.iter().all(|q| q.is_finite()) {
                 return None;
             }
-            if previous == equilibrium {
+            if previous_equilibrium == equilibrium {
                 break;
             }
-            tangent = self::tangent::<O, C, D, P>(&p, &equilibrium, &zero);
+            tangent = compute_tangent::<O, C, D, P>(&p, &equilibrium, &rest);
         }
         Some(Self { p, window_s, equilibrium, tangent })
     }
@@ -67,25 +67,25 @@ impl<const C: usize, const P: usize> PreparedPoint<C, P> {
     /// Returns an upper bound of the frequencies of the linear model's free motions (rad/s), from
     /// the norms of its matrices.
     pub(crate) fn highest_frequency_rad_per_s(&self) -> f64 {
-        let norm = |matrix: &[[N<f64>; C]; C]| {
+        let row_sum_norm = |matrix: &[[N<f64>; C]; C]| {
             let row_sum = |row: &[N<f64>; C]| row.iter().map(|entry| entry.0.abs()).sum::<f64>();
             matrix.iter().map(row_sum).fold(0.0, f64::max)
         };
-        norm(&self.tangent.by_coordinate).sqrt() + norm(&self.tangent.by_speed)
+        row_sum_norm(&self.tangent.by_coordinate).sqrt() + row_sum_norm(&self.tangent.by_speed)
     }
 }
 
 /// Computes the derivatives of the free motion's accelerations at a state, by dual numbers.
-fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
+fn compute_tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     p: &[f64; P],
     q: &[f64; C],
     u: &[f64; C],
 ) -> Partials<C> {
-    let constant = |value: f64| N(value).constant();
+    let to_constant = |value: f64| N(value).constant();
     let mut partials = Partials::zero();
-    let p = p.map(constant);
+    let p = p.map(to_constant);
     for j in 0..C {
-        let [mut q, mut u]: [[N<Dual<f64>>; C]; 2] = [q, u].map(|state| state.map(constant));
+        let [mut q, mut u]: [[N<Dual<f64>>; C]; 2] = [q, u].map(|state| state.map(to_constant));
         q[j].0.slope = 1.0;
         let by_coordinate = O::accelerations(&p, &q, &u);
         q[j].0.slope = 0.0;
@@ -197,8 +197,8 @@ fn split_state<T: Copy, const C: usize, const D: usize>(x: &[T; D]) -> ([T; C], 
     (std::array::from_fn(|i| x[i]), std::array::from_fn(|i| x[C + i]))
 }
 
-fn set_lane<T: Lane>(target: &mut [N<T>], lane: usize, source: &[N<f64>]) {
-    for (target, source) in target.iter_mut().zip(source) {
-        target.0.set(lane, source.0);
+fn set_lane<T: Lane>(lane_values: &mut [N<T>], lane: usize, numbers: &[N<f64>]) {
+    for (lane_value, number) in lane_values.iter_mut().zip(numbers) {
+        lane_value.0.set(lane, number.0);
     }
 }

@@ -47,11 +47,11 @@ const RICHARDSON_FACTOR: f64 = 1.0 / 15.0;
 const AMPLITUDE_FLOOR: f64 = 1e-9;
 
 /// Names of methods in results.
-const METHODS: [&str; 2] = ["rk4", "dopri5"];
+const METHOD_NAMES: [&str; 2] = ["rk4", "dopri5"];
 /// Values of `status`: `ok`, the reasons of [`lane_ode::Failure`] in their order, and a point
 /// without equilibrium; then the same reasons of the linear model, for rows in which it alone
 /// fails.
-const STATUSES: [&str; 8] = [
+const STATUS_NAMES: [&str; 8] = [
     "ok",
     "diverged",
     "step_too_small",
@@ -61,13 +61,13 @@ const STATUSES: [&str; 8] = [
     "linear_step_too_small",
     "linear_step_limit",
 ];
-/// The index of `no_equilibrium` in [`STATUSES`].
-const NO_EQUILIBRIUM: usize = 4;
+/// The index of `no_equilibrium` in [`STATUS_NAMES`].
+const NO_EQUILIBRIUM_STATUS: usize = 4;
 
 /// The model that a grid file describes: an oscillator with a value for every parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map<O, const C: usize, const D: usize, const P: usize> {
-    values: [f64; P],
+    parameter_values: [f64; P],
     oscillator: PhantomData<O>,
 }
 
@@ -88,21 +88,24 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     );
 
     fn blank() -> Self {
-        Self { values: O::PARAMETERS.map(|parameter| parameter.default), oscillator: PhantomData }
+        Self {
+            parameter_values: O::PARAMETERS.map(|parameter| parameter.default),
+            oscillator: PhantomData,
+        }
     }
 
     fn parameters(&self) -> Vec<ModelParameter<Self>> {
         let model_parameters =
-            O::PARAMETERS.into_iter().zip(self.values).map(|(parameter, value)| {
+            O::PARAMETERS.into_iter().zip(self.parameter_values).map(|(parameter, value)| {
                 let OscillatorParameter { name, unit, description, range, source, .. } = parameter;
                 (name, unit, description, range, source, Some(value))
             });
-        let source = "the grid file's [time]";
-        let window_ends = WINDOW_ENDS
-            .into_iter()
-            .map(|(name, description)| (name, "s", description, Range::NonNegative, source, None));
+        let window_source = "the grid file's [time]";
+        let window_ends = WINDOW_ENDS.into_iter().map(|(name, description)| {
+            (name, "s", description, Range::NonNegative, window_source, None)
+        });
         let to_model = |(handle, (name, unit, description, range, source, value))| {
-            let window_edge = usize::checked_sub(handle, P);
+            let window_end_index = usize::checked_sub(handle, P);
             sweep_parameter::Parameter {
                 name: Cow::Borrowed(name),
                 unit,
@@ -111,8 +114,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
                 source,
                 value,
                 parts: vec![Cow::Borrowed(name)],
-                window_edge,
-                is_in_grid: window_edge.is_some(),
+                window_edge: window_end_index,
+                is_in_grid: window_end_index.is_some(),
                 handle,
             }
         };
@@ -120,21 +123,21 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     }
 
     fn write(&mut self, handle: &usize, value: f64) {
-        self.values[*handle] = value;
+        self.parameter_values[*handle] = value;
     }
 
     fn walk(&mut self, table: GridTable, keys: &mut Keys<'_>, _: Option<&GridInput<Self>>) {
         if table == GridTable::Top {
-            let named = O::PARAMETERS.iter().zip(self.values);
-            let pair = |(parameter, value): (&OscillatorParameter, f64)| {
+            let parameters_with_values = O::PARAMETERS.iter().zip(self.parameter_values);
+            let name_and_value = |(parameter, value): (&OscillatorParameter, f64)| {
                 (parameter.name.to_owned(), Value::from(value))
             };
-            keys.write("parameters", named.map(pair).collect());
+            keys.write("parameters", parameters_with_values.map(name_and_value).collect());
         }
     }
 
     fn layout(plan: &Plan<Self>) -> Layout {
-        Layout::map(axis_columns(plan), declared(columns(plan)))
+        Layout::map(axis_map_columns(plan), declared(columns(plan)))
     }
 
     fn engine<'a>(plan: &'a Plan<Self>, _: Option<&str>) -> Result<Engine<'a>, Error> {
@@ -146,8 +149,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
 /// The runs of both models at a point, their error, and their comparison.
 #[derive(Clone)]
 struct PointRuns<const C: usize> {
-    runs: [ModelRun<C>; 2],
-    error: Option<f64>,
+    model_runs: [ModelRun<C>; 2],
+    relative_error: Option<f64>,
     converged: Option<bool>,
     /// The index of the method's name.
     method: usize,
@@ -159,10 +162,11 @@ struct PointRuns<const C: usize> {
 impl<const C: usize> PointRuns<C> {
     /// Creates the runs of a point without equilibrium.
     fn without_equilibrium(method: usize) -> Self {
-        let failed = ModelRun { failure: Some((NO_EQUILIBRIUM, None)), ..ModelRun::NONE };
+        let failed_run =
+            ModelRun { failure: Some((NO_EQUILIBRIUM_STATUS, None)), ..ModelRun::EMPTY };
         Self {
-            runs: [failed; 2],
-            error: None,
+            model_runs: [failed_run; 2],
+            relative_error: None,
             converged: None,
             method,
             amplitudes: Default::default(),
@@ -171,28 +175,28 @@ impl<const C: usize> PointRuns<C> {
     }
 
     fn status(&self) -> usize {
-        match self.runs.map(|run| run.failure.map_or(0, |(status, _)| status)) {
+        match self.model_runs.map(|run| run.failure.map_or(0, |(status, _)| status)) {
             [0, 0] => 0,
-            [0, linear] => NO_EQUILIBRIUM + linear,
+            [0, linear] => NO_EQUILIBRIUM_STATUS + linear,
             [nonlinear, _] => nonlinear,
         }
     }
 
     /// Compares the amplitudes of both runs in the coordinates of the plan's channels.
-    fn compare(&mut self, channels: &[usize], limits: RatioLimits) {
-        self.amplitudes = self.runs.map(|run| {
-            let sound_channels = channels.iter().filter(|_| run.failure.is_none());
-            sound_channels.map(|k| run.peaks[*k]).collect()
+    fn compare_models(&mut self, channels: &[usize], limits: RatioLimits) {
+        self.amplitudes = self.model_runs.map(|run| {
+            let completed_channels = channels.iter().filter(|_| run.failure.is_none());
+            completed_channels.map(|k| run.peaks[*k]).collect()
         });
-        let ratio = |k: usize| {
+        let channel_ratio = |k: usize| {
             let linear = self.amplitudes[1].get(k).filter(|linear| **linear != 0.0)?;
             Some(self.amplitudes[0].get(k)? / linear)
         };
-        self.verdict = Verdict::new((0..channels.len()).map(ratio).collect(), limits);
+        self.verdict = Verdict::new((0..channels.len()).map(channel_ratio).collect(), limits);
     }
 
     /// Returns the comparison as columns read it.
-    fn compared(&self) -> Compared<'_> {
+    fn compared_models(&self) -> Compared<'_> {
         Compared {
             amplitudes: self.amplitudes.each_ref().map(Vec::as_slice),
             verdict: &self.verdict,
@@ -200,30 +204,30 @@ impl<const C: usize> PointRuns<C> {
             // Chaos is not examined.
             sensitive: None,
             method: self.method,
-            error: self.error,
+            error: self.relative_error,
             status: self.status(),
-            fail_time_s: self.runs.iter().find_map(|run| run.failure).and_then(|(_, at)| at),
-            steps: self.runs.map(|run| run.steps),
-            rejected: self.runs.map(|run| run.rejected),
+            fail_time_s: self.model_runs.iter().find_map(|run| run.failure).and_then(|(_, at)| at),
+            steps: self.model_runs.map(|run| run.steps),
+            rejected: self.model_runs.map(|run| run.rejected),
         }
     }
 }
 
-fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
+fn map_columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     plan: &Plan<Map<O, C, D, P>>,
 ) -> Vec<ResultColumn<PointRuns<C>>> {
     let comparison = ComparisonColumns {
         channels: &plan.reliability.channels,
         limits: plan.reliability.limits,
-        compared: PointRuns::compared,
+        compared: PointRuns::compared_models,
     };
-    let amplitude = "largest deviation from equilibrium in the window";
-    let ratio = "nonlinear over linear amplitude; null where the linear one is zero or a model \
+    let amplitude_description = "largest deviation from equilibrium in the window";
+    let ratio_description = "nonlinear over linear amplitude; null where the linear one is zero or a model \
                  failed";
-    let mut result_columns = comparison.amplitudes(amplitude, ratio);
+    let mut result_columns = comparison.amplitudes(amplitude_description, ratio_description);
     let method_description = "the method that the row's numbers come from";
-    result_columns.extend(comparison.verdict(METHODS.to_vec(), method_description));
-    result_columns.extend(comparison.runs(STATUSES.to_vec()));
+    result_columns.extend(comparison.verdict(METHOD_NAMES.to_vec(), method_description));
+    result_columns.extend(comparison.runs(STATUS_NAMES.to_vec()));
     result_columns
 }
 
@@ -240,15 +244,16 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         let mut rows = self.evaluate_points(axis_values, cancel);
         let channels = self.channels();
         for row in &mut rows {
-            row.compare(&channels, self.plan.reliability.limits);
+            row.compare_models(&channels, self.plan.reliability.limits);
         }
         rows
     }
 
     /// Returns the indices of the coordinates that the plan compares.
     fn channels(&self) -> Vec<usize> {
-        let index = |channel: &Coordinate| O::COORDINATES.iter().position(|one| one == channel);
-        self.plan.reliability.channels.iter().filter_map(index).collect()
+        let coordinate_index =
+            |channel: &Coordinate| O::COORDINATES.iter().position(|one| one == channel);
+        self.plan.reliability.channels.iter().filter_map(coordinate_index).collect()
     }
 
     /// Returns the method if it is the same for all rows, and the index of its name.
@@ -265,8 +270,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
 
     /// Integrates both models at points with these values of the axes.
     fn evaluate_points(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<PointRuns<C>> {
-        let prepare = |values: &Vec<f64>| {
-            let mut parameters = self.plan.model.values;
+        let prepare_point = |values: &Vec<f64>| {
+            let mut parameters = self.plan.model.parameter_values;
             let mut window_s = self.plan.window_s;
             for (axis, &value) in self.plan.axes.iter().zip(values) {
                 let handle = axis.parameter.handle;
@@ -277,21 +282,25 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             }
             PreparedPoint::new::<O, D>(parameters, window_s)
         };
-        let points: Vec<Option<PreparedPoint<C, P>>> = axis_values.iter().map(prepare).collect();
-        let positions: Vec<usize> = (0..points.len()).filter(|k| points[*k].is_some()).collect();
-        let prepared: Vec<&PreparedPoint<C, P>> = points.iter().flatten().collect();
+        let points: Vec<Option<PreparedPoint<C, P>>> =
+            axis_values.iter().map(prepare_point).collect();
+        let prepared_indices: Vec<usize> =
+            (0..points.len()).filter(|k| points[*k].is_some()).collect();
+        let prepared_points: Vec<&PreparedPoint<C, P>> = points.iter().flatten().collect();
         let (common_method, method_index) = self.common_method();
         let mut rows = vec![PointRuns::without_equilibrium(method_index); points.len()];
         if let Some(method) = common_method {
-            for (position, runs) in
-                positions.into_iter().zip(self.run_both_models(method, &prepared, cancel))
-            {
-                rows[position].runs = runs;
+            for (position, runs) in prepared_indices.into_iter().zip(self.run_both_models(
+                method,
+                &prepared_points,
+                cancel,
+            )) {
+                rows[position].model_runs = runs;
             }
             return rows;
         }
         // Each point has its own steps, so that a row does not depend on the other points.
-        for (position, point) in positions.into_iter().zip(prepared) {
+        for (position, point) in prepared_indices.into_iter().zip(prepared_points) {
             self.refine(&mut rows[position], point, cancel);
             if cancel.is_requested() {
                 break;
@@ -308,7 +317,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         cancel: Cancel<'_>,
     ) -> Vec<[ModelRun<C>; 2]> {
         let end_s = self.plan.end_s;
-        let runs = |model| {
+        let run_model = |model| {
             Integration::<O, C, D, P> {
                 model,
                 method,
@@ -317,9 +326,11 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 cancel,
                 oscillator: PhantomData,
             }
-            .runs()
+            .integrate()
         };
-        let pairs = runs(OscillatorModel::Nonlinear).into_iter().zip(runs(OscillatorModel::Linear));
+        let pairs = run_model(OscillatorModel::Nonlinear)
+            .into_iter()
+            .zip(run_model(OscillatorModel::Linear));
         pairs.map(|(nonlinear, linear)| [nonlinear, linear]).collect()
     }
 
@@ -330,11 +341,15 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         let mut step_s =
             (FIRST_STEP_RAD / point.highest_frequency_rad_per_s()).min(self.plan.end_s / 8.0);
         for run_index in 0..MAX_HALVING_RUNS {
-            let runs = self.run_both_models(OscillatorMethod::Rk4(step_s), &[point], cancel)[0];
-            row.error =
-                if run_index > 0 { error_of_finer_run(&row.runs, &runs, &channels) } else { None };
-            row.converged = Some(row.error.is_some_and(|error| error <= accuracy));
-            row.runs = runs;
+            let model_runs =
+                self.run_both_models(OscillatorMethod::Rk4(step_s), &[point], cancel)[0];
+            row.relative_error = if run_index > 0 {
+                error_of_finer_run(&row.model_runs, &model_runs, &channels)
+            } else {
+                None
+            };
+            row.converged = Some(row.relative_error.is_some_and(|error| error <= accuracy));
+            row.model_runs = model_runs;
             if row.converged == Some(true) {
                 return;
             }
@@ -345,19 +360,19 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
 
 /// Returns the relative error of the finer runs; `None` if any run failed.
 fn error_of_finer_run<const C: usize>(
-    coarse: &[ModelRun<C>; 2],
-    fine: &[ModelRun<C>; 2],
+    coarse_runs: &[ModelRun<C>; 2],
+    fine_runs: &[ModelRun<C>; 2],
     channels: &[usize],
 ) -> Option<f64> {
     let mut max_difference = 0.0_f64;
-    for (coarse, fine) in coarse.iter().zip(fine) {
-        if coarse.failure.or(fine.failure).is_some() {
+    for (coarse_run, fine_run) in coarse_runs.iter().zip(fine_runs) {
+        if coarse_run.failure.or(fine_run.failure).is_some() {
             return None;
         }
-        let max_peak = fine.peaks.iter().copied().fold(0.0, f64::max);
+        let max_peak = fine_run.peaks.iter().copied().fold(0.0, f64::max);
         for &channel in channels {
-            let a = coarse.peaks[channel];
-            let b = fine.peaks[channel];
+            let a = coarse_run.peaks[channel];
+            let b = fine_run.peaks[channel];
             if a != b {
                 max_difference =
                     max_difference.max((a - b).abs() / b.max(AMPLITUDE_FLOOR * max_peak));
@@ -371,7 +386,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eva
     for RowEvaluator<'_, O, C, D, P>
 {
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
-        let columns = columns(self.plan);
+        let columns = map_columns(self.plan);
         rayon::broadcast(|_| {
             while !context.must_stop() {
                 let (points, axis_values): (Vec<u64>, Vec<Vec<f64>>) =

@@ -19,7 +19,7 @@ const MAX_STEPS: u64 = 100_000_000;
 const FIRST_STEP_RATIO: f64 = 1e-6;
 
 /// Number of segments of a trajectory: before its window, in it and after it.
-const SEGMENTS: usize = 3;
+const SEGMENT_COUNT: usize = 3;
 
 /// A method of integration with its parameters.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +44,7 @@ pub(crate) struct ModelRun<const C: usize> {
 
 impl<const C: usize> ModelRun<C> {
     /// The result of a trajectory that has not begun.
-    pub(crate) const NONE: Self = Self { failure: None, peaks: [0.0; C], steps: 0, rejected: 0 };
+    pub(crate) const EMPTY: Self = Self { failure: None, peaks: [0.0; C], steps: 0, rejected: 0 };
 }
 
 /// The integration of one model at every point, from rest to `end_s`, by one method.
@@ -62,7 +62,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     Integration<'_, O, C, D, P>
 {
     /// Integrates every point and returns the results.
-    pub(crate) fn runs(self) -> Vec<ModelRun<C>> {
+    pub(crate) fn integrate(self) -> Vec<ModelRun<C>> {
         Simd::best().dispatch(self)
     }
 }
@@ -123,7 +123,7 @@ impl<'a, O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const 
             current_segments: [(0, 0); MAX_LANES],
             peaks: Peaks::new(zero),
             window_indicator: zero,
-            runs: vec![ModelRun::NONE; integration.points.len()],
+            runs: vec![ModelRun::EMPTY; integration.points.len()],
         }
     }
 
@@ -158,18 +158,18 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             SegmentEnd::Completed(_) => segment += 1,
             SegmentEnd::Failed { reason, time_s, .. } => {
                 self.runs[trajectory].failure = Some((1 + reason as usize, Some(time_s)));
-                segment = SEGMENTS;
+                segment = SEGMENT_COUNT;
             }
-            SegmentEnd::Idle => segment = SEGMENTS,
+            SegmentEnd::Idle => segment = SEGMENT_COUNT,
         }
         loop {
-            while segment < SEGMENTS {
+            while segment < SEGMENT_COUNT {
                 // The run is divided into segments at the ends of the window.
                 let [from_s, to_s] =
                     self.integration.points[self.current_segments[lane].0].window_s;
-                let ends = [0.0, from_s, to_s, self.integration.end_s];
-                let start_s = ends[segment];
-                let end_s = ends[segment + 1];
+                let boundaries_s = [0.0, from_s, to_s, self.integration.end_s];
+                let start_s = boundaries_s[segment];
+                let end_s = boundaries_s[segment + 1];
                 // A segment is empty if the window begins with the run or ends with it.
                 if start_s < end_s {
                     self.current_segments[lane].1 = segment;

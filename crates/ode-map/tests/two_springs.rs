@@ -10,13 +10,13 @@ use arrow_array::types::Float64Type;
 use arrow_array::{Array, RecordBatch};
 
 /// Returns the example, which cargo builds beside this test.
-fn program() -> PathBuf {
-    let test = std::env::current_exe().unwrap();
-    let folder = test.parent().and_then(Path::parent).unwrap();
-    folder.join("examples").join(format!("two_springs{}", std::env::consts::EXE_SUFFIX))
+fn program_path() -> PathBuf {
+    let test_path = std::env::current_exe().unwrap();
+    let target_folder = test_path.parent().and_then(Path::parent).unwrap();
+    target_folder.join("examples").join(format!("two_springs{}", std::env::consts::EXE_SUFFIX))
 }
 
-fn grid(integrator: &str, axes: &str) -> String {
+fn grid_text(integrator: &str, axes: &str) -> String {
     format!(
         "name = \"springs\"\ntime = {{ end_s = 400, window_s = [300, 400] }}\n\
          integrator = {integrator}\n{axes}"
@@ -36,58 +36,62 @@ impl GridFolder {
         Self(folder)
     }
 
-    fn output(&self, arguments: &str) -> Output {
-        let mut command = Command::new(program());
+    fn run_command(&self, arguments: &str) -> Output {
+        let mut command = Command::new(program_path());
         command.current_dir(self.0.path()).args(arguments.split(' ')).output().unwrap()
     }
 
     /// Runs a command, which must succeed, and returns its standard output and error.
     fn run_successfully(&self, arguments: &str) -> String {
-        let output = self.output(arguments);
+        let output = self.run_command(arguments);
         let text = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
         assert!(output.status.success(), "{arguments}: {}", text.concat());
         text.concat()
     }
 
-    fn bytes(&self, name: &str) -> Vec<u8> {
+    fn read_bytes(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.0.path().join(name)).unwrap()
     }
 
-    fn rows(&self, name: &str) -> RecordBatch {
+    fn read_rows(&self, name: &str) -> RecordBatch {
         let file = sweep_files::ParquetFile::open(&self.0.path().join(name)).unwrap();
         file.batches((0..file.schema().fields().len()).collect()).unwrap().next().unwrap().unwrap()
     }
 }
 
-fn number(rows: &RecordBatch, name: &str, row: usize) -> Option<f64> {
+fn read_number(rows: &RecordBatch, name: &str, row: usize) -> Option<f64> {
     let column = rows.column_by_name(name).unwrap().as_primitive::<Float64Type>();
     column.is_valid(row).then(|| column.value(row))
 }
 
 /// Returns the greatest difference from the reference, relative to the peak.
 fn greatest_difference(integrator: &str) -> f64 {
-    let folder = GridFolder::new(&grid(integrator, AXES));
+    let folder = GridFolder::new(&grid_text(integrator, AXES));
     folder.run_successfully("run grid.toml --out x.parquet --progress none");
-    let rows = folder.rows("x.parquet");
-    let text = include_str!("../testdata/two_springs.json");
-    let reference: serde_json::Value = serde_json::from_str(text).unwrap();
+    let rows = folder.read_rows("x.parquet");
+    let reference_text = include_str!("../testdata/two_springs.json");
+    let reference: serde_json::Value = serde_json::from_str(reference_text).unwrap();
     let expected = reference["rows"].as_array().unwrap();
     assert_eq!(rows.num_rows(), expected.len());
     let mut difference = 0.0_f64;
     for (row, expected) in expected.iter().enumerate() {
         for key in ["forcing", "forcing_rad_per_s"] {
-            assert_eq!(number(&rows, key, row), expected[key].as_f64());
+            assert_eq!(read_number(&rows, key, row), expected[key].as_f64());
         }
         for (k, name) in ["x1", "x2"].into_iter().enumerate() {
-            let amplitude = |model: &str| number(&rows, &format!("{model}_{name}"), row).unwrap();
-            let peak = expected["nonlinear"][k].as_f64().unwrap();
-            difference = difference.max((amplitude("nonlinear") / peak - 1.0).abs());
-            let linear = expected["linear"][k].as_f64().unwrap();
-            difference = difference.max((amplitude("linear") - linear).abs() / linear.max(1e-9));
+            let amplitude =
+                |model: &str| read_number(&rows, &format!("{model}_{name}"), row).unwrap();
+            let expected_peak = expected["nonlinear"][k].as_f64().unwrap();
+            difference = difference.max((amplitude("nonlinear") / expected_peak - 1.0).abs());
+            let expected_linear_peak = expected["linear"][k].as_f64().unwrap();
+            difference = difference.max(
+                (amplitude("linear") - expected_linear_peak).abs() / expected_linear_peak.max(1e-9),
+            );
         }
-        assert_eq!(number(&rows, "ratio_x2", row), None, "its linear motion is zero");
-        let ratio = expected["ratio"].as_f64().unwrap();
-        difference = difference.max((number(&rows, "ratio_x1", row).unwrap() / ratio - 1.0).abs());
+        assert_eq!(read_number(&rows, "ratio_x2", row), None, "its linear motion is zero");
+        let expected_ratio = expected["ratio"].as_f64().unwrap();
+        difference = difference
+            .max((read_number(&rows, "ratio_x1", row).unwrap() / expected_ratio - 1.0).abs());
     }
     difference
 }
@@ -104,13 +108,13 @@ fn every_method_agrees_with_the_independent_program() {
     }
 }
 
-const FAST: &str = "{ method = \"rk4\", step_s = 0.05 }";
+const FAST_INTEGRATOR: &str = "{ method = \"rk4\", step_s = 0.05 }";
 
 #[test]
 fn all_mistakes_are_reported_together_with_their_places_and_suggestions() {
     let invalid_grid =
-        grid("{ method = \"rk5\" }", "[[axis]]\nparameter = \"forcin\"\nvalues = [1, 1]\n");
-    let output = GridFolder::new(&invalid_grid).output("check grid.toml");
+        grid_text("{ method = \"rk5\" }", "[[axis]]\nparameter = \"forcin\"\nvalues = [1, 1]\n");
+    let output = GridFolder::new(&invalid_grid).run_command("check grid.toml");
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{text}");
     for message_part in ["did you mean `rk4`", "did you mean `forcing`", "grid.toml:6", "is twice"]
@@ -121,7 +125,7 @@ fn all_mistakes_are_reported_together_with_their_places_and_suggestions() {
 
 #[test]
 fn merged_shards_have_the_same_bytes_as_one_run() {
-    let folder = GridFolder::new(&grid(FAST, AXES));
+    let folder = GridFolder::new(&grid_text(FAST_INTEGRATOR, AXES));
     folder.run_successfully("run grid.toml --out whole.parquet --threads 1 --progress none");
     for shard in ["1/2", "2/2"] {
         folder.run_successfully(&format!(
@@ -134,7 +138,7 @@ fn merged_shards_have_the_same_bytes_as_one_run() {
             .contains("complete, to be merged")
     );
     folder.run_successfully("merge grid.toml --out x.parquet");
-    assert!(folder.bytes("whole.parquet") == folder.bytes("x.parquet"));
+    assert!(folder.read_bytes("whole.parquet") == folder.read_bytes("x.parquet"));
 }
 
 #[test]
@@ -142,8 +146,10 @@ fn every_command_works() {
     let axes = "[[axis]]\nparameter = \"forcing_rad_per_s\"\nvalues = [1.05, 1.1]\n\
                 [[axis]]\nparameter = \"forcing\"\n\
                 range = { from = 0.001, to = 0.05, count = 9 }\n";
-    let folder =
-        GridFolder::new(&format!("{}[reliability]\nratio_limit = 1.02\n", grid(FAST, axes)));
+    let folder = GridFolder::new(&format!(
+        "{}[reliability]\nratio_limit = 1.02\n",
+        grid_text(FAST_INTEGRATOR, axes)
+    ));
     assert!(folder.run_successfully("check grid.toml").contains("18"));
     folder.run_successfully("run grid.toml --out x.parquet --progress none");
     assert!(folder.run_successfully("show x.parquet").contains("below ratio 1.02"));
@@ -153,21 +159,22 @@ fn every_command_works() {
             .contains("forcing_rad_per_s")
     );
     folder.run_successfully("plot x.parquet -o x.svg");
-    assert!(String::from_utf8(folder.bytes("x.svg")).unwrap().starts_with("<svg"));
+    assert!(String::from_utf8(folder.read_bytes("x.svg")).unwrap().starts_with("<svg"));
     folder.run_successfully("export x.parquet x.csv");
-    assert!(String::from_utf8(folder.bytes("x.csv")).unwrap().contains("nonlinear_x1"));
+    assert!(String::from_utf8(folder.read_bytes("x.csv")).unwrap().contains("nonlinear_x1"));
     folder.run_successfully("require x.parquet count(status=='ok')==18");
-    let violated = folder.output("require x.parquet ratio_x1<1");
-    assert_eq!(violated.status.code(), Some(4), "{violated:?}");
+    let violated_output = folder.run_command("require x.parquet ratio_x1<1");
+    assert_eq!(violated_output.status.code(), Some(4), "{violated_output:?}");
     folder.run_successfully("run grid.toml --set zeta_1=0.02 --out y.parquet --progress none");
     assert!(folder.run_successfully("compare x.parquet y.parquet").contains("zeta_1"));
-    let boundary = folder.run_successfully("boundary grid.toml --out b.parquet --progress none");
-    assert!(boundary.contains("crossing"), "{boundary}");
+    let boundary_text =
+        folder.run_successfully("boundary grid.toml --out b.parquet --progress none");
+    assert!(boundary_text.contains("crossing"), "{boundary_text}");
     folder.run_successfully("plot x.parquet --boundary b.parquet -o y.svg");
-    let parameters = folder.run_successfully("parameters grid.toml");
+    let parameters_text = folder.run_successfully("parameters grid.toml");
     assert!(
-        parameters.contains("omega_1_rad_per_s") && parameters.contains("window_to_s"),
-        "{parameters}"
+        parameters_text.contains("omega_1_rad_per_s") && parameters_text.contains("window_to_s"),
+        "{parameters_text}"
     );
     let schema: serde_json::Value =
         serde_json::from_str(&folder.run_successfully("schema")).unwrap();
@@ -178,16 +185,17 @@ fn every_command_works() {
 fn a_study_finds_the_resonance_that_a_fine_map_shows() {
     let axis = "[[axis]]\nparameter = \"forcing_rad_per_s\"\n\
                 range = { from = 0.7, to = 1.5, count = 401 }\n";
-    let folder = GridFolder::new(&grid(FAST, axis));
+    let folder = GridFolder::new(&grid_text(FAST_INTEGRATOR, axis));
     folder.run_successfully("run grid.toml --out x.parquet --progress none");
-    let rows = folder.rows("x.parquet");
-    let linear_x1 = |row| number(&rows, "linear_x1", row).unwrap();
-    let highest =
+    let rows = folder.read_rows("x.parquet");
+    let linear_x1 = |row| read_number(&rows, "linear_x1", row).unwrap();
+    let highest_row =
         (0..rows.num_rows()).max_by(|a, b| linear_x1(*a).total_cmp(&linear_x1(*b))).unwrap();
-    let resonance = number(&rows, "forcing_rad_per_s", highest).unwrap();
-    let write = |name: &str, text: &str| std::fs::write(folder.0.path().join(name), text).unwrap();
-    write("point.toml", &grid(FAST, ""));
-    write(
+    let resonance = read_number(&rows, "forcing_rad_per_s", highest_row).unwrap();
+    let write_file =
+        |name: &str, text: &str| std::fs::write(folder.0.path().join(name), text).unwrap();
+    write_file("point.toml", &grid_text(FAST_INTEGRATOR, ""));
+    write_file(
         "study.toml",
         "grid = \"point.toml\"\ncandidates = 160\npopulation = 16\n\
          [[objective]]\nmaximise = \"linear_x1\"\n\
@@ -198,21 +206,21 @@ fn a_study_finds_the_resonance_that_a_fine_map_shows() {
         let text = folder.run_successfully(&format!("{arguments} {threads}.parquet"));
         assert!(text.contains("feasible  160 of 160\n"), "{text}");
     }
-    assert!(folder.bytes("1.parquet") == folder.bytes("2.parquet"));
+    assert!(folder.read_bytes("1.parquet") == folder.read_bytes("2.parquet"));
     let best_point = folder.run_successfully(
         "show 1.parquet --where on_front --json --columns forcing_rad_per_s,linear_x1",
     );
     let best_point: serde_json::Value = serde_json::from_str(&best_point).unwrap();
     let frequency = best_point[0]["forcing_rad_per_s"].as_f64().unwrap();
     assert!((frequency - resonance).abs() <= 0.003, "{frequency} for {resonance}");
-    assert!(best_point[0]["linear_x1"].as_f64().unwrap() >= linear_x1(highest), "{best_point}");
+    assert!(best_point[0]["linear_x1"].as_f64().unwrap() >= linear_x1(highest_row), "{best_point}");
 }
 
 #[test]
 fn a_design_has_its_number_of_points() {
     let design = "[design]\nmethod = \"sobol\"\npoints = 16\n\
                   [[axis]]\nparameter = \"zeta_1\"\nrange = { from = 0.005, to = 0.05 }\n";
-    let folder = GridFolder::new(&grid(FAST, design));
+    let folder = GridFolder::new(&grid_text(FAST_INTEGRATOR, design));
     folder.run_successfully("run grid.toml --out x.parquet --progress none");
-    assert_eq!(folder.rows("x.parquet").num_rows(), 16);
+    assert_eq!(folder.read_rows("x.parquet").num_rows(), 16);
 }
