@@ -45,8 +45,8 @@ pub(crate) fn read_rows(
     table: &Bound<'_, PyAny>,
 ) -> PyResult<Option<(SchemaRef, Vec<RecordBatch>)>> {
     let Some(method) = table.getattr_opt("__arrow_c_stream__")? else { return Ok(None) };
-    let capsule = method.call0()?;
-    let capsule = capsule.cast::<PyCapsule>().map_err(|_| {
+    let capsule_object = method.call0()?;
+    let capsule = capsule_object.cast::<PyCapsule>().map_err(|_| {
         PyTypeError::new_err("`__arrow_c_stream__` of this table returns no capsule")
     })?;
     let pointer =

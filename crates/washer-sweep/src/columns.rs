@@ -24,7 +24,7 @@ pub(crate) fn read_points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
              mapping of parameter name to numbers; got `{type_name}`"
         )));
     };
-    let column = |item: Bound<'_, PyAny>| {
+    let read_column = |item: Bound<'_, PyAny>| {
         let (name, values): (String, Bound<'_, PyAny>) = item.extract()?;
         let values = read_numbers(&values).map_err(|error| {
             let type_error = PyTypeError::new_err(format!("column `{name}`: expected numbers"));
@@ -33,17 +33,17 @@ pub(crate) fn read_points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
         })?;
         Ok((name, values))
     };
-    let columns = columns.items()?.iter().map(column).collect::<PyResult<Vec<_>>>()?;
+    let columns = columns.items()?.iter().map(read_column).collect::<PyResult<Vec<_>>>()?;
     PointTable::from_columns(columns).map_err(|error| plan_error(py, &error))
 }
 
 /// Reads the numbers of a one-dimensional NumPy array, or of another iterable.
 pub(crate) fn read_numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     check_numbers(values)?;
-    let dimensions = values.getattr_opt("ndim")?.map(|count| count.extract::<usize>());
-    let dimensions = dimensions.transpose()?.unwrap_or(1);
-    if dimensions != 1 {
-        let text = format!("expected one dimension, got {dimensions}");
+    let dimension_count = values.getattr_opt("ndim")?.map(|count| count.extract::<usize>());
+    let dimension_count = dimension_count.transpose()?.unwrap_or(1);
+    if dimension_count != 1 {
+        let text = format!("expected one dimension, got {dimension_count}");
         return Err(PyTypeError::new_err(text));
     }
     match PyBuffer::<f64>::get(values) {

@@ -67,7 +67,7 @@ fn wait_for_result<T>(
 ) -> (Option<T>, Option<PyErr>) {
     let mut raised_exception = None;
     loop {
-        let received = results.recv_timeout(SIGNAL_POLL_INTERVAL);
+        let reception = results.recv_timeout(SIGNAL_POLL_INTERVAL);
         // Signals are checked after the end of the computation as well, because one may have
         // arrived just before.
         if raised_exception.is_none() {
@@ -77,9 +77,9 @@ fn wait_for_result<T>(
                 interrupt.raise(2);
             }
         }
-        let is_running = received.as_ref().err() == Some(&RecvTimeoutError::Timeout);
+        let is_running = reception.as_ref().err() == Some(&RecvTimeoutError::Timeout);
         if !is_running || is_abandoned && raised_exception.is_some() {
-            return (received.ok(), raised_exception);
+            return (reception.ok(), raised_exception);
         }
     }
 }
@@ -109,13 +109,13 @@ pub(crate) fn supervise_abandonable<T: Send + 'static>(
     });
     let value = result.map_err(|raised_exception| {
         match raised_exception.is_instance_of::<PyKeyboardInterrupt>(py) {
-            true => errors::interrupted_without_result(py),
+            true => errors::interrupted_without_result_error(py),
             false => raised_exception,
         }
     })?;
     value
         .map_err(|error| errors::to_exception(py, &error))?
-        .ok_or_else(|| errors::interrupted_without_result(py))
+        .ok_or_else(|| errors::interrupted_without_result_error(py))
 }
 
 fn thread_error(error: std::io::Error) -> PyErr {

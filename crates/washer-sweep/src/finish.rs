@@ -13,14 +13,14 @@ use crate::result::PyResultTable;
 /// Returns the rows; after Ctrl-C raises an exception with the rows computed before.
 pub(crate) fn rows_or_raise(
     py: Python<'_>,
-    evaluated: Supervised<MemoryTable>,
+    evaluation: Supervised<MemoryTable>,
 ) -> PyResult<PyResultTable> {
-    let table = evaluated.value_or_raise(py, |evaluated| match evaluated {
+    let table = evaluation.value_or_raise(py, |evaluation| match evaluation {
         Err(error) => errors::to_exception(py, &error),
         Ok(table) => {
             let rows = format_count(table.rows(), "row");
             let text = format!("interrupted; `result` of this exception holds {rows}");
-            interruption(py, text, Some(table))
+            interruption_error(py, text, Some(table))
         }
     })?;
     Ok(PyResultTable::new(table))
@@ -42,14 +42,15 @@ pub(crate) fn rows_or_file(
             supervise(py, options, |execution| task.compute_in_memory(execution))?,
         );
     };
-    let report: fn(&str) = if options.progress { sweep::tell } else { |_| () };
-    let result =
-        supervise(py, options, |execution| task.compute_to_file(&out, fresh, &report, execution))?;
+    let report_progress: fn(&str) = if options.progress { sweep::tell } else { |_| () };
+    let result = supervise(py, options, |execution| {
+        task.compute_to_file(&out, fresh, &report_progress, execution)
+    })?;
     let result = result.value_or_raise(py, |result| match result {
         Err(error) => errors::to_exception(py, &error),
         Ok(FileRunEnd::Complete(table)) => {
             let text = format!("interrupted after {} was complete", out.display());
-            interruption(py, text, Some(table))
+            interruption_error(py, text, Some(table))
         }
         Ok(FileRunEnd::Interrupted { stored_rows, points }) => {
             let text = format!(
@@ -57,7 +58,7 @@ pub(crate) fn rows_or_file(
                  continues with the others",
                 out.display()
             );
-            interruption(py, text, None)
+            interruption_error(py, text, None)
         }
     })?;
     match result {
@@ -79,11 +80,15 @@ pub(crate) fn table_or_raise(
 }
 
 /// Creates the exception of an interruption, with the rows computed before.
-pub(crate) fn interruption(py: Python<'_>, text: String, result: Option<MemoryTable>) -> PyErr {
+pub(crate) fn interruption_error(
+    py: Python<'_>,
+    text: String,
+    result: Option<MemoryTable>,
+) -> PyErr {
     match result.map(|result| Py::new(py, PyResultTable::new(result))).transpose() {
         Ok(result) => {
             let result = result.map_or_else(|| py.None(), Py::into_any);
-            errors::interrupted(py, text, result)
+            errors::interrupted_error(py, text, result)
         }
         Err(error) => error,
     }

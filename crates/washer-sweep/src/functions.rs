@@ -11,7 +11,7 @@ use crate::columns::{read_numbers, read_points};
 use crate::computation::{ComputationOptions, supervise, supervise_abandonable};
 use crate::errors;
 use crate::finish;
-use crate::mappings::assignments;
+use crate::mappings::to_assignments;
 use crate::plan::PyPlan;
 use crate::result::PyResultTable;
 
@@ -29,7 +29,7 @@ pub(crate) fn modes(
     speeds_rpm: Option<&Bound<'_, PyAny>>,
     at: Option<&Bound<'_, PyMapping>>,
 ) -> PyResult<PyResultTable> {
-    let at = assignments(at)?;
+    let at = to_assignments(at)?;
     let speeds_rpm = speeds_rpm.map(read_numbers).transpose()?;
     if plan.is_none() && !at.is_empty() {
         return Err(PyTypeError::new_err("`at` needs a plan"));
@@ -61,7 +61,13 @@ pub(crate) fn stability(
     progress: bool,
     fresh: bool,
 ) -> PyResult<PyResultTable> {
-    held_speeds(plan, speeds_rpm, None, (out, fresh), ComputationOptions { threads, progress })
+    analyse_held_speeds(
+        plan,
+        speeds_rpm,
+        None,
+        (out, fresh),
+        ComputationOptions { threads, progress },
+    )
 }
 
 /// Finds the attractors of each point of the plan's grid at each held speed, a row for each.
@@ -93,7 +99,7 @@ pub(crate) fn dwell(
     let carry = carry.map(str::parse).transpose();
     let carry = carry.map_err(|wrong: String| PyValueError::new_err(format!("carry: {wrong}")))?;
     let search = AttractorSearch { starts, kick, carry, threshold, sections, longest };
-    held_speeds(
+    analyse_held_speeds(
         plan,
         speeds_rpm,
         Some(search),
@@ -104,7 +110,7 @@ pub(crate) fn dwell(
 
 /// Returns the results at held speeds: attractors if there is a `search`, else periodic responses
 /// with the growth of disturbances.
-fn held_speeds(
+fn analyse_held_speeds(
     plan: &Bound<'_, PyPlan>,
     speeds_rpm: &Bound<'_, PyAny>,
     search: Option<AttractorSearch>,
@@ -134,11 +140,11 @@ pub(crate) fn optimise(
     progress: bool,
     fresh: bool,
 ) -> PyResult<PyResultTable> {
-    let sets = assignments(set)?;
+    let assignments_of_set = to_assignments(set)?;
     let result = supervise(py, ComputationOptions { threads, progress }, |execution| {
-        sweep::optimise_study(&study, &sets, out.as_deref(), fresh, execution)
+        sweep::optimise_study(&study, &assignments_of_set, out.as_deref(), fresh, execution)
     })?;
-    finish::table_or_raise(py, result, || errors::interrupted_without_result(py))
+    finish::table_or_raise(py, result, || errors::interrupted_without_result_error(py))
 }
 
 /// Explains why the linear model fails at one point: the unstable speeds that the run passes,
@@ -157,12 +163,12 @@ pub(crate) fn explain<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
     let speeds_rpm = speeds_rpm.map(read_numbers).transpose()?;
-    let at = assignments(at)?;
+    let at = to_assignments(at)?;
     let input = plan.get().input.clone();
-    let explained = supervise_abandonable(py, threads, move |execution| {
+    let explanation_result = supervise_abandonable(py, threads, move |execution| {
         sweep::explain_point(&input, &at, speeds_rpm.as_deref(), execution)
     })?;
-    explanation(py, explained)
+    to_explanation(py, explanation_result)
 }
 
 /// Fits numbers of the plan's machine to one or several measured run-ups.
@@ -195,16 +201,16 @@ pub(crate) fn fit<'py>(
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
-    let as_list = |value: &Bound<'py, PyAny>| -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let to_list = |value: &Bound<'py, PyAny>| -> PyResult<Vec<Bound<'py, PyAny>>> {
         if value.is_instance_of::<PyList>() { value.extract() } else { Ok(vec![value.clone()]) }
     };
-    let tables = as_list(table)?;
-    let at = at.map_or_else(|| Ok(Vec::new()), as_list)?;
+    let tables = to_list(table)?;
+    let at = at.map_or_else(|| Ok(Vec::new()), to_list)?;
     if at.len() > tables.len() {
         return Err(PyTypeError::new_err("`at` has more entries than there are tables"));
     }
     let constants_of_table = |k: usize| match at.get(k) {
-        Some(at) => assignments(Some(at.cast::<PyMapping>()?)),
+        Some(at) => to_assignments(Some(at.cast::<PyMapping>()?)),
         None => Ok(Vec::new()),
     };
     let tables = tables
@@ -216,14 +222,14 @@ pub(crate) fn fit<'py>(
     let no_shift = !shift;
     let options = FitOptions { free, own, model, no_shift, starts, bootstrap, known, draws };
     let input = plan.get().input.clone();
-    let fitted = supervise_abandonable(py, threads, move |execution| {
+    let fit_result = supervise_abandonable(py, threads, move |execution| {
         sweep::fit_tables(&input, tables, &options, execution)
     })?;
-    explanation(py, fitted)
+    to_explanation(py, fit_result)
 }
 
 /// Creates the package's `Explanation` from data and text.
-fn explanation(py: Python<'_>, report: CommandReport) -> PyResult<Bound<'_, PyAny>> {
+fn to_explanation(py: Python<'_>, report: CommandReport) -> PyResult<Bound<'_, PyAny>> {
     let data = py.import("json")?.call_method1("loads", (report.data.to_string(),))?;
     py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, report.text))
 }

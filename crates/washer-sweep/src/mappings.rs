@@ -11,8 +11,8 @@ use crate::columns::read_number;
 
 /// Returns `NAME=VALUE` for each entry. A number is written in the shortest form that reads back to
 /// the same bits.
-pub(crate) fn assignments(values: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<String>> {
-    let assignment = |item: Bound<'_, PyAny>| {
+pub(crate) fn to_assignments(values: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<String>> {
+    let to_assignment = |item: Bound<'_, PyAny>| {
         let (name, value): (String, Bound<'_, PyAny>) = item.extract()?;
         let value = read_number(&value).map_err(|_| {
             PyTypeError::new_err(format!(
@@ -23,7 +23,7 @@ pub(crate) fn assignments(values: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec
         Ok(format!("{name}={value:?}"))
     };
     match values {
-        Some(values) => values.items()?.iter().map(assignment).collect(),
+        Some(values) => values.items()?.iter().map(to_assignment).collect(),
         None => Ok(Vec::new()),
     }
 }

@@ -9,12 +9,12 @@ use sweep::{
 };
 
 use crate::computation::{ComputationOptions, supervise, supervise_abandonable};
-use crate::mappings::{self, assignments};
+use crate::mappings::{self, to_assignments};
 use crate::result::PyResultTable;
 use crate::{columns, errors, finish};
 
 /// The name of a plan without a file and without a name.
-const UNNAMED: &str = "plan";
+const DEFAULT_PLAN_NAME: &str = "plan";
 
 /// A validated plan.
 #[pyclass(name = "Plan", module = "washer_sweep", frozen)]
@@ -37,7 +37,9 @@ impl PlanSource {
     fn to_input(&self) -> WasherGridInput {
         match self.is_file {
             true => WasherGridInput::file(self.text.clone().into(), self.constants.clone()),
-            false => WasherGridInput::text(UNNAMED, self.text.clone(), self.constants.clone()),
+            false => {
+                WasherGridInput::text(DEFAULT_PLAN_NAME, self.text.clone(), self.constants.clone())
+            }
         }
     }
 }
@@ -57,7 +59,7 @@ impl PyPlan {
     fn new(grid: &Bound<'_, PyMapping>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = grid.py();
         let text = mappings::to_grid_text(grid)?;
-        let constants = assignments(set)?;
+        let constants = to_assignments(set)?;
         let source = PlanSource { text, is_file: false, constants };
         Self::load(py, source.to_input(), source)
     }
@@ -71,7 +73,7 @@ impl PyPlan {
     #[pyo3(signature = (source, *, set=None))]
     fn from_toml(source: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = source.py();
-        let constants = assignments(set)?;
+        let constants = to_assignments(set)?;
         // The text of a grid file has a line break or an assignment, and a path has neither.
         let text = source.cast::<PyString>().ok().map(|text| text.to_string());
         let text = text.filter(|text| text.contains('\n') || text.contains('='));
@@ -83,8 +85,8 @@ impl PyPlan {
             None => {
                 let path: PathBuf = source.extract()?;
                 // The path is made absolute because another process may work in another folder.
-                let absolute = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
-                let text = absolute.to_string_lossy().into_owned();
+                let absolute_path = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
+                let text = absolute_path.to_string_lossy().into_owned();
                 let source = PlanSource { text, is_file: true, constants: constants.clone() };
                 (WasherGridInput::file(path, constants), source)
             }
@@ -136,10 +138,10 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         let py = table.py();
         let points = columns::read_points(table)?;
-        let evaluated = supervise(py, ComputationOptions { threads, progress }, |execution| {
+        let evaluation = supervise(py, ComputationOptions { threads, progress }, |execution| {
             self.evaluator.evaluate(&points, execution)
         })?;
-        finish::rows_or_raise(py, evaluated)
+        finish::rows_or_raise(py, evaluation)
     }
 
     /// Evaluates both models at every point of the grid.
@@ -197,8 +199,8 @@ impl PyPlan {
         angle: bool,
         start: Option<&Bound<'_, PyMapping>>,
     ) -> PyResult<PyResultTable> {
-        let at = assignments(at)?;
-        let start = assignments(start)?;
+        let at = to_assignments(at)?;
+        let start = to_assignments(start)?;
         let every_s = (!turns).then_some(every);
         let extras = TraceExtras { rates, states, forces, angle };
         let options = TraceOptions { every_s, model, all, extras, start };
@@ -252,7 +254,7 @@ impl PyPlan {
                 ),
                 None => "interrupted; with `out` a search keeps its results so far".into(),
             };
-            finish::interruption(py, text, None)
+            finish::interruption_error(py, text, None)
         })
     }
 

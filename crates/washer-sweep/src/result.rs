@@ -55,11 +55,11 @@ impl PyResultTable {
 
     /// Returns an entry of the metadata of every column.
     fn column_metadata<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
-        let entries = PyDict::new(py);
+        let metadata_by_column = PyDict::new(py);
         for field in self.0.schema().fields() {
-            entries.set_item(field.name(), field.metadata().get(key))?;
+            metadata_by_column.set_item(field.name(), field.metadata().get(key))?;
         }
-        Ok(entries)
+        Ok(metadata_by_column)
     }
 }
 
@@ -159,8 +159,8 @@ impl PyResultTable {
     /// if it has the same kind.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        let is_rows = ending.eq_ignore_ascii_case("parquet");
-        py.detach(|| match is_rows {
+        let is_parquet = ending.eq_ignore_ascii_case("parquet");
+        py.detach(|| match is_parquet {
             true => self.0.save(&path),
             false => self.0.draw(&path),
         })
@@ -217,9 +217,9 @@ impl PyResultTable {
 }
 
 /// Calls a function with the path of a result file that is deleted afterwards.
-fn in_temporary_file<T>(action: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T> {
+fn in_temporary_file<T>(use_file: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T> {
     let folder = tempfile::tempdir()?;
-    action(&folder.path().join("result.parquet"))
+    use_file(&folder.path().join("result.parquet"))
 }
 
 /// Appends flags or words to a list; a null becomes `None`.
