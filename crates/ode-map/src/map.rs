@@ -137,7 +137,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     }
 
     fn layout(plan: &Plan<Self>) -> Layout {
-        Layout::map(axis_map_columns(plan), declared(columns(plan)))
+        Layout::map(axis_columns(plan), declared(map_columns(plan)))
     }
 
     fn engine<'a>(plan: &'a Plan<Self>, _: Option<&str>) -> Result<Engine<'a>, Error> {
@@ -222,8 +222,8 @@ fn map_columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: 
         compared: PointRuns::compared_models,
     };
     let amplitude_description = "largest deviation from equilibrium in the window";
-    let ratio_description = "nonlinear over linear amplitude; null where the linear one is zero or a model \
-                 failed";
+    let ratio_description =
+        "nonlinear over linear amplitude; null where the linear one is zero or a model failed";
     let mut result_columns = comparison.amplitudes(amplitude_description, ratio_description);
     let method_description = "the method that the row's numbers come from";
     result_columns.extend(comparison.verdict(METHOD_NAMES.to_vec(), method_description));

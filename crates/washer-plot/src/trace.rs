@@ -366,7 +366,7 @@ mod tests {
     fn a_resonance_is_passed_while_speed_rises_and_falls() {
         let times_s: Vec<f64> = (0..=8).map(f64::from).collect();
         let speed: Vec<f64> = times_s.iter().map(|t| 50.0 * (4.0 - (t - 4.0).abs())).collect();
-        assert_eq!(passages(&times_s, &speed, &[75.0, 500.0]), [(1.5, 75.0), (6.5, 75.0)]);
-        assert_eq!(passages(&times_s, &speed, &[200.0]), [(4.0, 200.0)]);
+        assert_eq!(passage_times(&times_s, &speed, &[75.0, 500.0]), [(1.5, 75.0), (6.5, 75.0)]);
+        assert_eq!(passage_times(&times_s, &speed, &[200.0]), [(4.0, 200.0)]);
     }
 }
